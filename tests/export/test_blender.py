@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from small_head import write_head
 
-from dermis.apps.export.fitting import curve_error, fit_burley_width
+from dermis.apps.export.fitting import fit_burley_width, profile_error
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.target import get_numbers
@@ -23,7 +23,7 @@ from dermis.apps.export.targets.blender.target import (
     burley_shape_factor,
     hulst_albedo,
     legacy_albedo,
-    skin_path_ratio,
+    skin_mfp_per_radius,
     walk_cdf,
 )
 from dermis.apps.truths.half_space import diffuse_albedo, directional_albedo
@@ -61,7 +61,7 @@ def test_random_walk_albedo_reproduces_the_colour(formula: Any, tolerance: float
 def test_published_diffuse_mean_free_paths_equal_the_skin_walk_radius() -> None:
     """[Jensen2001] tabulates the diffuse path of skin1; its coefficients give the mean free path."""
     (layer,) = published_media()["skin1"].layers
-    path = np.array([3.67, 1.37, 0.68]) * skin_path_ratio(np.array([0.44, 0.22, 0.13]), 1.3)
+    path = np.array([3.67, 1.37, 0.68]) * skin_mfp_per_radius(np.array([0.44, 0.22, 0.13]), 1.3)
     assert path == pytest.approx(layer.mean_free_path_mm, rel=0.06)
 
 
@@ -92,7 +92,7 @@ def test_radii_depend_on_the_subsurface_method(skin1: Subject) -> None:
 def test_fitted_parameters_beat_typed_values(skin1: Subject, variant: str) -> None:
     target = TARGET.with_variant(variant)
     errors = [
-        curve_error(skin1.curve, target.predicted_curve(rows(skin1, "5.2"), skin1, "5.2"))
+        profile_error(skin1.curve, target.predicted_profile(rows(skin1, "5.2"), skin1, "5.2"))
         for rows in (target.parameters, target.naive_parameters)
     ]
     assert errors[0].edge.max() < 0.016 < errors[1].edge.max()

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dermis.apps.export.fitting import CurveError, curve_error, fit_burley_width
+from dermis.apps.export.fitting import ProfileError, fit_burley_width, profile_error
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import ModelName, Subject, load_subject
 from dermis.apps.export.target import Parameters, ParameterValue, Target
@@ -56,8 +56,8 @@ class ExportReport:
     parameters: Parameters
     naive_parameters: Parameters
     d_mm: Floats
-    error: CurveError
-    naive_error: CurveError
+    error: ProfileError
+    naive_error: ProfileError
     limitations: str
     untested: bool
     files: tuple[Path, ...] = ()
@@ -93,11 +93,12 @@ class ExportReport:
         if with_naive_parameters:
             lines += ["", "naive parameters", *_parameter_table_lines(self.naive_parameters)]
         lines += ["", f"{'':12}" + "".join(f"{name:>9}" for name in _CHANNEL_NAMES)]
-        lines.append(f"{'d [mm]':12}{_format_channels(self.d_mm)}  width of the fitted Burley profile")
+        lines.append(f"{'d [mm]':12}{_format_colour_channels(self.d_mm)}  width of the fitted Burley profile")
         for name, meaning in _ERROR_MEANINGS.items():
-            lines.append(f"{name:12}{_format_channels(getattr(self.error, name))}  {meaning}")
+            lines.append(f"{name:12}{_format_colour_channels(getattr(self.error, name))}  {meaning}")
             lines.append(
-                f"{'  naive':12}{_format_channels(getattr(self.naive_error, name))}  of naive parameters"
+                f"{'  naive':12}{_format_colour_channels(getattr(self.naive_error, name))}"
+                "  of naive parameters"
             )
         return [*lines, "", *self.limitation_texts()]
 
@@ -135,7 +136,7 @@ def format_parameter(value: ParameterValue) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def _format_channels(channel_values: Floats) -> str:
+def _format_colour_channels(channel_values: Floats) -> str:
     return "".join(f"{x:9.4f}" for x in channel_values)
 
 
@@ -211,7 +212,7 @@ def export_skin(
     """
     target = replace(TARGETS[to].with_variant(variant), side=side, adapter=adapter)
     target = target if library is None else target.with_library(library)
-    resolved, path = target.resolve_version(version), _checked_output(target, output)
+    resolved, path = target.resolve_version(version), _check_output_path(target, output)
     options = {"model": model, "profile": profile, **head}
     if not isinstance(subject, Subject):
         subject = load_subject(subject, **options)
@@ -234,7 +235,7 @@ def evaluate_export(subject: Subject, target: Target, version: str) -> ExportRep
     part_limitations = () if subject.part_pictures is None else (target.part_limitations,)
     parameters, naive = target.parameters(subject, version), target.naive_parameters(subject, version)
     errors = [
-        curve_error(subject.curve, target.predicted_curve(one, subject, version))
+        profile_error(subject.curve, target.predicted_profile(one, subject, version))
         for one in (parameters, naive)
     ]
     return ExportReport(
@@ -254,7 +255,7 @@ def evaluate_export(subject: Subject, target: Target, version: str) -> ExportRep
     )
 
 
-def _checked_output(target: Target, output: str | Path) -> Path:
+def _check_output_path(target: Target, output: str | Path) -> Path:
     """Return the output path; raise DermisError if the target cannot write files with this suffix."""
     path = Path(output)
     if path.suffix.lower() not in target.suffixes:
@@ -274,10 +275,10 @@ def _staging_path(output: Path) -> Iterator[Path]:
     with temporary_folder(output) as folder:
         yield folder / output.name
         for file in sorted(folder.iterdir(), key=lambda file: file.name == output.name):  # the output last
-            _move_into_place(file, output.with_name(file.name))
+            _move_written_files(file, output.with_name(file.name))
 
 
-def _move_into_place(staged_path: Path, output_path: Path) -> None:
+def _move_written_files(staged_path: Path, output_path: Path) -> None:
     if staged_path.is_dir():
         with atomic_folder(output_path, REPORT_FILE) as folder:
             folder.rmdir()

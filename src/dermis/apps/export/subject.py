@@ -98,15 +98,17 @@ class Subject:
         """Return the albedo (3,) clipped to the interval from `min_albedo` to 1."""
         return np.clip(self.albedo, min_albedo, 1.0)
 
-    def rescale_energy(self, curve: CumulativeProfile) -> CumulativeProfile:
-        """Return `curve` with its energy scaled for comparison with the reference profile.
+    def rescale_energy(self, rendered_profile: CumulativeProfile) -> CumulativeProfile:
+        """Return a rendered profile with its energy scaled for comparison with the reference profile.
 
-        The subject's albedo may differ from the energy of its reference profile. The energy of `curve` is
-        therefore multiplied by (energy of the reference profile) / albedo.
+        The subject's albedo may differ from the energy of its reference profile. The energy of the rendered
+        profile is therefore multiplied by (energy of the reference profile) / albedo.
 
-        curve : cumulative profile that the program renders for the subject's albedo
+        rendered_profile : cumulative profile that the program renders for the subject's albedo
         """
-        return curve.with_energy(self.curve.energy * curve.energy / np.maximum(self.albedo, _MIN_ALBEDO))
+        return rendered_profile.with_energy(
+            self.curve.energy * rendered_profile.energy / np.maximum(self.albedo, _MIN_ALBEDO)
+        )
 
     def eye_pictures(self) -> EyeTextures | None:
         """Return the painted textures of the eyes, or None if there are no eyes."""
@@ -158,7 +160,7 @@ def load_subject(
         ...)
     profile : name or file of the profile of a head's skin; by default, the skin of a parametric person has
         the pigments of that person, and other heads have the default skin
-    model : model of the reference profile, see `reference_curve`
+    model : model of the reference profile, see `reference_profile`
     head : options of `load_head`
 
     Raises DermisError for an unknown name, and for options of heads if `source` is a skin.
@@ -172,7 +174,7 @@ def load_subject(
         skin = Skin(profile=str(profile))
     else:
         skin = skin_of(load_person(name)) if is_person_name(name) else Skin()
-    curve, used_model, tissue = reference_curve(skin, model)
+    curve, used_model, tissue = reference_profile(skin, model)
     albedo = curve.energy if loaded.maps.mean_colour is None else loaded.maps.mean_colour
     return Subject(path.name, curve, albedo, used_model, tissue, Scene(loaded, skin=skin))
 
@@ -180,11 +182,11 @@ def load_subject(
 def _load_skin(skin_name: str, model: ModelName | None, head_options: Iterable[str]) -> Subject:
     for option in head_options:
         refuse(option, "a head", f"got the skin {skin_name}", "Omit this option, or name a head")
-    curve, used_model, tissue = reference_curve(Skin(profile=skin_name), model)
+    curve, used_model, tissue = reference_profile(Skin(profile=skin_name), model)
     return Subject(Path(skin_name).name, curve, curve.energy, used_model, tissue)
 
 
-def reference_curve(
+def reference_profile(
     skin: Skin, model: ModelName | None = None
 ) -> tuple[CumulativeProfile, str, Tissue | None]:
     """Return the cumulative reference profile of a skin, the name of its model, and its tissue.

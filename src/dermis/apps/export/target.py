@@ -255,7 +255,7 @@ class Target(ABC):
         """
 
     @abstractmethod
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile that the program renders, predicted by the formulas of the program.
 
         Parameters

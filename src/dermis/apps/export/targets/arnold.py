@@ -40,7 +40,7 @@ class Arnold(JsonTarget):
         """Return parameters with Burley widths as subsurface_radius, instead of mean free paths."""
         return _material_parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the profile of a random walk whose albedo is derived from subsurface_color."""
         path = (
             _MM_PER_CM

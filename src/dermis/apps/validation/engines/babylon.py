@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.fitting import burley_curve, fit_burley_width
+from dermis.apps.export.fitting import cumulative_burley_profile, fit_burley_width
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import load_subject
 from dermis.apps.export.target import get_numbers
@@ -132,9 +132,11 @@ def edge_profile(
 
 
 def edge_responses(page: Page, profile_colour: Floats, meters_per_unit: float, d_mm: Floats) -> JsonObject:
-    """Return the measured and predicted edge responses of a diffusion profile, averaged over azimuths.
+    """Measure the edge response of a diffusion profile in Babylon.js, and compare it with predictions.
 
-    The result also has the largest errors against the prediction and against exact Burley profiles.
+    An edge response is the radiance of a half-lit plane by distance from the edge of the light. Here it is
+    averaged over directions across the edge. The predictions come from the samples of Babylon.js's shader and
+    from exact Burley profiles.
 
     profile_colour : diffusion profile, which Babylon.js expresses as a colour
     meters_per_unit : setting metersPerUnit of Babylon.js; the unit of the scene is a millimetre
@@ -150,7 +152,7 @@ def edge_responses(page: Page, profile_colour: Floats, meters_per_unit: float, d
         profiles.append([edge_profile(one, pixel, azimuth, x, 3.0 * widest) for one in pictures])
     largest = max(float(np.abs(one - other).max()) for one, other in profiles)
     measured, predicted = np.mean(profiles, axis=0)
-    true = burley_curve(d_mm, np.ones(3)).edge_response(x)
+    true = cumulative_burley_profile(d_mm, np.ones(3)).edge_response(x)
     near = np.abs(x)[:, None] <= 6.0 * d_mm
     step = slice(0, None, 7)
     return {
@@ -178,13 +180,13 @@ def fitted_widths(x_mm: Floats, edge_response: Floats) -> list[float]:
     edge_response : (n, 3) measured edge responses
     """
     widths = np.geomspace(x_mm[-1] / 600.0, x_mm[-1], 241)
-    curves = [burley_curve(np.full(3, d), np.ones(3)).edge_response(x_mm)[:, 0] for d in widths]
+    curves = [cumulative_burley_profile(np.full(3, d), np.ones(3)).edge_response(x_mm)[:, 0] for d in widths]
     error = ((np.stack(curves)[:, :, None] - edge_response) ** 2).sum(axis=1)
     return [round(float(d), 4) for d in widths[error.argmin(axis=0)]]
 
 
 def measure_exported_skin(page: Page, skin_name: str) -> JsonObject:
-    """Return the edge responses of an exported skin, and their errors against the skin's own profile."""
+    """Return results of `edge_responses` for an exported skin, and errors against the skin's own profile."""
     subject, target = load_subject(skin_name), TARGETS["babylon"].with_variant(None)
     rows = target.parameters(subject, target.resolve_version(None))
     colour = np.array(get_numbers(rows, "subSurface.scatteringDiffusionProfile"))

@@ -12,7 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 from PIL import Image
 
-from dermis.apps.export.fitting import curve_error, fit_burley_width
+from dermis.apps.export.fitting import fit_burley_width, profile_error
 from dermis.apps.export.subject import load_subject
 from dermis.apps.export.targets.blender.target import TARGET
 from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
@@ -75,7 +75,7 @@ def blender(python_45: Path, python_52: Path, *parts: Measurement) -> None:
 
 
 def measure_edges(pythons: dict[str, Path]) -> Iterator[JsonObject]:
-    """Yield the measured edge response of each skin, by Blender version and subsurface method."""
+    """Yield results of `measure_edge` for each Blender version, subsurface method and skin."""
     for version, python in pythons.items():
         for method in SUBSURFACE_METHODS:
             for name in COMPARED_SKINS:
@@ -84,20 +84,22 @@ def measure_edges(pythons: dict[str, Path]) -> Iterator[JsonObject]:
 
 
 def column_positions() -> Floats:
-    """Return the distance of each pixel column from the edge of the light, in units of the Burley width d."""
+    """Return the distances of the pixel columns from the edge of the light, in units of the Burley width."""
     return 12.0 * (np.arange(EDGE_BIN_COUNT * PIXELS_PER_BIN) + 0.5) / (EDGE_BIN_COUNT * PIXELS_PER_BIN) - 6.0
 
 
 def measure_edge(python: Path, version: str, subsurface_method: str, skin_name: str) -> JsonObject:
-    """Return the measured and the predicted edge response of a skin, and their errors.
+    """Return the measured and the predicted edge response of an exported skin, and its errors.
+
+    An edge response is the radiance of a half-lit plane by distance from the edge of the light.
 
     python : Python program that has Blender's module bpy
     skin_name : name of the skin
     """
     subject, target = load_subject(skin_name), TARGET.with_variant(subsurface_method)
     rows, d = target.parameters(subject, version), fit_burley_width(subject.curve)
-    predicted_curve = target.predicted_curve(rows, subject, version)
-    naive = target.predicted_curve(target.naive_parameters(subject, version), subject, version)
+    predicted_profile = target.predicted_profile(rows, subject, version)
+    naive = target.predicted_profile(target.naive_parameters(subject, version), subject, version)
     samples = SAMPLES_BY_METHOD.get(subsurface_method, DEFAULT_SAMPLES)
     shared = {"size": [EDGE_BIN_COUNT * PIXELS_PER_BIN, PIXEL_ROWS], "samples": samples}
     channels = [(k, c) for k in range(SEED_COUNT) for c in range(3)]
@@ -110,7 +112,7 @@ def measure_edge(python: Path, version: str, subsurface_method: str, skin_name: 
         output = json.loads((folder / "done.json").read_text(encoding="utf-8"))
     columns = np.array([[output["columns"][3 * k + c] for c in range(3)] for k in range(SEED_COUNT)])[..., 0]
     means = columns.reshape(SEED_COUNT, 3, EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=-1)
-    predicted, true = (binned_response(curve, d) for curve in (predicted_curve, subject.curve))
+    predicted, true = (binned_response(curve, d) for curve in (predicted_profile, subject.curve))
     radiance = (means.mean(axis=0) * predicted).sum(axis=1) / (predicted**2).sum(axis=1)
     measured = means.mean(axis=0) / radiance[:, None]
     noise = np.abs(means[0] - means[1]) / (2.0 * radiance[:, None])
@@ -126,22 +128,26 @@ def measure_edge(python: Path, version: str, subsurface_method: str, skin_name: 
         "against_true": np.abs(measured - true).max(axis=1).round(4).tolist(),
         "noise": np.sqrt((noise**2).mean(axis=1)).round(4).tolist(),
         "energy": (np.pi * radiance / subject.curve.energy).round(4).tolist(),
-        "typed_in": curve_error(subject.curve, naive).edge.round(4).tolist(),
-        "predicted_energy": (predicted_curve.energy / subject.curve.energy).round(4).tolist(),
+        "typed_in": profile_error(subject.curve, naive).edge.round(4).tolist(),
+        "predicted_energy": (predicted_profile.energy / subject.curve.energy).round(4).tolist(),
     }
 
 
 def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
-    """Return the edge response (3, n) of a cumulative profile, averaged over the pixels in each bin.
+    """Return the predicted edge response (3, n) of a profile, averaged over the pixel columns of each bin.
 
-    d_mm : (3,) Burley widths of the channels, which set the width of the bins [mm]
+    curve : cumulative form of the profile
+    d_mm : (3,) Burley widths of the channels, to which the width of a bin is proportional [mm]
     """
     columns = [curve.edge_response(column_positions() * d_mm[c])[:, c] for c in range(3)]
     return np.asarray(np.array(columns).reshape(3, EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=-1))
 
 
 def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
-    """Yield differences in outline and colour between pictures of a bald head by Cycles and by dermis."""
+    """Yield differences in outline and colour between pictures of a bald head by Cycles and dermis.
+
+    There is one result for each Blender version and subsurface method.
+    """
     subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
     assert subject.scene is not None
     head = replace(subject.scene.head, hair=None, strands=None)
@@ -157,7 +163,7 @@ def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
 
 
 def write_picture(pythons: dict[str, Path]) -> None:
-    """Write a picture that shows a head with hair by dermis and by each version of Cycles."""
+    """Write a picture that shows a head with hair, rendered by dermis and by each version of Cycles."""
     subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
     columns = [render_dermis(subject, PICTURE_SIDE)]
     for version, python in pythons.items():

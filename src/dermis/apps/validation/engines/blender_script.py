@@ -33,7 +33,7 @@ def main(folder: Path) -> None:
     skin.check_version()
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.preferences.addon_enable(module="cycles")
-    material = skin.make_skin()
+    material = skin.make_skin_material()
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Specular IOR Level"].default_value = 0.0  # light below the surface only
     add_rectangle(skin, material, -PLANE_HALF_SIDE_M, PLANE_HALF_SIDE_M, 0.0)
@@ -49,7 +49,7 @@ def main(folder: Path) -> None:
     camera_object.matrix_world = Matrix.Translation((0.0, 0.0, 0.1))
     scene = bpy.context.scene
     scene.camera = camera_object
-    skin.set_render(scene)
+    skin.set_render_settings(scene)
     passes = json.loads((folder / "passes.json").read_text(encoding="utf-8"))
     columns = []
     for k, one in enumerate(passes):
@@ -60,7 +60,9 @@ def main(folder: Path) -> None:
 
 
 def isolate_channel(shader: Any, description: dict[str, Any], channel: int) -> None:
-    """Give all channels the colour and radius of one channel, so that all paths help to measure this channel.
+    """Give all three channels the albedo and subsurface radius of one channel.
+
+    Each path then contributes to the measurement of this channel.
 
     description : subsurface parameters of the exported skin, with values for all channels
     """

@@ -112,8 +112,9 @@ def measured_edge(
 
 
 def pixel_averages(curve: CumulativeProfile, channel: int, d_mm: float) -> Floats:
-    """Return the edge response of a cumulative profile, averaged over each pixel of the view.
+    """Return the predicted edge response (n,) of one channel of a profile, averaged over each pixel.
 
+    curve : cumulative form of the profile
     channel : index of the channel
     d_mm : Burley width of the profile, which sets the size of the view [mm]
     """
@@ -126,14 +127,16 @@ def pixel_averages(curve: CumulativeProfile, channel: int, d_mm: float) -> Float
 
 
 def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int) -> JsonObject:
-    """Return measured edge responses of a skin under a surface model, and their errors, by channel.
+    """Return the measured edge responses of a skin with a model of its surface, and their errors, by channel.
+
+    An edge response is the radiance of a half-lit plane by distance from the edge of the light.
 
     samples : paths per pixel
     """
     target = TARGET.with_variant(boundary)
     version = target.resolve_version(None)
     rows = target.parameters(subject, version)
-    predicted, d = target.predicted_curve(rows, subject, version), fit_burley_width(subject.curve)
+    predicted, d = target.predicted_profile(rows, subject, version), fit_burley_width(subject.curve)
     keys = "predicted", "exported", "noise", "rms", "energy", "edge"
     results: dict[str, list[Any]] = {key: [] for key in keys}
     for c in range(3):

@@ -68,13 +68,13 @@ class Babylon(EnginePage):
         """Return parameters with the Burley widths [mm] as the colour c, and metersPerUnit 1."""
         return _profile_parameters(subject, fit_burley_width(subject.curve), 1.0)
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile of the discrete samples that the shader takes."""
         profile, (metres,) = (
             get_numbers(parameters, _DIFFUSION_PROFILE_NAME),
             get_numbers(parameters, _METERS_PER_UNIT_NAME),
         )
-        return spiral_curve(profile, metres, subject.curve.energy)
+        return spiral_profile(profile, metres, subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
         """Return the library's script elements, and the URLs or hashes that the page's policy must allow."""
@@ -134,7 +134,7 @@ def burley_radii(enclosed_fraction: ArrayLike) -> tuple[Floats, Floats]:
     return 3.0 * np.log(c / (4.0 * u)), c**3 / (4.0 * u * (c * c + 16.0 * u * u))
 
 
-def spiral_curve(profile_colour: ArrayLike, meters_per_unit: float, energy: ArrayLike) -> CumulativeProfile:
+def spiral_profile(profile_colour: ArrayLike, meters_per_unit: float, energy: ArrayLike) -> CumulativeProfile:
     """Return the cumulative profile of the shader's samples, averaged over all rotations of the spiral.
 
     profile_colour : (3,) diffusion profile as Babylon.js defines it: inverse widths

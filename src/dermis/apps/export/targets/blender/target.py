@@ -80,7 +80,7 @@ def hulst_albedo(base_colour: ArrayLike) -> Floats:
     return np.asarray(np.clip(1.0 - s**2, 0.0, MAX_ALBEDO))
 
 
-def skin_path_ratio(base_colour: ArrayLike, eta: float) -> Floats:
+def skin_mfp_per_radius(base_colour: ArrayLike, eta: float) -> Floats:
     """Return the ratio of mean free path to subsurface radius in Cycles' method RANDOM_WALK_SKIN [-].
 
     Cycles interprets the radius as a diffuse mean free path. From the base colour, Cycles derives the
@@ -106,9 +106,11 @@ def skin_path_ratio(base_colour: ArrayLike, eta: float) -> Floats:
     return np.asarray(np.sqrt(3.0 * (1.0 - albedo)))
 
 
-def _dipole_reflectance(albedo: Floats, A: float) -> Floats:
+def _dipole_reflectance(albedo: Floats, internal_reflection_factor: float) -> Floats:
     root = np.sqrt(3.0 * (1.0 - albedo))
-    return np.asarray(0.5 * albedo * (1.0 + np.exp(-4.0 / 3.0 * A * root)) * np.exp(-root))
+    return np.asarray(
+        0.5 * albedo * (1.0 + np.exp(-4.0 / 3.0 * internal_reflection_factor * root)) * np.exp(-root)
+    )
 
 
 def walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> Floats:
@@ -205,17 +207,17 @@ class Blender(Target):
         """Return parameters with the subsurface radius whose profile is closest to the reference profile."""
         units = self._unit_cdfs(subject, version)
         fitted = np.array([fit_length_scale(subject.curve, k, unit) for k, unit in enumerate(units)])
-        radius = fitted / self._unit_lengths(subject, version)
+        radius = fitted / self._lengths_per_unit_radius(subject, version)
         return self._parameters(tuple(round(float(x), 5) for x in radius), version)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return parameters with published diffuse mean free paths of skin as the subsurface radius."""
         return self._parameters(JENSEN_DMFP_MM, version)
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile, predicted by the formulas of Cycles' kernel and EEVEE's shader."""
         metres = np.array(get_numbers(parameters, _RADIUS_NAME)) * get_numbers(parameters, _SCALE_NAME)[0]
-        lengths = np.maximum(metres / _METRES_PER_MM * self._unit_lengths(subject, version), 1e-9)
+        lengths = np.maximum(metres / _METRES_PER_MM * self._lengths_per_unit_radius(subject, version), 1e-9)
         units = self._unit_cdfs(subject, version)
 
         def fraction_within(radius_mm: Floats) -> Floats:
@@ -223,7 +225,7 @@ class Blender(Target):
                 [unit(radius_mm / length) for unit, length in zip(units, lengths, strict=True)], axis=-1
             )
 
-        energy = subject.curve.energy * self._energy_ratio(subject, version)
+        energy = subject.curve.energy * self._energy_per_base_colour(subject, version)
         return CumulativeProfile.from_function(fraction_within, energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
@@ -271,12 +273,12 @@ class Blender(Target):
             "eevee": "4 pi d s(A), where A is the colour divided by its brightest channel",
         }[self.variant]
 
-    def _unit_lengths(self, subject: Subject, version: str) -> Floats:
+    def _lengths_per_unit_radius(self, subject: Subject, version: str) -> Floats:
         """Return the Burley width or mean free path (3,) that results from a subsurface radius of 1."""
         if self.variant == "random-walk":
             return np.full(3, 1.0 if _radius_is_mfp(version) else 1.0 / _4_PI)
         if self.variant == "random-walk-skin":
-            return skin_path_ratio(subject.clipped_albedo(), SKIN_ETA)
+            return skin_mfp_per_radius(subject.clipped_albedo(), SKIN_ETA)
         factor = burley_shape_factor(subject.clipped_albedo()) if self.variant == "eevee" else 1.0
         return np.full(3, 1.0 / _4_PI) / factor
 
@@ -287,12 +289,12 @@ class Blender(Target):
         return [RandomWalk(float(one), "straight" if plain else "skin") for one in albedos]
 
     def _unit_cdfs(self, subject: Subject, version: str) -> list[Cdf]:
-        """Return each channel's cumulative profile as a function of radius in units of `_unit_lengths`."""
+        """Return each channel's cumulative profile as a function of radius / `_lengths_per_unit_radius`."""
         if self.variant in ("burley", "eevee"):
             return [burley_cdf] * 3
         return [walk.cdf for walk in self._random_walks(subject, version)]
 
-    def _energy_ratio(self, subject: Subject, version: str) -> Floats:
+    def _energy_per_base_colour(self, subject: Subject, version: str) -> Floats:
         """Return the light (3,) that leaves the skin along the normal, divided by the base colour [-]."""
         if self.variant in ("burley", "eevee"):
             return np.ones(3)

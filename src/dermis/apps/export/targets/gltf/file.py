@@ -17,7 +17,7 @@ from dermis.scene.heads import is_person_name, load_person
 
 Extensions = Mapping[str, Mapping[str, object]]
 _MULTISCATTER_ROLE = "multiscatter"
-_MULTISCATTER_TABLE_STEPS = 1024
+_MULTISCATTER_TABLE_SIZE = 1024
 
 
 def encode_glb(subject: Subject, extensions: Extensions, draft_notice: str) -> bytes:
@@ -36,7 +36,7 @@ def encode_glb(subject: Subject, extensions: Extensions, draft_notice: str) -> b
         head,
         roughness=subject.skin.roughness,
         slopes=relief_slopes(head),
-        notes=notes,
+        asset_extras=notes,
         eyes=subject.eye_pictures(),
         skin_additions=_skin_additions(subject, head, extensions, draft_notice),
     )
@@ -54,7 +54,7 @@ def _skin_additions(subject: Subject, head: Head, extensions: Extensions, draft_
     white, extras = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]}, {"draft": draft_notice}
     if head.maps.colour is None:
         return SkinAdditions(white, extensions, extras)
-    steps = np.linspace(0.0, 1.0, _MULTISCATTER_TABLE_STEPS)
+    steps = np.linspace(0.0, 1.0, _MULTISCATTER_TABLE_SIZE)
     scattered = np.interp(head.maps.colour, steps, multiscatter_for_reflectance(steps)).astype(np.float32)
     scatter = {**extensions["KHR_materials_scatter"], "multiscatterColorFactor": [1.0, 1.0, 1.0]}
     scatter["multiscatterColorTexture"] = {"index": _MULTISCATTER_ROLE}

@@ -200,17 +200,20 @@ def _scene_elements(
         roles = appearance.pictured.get(index)
         bsdf = opaque if roles is None else _part_bsdf(roles)
         parts.append({"type": "ply", "filename": _opaque_mesh_file(index), "bsdf": bsdf})
-    defaults = [xml.default_element(*one) for one in (("boundary", boundary), *sizes)]
+    defaults = [xml.default_property_element(*one) for one in (("boundary", boundary), *sizes)]
     elements = [xml.object_element(part, "", backend) for part in parts]
     return [*defaults, *elements, xml.include_element("boundary_$boundary.xml")]
 
 
 def _skin_elements(
-    backend: XmlBackend, boundary: Boundary, appearance: SkinAppearance, meshes: Mapping[str, bytes]
+    backend: XmlBackend,
+    boundary: Boundary,
+    appearance: SkinAppearance,
+    meshes_by_shape_name: Mapping[str, bytes],
 ) -> list[ET.Element]:
     """Return the XML elements of the skin with one surface model: medium, surface and shapes.
 
-    meshes : dictionary from shape name to the PLY file of a surface of the skin
+    meshes_by_shape_name : dictionary from shape name to the PLY file of a surface of the skin
     """
     roughness = appearance.roughness if isinstance(appearance.roughness, float) else _exr_texture("roughness")
     transmittance = None if appearance.transmittance is None else _exr_texture("passing")
@@ -224,31 +227,35 @@ def _skin_elements(
         parts.append(_lower_surface_bsdf(transmittance is not None))
         shapes = dict.fromkeys(("upper", "upper_caps"), "skin_surface")
         shapes |= dict.fromkeys(("skin", "caps"), "skin_below")
-    for name in (name for name in shapes if name in meshes):
+    for name in (name for name in shapes if name in meshes_by_shape_name):
         shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": xml.Ref(shapes[name])}
         parts.append({**shape, "interior": xml.Ref("skin_medium")})
     return [xml.object_element(part, "", backend) for part in parts]
 
 
-def _part_bsdf(roles: set[PartRole]) -> SceneDict:
+def _part_bsdf(image_roles: set[PartRole]) -> SceneDict:
     """Return Mitsuba's BSDF for a material that is not skin and has texture images.
 
-    roles : roles of these images, such as "colour"
+    image_roles : roles of these images, such as "colour"
     """
     bsdf: SceneDict = {"type": "principled", "eta": _PART_IOR, "roughness": _OPAQUE_PART_ROUGHNESS}
-    bsdf |= {name: _part_texture(role) for role, name in _PART_INPUTS.items() if role in roles}
-    if "normal" in roles:
+    bsdf |= {name: _part_texture(role) for role, name in _PART_INPUTS.items() if role in image_roles}
+    if "normal" in image_roles:
         bsdf = {"type": "normalmap", "normalmap": _part_texture("normal"), "bsdf": bsdf}
     bsdf = {"type": "twosided", "bsdf": bsdf}
-    return {"type": "mask", "opacity": _part_texture("opacity"), "bsdf": bsdf} if "opacity" in roles else bsdf
+    return (
+        {"type": "mask", "opacity": _part_texture("opacity"), "bsdf": bsdf}
+        if "opacity" in image_roles
+        else bsdf
+    )
 
 
-def _part_texture(role: PartRole) -> xml.Ref:
-    return xml.Ref(f"parts_{role}")
+def _part_texture(image_role: PartRole) -> xml.Ref:
+    return xml.Ref(f"parts_{image_role}")
 
 
-def _part_picture_file(role: PartRole) -> str:
-    return f"textures/{_part_texture(role).name}.png"
+def _part_picture_file(image_role: PartRole) -> str:
+    return f"textures/{_part_texture(image_role).name}.png"
 
 
 def _opaque_mesh_file(material_index: int) -> str:

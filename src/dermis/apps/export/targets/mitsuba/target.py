@@ -103,7 +103,7 @@ class Mitsuba(Target):
         values = {_EXTINCTION_NAME: extinction, _ALBEDO_NAME: albedo, _TRANSMITTANCE_NAME: (1.0,) * 3}
         return replace_values(self.parameters(subject, version), values)
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the profile of random walks through the medium, for light incident along the normal."""
         boundary = self._boundary
         names = _EXTINCTION_NAME, _ALBEDO_NAME, _TRANSMITTANCE_NAME
@@ -132,20 +132,21 @@ class Mitsuba(Target):
         return next(one for one in BOUNDARIES if one == (self.variant or self.variants[0]))
 
 
-def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundary) -> IsotropicMedium:
-    """Return the medium that has the skin's lightest colour and, with it, the profile closest to `curve`.
+def fit_medium(
+    reference_profile: CumulativeProfile, colours: SkinColours, boundary: Boundary
+) -> IsotropicMedium:
+    """Return the medium that has the skin's lightest colour and the profile closest to the reference.
 
     The colour is matched for light from all directions, as heads are lit from all sides. The profile is
     matched for light incident along the normal.
 
-    curve : reference profile
     colours : mean and lightest colour of the skin
     boundary : model of the surface above the medium
     """
     energy = colours.medium_colour(boundary) / _boundary_transmittance(boundary)
     if boundary == "matched":
         energy = half_space("matched", tabulated_albedo("walk", energy), np.ones(3)).energy
-    medium = fit_homogeneous_medium(curve, energy, _half_space_kind(boundary))
+    medium = fit_homogeneous_medium(reference_profile, energy, _half_space_kind(boundary))
     return IsotropicMedium(flat_tuple(1.0 / medium.mfp_mm), flat_tuple(medium.albedo))
 
 

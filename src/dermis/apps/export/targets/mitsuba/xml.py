@@ -128,7 +128,7 @@ def scene_document(elements: list[ET.Element]) -> bytes:
     return text + b"\n"
 
 
-def default_element(parameter_name: str, default_value: str) -> ET.Element:
+def default_property_element(parameter_name: str, default_value: str) -> ET.Element:
     """Return the element that sets the default of a parameter for `mitsuba -D`."""
     return ET.Element("default", {"name": parameter_name, "value": default_value})
 

@@ -45,37 +45,37 @@ def standard_library() -> MaterialX.Document:
 
 
 def _add_material(
-    document: MaterialX.Document, definition: OpenPbrMaterial, shader: str, file_prefix: str
+    document: MaterialX.Document, open_pbr_material: OpenPbrMaterial, shader: str, file_prefix: str
 ) -> None:
-    name = MaterialX.createValidName(definition.name) or "material"
+    name = MaterialX.createValidName(open_pbr_material.name) or "material"
     node = document.addNode(shader, document.createValidChildName(f"{name}_surface"), "surfaceshader")
-    for key, value in definition.values.items():
+    for key, value in open_pbr_material.values.items():
         constant = node.setInputValue(input_name(shader, key), _materialx_value(value))
         if key in LENGTH_INPUTS:
             constant.setUnitType("distance")
             constant.setUnit("meter")
-    if definition.maps:
+    if open_pbr_material.maps:
         graph = document.addNodeGraph(document.createValidChildName(f"{name}_maps"))
-        for key, role in definition.maps.items():
+        for key, role in open_pbr_material.maps.items():
             output = _add_map(graph, role, f"{file_prefix}{role}.png", shader)
             mapped = node.addInput(input_name(shader, key), output.getType())
             mapped.setNodeGraphString(graph.getName())
             mapped.setOutputString(output.getName())
     material = document.addMaterialNode(document.createValidChildName(name), node)
-    if material.getName() != definition.name:
-        material.setAttribute("uiname", definition.name)
+    if material.getName() != open_pbr_material.name:
+        material.setAttribute("uiname", open_pbr_material.name)
 
 
-def _add_map(graph: MaterialX.NodeGraph, role: str, map_path: str, shader: str) -> MaterialX.Output:
+def _add_map(graph: MaterialX.NodeGraph, map_role: str, map_path: str, shader: str) -> MaterialX.Output:
     """Add the nodes that read a map file to a graph, and return their output.
 
-    role : role of the map, such as "colour"; determines the type and colour space of the map's node
+    map_role : role of the map, such as "colour"; determines the type and colour space of the map's node
     map_path : path of the map
     shader : MaterialX node category of the surface shaders
     """
-    map_type = MAP_TYPES[role]
+    map_type = MAP_TYPES[map_role]
     output_type = map_type.type
-    image = graph.addNode("image", f"{role}_image", map_type.type)
+    image = graph.addNode("image", f"{map_role}_image", map_type.type)
     filename = image.setInputValue("file", map_path, "filename")
     if map_type.space:
         filename.setColorSpace(map_type.space)
@@ -83,11 +83,11 @@ def _add_map(graph: MaterialX.NodeGraph, role: str, map_path: str, shader: str) 
     if map_type.type == "vector3":
         last_node = graph.addNode("normalmap", "normal_in_space", map_type.type)
         last_node.addInput("in", map_type.type).setNodeName(image.getName())
-    elif role == "parts_opacity" and shader == STANDARD_SURFACE:
+    elif map_role == "parts_opacity" and shader == STANDARD_SURFACE:
         output_type = "color3"
         last_node = graph.addNode("convert", "opacity_of_channels", output_type)
         last_node.addInput("in", map_type.type).setNodeName(image.getName())
-    output = graph.addOutput(role, output_type)
+    output = graph.addOutput(map_role, output_type)
     output.setNodeName(last_node.getName())
     return output
 

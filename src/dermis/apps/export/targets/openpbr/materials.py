@@ -122,13 +122,13 @@ def skin_material(
     skin: Skin,
     radius_m: tuple[float, float, float],
     colour: tuple[float, ...],
-    roles: Iterable[str],
+    map_roles: Iterable[str],
 ) -> OpenPbrMaterial:
     """Return the OpenPBR material of skin.
 
     radius_m : (3,) mean free paths [m]
     colour : (3,) uniform colour, used without a colour map; linear Rec. 709 [-]
-    roles : roles of the maps that replace uniform values
+    map_roles : roles of the maps that replace uniform values
     """
     longest = max(radius_m)
     values: dict[str, InputValue] = {
@@ -142,7 +142,7 @@ def skin_material(
         "specular_ior": SKIN_ETA,
         "specular_roughness": float(np.sqrt(skin.roughness * skin.smoothing)),
     }
-    mapped = {MAP_INPUTS[role]: role for role in roles}
+    mapped = {MAP_INPUTS[role]: role for role in map_roles}
     return OpenPbrMaterial(
         material_name, {key: value for key, value in values.items() if key not in mapped}, mapped
     )
@@ -196,7 +196,7 @@ def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
     return OpenPbrMaterial("hair", values, {})
 
 
-def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
+def open_pbr_maps(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
     """Return a dictionary from role to map of a skin, with the values that OpenPBR expects.
 
     slopes : (n, n, 2) slopes of the relief, used if `maps` has no normals
@@ -216,14 +216,16 @@ def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str
     return arrays
 
 
-def encode_map_files(arrays: Mapping[str, Floats]) -> dict[str, bytes]:
+def encode_map_files(maps_by_role: Mapping[str, Floats]) -> dict[str, bytes]:
     """Return a dictionary from the role of each map to the map as an 8-bit PNG file."""
     with ThreadPoolExecutor() as pool:  # compression releases the interpreter lock
-        return dict(zip(arrays, pool.map(_encode_map_png, arrays, arrays.values()), strict=True))
+        return dict(
+            zip(maps_by_role, pool.map(_encode_map_png, maps_by_role, maps_by_role.values()), strict=True)
+        )
 
 
-def _encode_map_png(role: str, texels: Floats) -> bytes:
-    if role in ("colour", "eye"):
+def _encode_map_png(map_role: str, texels: Floats) -> bytes:
+    if map_role in ("colour", "eye"):
         return encode_png(encode_srgb8(texels))
     levels = np.rint(np.clip(texels, 0.0, 1.0) * 255).astype(np.uint8)
     return encode_png(levels if levels.ndim == 3 else levels[..., None])
@@ -235,40 +237,42 @@ def file_prefix(file: Path, subject: Subject) -> str:
     return f"{identifier or subject.identifier}_"
 
 
-def write_maps(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
+def write_maps(subject: Subject, folder: Path, file_name_prefix: str) -> dict[str, Path]:
     """Write the maps of the head's skin as PNG files, and return a dictionary from role to path.
 
-    prefix : prefix of the file names
+    file_name_prefix : prefix of the file names
     """
     if subject.head is None:
         return {}
-    files = encode_map_files(map_arrays(subject.head.maps, subject.skin, relief_slopes(subject.head)))
-    written = write_files(folder, ((f"{prefix}{role}.png", data) for role, data in files.items()))
+    files = encode_map_files(open_pbr_maps(subject.head.maps, subject.skin, relief_slopes(subject.head)))
+    written = write_files(folder, ((f"{file_name_prefix}{role}.png", data) for role, data in files.items()))
     return dict(zip(files, written, strict=True))
 
 
 def write_part_pictures(
-    subject: Subject, folder: Path, prefix: str, roles: Iterable[PartRole] = ()
+    subject: Subject, folder: Path, file_name_prefix: str, additional_roles: Iterable[PartRole] = ()
 ) -> list[Path]:
     """Write the texture images of parts that are not skin as PNG files, and return their paths.
 
-    prefix : prefix of the file names
-    roles : roles of additional images to write, which OpenPBR does not use
+    file_name_prefix : prefix of the file names
+    additional_roles : roles of additional images to write, which OpenPBR does not use
     """
     if subject.part_pictures is None:
         return []
-    files = subject.part_pictures.encode([*_PART_INPUTS, *roles])
-    return write_files(folder, ((f"{prefix}{PART_PREFIX}{role}.png", data) for role, data in files.items()))
+    files = subject.part_pictures.encode([*_PART_INPUTS, *additional_roles])
+    return write_files(
+        folder, ((f"{file_name_prefix}{PART_PREFIX}{role}.png", data) for role, data in files.items())
+    )
 
 
-def mesh_materials(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> dict[int, OpenPbrMaterial]:
+def mesh_materials(subject: Subject, mfp_mm: Doubles, map_roles: Iterable[str]) -> dict[int, OpenPbrMaterial]:
     """Return a dictionary from material index in the subject's mesh to OpenPBR material.
 
     mfp_mm : (3,) mean free paths of the skin [mm]
-    roles : roles of the maps that replace uniform values of the skin
+    map_roles : roles of the maps that replace uniform values of the skin
     """
     red, green, blue = (_METRES_PER_MM * float(path) for path in mfp_mm)
-    colour, known_roles = flat_tuple(subject.clipped_albedo()), list(roles)
+    colour, known_roles = flat_tuple(subject.clipped_albedo()), list(map_roles)
     mesh, parts = subject.head_or_ball.mesh, subject.part_pictures
 
     def material_definition(material: Material) -> OpenPbrMaterial:

@@ -31,7 +31,7 @@ _MAX_SCRIPT_BYTES = 32 << 20
 _METRES_PER_MM = 1e-3
 _SHADOW_MAP_SIDE = 2048
 _WARM_UP_FRAMES = 4  # frames until all shaders are compiled
-_LOAD_ERROR = "{} could not be loaded from {}. Check the network, or export again with --library."
+_LOAD_ERROR_TEXT = "{} could not be loaded from {}. Check the network, or export again with --library."
 _TEXTURE_POLICY = "img-src blob: data:; connect-src blob: data:"  # for textures in the head's file
 _PAGE_FOLDER = Path(__file__).parent
 
@@ -67,13 +67,13 @@ class LibraryFile:
         """Return the HTML element that loads and checks the file."""
         return f'<script src="{self.url}" integrity="{self.integrity}" crossorigin="anonymous"></script>'
 
-    def read(self, folder: Path) -> str:
+    def read(self, node_modules_folder: Path) -> str:
         """Return the text of the file from a node_modules folder of npm.
 
         Raises DermisError if the file is missing or differs from the expected version.
         """
         expected = f"{self.path} of {self.package} {self.version}, as npm installs it"
-        file = folder / self.package / self.path
+        file = node_modules_folder / self.package / self.path
         data = read_file(file, expected, _MAX_SCRIPT_BYTES)
         if base64.b64encode(hashlib.sha384(data).digest()).decode() != self.sha384:
             advice = f"Install it: npm install {self.package}@{self.version}"
@@ -116,7 +116,7 @@ class EnginePage(Target):
             script=escape_script(script),
             policy=_TEXTURE_POLICY,
             script_sources=sources,
-            settings=html_safe_json(self._page_settings(subject, parameters, version)),
+            settings=html_safe_json(self._page_settings_json(subject, parameters, version)),
             head=base64.b64encode(encode_glb(subject, {"KHR_materials_ior": {"ior": SKIN_ETA}}, "")).decode(),
             libraries=libraries,
         )
@@ -130,7 +130,7 @@ class EnginePage(Target):
         The policy is the page's Content-Security-Policy; a source is a URL, a scheme or a hash.
         """
 
-    def _page_settings(self, subject: Subject, parameters: Parameters, version: str) -> Json:
+    def _page_settings_json(self, subject: Subject, parameters: Parameters, version: str) -> Json:
         scene = subject.scene or Scene(subject.head_or_ball)
         centre_mm = scene.head.centre_mm if subject.scene else (0.0, 0.0, 0.0)  # of the ball
         return {
@@ -140,7 +140,7 @@ class EnginePage(Target):
             "shadow_side": _SHADOW_MAP_SIDE,
             "warm_frames": _WARM_UP_FRAMES,
             "smooth": True,
-            "no_library": _LOAD_ERROR.format(self.title, self.library_files[version][0].url),
+            "no_library": _LOAD_ERROR_TEXT.format(self.title, self.library_files[version][0].url),
         }
 
 

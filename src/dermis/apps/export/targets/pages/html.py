@@ -11,7 +11,7 @@ from pathlib import Path
 from string import Template
 
 _BASE_POLICY = "default-src 'none'; base-uri 'none'; form-action 'none'"
-_SCRIPT_END = re.compile("</(?=script)", re.IGNORECASE)
+_SCRIPT_END_PATTERN = re.compile("</(?=script)", re.IGNORECASE)
 
 
 def render_page(
@@ -44,9 +44,9 @@ def render_page(
     )
 
 
-def escape_script(script: str) -> str:
+def escape_script(script_text: str) -> str:
     """Return a script escaped for a <script> element; the values of its string literals do not change."""
-    return _SCRIPT_END.sub(r"<\\/", script).replace("<!--", r"<\!--")
+    return _SCRIPT_END_PATTERN.sub(r"<\\/", script_text).replace("<!--", r"<\!--")
 
 
 def csp_hash(inline_text: str) -> str:

@@ -18,7 +18,7 @@ from dermis.apps.export.targets.openpbr.materials import (
     PART_PREFIX,
     encode_map_files,
     file_prefix,
-    map_arrays,
+    open_pbr_maps,
 )
 from dermis.apps.export.targets.openpbr.target import published_mean_free_path_mm
 from dermis.apps.export.targets.pbrt.scene import Lines, camera_lines, format_directive, light_lines
@@ -182,7 +182,7 @@ class Pbrt(Target):
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the reflectance, and the mean free paths whose profile is closest to the reference."""
-        path = fit_radius_scale(subject.curve, _unit_curve(subject.albedo))
+        path = fit_radius_scale(subject.curve, _unit_profile(subject.albedo))
         return _material_parameters(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
@@ -191,10 +191,10 @@ class Pbrt(Target):
             subject, published_mean_free_path_mm(subject), "as published, 1 / sigma_tr"
         )
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile that pbrt tabulates for the reflectance and mean free paths."""
         reflectance = np.array(get_numbers(parameters, _REFLECTANCE_NAME))
-        curve = scale_radii(_unit_curve(reflectance), get_numbers(parameters, _MFP_NAME))
+        curve = scale_radii(_unit_profile(reflectance), get_numbers(parameters, _MFP_NAME))
         return subject.rescale_energy(curve)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
@@ -207,7 +207,7 @@ class Pbrt(Target):
         return [file, *write_files(file.parent, files.items())]
 
 
-def _unit_curve(reflectance: Floats) -> CumulativeProfile:
+def _unit_profile(reflectance: Floats) -> CumulativeProfile:
     """Return pbrt's cumulative profile for reflectances (3,), with radii in mean free paths."""
     table = diffusion_table(SKIN_ETA)
     total = np.array([table.interpolate(table.radius[-1], float(one)) for one in reflectance], np.float64)
@@ -219,11 +219,11 @@ def _unit_curve(reflectance: Floats) -> CumulativeProfile:
     return CumulativeProfile.from_function(fraction_within, total)
 
 
-def _material_parameters(subject: Subject, mean_free_path_mm: Floats, meaning: str) -> Parameters:
+def _material_parameters(subject: Subject, mean_free_path_mm: Floats, mfp_meaning: str) -> Parameters:
     skin, colour = subject.skin, flat_tuple(subject.clipped_albedo())
     return (
         Parameter(_REFLECTANCE_NAME, colour, "-", "of the light that enters, or a texture"),
-        Parameter(_MFP_NAME, flat_tuple(mean_free_path_mm), "mm", meaning),
+        Parameter(_MFP_NAME, flat_tuple(mean_free_path_mm), "mm", mfp_meaning),
         Parameter("scale", 1.0, "-", "factor of mfp; must not be changed"),
         Parameter("g", 0.0, "-", "the mean free paths are reduced ones"),
         Parameter("eta", SKIN_ETA, "-", "index of refraction of the skin"),
@@ -289,25 +289,25 @@ def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[st
 
 
 def _opaque_materials(
-    material: Material, roles: set[PartRole], material_name: str, file_prefix: str
+    material: Material, image_roles: set[PartRole], material_name: str, file_prefix: str
 ) -> Lines:
     """Return the material directives for a part of the head that is not skin.
 
-    roles : roles of the texture images that the part uses, such as "colour"
+    image_roles : roles of the texture images that the part uses, such as "colour"
     material_name : name of the part's material; partly metallic parts mix two materials with this prefix
     file_prefix : prefix of the names of the image files
     """
     values: dict[str, ArrayLike | Sequence[str]] = {"rgb reflectance": material.colour}
-    if "colour" in roles:
+    if "colour" in image_roles:
         values = {"texture reflectance": "parts_colour"}
-    if "alpha" in roles:
+    if "alpha" in image_roles:
         values["texture roughness"] = "parts_alpha"
     else:
         values["float roughness"] = _OPAQUE_PART_ROUGHNESS
     values["bool remaproughness"] = False
-    if "normal" in roles:
+    if "normal" in image_roles:
         values["string normalmap"] = f"{file_prefix}{PART_PREFIX}normal.png"
-    if "metalness" not in roles:
+    if "metalness" not in image_roles:
         return [format_directive("Material", "coateddiffuse", values)]
     names = {f"{material_name}_{kind}": kind for kind in ("coateddiffuse", "conductor")}
     mix: dict[str, ArrayLike | Sequence[str]] = {"string materials": [*names]}
@@ -360,7 +360,7 @@ def skin_textures(subject: Subject, file_prefix: str) -> SkinTextures:
     textures = SkinTextures([], {}, {})
     if subject.head is None:
         return textures
-    arrays = map_arrays(subject.head.maps, subject.skin, relief_slopes(subject.head))
+    arrays = open_pbr_maps(subject.head.maps, subject.skin, relief_slopes(subject.head))
     arrays.pop("specular", None)
     if "roughness" in arrays:
         arrays["roughness"] = arrays["roughness"] ** 2  # pbrt expects alpha, OpenPBR its square root

@@ -23,7 +23,7 @@ from dermis.apps.export.targets.pages.html import csp_hash
 from dermis.base.tables import read_rows
 from dermis.optics.cumulative_profile import CumulativeProfile
 
-_MODULE_NAMES = {
+_IMPORT_MAP_NAMES = {
     "./three.core.js": "three/core",
     "../utils/BufferGeometryUtils.js": "three/buffers",
     "../utils/SkeletonUtils.js": "three/skeletons",
@@ -60,7 +60,7 @@ class Three(EnginePage):
         """Return the exported parameters with the default index of refraction of MeshPhysicalMaterial."""
         return replace_values(self.parameters(subject, version), {"ior": _DEFAULT_IOR})
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile of light that leaves the skin where it enters: 1 at every radius."""
         return CumulativeProfile.from_function(lambda r: np.ones((len(r), 3)), subject.curve.energy)
 
@@ -71,13 +71,13 @@ class Three(EnginePage):
             imports = {file.name: file.url for file in files}
             integrity = {file.url: file.integrity for file in files}
             return _import_map({"imports": imports, "integrity": integrity}, [*integrity])
-        modules = {file.name: module_url(file.read(self.library_folder), _MODULE_NAMES) for file in files}
+        modules = {file.name: module_url(file.read(self.library_folder), _IMPORT_MAP_NAMES) for file in files}
         return _import_map({"imports": modules}, ["data:"])
 
 
-def _import_map(entries: dict[str, dict[str, str]], sources: list[str]) -> tuple[str, list[str]]:
-    text = json.dumps(entries)
-    return f'<script type="importmap">{text}</script>', [csp_hash(text), *sources]
+def _import_map(import_map: dict[str, dict[str, str]], script_sources: list[str]) -> tuple[str, list[str]]:
+    text = json.dumps(import_map)
+    return f'<script type="importmap">{text}</script>', [csp_hash(text), *script_sources]
 
 
 TARGET = Three()

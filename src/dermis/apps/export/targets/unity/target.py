@@ -12,7 +12,7 @@ from string import Template
 
 import numpy as np
 
-from dermis.apps.export.fitting import burley_curve, fit_burley_width
+from dermis.apps.export.fitting import cumulative_burley_profile, fit_burley_width
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import (
     Parameter,
@@ -84,14 +84,14 @@ class Unity(Target):
         }
         return replace_values(self.parameters(subject, version), values)
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative Burley profile that HDRP derives from scattering colour and multiplier."""
         colour, scale = (
             np.array(get_numbers(parameters, _SCATTERING_DISTANCE_NAME)),
             get_numbers(parameters, _WORLD_SCALE_NAME)[0],
         )
         multiplier = 1.0 if version == _VERSION_BEFORE_14 else get_numbers(parameters, _MULTIPLIER_NAME)[0]
-        return burley_curve(colour * multiplier / scale, subject.curve.energy)
+        return cumulative_burley_profile(colour * multiplier / scale, subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the asset, and the maps of a head beside it."""

@@ -120,8 +120,8 @@ def build_page_content(
 ) -> PageContent:
     """Capture the frames of all kinds of adapter, and return the data that the page embeds.
 
-    on_frames_captured : function called for each kind of adapter after its frames were captured; it receives the
-        renderer, whose maps are those of the page, the scene and the settings
+    on_frames_captured : function called for each kind of adapter after its frames were captured; it receives
+        the renderer, whose maps are those of the page, the scene and the settings
     """
     content = PageContent()
     for adapter_kind in (one for one in ADAPTER_KINDS if request.sizes.get(one)):
@@ -137,7 +137,7 @@ def build_page_content(
 def _capture_frames(
     page_content: PageContent, renderer: Renderer, request: PageRequest, adapter_kind: str
 ) -> Json:
-    """Capture the frames for one kind of adapter, add the data to `page_content`, and return the frames' JSON.
+    """Capture the frames for one kind of adapter, add their data to `page_content`, and return their JSON.
 
     adapter_kind : kind of adapter, "gpu" or "software"
     """

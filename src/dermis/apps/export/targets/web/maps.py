@@ -49,7 +49,9 @@ def encode_picture(texels: Halves, is_colour_map: bool) -> Picture:
     texels : (h, w, c) texels
     is_colour_map : whether the first three channels are a colour; all further channels are then constant
     """
-    curves = np.stack([_value_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])])
+    curves = np.stack(
+        [_quantisation_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])]
+    )
     steps = np.stack([_nearest_levels(texels[..., k], curves[k]) for k in range(len(curves))], axis=-1)
     image = (
         steps[..., :_COLOUR_CHANNEL_COUNT]
@@ -67,7 +69,7 @@ def encode_picture(texels: Halves, is_colour_map: bool) -> Picture:
     return Picture(data, curves.astype(np.float16), decoded.astype(np.float16))
 
 
-def _value_curve(texels: NDArray[np.float64]) -> NDArray[np.float64]:
+def _quantisation_curve(texels: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the 256 increasing values to which a channel is quantised, with smaller steps near 0.
 
     texels : texels of the channel, whose minimum and maximum are the ends of the curve
@@ -78,12 +80,12 @@ def _value_curve(texels: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.sign(root) * root * root)
 
 
-def _nearest_levels(texels: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
+def _nearest_levels(texels: Halves, quantisation_curve: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Return the index of the curve value nearest to each texel.
 
-    curve : increasing values
+    quantisation_curve : increasing values
     """
-    midpoints = 0.5 * (curve[1:] + curve[:-1])
+    midpoints = 0.5 * (quantisation_curve[1:] + quantisation_curve[:-1])
     return np.searchsorted(midpoints, texels.astype(np.float64)).astype(np.uint8)
 
 

@@ -45,7 +45,7 @@ class Slider:
     changes_pose_only: bool = False
 
 
-def node_inputs(
+def slider_frame_inputs(
     slider: Slider, prepare_inputs: Callable[[Scene], FrameInputs], default_inputs: FrameInputs
 ) -> Iterator[FrameInputs | None]:
     """Yield the frame inputs at each captured value of a slider; None at the default value.
@@ -63,8 +63,8 @@ def node_inputs(
             yield prepare_inputs(scene)
 
 
-def node_changes(
-    default_frame: CapturedFrame, node_frame: CapturedFrame, byte_runs: ByteRunCollector
+def slider_frame_changes(
+    default_frame: CapturedFrame, moved_frame: CapturedFrame, byte_runs: ByteRunCollector
 ) -> Json:
     """Return as JSON how the frame at one value of a slider differs from the frame at the default value.
 
@@ -72,22 +72,22 @@ def node_changes(
     the index of the record or pass, the index of the first word that differs, and the index of the
     differences in `byte_runs`.
 
-    default_frame, node_frame : captured frames at the default value and at the other value
+    default_frame, moved_frame : captured frames at the default value and at the other value
 
     Raises DermisError if the two frames have different passes.
     """
-    stages = [[one.stage for one in captured.passes] for captured in (default_frame, node_frame)]
+    stages = [[one.stage for one in captured.passes] for captured in (default_frame, moved_frame)]
     if stages[0] != stages[1]:
         refuse("slider", "the same passes at each of its nodes", "they differ", "Remove the slider")
-    pairs = enumerate(zip(default_frame.records, node_frame.records, strict=True))
+    pairs = enumerate(zip(default_frame.records, moved_frame.records, strict=True))
     records = [(k, (_record_floats(one), _record_floats(other))) for k, ((_, one), (_, other)) in pairs]
-    passes = enumerate(zip(default_frame.passes, node_frame.passes, strict=True))
+    passes = enumerate(zip(default_frame.passes, moved_frame.passes, strict=True))
     written = [
         (k, (_written_floats(one), _written_floats(other))) for k, (one, other) in passes if one.written
     ]
     return {
-        "records": _node_differences(records, byte_runs),
-        "written": _node_differences(written, byte_runs),
+        "records": _word_differences(records, byte_runs),
+        "written": _word_differences(written, byte_runs),
     }
 
 
@@ -112,7 +112,7 @@ def _written_floats(captured_pass: CapturedPass) -> Floats:
     return np.frombuffer(captured_pass.written[1] if captured_pass.written else b"", "<f4")
 
 
-def _node_differences(
+def _word_differences(
     indexed_value_pairs: list[tuple[int, tuple[Floats, Floats]]], byte_runs: ByteRunCollector
 ) -> list[tuple[int, int, int]]:
     changes = []
