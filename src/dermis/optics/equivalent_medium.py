@@ -59,7 +59,7 @@ def _half_space_column(eta: float, from_photons: bool, total_reflectance: float)
     albedo = albedo_for_total(total_reflectance, eta, from_photons)
     kind = tabulated_kind_for_index(eta) if from_photons else None
     if kind is None:
-        half = _half_frequency(partial(_reflectance_transform, _unit_medium(albedo, eta)))
+        half = _half_frequency(partial(_reflectance_transform, _unit_mean_free_path_medium(albedo, eta)))
     else:
         cumulative = half_space(kind, np.full(3, albedo), np.ones(3))
         half = _half_frequency(partial(_cumulative_transform, cumulative))
@@ -81,7 +81,9 @@ def albedo_for_total(total_reflectance: float, eta: float, from_photons: bool = 
 
     def reflectance_excess(albedo: float) -> float:
         return (
-            _reflectance_transform(_unit_medium(albedo, eta), float(hankel.NEAR_ZERO_FREQUENCY[0]))
+            _reflectance_transform(
+                _unit_mean_free_path_medium(albedo, eta), float(hankel.NEAR_ZERO_FREQUENCY[0])
+            )
             - total_reflectance
         )
 
@@ -94,7 +96,7 @@ def albedo_for_total(total_reflectance: float, eta: float, from_photons: bool = 
     )
 
 
-def _unit_medium(albedo: float, eta: float) -> Medium:
+def _unit_mean_free_path_medium(albedo: float, eta: float) -> Medium:
     """Return a half-space whose mean free path is 1 mm."""
     return Medium("half-space", (Layer(np.array([1.0 - albedo]), np.array([albedo])),), eta)
 

@@ -143,20 +143,20 @@ def write_profile(path: Path, profile: GaussianSum, metadata: Mapping[str, Any])
     Raises DermisError when the file cannot be written.
     """
     lines = ["# Written by dermis profile. Lengths in mm; red, green, blue are linear Rec. 709."]
-    lines += [f"{key} = {_toml_value(value)}" for key, value in metadata.items()]
-    lines += [f"variances_mm2 = {_toml_value(profile.variance_mm2)}", "weights = ["]
-    lines += [f"    {_toml_value(row)}," for row in profile.weight]
+    lines += [f"{key} = {_format_toml_value(value)}" for key, value in metadata.items()]
+    lines += [f"variances_mm2 = {_format_toml_value(profile.variance_mm2)}", "weights = ["]
+    lines += [f"    {_format_toml_value(row)}," for row in profile.weight]
     with atomic_file(path) as temporary:
         temporary.write_text("\n".join([*lines, "]", ""]), encoding="utf-8")
 
 
-def _toml_value(value: Any) -> str:
+def _format_toml_value(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, np.ndarray):
-        return _toml_value(value.tolist())
+        return _format_toml_value(value.tolist())
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return f"[{', '.join(map(_toml_value, value))}]"
+        return f"[{', '.join(map(_format_toml_value, value))}]"
     if isinstance(value, float):
         return repr(float(value))  # the repr of NumPy scalars contains their type
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)

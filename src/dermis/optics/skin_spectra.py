@@ -13,7 +13,7 @@ from dermis.optics.pigments.spectra import (
     WAVELENGTHS_NM,
     baseline_absorption,
     blood_absorption,
-    donner_jensen_2006,
+    donner_jensen_scattering,
     eumelanin_absorption,
     pheomelanin_absorption,
 )
@@ -45,7 +45,7 @@ def skin_reflectance(
     bloodless = _as_column(baseline) * baseline_absorption(WAVELENGTHS_NM)
     pigment = eu * eumelanin_absorption(WAVELENGTHS_NM) + (1.0 - eu) * pheomelanin_absorption(WAVELENGTHS_NM)
     vessels = ox * blood_absorption(WAVELENGTHS_NM, 1.0) + (1.0 - ox) * blood_absorption(WAVELENGTHS_NM, 0.0)
-    sigma_s_prime = _as_column(scattering) * donner_jensen_2006(WAVELENGTHS_NM)
+    sigma_s_prime = _as_column(scattering) * donner_jensen_scattering(WAVELENGTHS_NM)
     epidermis = m * pigment + (1.0 - m) * bloodless
     return two_layer_reflectance(
         epidermis, b * vessels + (1.0 - b) * bloodless, sigma_s_prime, _as_column(epidermis_mm)

@@ -193,10 +193,10 @@ class _Transport:
     phase: PhaseMatrices
 
     @classmethod
-    def create(cls, albedo: float, eta: float, nodes: int, g: float) -> _Transport:
-        mu, weight = _direction_quadrature(eta, nodes)
+    def create(cls, albedo: float, eta: float, direction_nodes: int, g: float) -> _Transport:
+        mu, weight = _direction_quadrature(eta, direction_nodes)
         internal, escapes = internal_reflectance(mu, eta), mu > critical_cosine(eta)
-        return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, nodes))
+        return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, direction_nodes))
 
     def doubling_count(self, depth: float) -> int:
         """Return how many doublings turn a slab thin enough for single scattering into one of a given depth.

@@ -102,7 +102,7 @@ class Tissue:
 
     @property
     def default_model(self) -> ProfileModel:
-        """Return the default profile model: "counted" if there are photon counts of the medium, else "layered"."""
+        """Return the default profile model: "counted" if photon counts cover the medium, else "layered"."""
         return COUNTED_MODEL if self.rgb is None and has_photon_table(self.medium) else "layered"
 
     def profile(self, model: ProfileModel | None = None, clamp: Clamp = "layer") -> RadialProfile:
@@ -198,7 +198,7 @@ def load_tissue(
         refuse(f"tissue {name}", f"one of {known}, or a .toml file", "it is none of these", "Check the name")
     document = {} if str(name) in published_media() else read_toml(Path(name))
     if "skin" in document:
-        return _from_skin_table(Path(name), document, structure, overrides)
+        return _tissue_from_skin_table(Path(name), document, structure, overrides)
     if overrides:
         option = "--" + next(iter(overrides)).replace("_", "-")
         skins = ", ".join(SKINS)
@@ -223,15 +223,15 @@ def _checked_pigments(pigments: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _spectral_tissue(
-    name: str, structure: Structure, defaults: SkinParameters, overrides: dict[str, Any]
+    name: str, structure: Structure, default_parameters: SkinParameters, pigment_overrides: dict[str, Any]
 ) -> Tissue:
-    parameters = replace(defaults, **overrides)
+    parameters = replace(default_parameters, **pigment_overrides)
     medium = replace(spectral_medium(structure, parameters), name=name)
     return Tissue(medium, rgb_weights(WAVELENGTHS_NM), parameters)
 
 
-def _from_skin_table(
-    path: Path, document: Mapping[str, Any], structure: Structure | None, overrides: dict[str, Any]
+def _tissue_from_skin_table(
+    path: Path, document: Mapping[str, Any], structure: Structure | None, pigment_overrides: dict[str, Any]
 ) -> Tissue:
     table = document["skin"]
     fields = set(SkinParameters.__dataclass_fields__)
@@ -251,4 +251,4 @@ def _from_skin_table(
     except DermisError as fault:
         raise DermisError(f"{path}: {fault}") from None
     name, structure = str(document.get("name", path.stem)), structure or table_structure
-    return _spectral_tissue(name, structure, parameters, overrides)
+    return _spectral_tissue(name, structure, parameters, pigment_overrides)

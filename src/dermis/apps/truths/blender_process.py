@@ -61,10 +61,12 @@ def run_blender(
         actual = f"it was ended after {timeout_s:.0f} s"
         refuse(task.renderer, task.goal, actual, "Take fewer samples or a smaller image")
     if process.returncode != 0:
-        _refuse_exit(python, process, task)
+        _refuse_failed_run(python, process, task)
 
 
-def _refuse_exit(python: Path, process: subprocess.CompletedProcess[bytes], task: BlenderTask) -> NoReturn:
+def _refuse_failed_run(
+    python: Path, process: subprocess.CompletedProcess[bytes], task: BlenderTask
+) -> NoReturn:
     output = (process.stderr.strip() or process.stdout.strip()).decode("utf-8", "replace").splitlines()
     last_line = output[-1] if output else "no output"
     if "No module named" in last_line:

@@ -71,13 +71,13 @@ def _check_shadows(light: Light, light_number: int, renderer: str) -> None:
         )
 
 
-def mitsuba_point(mi: Mitsuba, light: PointLight, label: str) -> SceneDict:
+def mitsuba_point(mi: Mitsuba, light: PointLight, light_label: str) -> SceneDict:
     """Return Mitsuba's description of a point light."""
     intensity = np.multiply(light.irradiance, _target_distance_mm(light) ** 2)
     return {"type": "point", "position": list(light.position), "intensity": mitsuba_rgb(intensity)}
 
 
-def mitsuba_spot(mi: Mitsuba, light: SpotLight, label: str) -> SceneDict:
+def mitsuba_spot(mi: Mitsuba, light: SpotLight, light_label: str) -> SceneDict:
     """Return a Mitsuba projector in place of a spot light; Mitsuba's own spot light has no smooth edge."""
     tangent = np.tan(np.radians(light.outer_degrees))
     along = tangent * ((np.arange(_SPOT_SLIDE_SIDE) + 0.5) / _SPOT_SLIDE_SIDE * 2.0 - 1.0)
@@ -88,7 +88,7 @@ def mitsuba_spot(mi: Mitsuba, light: SpotLight, label: str) -> SceneDict:
     return mitsuba_projector(mi, slide, cosine, mitsuba_look_at(mi, light.position, light.target), tangent)
 
 
-def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, label: str) -> SceneDict:
+def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, light_label: str) -> SceneDict:
     """Return Mitsuba's description of a rectangle light: a rectangle of uniform radiance."""
     sides = [0.5 * light.width_mm, 0.5 * light.height_mm, 1.0]
     to_world = mitsuba_look_at(mi, light.position, light.target).scale(sides)
@@ -96,7 +96,7 @@ def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, label: str) -> SceneDi
     return mitsuba_shape("rectangle", np.divide(light.irradiance, unit_irradiance), to_world=to_world)
 
 
-def mitsuba_sphere(mi: Mitsuba, light: SphereLight, label: str) -> SceneDict:
+def mitsuba_sphere(mi: Mitsuba, light: SphereLight, light_label: str) -> SceneDict:
     """Return Mitsuba's description of a sphere light: a sphere of uniform radiance."""
     unit_irradiance = np.pi * (light.radius_mm / _target_distance_mm(light)) ** 2
     return mitsuba_shape(
@@ -107,7 +107,7 @@ def mitsuba_sphere(mi: Mitsuba, light: SphereLight, label: str) -> SceneDict:
     )
 
 
-def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, label: str) -> SceneDict:
+def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, light_label: str) -> SceneDict:
     """Return Mitsuba's directional light, or a distant disc for a light with an angular diameter."""
     if light.angle_degrees == 0:
         irradiance = mitsuba_rgb(light.irradiance)
@@ -120,7 +120,7 @@ def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, label: str) -> Sce
     return mitsuba_shape("disk", np.divide(light.irradiance, np.pi * np.sin(half) ** 2), to_world=to_world)
 
 
-def mitsuba_stripe(mi: Mitsuba, light: StripeLight, label: str) -> SceneDict:
+def mitsuba_stripe(mi: Mitsuba, light: StripeLight, light_label: str) -> SceneDict:
     """Return Mitsuba's description of a stripe light: a distant slide projector whose slide is the stripe."""
     width, length = light.width_mm, light.length_mm
     size = np.array([2.0 * _STRIPE_SLIDE_HALF_WIDTHS * width, length])
@@ -128,7 +128,7 @@ def mitsuba_stripe(mi: Mitsuba, light: StripeLight, label: str) -> SceneDict:
     texel = max(texel, float(np.sqrt(size.prod() / _MAX_STRIPE_SLIDE_TEXELS)))
     if width < 10.0 * texel:
         actual = f"it is {length:g} mm long and {width:g} mm wide"
-        refuse(label, "a stripe less slender, for path tracing", actual, "Shorten it")
+        refuse(light_label, "a stripe less slender, for path tracing", actual, "Shorten it")
     columns, rows = np.ceil(size / texel).astype(int)
     # The slide's texels are square; those added by rounding up are dark.
     across = ((np.arange(columns) + 0.5) - 0.5 * columns) * texel / (0.5 * width)

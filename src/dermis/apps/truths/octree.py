@@ -159,7 +159,7 @@ def _point_approximation(
     eigenvalues, axes = np.linalg.eigh(sum(second_moments) / total[:, None, None])
     # A patch of surface is nearly flat, so its two longer axes are enough.
     axis_lengths, axes = np.sqrt(eigenvalues[:, 1:].clip(0)), axes[..., 1:]
-    offsets = np.einsum("kj,nj,naj->nka", _TRIANGLE_POINTS, axis_lengths, axes)
+    offsets = np.einsum("kj,nj,naj->nka", _UNIT_VARIANCE_POINTS, axis_lengths, axes)
     point_flux = _point_flux(flux, first_moments, axis_lengths, axes)
     safe_flux = np.where(flux > 0, flux, np.inf)
     bounds = np.zeros((3, len(flux), 3))
@@ -173,8 +173,8 @@ def _point_approximation(
     return centre, centre[:, None] + offsets, point_flux, second_moment, moment_error, centroid_error
 
 
-_TRIANGLE_ANGLES = 2 * np.pi / 3 * np.arange(3)
-_TRIANGLE_POINTS = np.sqrt(2) * np.column_stack((np.sin(_TRIANGLE_ANGLES), np.cos(_TRIANGLE_ANGLES)))
+_POINT_ANGLES = 2 * np.pi / 3 * np.arange(3)
+_UNIT_VARIANCE_POINTS = np.sqrt(2) * np.column_stack((np.sin(_POINT_ANGLES), np.cos(_POINT_ANGLES)))
 
 
 def _central_moments(
@@ -239,7 +239,7 @@ def _point_flux(
     moment = np.einsum("cna,naj->ncj", np.array(first_moments), principal_axes)
     lengths = axis_lengths[:, None]
     ratio = np.divide(moment, lengths, where=lengths > 1e-9, out=np.zeros_like(moment))
-    return np.asarray((flux[:, None] + np.einsum("kj,ncj->nkc", _TRIANGLE_POINTS, ratio)) / 3)
+    return np.asarray((flux[:, None] + np.einsum("kj,ncj->nkc", _UNIT_VARIANCE_POINTS, ratio)) / 3)
 
 
 def _reduce_nodes(

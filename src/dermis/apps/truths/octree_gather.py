@@ -55,7 +55,7 @@ def gather_exitance(
         while node_index < len(tree.first):
             visit_count += 1
             if _node_is_far(points[i], node_index, tree, profile_table, error_bound):
-                _add_node(points[i], node_index, tree, profile_table, exitance[i])
+                _add_node_light(points[i], node_index, tree, profile_table, exitance[i])
                 node_index = tree.next_node[node_index]
                 continue
             if tree.next_node[node_index] == node_index + 1:
@@ -83,7 +83,7 @@ def _node_is_far(
 
 
 @compiled
-def _add_node(
+def _add_node_light(
     point: Floats, node_index: int, tree: Octree, profile_table: ProfileTable, exitance: Floats
 ) -> None:
     for k in range(3):

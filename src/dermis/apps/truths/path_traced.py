@@ -163,7 +163,7 @@ def pass_count(samples: int) -> int:
 
 def add_passes(
     mi: Mitsuba,
-    built_scene: MitsubaObject,
+    loaded_scene: MitsubaObject,
     passes: PassStatistics,
     min_pass_count: int,
     cache_key: str | None,
@@ -177,7 +177,7 @@ def add_passes(
     try:
         while passes.count < min_pass_count:
             started = time.perf_counter()
-            image = np.array(mi.render(built_scene, spp=SAMPLES_PER_PASS, seed=passes.count), np.float64)
+            image = np.array(mi.render(loaded_scene, spp=SAMPLES_PER_PASS, seed=passes.count), np.float64)
             ended = time.perf_counter()
             passes.add(image, ended - started)
             if progress is not None:

@@ -12,7 +12,7 @@ from dermis.base.errors import refuse
 
 Floats = NDArray[np.float64]
 
-TABLE_ROWS = 8192
+PROFILE_TABLE_ROWS = 8192
 """Rows evenly spaced in the square root of the radius; linear interpolation has an error of 5e-6."""
 
 _RELATIVE_GAUSSIAN_CUTOFF = 1e-12  # relative to the peak of a Gaussian
@@ -108,7 +108,7 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
     surface patches small for which the surface integral evaluates the profile.
     """
     end = profile.end_mm
-    root = np.linspace(0.0, np.sqrt(end), TABLE_ROWS)
+    root = np.linspace(0.0, np.sqrt(end), PROFILE_TABLE_ROWS)
     r = root**2
     # The tangential second derivative is R'/r, which tends to R'' on the axis.
     off_axis = np.maximum(r, r[1])
@@ -117,12 +117,12 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
     nonzero = energy > 0
     if not nonzero.any():
         refuse("profile", "light in at least one channel", "it is 0 everywhere", "Correct it")
-    slope = _bound_from_radius_on(np.abs(dR), energy, nonzero)
+    slope = _bound_beyond_radius(np.abs(dR), energy, nonzero)
     bend = np.maximum(np.abs(ddR), np.abs(dR) / off_axis[:, None])
-    curvature = _bound_from_radius_on(0.5 * bend, energy, nonzero)
+    curvature = _bound_beyond_radius(0.5 * bend, energy, nonzero)
     R[-1] = 0.0
     return ProfileTable(
-        (TABLE_ROWS - 1) / np.sqrt(end),
+        (PROFILE_TABLE_ROWS - 1) / np.sqrt(end),
         np.ascontiguousarray(R),
         slope,
         curvature,
@@ -130,7 +130,7 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
     )
 
 
-def _bound_from_radius_on(radial_values: Floats, energy: Floats, has_energy: NDArray[np.bool_]) -> Floats:
+def _bound_beyond_radius(radial_values: Floats, energy: Floats, has_energy: NDArray[np.bool_]) -> Floats:
     """Return for each row the largest value (rows,) that any channel has at this or a larger radius.
 
     radial_values : (rows, 3) function of the radius by channel

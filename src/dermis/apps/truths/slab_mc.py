@@ -30,7 +30,7 @@ MAX_PHOTONS = 10**10
 
 _MAX_SEED = 2**63 - 1
 _PHOTONS_PER_CALL = 20_000  # between two checks for Ctrl-C
-_REPORTED_UNFINISHED_FRACTION = 1e-3  # fraction of dropped photons from which on a warning reports it
+_MIN_REPORTED_UNFINISHED_FRACTION = 1e-3  # fraction of dropped photons from which on a warning reports it
 
 
 def default_ring_edges() -> Floats:
@@ -132,7 +132,7 @@ def monte_carlo_profile(
 
 def _unfinished_warnings(channel_results: Sequence[SlabResult]) -> list[str]:
     lost = max(run.relative_to_entering.unfinished for run in channel_results)
-    if lost < _REPORTED_UNFINISHED_FRACTION:
+    if lost < _MIN_REPORTED_UNFINISHED_FRACTION:
         return []
     return [f"{lost:.1%} of the light was dropped after very many scatterings and is missing from the total"]
 
@@ -163,14 +163,14 @@ def _checked_edges(edges_mm: ArrayLike) -> Floats:
 def _layer_stack(layers: Sequence[ScatteringLayer]) -> LayerStack:
     from dermis.apps.truths.photon import LayerStack
 
-    def between_air(air_value: float, layer_values: list[float]) -> Floats:
+    def padded_with_air(air_value: float, layer_values: list[float]) -> Floats:
         return np.array([air_value, *layer_values, air_value])
 
     return LayerStack(
-        eta=between_air(1.0, [layer.eta for layer in layers]),
-        sigma_t=between_air(0.0, [layer.sigma_t for layer in layers]),
-        albedo=between_air(0.0, [layer.albedo for layer in layers]),
-        g=between_air(0.0, [layer.g for layer in layers]),
+        eta=padded_with_air(1.0, [layer.eta for layer in layers]),
+        sigma_t=padded_with_air(0.0, [layer.sigma_t for layer in layers]),
+        albedo=padded_with_air(0.0, [layer.albedo for layer in layers]),
+        g=padded_with_air(0.0, [layer.g for layer in layers]),
         face_mm=np.cumsum([0.0, *(layer.thickness_mm for layer in layers)]),
     )
 

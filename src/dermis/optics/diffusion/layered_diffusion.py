@@ -29,7 +29,7 @@ class _Sublayer(NamedTuple):
     point: Floats  # power of the point source on its lower face
 
 
-class _Face(NamedTuple):
+class _BoundaryCondition(NamedTuple):
     """Boundary condition D phi' = W - Z phi for the fluence phi at a face; Z and W depend on lower layers."""
 
     Z: Floats
@@ -142,14 +142,16 @@ def _solve_upwards(
     """Return the fluence at the surface, and the transfer through each sublayer, topmost sublayer first."""
     s = np.asarray(frequency, dtype=np.float64)[..., None]
     zero = np.zeros((*s.shape[:-1], channel_count))
-    face, transfers = _Face(zero + 1.0 / (2.0 * A), zero), list[_DownwardTransfer]()
+    face, transfers = _BoundaryCondition(zero + 1.0 / (2.0 * A), zero), list[_DownwardTransfer]()
     for sublayer in reversed(sublayers):
         face, transfer = _propagate_up(s, sublayer, face)
         transfers.insert(0, transfer)
     return np.asarray(2.0 * A * face.W / (1.0 + 2.0 * A * face.Z)), transfers
 
 
-def _propagate_up(s: Floats, sublayer: _Sublayer, lower_face: _Face) -> tuple[_Face, _DownwardTransfer]:
+def _propagate_up(
+    s: Floats, sublayer: _Sublayer, lower_face: _BoundaryCondition
+) -> tuple[_BoundaryCondition, _DownwardTransfer]:
     """Propagate the boundary condition from the lower face of a sublayer to its upper face.
 
     s : frequencies [1/mm]
@@ -164,7 +166,7 @@ def _propagate_up(s: Floats, sublayer: _Sublayer, lower_face: _Face) -> tuple[_F
     source = layer.sigma_s_prime * sublayer.beam / D
     slope = source / (sigma_t + q)  # slope of the particular solution that is 0 at the upper face
     if np.all(np.isinf(d)):
-        return _Face(D * q, D * slope), _DownwardTransfer()
+        return _BoundaryCondition(D * q, D * slope), _DownwardTransfer()
     E = np.exp(-q * d)
     gap = np.abs(sigma_t - q)
     near = np.where(gap * d < 1e-8, d, -np.expm1(-gap * d) / np.where(gap > 0.0, gap, 1.0))
@@ -174,7 +176,9 @@ def _propagate_up(s: Floats, sublayer: _Sublayer, lower_face: _Face) -> tuple[_F
     W = lower_face.W + sublayer.point  # the flux jumps at a source on the face
     beta = (W - lower_face.Z * lower - D * lower_slope) / (D * q + lower_face.Z)
     common = 1.0 / (1.0 + E**2 * rho)
-    face = _Face(D * q * (1.0 - E**2 * rho) * common, 2.0 * D * q * beta * E * common + D * slope)
+    face = _BoundaryCondition(
+        D * q * (1.0 - E**2 * rho) * common, 2.0 * D * q * beta * E * common + D * slope
+    )
     # phi at the lower face is a E + b + P, with a = (phi0 - beta E) common and b = a E rho + beta.
     return face, _DownwardTransfer(E, rho, common, beta, lower)
 

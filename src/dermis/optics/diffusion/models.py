@@ -39,7 +39,7 @@ MODEL_SOURCES: dict[DiffusionModel, tuple[str, ...]] = {
     "layered-point": ("Kienle1998", "Haskell1994"),
 }
 _MIN_ACCURATE_DIPOLE_ALBEDO = 0.9  # reduced albedo below which the error of the dipole exceeds 10 %
-_REPORTED_NEGATIVE_LIGHT_RATIO = (
+_MIN_REPORTED_NEGATIVE_LIGHT_RATIO = (
     0.005  # ratio of negative light to total reflectance above which a warning is given
 )
 
@@ -181,7 +181,7 @@ def _result_warnings(total_reflectance: Floats, ring_energy: Floats) -> Sequence
         warnings.append(f"a total reflectance is negative: {np.round(total_reflectance, 4).tolist()}")
     size = np.maximum(np.abs(total_reflectance), SMALLEST_FLOAT)
     negative = float((-np.minimum(ring_energy, 0.0).sum(axis=0) / size).max())
-    if negative > _REPORTED_NEGATIVE_LIGHT_RATIO:
+    if negative > _MIN_REPORTED_NEGATIVE_LIGHT_RATIO:
         warnings.append(
             f"R(r) is negative at some radii, {negative:.1%} of a channel's total: layers too thin for the "
             "model, or colours outside Rec. 709. No sum of Gaussians fits it there"

@@ -159,17 +159,17 @@ class StackResponse:
     R_below: Floats
     T_up: Floats
 
-    def placed_over(self, lower: StackResponse) -> StackResponse:
+    def placed_over(self, lower_stack: StackResponse) -> StackResponse:
         """Return the combined response of this stack on top of another stack.
 
         Source: [DonnerJensen2005] section 3.3, after Kubelka's addition of layers.
         """
-        between = 1.0 / (1.0 - self.R_below * lower.R_above)
+        between = 1.0 / (1.0 - self.R_below * lower_stack.R_above)
         return StackResponse(
-            self.R_above + self.T_down * lower.R_above * between * self.T_up,
-            self.T_down * between * lower.T_down,
-            lower.R_below + lower.T_up * self.R_below * between * lower.T_down,
-            lower.T_up * between * self.T_up,
+            self.R_above + self.T_down * lower_stack.R_above * between * self.T_up,
+            self.T_down * between * lower_stack.T_down,
+            lower_stack.R_below + lower_stack.T_up * self.R_below * between * lower_stack.T_down,
+            lower_stack.T_up * between * self.T_up,
         )
 
 

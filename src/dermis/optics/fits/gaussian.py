@@ -230,13 +230,15 @@ def shared_gaussians(
     first = profiles[0].variance_mm2
     if all(np.array_equal(first, one.variance_mm2) for one in profiles):
         return tuple(profiles)
-    fitted = _fit_shared(tuple(map(_hashable_sum, profiles)), gaussian_count)
+    fitted = _fit_shared_variances(tuple(map(_hashable_sum, profiles)), gaussian_count)
     pairs = zip(fitted, profiles, strict=True)
     return tuple(replace(fit, from_photons=profile.from_photons) for fit, profile in pairs)
 
 
 @lru_cache(_MAX_CACHED_FITS)
-def _fit_shared(hashable_sums: tuple[_HashableSum, ...], gaussian_count: int) -> tuple[GaussianSum, ...]:
+def _fit_shared_variances(
+    hashable_sums: tuple[_HashableSum, ...], gaussian_count: int
+) -> tuple[GaussianSum, ...]:
     profiles = [
         GaussianSum(name, np.frombuffer(variance), np.frombuffer(weight).reshape(-1, channels))
         for name, variance, weight, channels in hashable_sums

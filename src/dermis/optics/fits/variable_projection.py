@@ -40,7 +40,7 @@ class WeightedFit(NamedTuple):
 
 
 def minimise(
-    design: DesignFunction,
+    design_function: DesignFunction,
     samples: Floats,
     log_variance: Floats,
     log_variance_bounds: tuple[float, float],
@@ -48,19 +48,21 @@ def minimise(
 ) -> WeightedFit:
     """Return the fit at a local minimum of the squared residuals, found by descent from given variances.
 
-    design : function from k variances to the samples (n, k) of unit Gaussians, and to the derivatives (n, k)
-        of these samples with respect to the logarithms of the variances
+    design_function : function from k variances to the samples (n, k) of unit Gaussians, and to the
+        derivatives (n, k) of these samples with respect to the logarithms of the variances
     samples : (n, c) data to fit
     log_variance : (k,) logarithms of the variances from which the descent starts
     log_variance_bounds : smallest and largest logarithm of a variance
     cost_tolerance : relative decrease of the cost below which the descent stops
     """
-    fit = _optimal_weights(design, samples, log_variance)
+    fit = _optimal_weights(design_function, samples, log_variance)
     damping, previous = 1e-2, None
     for _ in range(_MAX_STEP_COUNT):
         step = _marquardt_step(fit, damping)
         update = step if previous is None else _anderson_step(fit.log_variance, step, *previous)
-        trial = _optimal_weights(design, samples, np.clip(fit.log_variance + update, *log_variance_bounds))
+        trial = _optimal_weights(
+            design_function, samples, np.clip(fit.log_variance + update, *log_variance_bounds)
+        )
         if trial.cost < fit.cost:
             converged = fit.cost - trial.cost < cost_tolerance * fit.cost
             previous = fit.log_variance, step
@@ -98,9 +100,9 @@ def _anderson_step(
     return np.asarray(np.clip(extrapolated, -_MAX_LOG_VARIANCE_STEP, _MAX_LOG_VARIANCE_STEP))
 
 
-def _optimal_weights(design: DesignFunction, samples: Floats, log_variance: Floats) -> WeightedFit:
+def _optimal_weights(design_function: DesignFunction, samples: Floats, log_variance: Floats) -> WeightedFit:
     """Return the fit for given variances, with optimal non-negative weights, cost and derivatives."""
-    columns, slopes = design(np.exp(log_variance))
+    columns, slopes = design_function(np.exp(log_variance))
     k = len(log_variance)
     size = np.linalg.norm(columns, axis=0)
     # One QR factorisation reduces the problem of all channels to the space of these few columns.

@@ -17,7 +17,7 @@ from dermis.optics.pigments.spectra import (
     ScatteringLaw,
     baseline_absorption,
     blood_absorption,
-    donner_jensen_2006,
+    donner_jensen_scattering,
     melanosome_absorption,
     visible_wavelengths,
 )
@@ -38,7 +38,7 @@ def spectral_medium(
     structure: Structure,
     parameters: SkinParameters,
     wavelength_nm: Floats = WAVELENGTHS_NM,
-    scattering: ScatteringLaw = donner_jensen_2006,
+    scattering: ScatteringLaw = donner_jensen_scattering,
 ) -> Medium:
     """Return the medium of a skin with given pigments, with one channel for each wavelength.
 
@@ -157,7 +157,7 @@ def dj2006_layers(parameters: SkinParameters, pigment_fractions: Floats) -> tupl
     pigment_fractions : (n,) fractions, used both as melanin fractions of the epidermis and as blood fractions
         of the dermis [-]
     """
-    column, scattering = pigment_fractions[:, None], donner_jensen_2006(WAVELENGTHS_NM)
+    column, scattering = pigment_fractions[:, None], donner_jensen_scattering(WAVELENGTHS_NM)
     epidermal = _epidermal_absorption(parameters, column, WAVELENGTHS_NM)
     dermal = _dermal_absorption(parameters, column, WAVELENGTHS_NM)
     ratios = 1.0, DERMIS_SCATTERING_RATIO

@@ -52,9 +52,9 @@ class FaceRenderer:
         point : unknowns of the fit, of which only the skin parameters are used
         unclipped_pixels : (h, w) fraction of each pixel of the photograph in which no channel is clipped
         """
-        scene = with_skin(self._with_lights(()), point)
+        scene = with_skin(self._scene_with_lights(()), point)
         scene = replace(scene, lights=sun_lights(np.array([[0.0, 0.0, 1.0]]), [1.0], np.ones(3)))
-        rendered = self._draw(scene, "mask", ("label", "normal_camera", "alpha"))
+        rendered = self._draw_frame(scene, "mask", ("label", "normal_camera", "alpha"))
         label, alpha = rendered.output("label"), rendered.output("alpha")
         view_cosine = np.abs(rendered.output("normal_camera")[..., 2])
         skin = np.isin(label, _SKIN_LABELS) & (alpha > _FULL_COVERAGE) & (view_cosine > _MIN_VIEW_COSINE)
@@ -73,7 +73,7 @@ class FaceRenderer:
         """Return the diffuse radiance (9 + k, p, 3) and the specular radiance under each light alone."""
         scenes = []
         for scene, view in self._single_light_scenes(point):
-            rendered = self._draw(scene, view, ("diffuse", "specular"))
+            rendered = self._draw_frame(scene, view, ("diffuse", "specular"))
             scenes.append([rendered.output(name)[self.mask] for name in ("diffuse", "specular")])
         both = np.asarray(scenes, np.float64)
         return both[:, 0], both[:, 1]
@@ -96,15 +96,15 @@ class FaceRenderer:
         radiance = ambient_panorama(light_strengths[:AMBIENT_LOBE_COUNT])
         lights = [one for one in suns if max(one.irradiance) > 0.0]
         ambient = self._panorama_environment(panorama_name, radiance) if radiance.max() > 0.0 else None
-        return with_skin(replace(self._with_lights(lights), environment=ambient), point)
+        return with_skin(replace(self._scene_with_lights(lights), environment=ambient), point)
 
     def render_picture(self, scene: Scene) -> Floats:
         """Render a scene; return the linear radiance of all pixels (h, w, 3)."""
-        return np.asarray(self._draw(scene, "together").linear(), np.float64)
+        return np.asarray(self._draw_frame(scene, "together").linear(), np.float64)
 
     def _single_light_scenes(self, point: FitPoint) -> list[tuple[Scene, str]]:
         """Return for each light a scene with this light alone, and the name for caching the scene's frame."""
-        base = with_skin(self._with_lights(()), point)
+        base = with_skin(self._scene_with_lights(()), point)
         scenes = []
         for k in range(AMBIENT_LOBE_COUNT):
             path = self.folder / f"lobe_{k}.exr"
@@ -123,13 +123,13 @@ class FaceRenderer:
             file.write_bytes(encode_exr(np.repeat(radiance[..., None], 3, axis=2).astype(np.float32)))
         return Environment(name=str(path))
 
-    def _with_lights(self, lights: Sequence[object]) -> Scene:
+    def _scene_with_lights(self, lights: Sequence[object]) -> Scene:
         return replace(self.scene, lights=tuple(lights), environment=None)  # type: ignore[arg-type]
 
     def _masked_radiance(self, scene: Scene, view_name: str) -> Floats:
-        return np.asarray(self._draw(scene, view_name).linear()[self.mask], np.float64)
+        return np.asarray(self._draw_frame(scene, view_name).linear()[self.mask], np.float64)
 
-    def _draw(self, scene: Scene, view_name: str, outputs: tuple[str, ...] = ()) -> RenderedFrame:
+    def _draw_frame(self, scene: Scene, view_name: str, outputs: tuple[str, ...] = ()) -> RenderedFrame:
         self.frame_count += 1
         return self.renderer.draw(scene, self.settings, timed=False, view=view_name, outputs=outputs)
 

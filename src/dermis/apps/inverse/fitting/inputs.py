@@ -68,7 +68,7 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
     space = SRGB
     if isinstance(source, str | Path | EmbeddedPicture):
         name = source
-        image, space = read_colours(source, upright=True)
+        image, space = read_colours(source, apply_exif_orientation=True)
     else:
         image = np.asarray(source)
     if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or min(image.shape[:2]) < _MIN_PHOTO_SIDE:
@@ -141,16 +141,16 @@ def fit_subject(head_or_scene: object, camera: object = None) -> FitSubject:
     else:
         scene = head_or_scene if isinstance(head_or_scene, Scene) else Scene(as_head(head_or_scene))
     if camera is not None:
-        scene = replace(scene, camera=_as_camera(camera, scene.head))  # type: ignore[arg-type]
-    person = head_or_scene if isinstance(head_or_scene, Human) else _painted_person(scene.head)
+        scene = replace(scene, camera=_resolve_camera(camera, scene.head))  # type: ignore[arg-type]
+    person = head_or_scene if isinstance(head_or_scene, Human) else _person_of_head(scene.head)
     name = scene.head.name
     if not table and (person is not None or not is_person_name(name)):
         table = {"name": str(Path(name).resolve()) if Path(name).is_file() else name}
     known = () if scene.skin.pigments is None else tuple(scene.skin.pigments.overrides())
-    return FitSubject(_without_light(scene), person, table, known)
+    return FitSubject(_scene_without_lights(scene), person, table, known)
 
 
-def _as_camera(camera_source: object, head: Head) -> Camera | Callable[[Head], Camera]:
+def _resolve_camera(camera_source: object, head: Head) -> Camera | Callable[[Head], Camera]:
     if isinstance(camera_source, str | os.PathLike):
         return load_camera(str(camera_source), head)
     if not (isinstance(camera_source, Camera) or callable(camera_source)):
@@ -159,7 +159,7 @@ def _as_camera(camera_source: object, head: Head) -> Camera | Callable[[Head], C
     return camera_source
 
 
-def _painted_person(head: Head) -> Human | None:
+def _person_of_head(head: Head) -> Human | None:
     """Return the parametric person from which a head and its skin maps were made, or None for other heads."""
     maps = head.maps
     if not isinstance(maps, PaintedMaps) or maps.colour is not None or not is_person_name(head.name):
@@ -170,7 +170,7 @@ def _painted_person(head: Head) -> Human | None:
     return person if same else None
 
 
-def _without_light(scene: Scene) -> Scene:
+def _scene_without_lights(scene: Scene) -> Scene:
     """Return the scene without lights, with values for the pigments that a fit keeps fixed.
 
     The value of each of these pigments is the value that the scene states. If the scene states none, it is

@@ -165,7 +165,7 @@ def _landmarks_from_table(path: str | Path, lines: list[str], photo_size: tuple[
     if len(rows) == 1:  # all coordinates in one line
         rows = [rows[0][k : k + 2] for k in range(0, len(rows[0]), 2)]
     first = [row[0] for row in rows]
-    has_names = len(rows[0]) > 2 and (not all(map(_is_number, first)) or _are_consecutive(first))
+    has_names = len(rows[0]) > 2 and (not all(map(_is_number, first)) or _are_consecutive_numbers(first))
     start = 1 if has_names else 0
     if len(rows[0]) > start + 2:
         notify(f"{path}: of its {len(rows[0])} columns those from {start + 3} on are not used")
@@ -207,7 +207,7 @@ def _is_number(cell: str) -> bool:
         return False
 
 
-def _are_consecutive(cells: Sequence[str]) -> bool:
+def _are_consecutive_numbers(cells: Sequence[str]) -> bool:
     """Return whether the cells are 0, 1, 2 and so on, or 1, 2, 3 and so on."""
     return any(list(cells) == [str(k + start) for k in range(len(cells))] for start in (0, 1))
 

@@ -199,12 +199,12 @@ def _fit_camera_and_identity(
 
     prior_median = _prior_log_focal(photo_size)
 
-    def residuals(x: Floats) -> Floats:
-        positions = model.positions + np.einsum("u,unc->nc", x[7:], model.derivatives)
-        error = (_project_landmarks(x, positions, photo_size) - pixels) / (
+    def residuals(unknowns: Floats) -> Floats:
+        positions = model.positions + np.einsum("u,unc->nc", unknowns[7:], model.derivatives)
+        error = (_project_landmarks(unknowns, positions, photo_size) - pixels) / (
             _LANDMARK_SD_FRACTION * photo_size[1]
         )
-        return np.concatenate([error.ravel(), [(x[6] - prior_median) / _LOG_FOCAL_SD], x[7:]])
+        return np.concatenate([error.ravel(), [(unknowns[6] - prior_median) / _LOG_FOCAL_SD], unknowns[7:]])
 
     scale = np.concatenate([np.full(3, 0.1), (10.0, 10.0, 100.0), [0.1], np.ones(model.unknown_count)])
     return np.asarray(least_squares(residuals, start, x_scale=scale, loss="soft_l1").x, np.float64)

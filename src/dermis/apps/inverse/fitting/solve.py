@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.frames import FaceRenderer
-from dermis.apps.inverse.fitting.light_basis import AMBIENT_LOBE_COUNT, solve_strengths
+from dermis.apps.inverse.fitting.light_basis import AMBIENT_LOBE_COUNT, solve_light_strengths
 from dermis.apps.inverse.fitting.unknowns import (
     SKIN_UNKNOWNS,
     SUN_PRIOR_SD,
@@ -28,7 +28,7 @@ _NOISE_FLOOR_FRACTION = 0.03
 photograph's median; it limits the weight of dark pixels [-]."""
 ROBUST_LIMIT = 3.0
 """Number of standard deviations above which the weight of a residual decreases [Huber1964]."""
-NO_ASSUMED_SD: Mapping[str, float] = MappingProxyType({})
+NO_ADDITIONAL_SD: Mapping[str, float] = MappingProxyType({})
 _MAD_TO_SD = 1.4826
 _MAX_ITERATIONS = 8
 _STEP_TOLERANCE = 0.01
@@ -102,7 +102,7 @@ class FitProblem:
 
     def _best_light_state(self, point: FitPoint, basis: Floats, pixel_weight: Floats) -> FitState:
         A = (basis * pixel_weight).reshape(len(basis), -1).T
-        x = solve_strengths(A, (self.target * pixel_weight).ravel())
+        x = solve_light_strengths(A, (self.target * pixel_weight).ravel())
         residual = self.target - np.einsum("a,apc->pc", x, basis)
         prior = (self.prior_offsets(point) / self.prior_sd(2 * len(point.suns))) ** 2
         cost = float(((residual * pixel_weight) ** 2).sum()) + float(prior.sum())
@@ -173,7 +173,7 @@ def solve_fit(
     for iteration in range(_MAX_ITERATIONS):
         progress(iteration, _MAX_ITERATIONS)
         derivatives = problem.derivatives(state, f"light_{problem.frames.frame_count}")
-        improved, step, damping = _try_steps(problem, state, derivatives, damping)
+        improved, step, damping = _try_damped_steps(problem, state, derivatives, damping)
         if improved is None:
             return state, derivatives
         gain = 1.0 - improved.cost / state.cost
@@ -183,7 +183,7 @@ def solve_fit(
     return state, derivatives
 
 
-def _try_steps(
+def _try_damped_steps(
     problem: FitProblem, fit_state: FitState, derivatives: Floats, damping: float
 ) -> tuple[FitState | None, Floats, float]:
     """Try steps with increasing damping until one lowers the cost.
@@ -261,15 +261,15 @@ def fit_uncertainty(
     problem: FitProblem,
     fit_state: FitState,
     derivatives: Floats,
-    assumed_sd: Mapping[str, float] = NO_ASSUMED_SD,
+    sd_from_assumed_parameters: Mapping[str, float] = NO_ADDITIONAL_SD,
 ) -> Uncertainty:
     """Return the uncertainty of all unknowns.
 
     Residuals are taken as correlated within blocks of pixels, and as independent otherwise [White1980].
 
     derivatives : (p, 3, u) derivatives of the radiance with respect to the unknowns
-    assumed_sd : dictionary from pigment to the standard deviation of its logarithm that is due to assumed
-        parameters of the skin
+    sd_from_assumed_parameters : dictionary from pigment to the standard deviation of its logarithm that is
+        due to assumed parameters of the skin
     """
     sun_angles = 2 * len(fit_state.point.suns)
     suns = [f"sun {k + 1} {axis}" for k in range(sun_angles // 2) for axis in ("across", "along")]
@@ -283,7 +283,7 @@ def fit_uncertainty(
     sums = np.stack([np.bincount(block, column) for column in (J * r[:, None]).T], axis=-1)
     covariance = H @ (sums.T @ sums + np.diag(prior_sd**-2.0)) @ H
     systematic = np.array(
-        [np.hypot(SYSTEMATIC_SD.get(name, 0.0), assumed_sd.get(name, 0.0)) for name in names]
+        [np.hypot(SYSTEMATIC_SD.get(name, 0.0), sd_from_assumed_parameters.get(name, 0.0)) for name in names]
     )
     covariance += np.diag(systematic[:count] ** 2)
     sd = np.sqrt(np.diag(covariance))
@@ -314,8 +314,8 @@ def block_residual(problem: FitProblem, fit_state: FitState) -> float:
     return float(np.median(np.abs(residual[lit]) / target[lit]))
 
 
-def _pixel_blocks(frames: FaceRenderer) -> NDArray[np.int64]:
+def _pixel_blocks(face_renderer: FaceRenderer) -> NDArray[np.int64]:
     """Return for each masked pixel the index (p,) of the block of the picture that contains the pixel."""
-    rows, columns = np.nonzero(frames.mask)
-    side = max(1, max(frames.mask.shape) // _BLOCKS_PER_SIDE)
+    rows, columns = np.nonzero(face_renderer.mask)
+    side = max(1, max(face_renderer.mask.shape) // _BLOCKS_PER_SIDE)
     return np.asarray(rows // side * (_BLOCKS_PER_SIDE * 2) + columns // side, np.int64)

@@ -30,7 +30,7 @@ from dermis.optics.pigments.parameters import SkinParameters
 Pixels = NDArray[np.float32]
 ProgressCallback = Callable[[int, int], None]
 _SHADER_FOLDER = Path(__file__).parent
-_GUESS_GRID_SIDE = 96  # number of nodes along each side of the grid of initial guesses
+_INITIAL_GUESS_GRID_SIDE = 96  # number of nodes along each side of the grid of initial guesses
 _MAX_STEPS = 8
 _MAX_STRIP_TEXELS = 1 << 22  # texels of a strip, of 16 bytes each in five textures
 _TEXTURE_FORMAT = "rgba32float"
@@ -48,10 +48,15 @@ class Unmixer:
         self.device, self.model, self.noise = device, model, relative_noise
         self._table = _table_texture(device, model)
         self._outputs: tuple[Texture, Texture] | None = None
-        self._guesses = device.storage_buffer(8 * _GUESS_GRID_SIDE**2, "initial guesses")
+        self._guesses = device.storage_buffer(8 * _INITIAL_GUESS_GRID_SIDE**2, "initial guesses")
         shader = _unmixing_program(device, "unmix_start", model)
         frame = CommandList(device, timed=False)
-        frame.compute("start", shader, self._shader_bindings(shader, 0), (_GUESS_GRID_SIDE, _GUESS_GRID_SIDE))
+        frame.compute(
+            "start",
+            shader,
+            self._shader_bindings(shader, 0),
+            (_INITIAL_GUESS_GRID_SIDE, _INITIAL_GUESS_GRID_SIDE),
+        )
         frame.submit()
 
     def unmix(
@@ -161,7 +166,7 @@ def _unmixing_program(device: Device, shader_name: str, model: SkinModel) -> Com
         "NODES": nodes,
         "THIRDS": thirds,
         "SHADE": int(model.third == "shade"),
-        "SIDE": _GUESS_GRID_SIDE,
+        "SIDE": _INITIAL_GUESS_GRID_SIDE,
     }
     path = _SHADER_FOLDER / f"{shader_name}.wgsl"
     constants = used_constants(path, (), tuple(numbers.items()))

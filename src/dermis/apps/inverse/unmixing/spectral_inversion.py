@@ -164,20 +164,20 @@ def invert_spectra(
     x = np.stack([np.broadcast_to(column, len(spectra)) for column in columns], axis=-1)
     low, high = (np.array([one.coordinate(getattr(one, end)) for one in unknowns]) for end in ("low", "high"))
 
-    def values_at(point: Floats) -> dict[str, Floats]:
-        return {one.name: one.parameter_values(point[:, i]) for i, one in enumerate(unknowns)}
+    def parameter_values_at(coordinates: Floats) -> dict[str, Floats]:
+        return {one.name: one.parameter_values(coordinates[:, i]) for i, one in enumerate(unknowns)}
 
     weights = rgb_weights()
     target = lab(spectra @ weights.T)
     metric = colour_metric(target)
 
-    def residual(point: Floats) -> Floats:
-        reflectance = model(values_at(point))
+    def residual(coordinates: Floats) -> Floats:
+        reflectance = model(parameter_values_at(coordinates))
         if criterion == "spectrum":
             return np.asarray(reflectance - spectra)
         return np.asarray(np.einsum("nij,nj->ni", metric, lab(reflectance @ weights.T) - target))
 
-    found = values_at(least_squares(residual, x, low, high, max_steps))
+    found = parameter_values_at(least_squares(residual, x, low, high, max_steps))
     return SpectralFit(found, spectra, model(found))
 
 

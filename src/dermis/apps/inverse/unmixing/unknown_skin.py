@@ -42,7 +42,7 @@ def unknown_skin_sd(
     """
     if set(FIXED_PARAMETERS) <= set(known_parameters):
         return {"melanin": 0.0, "blood": 0.0}
-    found, error = _unmixed_sample(skin, tuple(sorted(known_parameters)), is_oxygen_fitted)
+    found, error = _unmix_prior_sample(skin, tuple(sorted(known_parameters)), is_oxygen_fitted)
     target = np.log(np.maximum([melanin, blood], 1e-4))
     distance = ((found - target) ** 2).sum(axis=1)
     # Relative to the nearest sample, so that results outside the prior have weights too.
@@ -52,7 +52,7 @@ def unknown_skin_sd(
 
 
 @lru_cache(maxsize=8)
-def _unmixed_sample(
+def _unmix_prior_sample(
     skin: SkinParameters, known_parameters: tuple[str, ...], is_oxygen_fitted: bool
 ) -> tuple[Floats, Floats]:
     """Unmix skins sampled from the prior; return estimates (n, 2) and their errors (n, 2).

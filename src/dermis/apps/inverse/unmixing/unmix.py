@@ -33,7 +33,7 @@ DEFAULT_NOISE = 0.01
 MAX_SKIN_DELTA_E = 5.0
 """Largest CIEDE2000 difference from the model's nearest colour at which a texel counts as skin."""
 _REPORTED_DELTA_E_LIMITS = 1.0, 2.0, MAX_SKIN_DELTA_E
-_SUMMARY_SIDE = 512  # largest number of texels along the longer side that the summary reads
+_SUMMARY_SIDE_TEXELS = 512  # largest number of texels along the longer side that the summary reads
 _RELATIVE_NOISE_RANGE = 1e-4, 0.5
 _MAX_BACKGROUND_CHANNEL = 1e-3  # largest channel of texels between the charts of a map
 _MAX_LOG_RESIDUAL = 0.15  # largest logarithm of the residual of a skin texel
@@ -153,7 +153,7 @@ class UnmixResult:
         as skin. The entry "sd" is the standard deviation due to noise, and "skin_sd" that due to the values
         assumed for oxygen and epidermal thickness, which vary among people.
         """
-        step = max(1, max(self.melanin.shape) // _SUMMARY_SIDE)
+        step = max(1, max(self.melanin.shape) // _SUMMARY_SIDE_TEXELS)
         maps = {name: one[::step, ::step].astype(np.float64) for name, one in self.maps().items()}
         fractions = {name: maps[name].ravel() for name in ("melanin", "blood", "oxygen") if name in maps}
         model_colours = self.model.colours(fractions["melanin"], fractions["blood"], fractions.get("oxygen"))
@@ -188,9 +188,9 @@ class UnmixResult:
         Raises DermisError when `dermis.gpu.open_device` does.
         """
         lazy_device = self.devices.setdefault(adapter, LazyDevice(adapter))
-        return lazy_device.run(lambda device: self._recoloured(device, change))
+        return lazy_device.run(lambda device: self._recolour_on_device(device, change))
 
-    def _recoloured(self, device: Device, change: PigmentChange) -> Pixels:
+    def _recolour_on_device(self, device: Device, change: PigmentChange) -> Pixels:
         fixed = self.third is None or change.oxygen is not None
         target = skin_model(change.applied_to(self.skin), "none") if fixed else self.model
         prior_mean = np.broadcast_to(np.float32(target.prior_mean), self.melanin.shape)
@@ -275,7 +275,7 @@ def unmix(
     if third == "shade":
         refuse("third", '"none" or "oxygen"', "got 'shade'", "Set shading=True instead")
     if isinstance(picture, str | Path | EmbeddedPicture):
-        colours = colour_map(picture, upright=True)
+        colours = colour_map(picture, apply_exif_orientation=True)
     else:
         colours = _checked_colours(picture)
 

@@ -26,15 +26,15 @@ Floats = NDArray[np.float32]
 
 COAT_TRANSMITTANCE = 0.98
 """Fraction of light that the coat transmits, see `coat_bsdf`; the medium compensates for it."""
-COAT_INDEX = SKIN_ETA
+COAT_IOR = SKIN_ETA
 ALBEDO_GRID_SIDE_VOXELS = 96
 """Number of cells along the longest side of the albedo grid."""
 _HALF_SIDE_PER_FRAME_HEIGHT, _MIN_HALF_SIDE_MM = 0.75, 25.0
 """Half the side of the albedo grid, relative to the height that the picture shows, and its lower limit."""
 _COLOURED_DEPTH_MM = 3.0  # depth to which the medium has the colour of the surface
 _SAMPLES_PER_VOXEL = 3.0  # samples per area of one voxel face
-_MAX_COLOUR = 0.97
-_MIN_ABSORPTION_ROOT = 0.02  # smallest tabulated square root of 1 - albedo
+_MAX_SKIN_REFLECTANCE = 0.97
+_MIN_ROOT_ABSORPTION = 0.02  # smallest tabulated square root of 1 - albedo
 _DISTANCE_PHOTON_COUNT, _TABLE_PHOTON_COUNT = 40_000, 40_000
 _HALF_SPACE_TABLE_ALBEDO_COUNT = 48
 _STACK_TABLE_ALBEDO_COUNT = 20
@@ -107,7 +107,7 @@ def deepest_albedo(medium: Medium, colour: ArrayLike) -> Doubles:
         )
         for one in medium.layers
     )
-    roots = np.linspace(1.0, _MIN_ABSORPTION_ROOT, _STACK_TABLE_ALBEDO_COUNT)
+    roots = np.linspace(1.0, _MIN_ROOT_ABSORPTION, _STACK_TABLE_ALBEDO_COUNT)
     found = [
         np.interp(wanted[..., c], _reflectance_table(tuple(one[c] for one in layers), medium.eta), roots)
         for c in range(3)
@@ -124,7 +124,7 @@ def _reflectance_table(layers: tuple[tuple[float, float, float], ...], eta: floa
     above = [ScatteringLayer(a, s, thickness, eta=eta) for a, s, thickness in layers[:-1]]
     extinction = layers[-1][0] + layers[-1][1]
     totals = []
-    for root in np.linspace(1.0, _MIN_ABSORPTION_ROOT, _STACK_TABLE_ALBEDO_COUNT):
+    for root in np.linspace(1.0, _MIN_ROOT_ABSORPTION, _STACK_TABLE_ALBEDO_COUNT):
         last = ScatteringLayer(root**2 * extinction, (1.0 - root**2) * extinction, eta=eta)
         totals.append(trace_slab([*above, last], _TABLE_PHOTON_COUNT).relative_to_entering.total_reflectance)
     return np.maximum.accumulate(totals)
@@ -133,7 +133,7 @@ def _reflectance_table(layers: tuple[tuple[float, float, float], ...], eta: floa
 def _half_space_albedo(colour: ArrayLike, eta: float) -> Doubles:
     """Return single-scattering albedos of half-spaces that have given colours [-]."""
     totals, roots = _half_space_reflectance_table(eta)
-    wanted = np.clip(np.asarray(colour, np.float64), 0.0, _MAX_COLOUR)
+    wanted = np.clip(np.asarray(colour, np.float64), 0.0, _MAX_SKIN_REFLECTANCE)
     return np.asarray(1.0 - np.interp(wanted, totals, roots) ** 2)
 
 
@@ -143,7 +143,7 @@ def _half_space_reflectance_table(eta: float) -> tuple[Doubles, Doubles]:
 
     The reflectances are exact for an index of refraction of 1, and counted by Monte Carlo for `SKIN_ETA`.
     """
-    roots = np.linspace(1.0, _MIN_ABSORPTION_ROOT, _HALF_SPACE_TABLE_ALBEDO_COUNT)
+    roots = np.linspace(1.0, _MIN_ROOT_ABSORPTION, _HALF_SPACE_TABLE_ALBEDO_COUNT)
     if eta == 1.0:
         return np.array([float(directional_albedo(1.0, float(1.0 - root**2))) for root in roots]), roots
     if eta != SKIN_ETA:

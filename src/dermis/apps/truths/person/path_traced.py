@@ -109,7 +109,7 @@ def person_scene(
     else:
         media = skin_media(mi, person, scene.camera, medium)
         shapes, notes = skin_shapes(mi, person, medium, media)
-    shapes |= eye_shapes(mi, person) | _opaque_parts(mi, person)
+    shapes |= eye_shapes(mi, person) | _opaque_shapes(mi, person)
     for number, hairs in enumerate(person.hairs):
         shapes |= hair_shapes(mi, hairs, f"hairs_{number}")
     integrator = {"type": "volpathmis", "rr_depth": RUSSIAN_ROULETTE_DEPTH, "hide_emitters": True}
@@ -118,7 +118,7 @@ def person_scene(
     return mitsuba_scene(mi, scene, integrator, shapes, picture_size), notes
 
 
-def _opaque_parts(mi: Mitsuba, person: Person) -> SceneDict:
+def _opaque_shapes(mi: Mitsuba, person: Person) -> SceneDict:
     """Return the Mitsuba shapes of all materials other than skin and eyes.
 
     Teeth and tongue are coated with saliva; all other materials are diffuse.

@@ -17,7 +17,7 @@ from dermis.apps.truths.mitsuba_scene import (
     mesh_shape,
 )
 from dermis.apps.truths.mitsuba_solid import ClosedSurface, closed_skin, offset_inwards
-from dermis.apps.truths.person.medium import COAT_INDEX, COAT_TRANSMITTANCE
+from dermis.apps.truths.person.medium import COAT_IOR, COAT_TRANSMITTANCE
 from dermis.apps.truths.person.person import HairFibres, Person, SkinTextures
 from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, SceneDict, mitsuba_rgb
 from dermis.mesh.eyeball import LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_plane_mm, profile_mm
@@ -60,7 +60,7 @@ def _reflection_lobes_bsdf(mi: Mitsuba, textures: SkinTextures, path_fraction: f
     lobe = {
         "distribution": "beckmann",
         "type": "roughconductor",
-        "eta": COAT_INDEX,
+        "eta": COAT_IOR,
         "k": 0.0,  # with a real index it reflects like a dielectric
         "specular_reflectance": mitsuba_texture(mi, textures.strength / path_fraction),
     }
@@ -80,7 +80,7 @@ def refracting_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject
     transmitted does not depend on the specular strength. Lights must have a size, because paths cannot
     connect to a point light through this boundary.
     """
-    indices = {"int_ior": COAT_INDEX, "ext_ior": 1.0}
+    indices = {"int_ior": COAT_IOR, "ext_ior": 1.0}
     # A blend with a perfectly smooth dielectric would be up to 20 % too bright in Mitsuba 3.9.
     below = {"type": "roughdielectric", "distribution": "beckmann", "alpha": _NEARLY_SMOOTH_ROUGHNESS}
     below |= {"specular_reflectance": 0.0, "specular_transmittance": 1.0 / (1.0 - _REFLECTION_PATH_FRACTION)}
@@ -94,7 +94,7 @@ def refracting_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject
     return mi.load_dict(outside), mi.load_dict({"type": "dielectric"} | indices)
 
 
-def painted_diffuse_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
+def lambertian_skin_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
     """Return the BSDF of skin with two specular lobes over a Lambertian base with the colour map."""
     fraction = 1.0 - COAT_TRANSMITTANCE
     base = {
@@ -106,13 +106,13 @@ def painted_diffuse_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
 
 
 def diffuse_skin_shapes(mi: Mitsuba, person: Person) -> SceneDict:
-    """Return the skin as an open surface with the BSDF `painted_diffuse_bsdf`, without a medium inside."""
+    """Return the skin as an open surface with the BSDF `lambertian_skin_bsdf`, without a medium inside."""
     triangles = person.mesh.triangles[_skin_mask(person)]
     vertices, corners = np.unique(triangles, return_inverse=True)
     positions, normals, uv = (
         values[vertices] for values in (person.mesh.positions, person.mesh.normals, person.mesh.uv)
     )
-    bsdf = painted_diffuse_bsdf(mi, person.textures)
+    bsdf = lambertian_skin_bsdf(mi, person.textures)
     return {"skin": mesh_shape(mi, positions, corners.reshape(-1, 3), normals, uv, bsdf=bsdf)}
 
 
@@ -135,10 +135,10 @@ def skin_shapes(
     lower, _ = offset_inwards(solid, np.zeros(len(gap)), person.name)
     textures, refracts = person.textures, medium.eta != 1.0
     outer, inner = refracting_bsdfs(mi, textures) if refracts else (coat_bsdf(mi, textures), None)
-    shapes = {"skin": _painted_mesh(mi, person, upper, outer, media[0])}
+    shapes = {"skin": _textured_skin_mesh(mi, person, upper, outer, media[0])}
     fans = solid.triangles[int(_skin_mask(person).sum()) :]
     if refracts:
-        shapes["skin_lower"] = _painted_mesh(mi, person, lower, inner, media[0])
+        shapes["skin_lower"] = _textured_skin_mesh(mi, person, lower, inner, media[0])
         if len(fans):
             shapes["openings_lower"] = interface_mesh(mi, replace(lower, triangles=fans), top)
     else:
@@ -154,7 +154,7 @@ def _skin_mask(person: Person) -> NDArray[np.bool_]:
     return np.asarray(np.array([material.kind == "skin" for material in mesh.materials])[mesh.material])
 
 
-def _painted_mesh(
+def _textured_skin_mesh(
     mi: Mitsuba, person: Person, surface: ClosedSurface, bsdf: MitsubaObject, medium: MitsubaObject
 ) -> MitsubaObject:
     """Return the skin as a Mitsuba mesh at the positions of a closed surface, with the head's normals and uv.
@@ -175,7 +175,7 @@ def _painted_mesh(
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-CORNEA_INDEX = 1.336
+CORNEA_IOR = 1.336
 """Index of refraction of the aqueous humour, used behind the cornea's front surface [-]."""
 TEAR_ROUGHNESS = 0.06
 """Roughness of the tear film over the white of the eye [-]."""
@@ -261,10 +261,10 @@ def eye_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject, Mitsu
         "type": "roughplastic",
         "distribution": "beckmann",
         "alpha": TEAR_ROUGHNESS,
-        "int_ior": CORNEA_INDEX,
+        "int_ior": CORNEA_IOR,
         "diffuse_reflectance": mitsuba_texture(mi, textures.white),
     }
-    clear = {"type": "dielectric", "int_ior": CORNEA_INDEX, "ext_ior": 1.0}
+    clear = {"type": "dielectric", "int_ior": CORNEA_IOR, "ext_ior": 1.0}
     weight = mitsuba_texture(mi, cornea_weight_map())
     eyeball = {"type": "blendbsdf", "weight": weight, "white": white, "clear": clear}
     iris = {"type": "diffuse", "reflectance": mitsuba_texture(mi, textures.iris)}
@@ -291,7 +291,7 @@ def _transform_points(matrix: Doubles, positions: Doubles) -> Doubles:
     return np.asarray(positions @ matrix[:3, :3].T + matrix[:3, 3])
 
 
-KERATIN_INDEX = 1.55
+KERATIN_IOR = 1.55
 """Index of refraction of keratin [Marschner2003]."""
 CUTICLE_TILT_DEGREES = 2.0
 """Tilt of the cuticle scales."""
@@ -320,7 +320,7 @@ def hair_shapes(mi: Mitsuba, hairs: HairFibres, shape_name: str = "hairs") -> Sc
                 "longitudinal_roughness": LONGITUDINAL_ROUGHNESS,
                 "azimuthal_roughness": AZIMUTHAL_ROUGHNESS,
                 "scale_tilt": CUTICLE_TILT_DEGREES,
-                "int_ior": KERATIN_INDEX,
+                "int_ior": KERATIN_IOR,
             }
             curves = {"type": "bsplinecurve", "filename": str(file), "bsdf": fibre}
             shapes[f"{shape_name}_{k}"] = mi.load_dict(curves)

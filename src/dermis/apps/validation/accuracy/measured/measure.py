@@ -40,7 +40,7 @@ from dermis.optics.pigments.spectra import (
     WAVELENGTHS_NM,
     baseline_absorption,
     blood_absorption,
-    jacques_1998,
+    jacques_scattering,
     melanosome_absorption,
     rgb_weights,
 )
@@ -315,7 +315,7 @@ def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObjec
 
 def _jacques_model(parameter_values: ParameterValues) -> Floats:
     """Return the reflectance (n, 31) of skins with the baseline and scattering of [Jacques1998]."""
-    bloodless, sigma_s_prime = baseline_absorption(WAVELENGTHS_NM), jacques_1998(WAVELENGTHS_NM)
+    bloodless, sigma_s_prime = baseline_absorption(WAVELENGTHS_NM), jacques_scattering(WAVELENGTHS_NM)
 
     def parameter_column(name: str, default: float) -> Floats:
         return np.asarray(parameter_values.get(name, np.float64(default)))[..., None]
