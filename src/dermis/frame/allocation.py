@@ -49,7 +49,7 @@ LayoutAtlas = tuple[Atlas, AtlasTextures]
 
 
 def make_resources(memo: Memo, device: Device, request: FrameRequest, technique: Technique) -> Resources:
-    """Return the textures, buffers and records that a request needs, from the cache if nothing has changed.
+    """Return the textures, buffers and records that a frame needs, from a cache if they are still valid.
 
     Raises DermisError for sizes that exceed the limits of the device.
     """
@@ -142,7 +142,7 @@ def _shared_bindings(
     shape_resources: shape.Resources,
     strands: hair.Resources | None,
 ) -> MutableBindings:
-    """Return the shader resources that all atlas layouts share, apart from maps and lights."""
+    """Return the shader resources that all atlas layouts share, apart from maps and lights of the scene."""
     skin, program = request.skin, shade_program(device)
     environment, total = request.environment, request.split.total
     curvature, light_count = shape_resources.curvature, sum(request.light_part_counts)
@@ -193,7 +193,7 @@ def _make_layout(
     shared_bindings: Bindings,
     layout_index: int,
 ) -> AtlasLayout:
-    """Return the resources of one atlas layout; each frame adds the uniform record of its lights.
+    """Return the resources of one atlas layout, except the record of the lights, which each frame adds.
 
     layout_atlas : the atlas, and its textures on the device
     shared_bindings : result of `_shared_bindings`, to which the maps of the head have been added

@@ -25,7 +25,7 @@ from dermis.gpu import Graph, Texture
 def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
     """Declare all passes of a frame: pose, shadows, light in the skin, shading, post-processing and outputs.
 
-    The graph runs only stale passes.
+    The graph runs only the passes whose inputs have changed.
     """
     resources, bindings, view = inputs.resources, inputs.bindings, inputs.view
     shape.draw(graph, resources.shape.shape, inputs.motion)
@@ -61,7 +61,7 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
 
 
 def _stage_inputs(graph: Graph, inputs: FrameInputs, technique: Technique, scattered: Texture) -> StageInputs:
-    """Collect the inputs of the passes that compute outputs: shading, geometry, picture and technique."""
+    """Collect the inputs of the shader stages that compute outputs."""
     resources, diffused = inputs.resources, None
     layers = technique.subsurface_layers(resources.output_layers)
     if layers is not None:

@@ -34,7 +34,7 @@ def check_formats(output_names: Iterable[str], file_format: Format) -> None:
 
 
 def output_path(picture_path: Path, output_name: str, file_format: Format) -> Path:
-    """Return the path of an output's file beside a picture, such as face.depth.exr beside face.png."""
+    """Return the path of the file of an output, beside the picture: face.depth.exr beside face.png."""
     return picture_path.with_name(f"{picture_path.stem}.{output_name}.{file_format}")
 
 
@@ -94,7 +94,7 @@ def _named_channels(output: Output, output_array: PlaneArray) -> dict[str, Plane
 
 def _as_exr(output_name: str, output_array: PlaneArray) -> bytes:
     return encode_exr_parts(
-        {output_name: _named_channels(OUTPUTS[output_name], output_array)}, run_length=True
+        {output_name: _named_channels(OUTPUTS[output_name], output_array)}, use_run_length_encoding=True
     )
 
 

@@ -52,7 +52,7 @@ RequestedNames = tuple[str, ...]
 
 
 class HeadState(NamedTuple):
-    """Current state of a head: its pose, the outline of its shape, and the poses of its eyes."""
+    """Current state of a head: its pose, the outline of the posed shape, and the poses of its eyes."""
 
     motion: MotionBytes
     outline: Outline
@@ -84,7 +84,7 @@ class Preparation:
         Resources are taken from the cache where nothing has changed; cached resources that are no longer used
         are released.
 
-        view : name of the scene, for callers that draw several scenes in turn
+        view : name of the scene, which tells apart the cached lights of scenes that are drawn in turn
         outputs : names of outputs besides the picture
         previous : scene of the same head for motion vectors; without it, motion is 0
         landmarks : names of landmark sets
@@ -160,9 +160,9 @@ class Preparation:
         )
 
     def _profiles(self, skin: Skin, technique: Technique) -> ProfileMix:
-        """Return the profiles of the skin and their blend weights.
+        """Return the diffusion profiles of the skin and their blend weights.
 
-        For techniques that cannot blend profiles, the result is the first profile alone, with None as
+        For techniques that cannot blend profiles, the result is the first profile alone, and None for the
         weights.
         """
         if technique.mixes_profiles:
@@ -172,7 +172,7 @@ class Preparation:
     def _sky_view(
         self, head: Head, motion: Motion | None, outline: Outline
     ) -> tuple[SkyViews, UniformRecord]:
-        """Return views of the posed head from all directions of the sky, and their uniform record."""
+        """Return the views of the posed head that ambient occlusion needs, and their uniform record."""
         anchors, motion = self.memo.get(make_anchors, head.topology), motion or head.control.rest
         return self.memo.get(_sky_view, outline, untracked=(motion, self.device, head, anchors))
 
@@ -214,7 +214,7 @@ def _motion_bytes(head: Head, motion: Motion, rest_bytes: MotionBytes) -> Motion
 
 
 def _rest_positions_mm(scene: Scene) -> NDArray[np.float32] | None:
-    """Return the person's (p, 3) control points at rest [mm], None if they are those of the shared mesh."""
+    """Return the (p, 3) control points of the person at rest [mm], None if they are those of the mesh."""
     motion = scene.motion or scene.head.control.rest
     positions_mm = motion.positions_mm
     return None if positions_mm is scene.head.topology.control.positions_mm else positions_mm
@@ -234,7 +234,7 @@ def _eye_poses(head: Head, motion: Motion) -> EyePoses | None:
         return None
     rig = head.control
     edges = None if rig.contact is None else rig.lid_edges_mm(motion)
-    return EyePoses(head.eyes.frames(rig, motion), edges)
+    return EyePoses(head.eyes.eye_matrices(rig, motion), edges)
 
 
 def _posed_state(head: Head, motion: Motion, at_rest: MotionBytes) -> HeadState:

@@ -49,7 +49,7 @@ def pipeline_frames(
     current_device: Callable[[], Device],
     frames: Iterable[tuple[Submit, Receive[T]]],
 ) -> Iterator[T]:
-    """Yield the result of each frame in order, while later frames are already submitted.
+    """Yield the results of frames in order; while one is read back, later frames are already submitted.
 
     A frame whose device is lost is submitted again.
 
@@ -150,9 +150,11 @@ class Renderer:
         force: bool,
         read_back: Callable[[Graph, Picture], T] | None = None,
     ) -> tuple[CommandList, T | None]:
-        """Declare the passes of a frame, run the stale passes, and start a readback in the same submission.
+        """Declare the passes of a frame, run those whose inputs have changed, and start a readback.
 
-        force : whether to run all passes
+        All passes are in one submission.
+
+        force : whether to run all passes, changed or not
         read_back : function that starts the readback of the picture, None for no readback
         """
         if force:
@@ -290,7 +292,7 @@ class Renderer:
         )
 
     def _run_on_device(self, textures: FrameTextures, redraw: Callable[[], None], job: Callable[[], T]) -> T:
-        """Return the result of a job that reads a frame; if the device was lost, draw the frame again first.
+        """Run a job that reads a frame; return its result. If the device was lost, redraw the frame first.
 
         textures : textures of the frame, which `redraw` replaces
         redraw : function that draws the frame again

@@ -1,4 +1,4 @@
-"""Surface points at pixel centres, and the irradiance at points of the surface."""
+"""Surface points that are visible at pixel centres, and the irradiance at given surface points."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class SurfacePoints:
     """Surface points of the head that are visible at the centres of pixels.
 
     mask : (h, w) mask of the pixels that show the head
-    triangle : (n,) indices of the triangles in these pixels, row by row
-    barycentric : (n, 3) barycentric weights in these triangles [-]
+    triangle : (n,) indices of the triangles that the n pixels of the mask show, row by row
+    barycentric : (n, 3) barycentric weights of the points in these triangles [-]
     """
 
     mask: NDArray[np.bool_]
@@ -41,7 +41,7 @@ class SurfacePoints:
 
 
 def surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> SurfacePoints:
-    """Return the surface points that a picture with one sample per pixel shows.
+    """Return the surface points at the pixel centres of a picture.
 
     settings : settings of the picture; technique and samples are ignored
     """
@@ -92,7 +92,9 @@ def _barycentric_weights(
 def irradiance_at(
     renderer: Renderer, scene: Scene, settings: Settings, triangle: Index, barycentric: Floats
 ) -> Floats:
-    """Return (n, 3) irradiance at points of the surface, times the skin colour applied before scattering [-].
+    """Return the (n, 3) irradiance at surface points, times the skin colour [-].
+
+    The skin colour is the part of the albedo that is applied before the light scatters.
 
     scene : scene without maps and environment, because the positions of the points in the atlas are unknown;
         interreflection is ignored
@@ -115,7 +117,7 @@ def irradiance_at(
 def _compute_irradiance(
     renderer: Renderer, scene: Scene, settings: Settings, packed_points: NDArray[np.uint32]
 ) -> Floats:
-    """Return the (n * n, 3) irradiance at surface points, one in each texel of an n x n atlas [-].
+    """Return the (n * n, 3) irradiance at surface points, which are the texels of an n x n atlas [-].
 
     packed_points : (n, n, 2) packed surface points
     """

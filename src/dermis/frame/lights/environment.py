@@ -1,4 +1,4 @@
-"""Environment on the device: a prefiltered panorama, whose suns are rendered as lights."""
+"""Environment on the device: a prefiltered panorama, and the suns in it, which are rendered as lights."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MAX_BACKGROUND_ROWS = 2048  # limit of a panorama in the background
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentMap:
-    """Prefiltered panorama on the device, and the suns that were cut out of the panorama.
+    """Prefiltered panorama on the device, and the suns that were removed from the panorama.
 
     panorama : texture whose first layer holds irradiance, and whose further layers hold reflections for
         increasing roughness; black without an environment
@@ -52,7 +52,10 @@ def load_environment_map(device: Device, environment_name: str | None) -> Enviro
 
 
 def unfiltered_panorama(device: Device, environment_name: str) -> Texture:
-    """Upload an unfiltered panorama, suns included, for sharp backgrounds; a second layer is black."""
+    """Upload an unfiltered panorama, suns included, for sharp backgrounds.
+
+    The texture has a second layer, which is black.
+    """
     radiance = load_panorama(environment_name, max_rows=_MAX_BACKGROUND_ROWS).astype(np.float32)
     return _upload_layers(device, [radiance, np.zeros_like(radiance)])
 
@@ -92,7 +95,7 @@ def add_suns(memo: Memo, scene: Scene, environment_map: EnvironmentMap) -> Scene
 def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
     """Return an upper bound of the irradiance in a scene [-].
 
-    A surface would receive it if it faced every light and the brightest part of the environment.
+    It is the irradiance of a surface that faces all lights and the brightest part of the environment.
 
     scene : scene whose lights include the suns of its environment
     """
@@ -107,7 +110,7 @@ def environment_record(
     albedo: NDArray[np.float64],
     has_occlusion: bool,
 ) -> UniformRecord:
-    """Return the uniform record of the environment: rotation, exposure and lobes of reflections.
+    """Return the uniform record of the environment, which holds its rotation, exposure and reflection lobes.
 
     albedo : (3,) albedo of skin where its colour map is white [-]
     has_occlusion : whether the head hides parts of the environment from its own skin

@@ -1,4 +1,4 @@
-"""Interface of a kind of light in the frame; each kind is a module with a WGSL file beside it."""
+"""Interface of the kinds of lights; each kind is a module with a WGSL file beside it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ L = TypeVar("L", bound=Light)
 
 
 class Kind(Generic[L]):
-    """Kind of light in the frame; this base class is a punctual light that sets no further shader members.
+    """Kind of light. This base class is a punctual light that needs no shader members of its own.
 
     The shader has the name of the module, with the suffix .wgsl. It defines the following function, where
     NAME is the name of the kind in scene files, with hyphens replaced by underscores:
@@ -34,9 +34,10 @@ class Kind(Generic[L]):
     punctual : bool
         Whether all light comes from one position or from one direction; False for area lights.
     round : bool
-        Whether the light appears as a disc from the head, instead of as a rectangle.
+        Whether the light has the shape of a disc as seen from the head; False for a rectangle.
     sheet : bool
-        Whether irradiance is a Gaussian along the shader member `half_u`, so that it can be blurred exactly.
+        Whether the light is a thin sheet, whose irradiance is a Gaussian along the shader member `half_u` and
+        can be blurred exactly.
 
     Examples
     --------
@@ -66,7 +67,7 @@ class Kind(Generic[L]):
         return not self.punctual
 
     def parts(self, light: L) -> list[Light]:
-        """Divide a light into parts that together equal the light; each part has a shadow map.
+        """Divide a light into parts that together equal the light; each part gets a shadow map of its own.
 
         Parameters
         ----------
@@ -76,7 +77,7 @@ class Kind(Generic[L]):
         Returns
         -------
         list of Light
-            The parts; the light itself for kinds that are not divided.
+            The parts. For kinds that are not divided, the only part is the light itself.
         """
         return [light]
 
@@ -155,7 +156,7 @@ def override_name(kind_name: str) -> str:
 
 
 def light_shaders() -> list[ShaderListMember]:
-    """Return the shaders of all kinds of lights, in the order that lights.wgsl numbers them."""
+    """Return the shaders of all kinds of lights, in the order of their numbers in lights.wgsl."""
     return [
         ShaderListMember(
             name, kind.shader, (("override", override_name(name)), ("always", str(kind.always).lower()))

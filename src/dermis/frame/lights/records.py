@@ -75,9 +75,9 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
 
 
 def oblique_constants(constants: Constants) -> Constants:
-    """Return `constants`; if they contain HALF_SPACE, add the constant that enables oblique incidence.
+    """Return `constants`, and add the constant for oblique incidence if they contain HALF_SPACE.
 
-    The result is only for passes that know the shape of the surface around a point.
+    Use the result only for passes that know the shape of the surface around a point.
     """
     return (*constants, ("OBLIQUE", 1)) if ("HALF_SPACE", 1) in constants else constants
 
@@ -88,7 +88,7 @@ def light_part_counts(scene: Scene) -> tuple[int, ...]:
 
 
 def light_shadow_views(scene: Scene, outline: Outline, map_side: int) -> list[ShadowView | None]:
-    """Return, for each part of each light, the view of the shadow map, None for lights without shadows.
+    """Return the views of the shadow maps: one for each part of each light, None if the light has no shadows.
 
     outline : outline of the head's shape
     map_side : side of the shadow maps [texels]
@@ -142,7 +142,7 @@ def light_records(
 
 @cache
 def light_sample_points() -> Floats:
-    """Return 64 evenly spread sample points of area lights, (64, 4) [Roberts2018].
+    """Return (64, 4) evenly spread sample points of area lights [Roberts2018].
 
     A row holds the coordinates x and y of a point on the unit disc, then x and y of a point on the square
     from -1 to 1.
@@ -154,7 +154,7 @@ def light_sample_points() -> Floats:
 
 
 def _light_members(light: Light, centre: Triple, shadow_view: ShadowView | None, part_count: int) -> Members:
-    """Return the members of the shader struct `Light`; members that are left out are 0.
+    """Return the members of the shader struct `Light` for a light; members that are left out are 0.
 
     light : light, or one part of a divided light
     part_count : number of parts of the light, 1 if it is not divided

@@ -34,7 +34,7 @@ _MAX_PENUMBRA_MM = 8.0
 class PreIntegratedTables(TechniqueResources):
     """Tables of scattered light for a profile, which the shading pass reads.
 
-    table : texture with the rows of `sphere_table`, followed by a result of `shadow_edge_row` for each of
+    table : texture with the rows of `sphere_table`, followed by one row of `shadow_edge_row` for each of
         several widths of the shadow filter
     penumbra_width_mm : distance over which light scatters across the edge of a shadow [mm]
     relief_mm : (3,) standard deviations of the Gaussians that smooth the relief for red, green and blue [mm]
@@ -46,7 +46,7 @@ class PreIntegratedTables(TechniqueResources):
 
 
 class PreIntegratedSkin(Technique):
-    """Scattering that is read from tables: one for curved surfaces, and one for the edges of shadows."""
+    """Technique that reads scattered light from tables: one for curved surfaces, and one for shadow edges."""
 
     sources = ("Penner2011",)
     needs_curvature = True
@@ -61,7 +61,7 @@ class PreIntegratedSkin(Technique):
     def write_view_record(
         self, view: UniformRecord, shade: ComputeProgram, resources: TechniqueResources | None
     ) -> None:
-        """Write the largest curvature, the penumbra width and the relief smoothing to the shading record."""
+        """Write the largest curvature, the penumbra width and the relief widths to the shading record."""
         assert isinstance(resources, PreIntegratedTables)
         scales = {
             "max_curvature": MAX_CURVATURE_PER_MM,
@@ -135,7 +135,9 @@ def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
 
 
 def shadow_edge_row(profile: GaussianSum, radius_mm: float, half_width_mm: float = 0.0) -> Floats:
-    """Return the light scattered across a straight shadow edge, at m points from dark to lit, (m, c) [-].
+    """Return the (m, c) light near a straight shadow edge after scattering [-].
+
+    The m points are evenly spaced from the dark to the lit side, and c is the number of colour channels.
 
     radius_mm : distance of the first point and of the last point from the edge [mm]
     half_width_mm : half width of the tent filter that already softens the edge [mm]
@@ -159,9 +161,10 @@ def penumbra_width_mm(profile: GaussianSum) -> float:
 
 
 def half_light_sigma_mm(profile: GaussianSum) -> Floats:
-    """Return the (c,) standard deviations of Gaussians with the profile's half-light radii [mm].
+    """Return (c,) standard deviations, one for each colour channel of a profile [mm].
 
-    The half-light radius is the radius within which half of the light emerges.
+    A Gaussian with this standard deviation has the same half-light radius as the profile. The half-light
+    radius is the radius within which half of the light emerges.
     """
     radius = np.geomspace(1e-3, 100.0, 2048)
     within = profile.energy_within(radius) / profile.albedo

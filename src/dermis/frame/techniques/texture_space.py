@@ -1,4 +1,4 @@
-"""Texture-space diffusion by a hierarchy of Gaussian blurs, stitched across the seams of the atlas."""
+"""Texture-space diffusion by a pyramid of Gaussian blurs, with light carried across the seams of the atlas."""
 
 from __future__ import annotations
 
@@ -37,7 +37,9 @@ class TextureSpace(AtlasTechnique):
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and their level indices.
+        """Insert intermediate levels of weight 0, which make the chain of blurs cheaper.
+
+        Return the new split of the profile, and the indices of the inserted levels.
 
         edge_mode : filter mode at the edges of charts
         """
@@ -55,7 +57,7 @@ class TextureSpace(AtlasTechnique):
         return replace(with_all_levels(split), others=tuple(map(with_all_levels, split.others))), steps
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
-        """Declare the passes that fill level k with the light of level 0 blurred by the k-th Gaussian."""
+        """Declare the passes that fill each level k with level 0, blurred by the k-th Gaussian."""
         diffuse.draw(graph, levels, atlas, blur)
 
 

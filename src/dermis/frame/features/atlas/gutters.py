@@ -1,6 +1,7 @@
-"""Gutters of a stitched atlas: texels beside the charts that copy light from points across the seams.
+"""Gutters of a stitched atlas: texels beside a chart that copy light from the surface across the seam.
 
-These points, the sources, are found by tracing paths over the surface of each person at rest.
+The position from which a gutter texel copies is called its source. It is found by tracing a path over the
+surface of each person at rest.
 """
 
 from __future__ import annotations
@@ -26,12 +27,12 @@ _NO_NEIGHBOUR_WORD = 0xFFFFFFFF  # word of a triangle edge without skin across i
 
 @dataclass(frozen=True, eq=False)
 class GutterTracing:
-    """Constant inputs of the passes that trace paths from charts to the sources of gutter texels.
+    """Constant inputs of the passes that trace a path from a chart to the source of each gutter texel.
 
-    starts : buffer of the start of each path, for gutter_trace.wgsl
+    starts : buffer of the point at which each path starts, for gutter_trace.wgsl
     sides : buffer of the neighbouring triangle across each edge of each triangle, for gutter_trace.wgsl
-    halvings : a dictionary for each coarser resolution of the atlas, from names in gutter_halve.wgsl to the
-        buffers that list the finer gutter texels averaged by each coarser gutter texel
+    halvings : for each coarser resolution of the atlas, a dictionary from names in gutter_halve.wgsl to
+        buffers. The buffers list the finer gutter texels that each coarser gutter texel averages
     """
 
     starts: Buffer
@@ -40,7 +41,7 @@ class GutterTracing:
 
 
 def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: AtlasTextures) -> GutterTracing:
-    """Upload the constant inputs of gutter tracing, for an atlas that has gutters."""
+    """Upload the constant inputs of the passes that trace gutters, for an atlas that has gutters."""
     starts, sides = (
         device.buffer(words, "STORAGE") for words in (_path_start_words(atlas), _neighbour_words(mesh))
     )
@@ -62,8 +63,9 @@ def with_separate_gutters(device: Device, textures: AtlasTextures) -> AtlasTextu
 def _path_start_words(atlas: Atlas) -> Words:
     """Return (a, 5) words for gutter_trace.wgsl, one row for each gutter texel.
 
-    The words are the packed texel, the triangle and the two packed barycentric weights of the point where
-    the path to its source starts, and as floats the source position (x, y) to use if tracing fails.
+    Word 0 packs the coordinates of the texel. Words 1 and 2 are the point where the path to the source
+    starts: a triangle, and two packed barycentric weights. Words 3 and 4 are the source position (x, y) to
+    use if tracing fails, as floats.
     """
     root = np.full((atlas.size, atlas.size), -1, np.int64)
     root[atlas.outside[:, 1], atlas.outside[:, 0]] = np.arange(len(atlas.outside))
@@ -89,7 +91,7 @@ def _neighbour_words(mesh: Mesh) -> Words:
 
 
 def _halving_buffers(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> Bindings:
-    """Upload, for each coarser gutter texel, the list of finer gutter texels that it averages."""
+    """Upload, for each gutter texel of the coarser atlas, the list of finer gutter texels to average."""
     width = int(finer.gutter_texels.max()) + 1
 
     def texel_index(texels: NDArray[np.integer]) -> NDArray[np.int64]:

@@ -70,7 +70,9 @@ def draw_gutters(
 def draw_blend(
     graph: Recorder, first_layout: LitAtlas, second_layout: LitAtlas, blended_light: Texture
 ) -> None:
-    """Declare the pass that, near the seams of a layout, fades to the light of a layout with other seams.
+    """Declare the pass that replaces the light near the seams of one layout by the light of another layout.
+
+    The seams of the two layouts are in different places. The transition between the two lights is smooth.
 
     first_layout : layout whose light is used away from its seams
     second_layout : layout whose light is used near the seams of the first layout

@@ -46,12 +46,12 @@ class AtlasTextures:
     """Textures and buffers of an atlas.
 
     resources : dictionary from names in shaders to textures: atlas, stretch_map (filled by `draw_stretch`),
-        reach_map and, for two layouts or feathered seams, edge_map; coarser resolutions have only
-        stretch_map and reach_map
+        reach_map (`AtlasMip.reach`) and, for two layouts or feathered seams, edge_map; coarser resolutions
+        have only stretch_map and reach_map
     sheared : whether blurs account for an angle between the u and v directions that is not a right angle
     stretch_constants : pipeline constants of the stretch passes
-    stretch_sources : buffer of gutter texels and of the surface points whose stretch they copy, None if there
-        are no gutters
+    stretch_sources : buffer of the texels outside charts, each with the surface point whose stretch it
+        copies; None if there are no such texels
     gutter : buffer of the gutter texels, None if there are no gutters
     gutter_light : buffer of the light of the gutter texels, None if there are no gutters
     gutter_texels : (a, 2) coordinates x and y of the gutter texels
@@ -158,10 +158,10 @@ def _upload_mip(
 
 
 def _stretch_sources(atlas: Atlas) -> NDArray[np.uint32]:
-    """Return (r, 3) words for stretch_beyond.wgsl, one row for each gutter texel.
+    """Return (r, 3) words for stretch_beyond.wgsl, one row for each texel outside the triangles of its chart.
 
-    The words are the packed texel, and the surface point whose stretch it copies: the triangle, and two
-    packed barycentric weights.
+    Word 0 packs the coordinates of the texel. Words 1 and 2 are the surface point whose stretch the texel
+    copies: a triangle, and two packed barycentric weights.
     """
     (x, y), (second, third) = (pair.T.astype(np.uint32) for pair in (atlas.outside, atlas.border_weights))
     return np.stack([x | (y << 16), atlas.border_triangle.astype(np.uint32), second | (third << 16)], axis=1)
@@ -170,7 +170,8 @@ def _stretch_sources(atlas: Atlas) -> NDArray[np.uint32]:
 def _upload_coarser(device: Device, mip: AtlasMip) -> tuple[AtlasTextures, ...]:
     """Upload the atlas at half, a quarter, ... of its resolution.
 
-    The data are computed or read from the disk cache."""
+    The coarser masks and gutters are computed, or read from the disk cache.
+    """
     parts = [field.name for field in fields(AtlasMip)]
     count = 0
     while count < MAX_ATLAS_HALVINGS and len(mip.reach) % (2 << count) == 0:
@@ -279,8 +280,8 @@ def _halved_gutter(
 ) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
     """Return the gutter texels of the halved atlas, and the positions from which they copy light.
 
-    Both results have the shape (b, 2) and are in texels of the halved atlas, as in `AtlasMip`. A position is
-    the mean over the finer gutter texels that become one coarser texel, without outliers.
+    Both results have the shape (b, 2) and are in texels of the halved atlas, as in `AtlasMip`. The position
+    for a coarser texel is the mean of the positions for its finer texels, without outliers.
 
     mip : atlas at the finer resolution
     stitched_squares : mask of the coarser texels that copy light from across a seam

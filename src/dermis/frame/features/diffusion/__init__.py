@@ -1,4 +1,4 @@
-"""Diffusion of light over the atlas: a pyramid of Gaussian blurs, their weighted sum, blended profiles."""
+"""Diffusion of light over the atlas: a pyramid of Gaussian blurs, its weighted sum, and blended profiles."""
 
 from dermis.frame.features.diffusion.resources import Resources, make
 

@@ -1,4 +1,4 @@
-"""Passes that fill the blur pyramid: each level is the level before it, blurred along u and then along v."""
+"""Passes that fill the blur pyramid: each level blurs the previous level along u and then along v."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _AVERAGING_VARIANCE, _INTERPOLATION_VARIANCE = 1 / 16, 3 / 16
 
 
 def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
-    """Declare the passes that fill each level k with level 0 blurred by the k-th Gaussian of `blur`."""
+    """Declare the passes that fill each level k with level 0, blurred by the k-th Gaussian of `blur`."""
     variance_mm2, sheets = blur.variance_mm2, atlas.mips_for(blur.edge)
     source: TextureOrView = levels.layer(0)
     first_deviation = np.sqrt(variance_mm2[0]) * atlas.median_texels_per_mm  # [texel]
@@ -102,7 +102,10 @@ def _kernel_texture(device: Device) -> Texture:
 def _spread_members(
     variance_mm2: NDArray[np.float64], halvings: tuple[int, ...]
 ) -> Iterator[dict[str, float]]:
-    """Yield the members of the shader struct `Spread` for each blurred level: variances of its blurs."""
+    """Yield the members of the shader struct `Spread` for each blurred level.
+
+    They are the variance that the level's blur adds, and the variances that other steps add or have added.
+    """
     source_mm2 = previous_resampling = previous_mm2 = 0.0
     for variance, (source_halvings, level_halvings) in zip(variance_mm2, pairwise(halvings), strict=True):
         halved = level_halvings > source_halvings

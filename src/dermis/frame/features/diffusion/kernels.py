@@ -50,11 +50,12 @@ def taps_per_side(variance: float, truncation_sigmas: float = KERNEL_TRUNCATION_
 def kernel_table() -> NDArray[np.float32]:
     """Return a table of the ratio q for which the kernel w(n) = q^(n^2) has a given variance [-].
 
-    w(n) is the weight of tap n on either side of the centre, so q = w(1) / w(0). Row i is for a variance of
-    i / 64, in units of the squared distance between taps; column j is for j taps on each side of the centre.
+    w(n) is the weight of the n-th tap on either side of the centre, so q = w(1) / w(0). Row i of the table is
+    for a variance of i / 64, in units of the squared distance between taps. Column j is for a kernel with j
+    taps on each side of the centre.
 
-    Sampling and truncation reduce the variance of a Gaussian, especially of a narrow Gaussian. Therefore q is
-    determined numerically, such that the truncated kernel has exactly the desired variance.
+    A sampled and truncated Gaussian has a smaller variance than the Gaussian. Therefore q is determined
+    numerically, such that the truncated kernel has exactly the desired variance.
     """
     variance = np.arange(MAX_TABLE_VARIANCE * ROWS_PER_UNIT_VARIANCE + 2)[:, None] / ROWS_PER_UNIT_VARIANCE
     n = np.arange(_MAX_TAPS_PER_SIDE + 1)
@@ -78,17 +79,15 @@ def _kernel_variance(weight_ratio: Floats, tap_mask: NDArray[np.bool_]) -> Float
 def add_intermediate_levels(
     variance_mm2: NDArray[np.float64], texels_per_mm: float, max_halvings: int
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    """Return the variances of the cheapest chain of blurs [mm^2], and the indices of its intermediate levels.
+    """Insert levels that make a chain of blurs cheaper; return all variances [mm^2] and the new indices.
 
-    An intermediate level is an additional blur; the levels after it can use half the resolution, which saves
-    texel reads.
+    In the chain, each level is computed by blurring the previous level; level 0 is the unblurred light. An
+    inserted level is blurred just enough for `choose_halvings` to halve the resolution of the next level,
+    which saves texel reads.
 
     variance_mm2 : (k,) increasing variances of the profile's levels [mm^2]
     texels_per_mm : texel density of the atlas at full resolution
     max_halvings : largest number of times that the resolution may be halved
-
-    An intermediate level is blurred just enough for `choose_halvings` to halve the resolution of the next
-    level. Level 0 is the unblurred light.
     """
     profile_mm2 = tuple(float(v) for v in variance_mm2)
     return _add_intermediate_levels(profile_mm2, float(texels_per_mm), max_halvings)

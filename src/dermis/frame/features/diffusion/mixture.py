@@ -1,4 +1,4 @@
-"""Profiles that are blended by a map: blend weights over the atlas, and the light of each profile."""
+"""Blend of diffusion profiles by a map: blend weights over the atlas, and the light of each profile."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class Mixture:
     """Textures for skin where a map blends a first profile with one or two others.
 
     uv_weights : texture over uv of the blend weights of all profiles but the first
-    entering : for each profile but the first, a blur pyramid of the entering light times the profile's blend
-        weight
+    entering : for each profile but the first, the blur pyramid of the light that enters the skin, multiplied
+        by the blend weight of the profile
     atlas_weights : for each layout, a texture over the atlas of the same blend weights
-    sums : texture array. Layer 0 holds the exitance of skin that has the first profile everywhere. Two more
-        layers for each other profile hold the change of exitance when the first profile is replaced by that
-        profile: one layer for all entering light, one layer for the weighted light in `entering`
+    sums : texture array. Layer 0 is the exitance if all skin has the first profile. Each other profile has
+        two more layers: the changes of the exitance if this profile replaces the first, for all entering
+        light and for the weighted light in `entering`
     """
 
     uv_weights: Texture
@@ -55,7 +55,7 @@ def make_mixture(
     """Allocate the textures of a mixture of profiles.
 
     uv_weights : texture over uv of the blend weights
-    entering_light : blur pyramids of the entering light, one for each profile but the first
+    entering_light : for each profile but the first, the blur pyramid of entering light times blend weight
     layout_count : number of atlas layouts
     """
     side, texel = entering_light[0].size, entering_light[0].texel
@@ -112,7 +112,7 @@ def _load_blend_map(path: Path, _: tuple[int, ...]) -> NDArray[np.float32]:
 
 
 def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, layout_index: int) -> None:
-    """Declare the pass that resamples the blend weights from uv to the atlas, gutters included.
+    """Declare the passes that resample the blend weights from uv to the atlas, gutters included.
 
     layout_index : index of the atlas layout
     """
@@ -131,9 +131,9 @@ def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, layo
 def draw_entering_light(
     graph: Recorder, levels: PyramidLevels, mixture: Mixture, layout_index: int, profile_index: int
 ) -> None:
-    """Declare the pass that fills level 0 of a profile's pyramid with entering light times blend weight.
+    """Declare the pass that fills level 0 of a profile's pyramid with entering light times the blend weight.
 
-    levels : pyramid whose level 0 holds all light that enters
+    levels : pyramid whose level 0 holds all light that enters the skin
     layout_index : index of the atlas layout
     profile_index : index of the profile among all profiles but the first
     """
@@ -146,10 +146,12 @@ def draw_entering_light(
 
 
 def draw(graph: Recorder, mixture: Mixture, layout_index: int, blended_exitance: Texture) -> None:
-    """Declare the pass that blends the sums of all profiles; alpha stores the packed blend weights.
+    """Declare the pass that blends the layers of `Mixture.sums` to the exitance of the skin.
+
+    The alpha channel of the result stores the blend weights, packed.
 
     layout_index : index of the atlas layout
-    blended_exitance : texture for the blended exitance
+    blended_exitance : texture for the result
     """
     shader = program(graph.device, "diffusion/profile_mixture.wgsl", (("OTHERS", len(mixture.entering)),))
     weights = mixture.atlas_weights[layout_index]

@@ -18,7 +18,7 @@ from dermis.gpu import Device, Memo
 
 
 class BlurScheme(Protocol):
-    """Interface of a technique that chooses the formats and resolutions of its blurs."""
+    """Interface of techniques, which choose the texture format and the resolutions of their blurs."""
 
     def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
         """Allocate the blur pyramid for an atlas of side x side texels."""
@@ -26,7 +26,9 @@ class BlurScheme(Protocol):
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and their level indices.
+        """Insert intermediate levels of weight 0, which make the chain of blurs cheaper.
+
+        Return the new split of the profile, and the indices of the inserted levels.
 
         edge_mode : filter mode at the edges of charts
         """

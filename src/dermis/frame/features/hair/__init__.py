@@ -1,4 +1,4 @@
-"""Hair: strands that follow the skin, cast shadows, are shaded at their knots and drawn over the picture."""
+"""Hair: strands that move with the skin, cast shadows, and are shaded and drawn over the picture."""
 
 from dermis.frame.features.hair.passes import draw, draw_shadows
 from dermis.frame.features.hair.resources import Resources, make, shader_constants

@@ -1,4 +1,4 @@
-"""Passes of hair: posing, shadows, shading at the knots, and drawing over the picture."""
+"""Passes of hair: pose the strands, render their shadows, shade their knots, draw them over the picture."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ _SHADOW_RAY_STRIDE = 4  # one of four rays to an area light is traced: pictures 
 def draw_shadows(
     graph: Graph, strands: Resources, shape: Shape, shadow_views: Views, lighting: Bindings
 ) -> None:
-    """Declare the passes that pose the strands, and fill the deep opacity maps of their shadows."""
+    """Declare the passes that move the hair with the skin, and fill the deep opacity maps for its shadows."""
     graph.repeat(pose_guides, strands.tables, shape)
     if len(shadow_views.clips):
         _draw_deep_opacity(graph, strands, shape, lighting)
 
 
 def pose_guides(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
-    """Declare the passes that move the guides of hair with the skin."""
+    """Declare the passes that move the guide strands of a hair style with the skin."""
     if tables.groom is None:
         return
     style = tables.groom.style
@@ -62,10 +62,10 @@ def pose_guides(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
 def pose_strands(
     graph: Recorder, tables: StrandTables, shape: Shape, posed_strands: Buffer, coarse: StrandCounts
 ) -> None:
-    """Declare the passes that move brows and lashes with the skin, and grow all other hair between guides.
+    """Declare the passes that move brows and lashes with the skin, and interpolate other strands from guides.
 
     posed_strands : buffer to which the posed strands are written
-    coarse : number of coarse strands to grow, and number of knots of each
+    coarse : number of interpolated strands (scalp hair and beard), and number of knots of each
     """
     shared: Bindings = {
         "points": shape.surface["points"],
@@ -109,9 +109,9 @@ def draw(
 ) -> Texture:
     """Declare the passes that shade the strands and draw them over the picture; return the new picture.
 
-    geometry : shape of the head, and its vertices and triangles
+    geometry : current shape of the head, and its vertices and triangles
     shading : resources of the lighting, uniform record of the shading pass, and constants of the lights
-    visibility : texture of the triangle at each sample
+    visibility : texture with the index of the triangle that is visible at each sample
     radiance : texture of the picture without hair
     labels : resources with which the pass labels pixels of hair, None if no labels are requested
     """
@@ -161,7 +161,7 @@ def _view_record(
 
 
 def _pixel_mm(view: UniformRecord, tables: StrandTables, picture_height: int) -> float:
-    """Return the side of a pixel at the depth of the coarse strands [mm].
+    """Return the side of the square that a pixel covers at the depth of the coarse strands [mm].
 
     view : uniform record of the shading pass
     picture_height : height of the picture [pixels]
@@ -173,11 +173,11 @@ def _pixel_mm(view: UniformRecord, tables: StrandTables, picture_height: int) ->
 def _max_segments_in_tile(tables: StrandTables, segment_count: int, pixel_mm: float) -> int:
     """Estimate the number of strand segments in a crowded tile of the picture.
 
-    The tile is assumed to contain all segments of fine strands, and several times the mean number of segments
-    of coarse strands per tile.
+    The tile is assumed to contain all segments of fine strands, and several times as many segments of coarse
+    strands as the mean tile.
 
     segment_count : number of segments of all strands that are drawn
-    pixel_mm : side of a pixel at the depth of the strands [mm]
+    pixel_mm : side of the square that a pixel covers at the depth of the strands [mm]
     """
     tiles = max(1.0, (_HAIR_EXTENT_MM / (TILE_PIXELS * pixel_mm)) ** 2)
     fine = tables.fine.all_segments()

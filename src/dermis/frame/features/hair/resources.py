@@ -1,4 +1,4 @@
-"""Resources of hair: tables of strands, and buffers for the picture and for shadows."""
+"""Resources of hair: buffers of the strands, the picture with hair, and deep opacity maps for shadows."""
 
 from __future__ import annotations
 
@@ -54,11 +54,11 @@ _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _HAIR_COUNT_MEMBERS), ("widt
 
 
 class Detail(NamedTuple):
-    """Level of detail of coarse strands (scalp hair and beard) on one kind of adapter.
+    """Limits of the detail of coarse strands (scalp hair and beard) on one kind of adapter.
 
     drawn_knots : largest total number of knots of the drawn strands
     casters : largest number of strands that are drawn into shadow maps to represent all strands
-    caster_knots : largest number of knots of each of these strands
+    caster_knots : largest number of knots of a strand in shadow maps
     width_px : least width of drawn strands [pixel]
     segment_px : least length of the segments of drawn strands [pixel]
     """
@@ -84,15 +84,15 @@ class StrandCounts(NamedTuple):
         return (self.hairs if strand_count is None else strand_count) * self.knots
 
     def all_segments(self, strand_count: int | None = None) -> int:
-        """Return the number of segments between knots of the first `strand_count` strands or all strands."""
+        """Return the total number of segments of the first `strand_count` strands, or of all strands."""
         return (self.hairs if strand_count is None else strand_count) * (self.knots - 1)
 
 
 class StrandCapacity(NamedTuple):
-    """Number of strands and knots that the buffers of hair can hold.
+    """Largest numbers of strands and knots that the buffers of hair can hold.
 
     fine : number of strands of brows and lashes
-    knots : total number of knots of fine and coarse strands
+    knots : total number of knots of all strands
     """
 
     fine: int
@@ -110,7 +110,7 @@ class StrandBuffers:
 
 @dataclass(frozen=True, eq=False)
 class StrandPicture:
-    """Lists of the strand segments in each tile of the picture, and the picture with hair.
+    """Picture with hair, and linked lists of the strand segments in each of its tiles.
 
     chains : buffer of the first link of each linked list of segments, see strands_bin.wgsl
     links : buffer of the links of these lists; a link consists of a segment and the index of the next link
@@ -130,7 +130,7 @@ def strand_counts(strands: Strands | None) -> StrandCounts:
 
 
 def coarse_counts(device: Device, head: Head) -> StrandCounts:
-    """Return how many coarse strands to draw at most, and how many knots each may have.
+    """Return the largest number of coarse strands to draw, and the largest number of knots of each.
 
     Coarse strands are scalp hair and beard. The limits depend on the device.
     """
@@ -205,7 +205,7 @@ def make_deep_opacity(device: Device, light_count: int) -> Buffer:
 
 
 def placeholder_strand_shadows(device: Device) -> Buffer:
-    """Return a placeholder for the deep opacity maps of heads without hair."""
+    """Return the buffer that heads without hair bind in place of the deep opacity maps."""
     return device.cached("no strand shadows", lambda: _make_buffer(device, DEEP_OPACITY_HEADER_WORDS))
 
 
@@ -215,7 +215,7 @@ def _make_buffer(device: Device, word_count: int) -> Buffer:
 
 @dataclass(frozen=True, eq=False)
 class GuideTables:
-    """Buffers of the guides of a hair style, named as in guides_pose.wgsl and strands_grow.wgsl."""
+    """Buffers of the guide strands of a hair style, named as in guides_pose.wgsl and strands_grow.wgsl."""
 
     anchors: Buffer
     guide_rest: Buffer
@@ -226,7 +226,7 @@ class GuideTables:
 
 @dataclass(frozen=True, eq=False)
 class GroomTables:
-    """Buffers of a person's groom: tables of the hair style, and parameters such as length and colour."""
+    """Buffers of a person's groom: guides of the hair style, and parameters such as length and colour."""
 
     style: GuideTables
     roots: Buffer
@@ -243,16 +243,16 @@ class StrandTables:
     strands : buffer of the fine strands at rest, see strands_pose.wgsl
     knots : buffer of the knots of the fine strands at rest, see strands_pose.wgsl
     buffers : buffers that each frame fills
-    fine : number of fine strands, and of the knots of each
+    fine : number of fine strands, and number of knots of each
     coarse : largest number of coarse strands to draw, and largest number of knots of each
-    casters : number of strands that represent all coarse strands in shadow maps, and of the knots of each
-    detail : level of detail of the coarse strands
-    groom : tables from which coarse strands grow, None if there are no coarse strands
+    casters : number of strands that represent all coarse strands in shadow maps, and number of knots of each
+    detail : limits of the detail of coarse strands
+    groom : buffers from which coarse strands are interpolated, None if there are no coarse strands
     possible : total number of coarse strands of the person
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
-    length_mm : length of the part of the hair with the longest strands [mm]
-    width_mm : width of a strand in this part [mm]
-    cover : projected area of hair per area of skin in this part [-]
+    length_mm : length of the longest kind of coarse hair, such as scalp hair or moustache [mm]
+    width_mm : width of a strand of this kind [mm]
+    cover : projected area of hair of this kind per area of skin [-]
     """
 
     strands: Buffer
@@ -270,9 +270,10 @@ class StrandTables:
     cover: float
 
     def record(self, coarse: StrandCounts) -> UniformRecord:
-        """Return the uniform record of the struct Hairs in strand_knots.wgsl.
+        """Return the numbers of strands as a uniform record of the struct Hairs in strand_knots.wgsl.
 
-        coarse : number of coarse strands to draw, and number of knots of each"""
+        coarse : number of coarse strands to draw, and number of knots of each
+        """
         width_scale = self.possible / max(1, coarse.hairs)
         values = self.fine.hairs, coarse.hairs, coarse.hairs, self.fine.knots, coarse.knots, width_scale
         return np.array(values, _HAIRS_DTYPE)
@@ -315,9 +316,10 @@ def strand_constants(head: Head, settings: Settings) -> Constants:
 def drawn_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
     """Return the number of coarse strands to draw, and the number of knots of each.
 
-    Where strands are thinner than a pixel, fewer but wider strands are drawn, which cover the same area.
+    Where strands are thinner than a pixel, fewer strands are drawn. They are wider, so that they cover the
+    same area.
 
-    pixel_mm : side of a pixel at the depth of the strands [mm]
+    pixel_mm : side of the square that a pixel covers at the depth of the strands [mm]
     """
     if not tables.coarse.hairs:
         return tables.coarse
@@ -331,11 +333,11 @@ def drawn_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
 def make_strand_tables(
     device: Device, head: Head, coarse: StrandCounts, buffers: StrandBuffers, groom: GroomTables | None
 ) -> StrandTables:
-    """Upload the fine strands of a head, and collect the tables of its coarse strands.
+    """Upload the fine strands of a head, and collect the buffers of its coarse strands.
 
     coarse : result of `coarse_counts`
     buffers : buffers that each frame fills
-    groom : tables from which coarse strands grow, None if there are no coarse strands
+    groom : buffers from which coarse strands are interpolated, None if there are no coarse strands
 
     Raises DermisError for strands whose roots do not lie on the head's mesh.
     """
@@ -363,7 +365,7 @@ def make_strand_tables(
 
 
 def make_guide_tables(device: Device, guides: Guides) -> GuideTables:
-    """Upload the guides of a hair style, and allocate buffers for the posed guides."""
+    """Upload the guide strands of a hair style, and allocate buffers for the posed guides."""
     anchors = np.empty(guides.weight.shape, _ANCHOR_DTYPE)
     anchors["corner"] = guides.corner
     anchors["local"][..., :3], anchors["local"][..., 3] = guides.local_mm, guides.weight
@@ -388,7 +390,7 @@ def make_groom_tables(device: Device, groom: Groom, guide_tables: GuideTables, r
     """Upload the parameters of a person's groom, such as colour and length.
 
     guide_tables : guides of the hair style, shared by all people with that style
-    roots : buffer of the strand roots of the hair style, shared by the same people
+    roots : buffer of the strand roots of the hair style, shared by all people with that style
     """
     parts = device.buffer(groom.parameters.view(np.float32), "STORAGE")
     return GroomTables(guide_tables, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"))
@@ -406,14 +408,14 @@ def _fill_strand_rows(rows: NDArray[np.void], head: Head, strands: Strands) -> N
 
 
 def _knot_rows(strands: Strands) -> NDArray[np.float32]:
-    """Return positions and radii of all knots, as (n k, 4) for n strands with k knots each [mm]."""
+    """Return (n k, 4) rows of position and radius [mm], one for each of the k knots of n strands."""
     rows = np.empty((*strands.radius_mm.shape, 4), np.float32)
     rows[..., :3], rows[..., 3] = strands.knots_mm, strands.radius_mm
     return rows.reshape(-1, 4)
 
 
 def mean_skin_albedo(head: Head) -> tuple[float, ...]:
-    """Return the mean (3,) albedo of the colour map, or a default albedo if there is no map [-]."""
+    """Return the mean RGB albedo of the colour map, or a default albedo if there is no map [-]."""
     colour = head.maps.mean_colour
     return (DEFAULT_COLOUR,) * 3 if colour is None else tuple(colour.tolist())
 

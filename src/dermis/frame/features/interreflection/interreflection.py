@@ -31,19 +31,21 @@ def shader_constants() -> dict[str, int]:
 class InterreflectionBuffers:
     """Buffers of interreflection, which do not depend on the appearance of the skin.
 
+    The skin is divided into patches that exchange light. A cell is a square of a coarse grid over the atlas;
+    the cells store the light that reaches the skin from the patches.
+
     sample_points : buffer of the surface points at which patches are lit, and the number of points
     patch_links : dictionary from names in shaders to buffers of the form factors between patches
-    cell_links : dictionary from names in shaders to buffers of the form factors from cells (squares of a
-        coarse grid over the atlas) to patches
-    stores_means : whether a cell stores the mean exitance of the patches that it sees, instead of the
-        irradiance from these patches
+    cell_links : dictionary from names in shaders to buffers of the form factors from cells to patches
+    stores_means : whether a cell stores the mean exitance of the patches that are visible from it, instead of
+        the irradiance from these patches
     sample_exitance : buffer of the exitance of the sample points
     direct_exitance : buffer of the exitance of the patches by direct light
     uniform_exitance : buffer of the exitance of the patches under a uniform irradiance of 1
     bounced_exitance : two buffers of the exitance of the patches after a bounce; bounces alternate between
         them
     from_skin : buffer of the light that reaches each cell from other skin
-    no_light : buffer of zeros that takes the place of `from_skin` while the sample points are lit
+    no_light : buffer of zeros to bind instead of `from_skin` in the pass that lights the sample points
     """
 
     sample_points: tuple[Buffer, int]
@@ -81,7 +83,7 @@ def make_interreflection(
     light_key: str,
     layout_key: str,
 ) -> Interreflection | None:
-    """Return the interreflection of a head, None for a head where no skin sees other skin.
+    """Return the interreflection of a head, None for a head where no skin is visible from other skin.
 
     profile_albedo : (3,) albedo of the skin's diffusion profile [-]
     has_occlusion : whether there is a map of the visible fraction of the sky
@@ -156,7 +158,7 @@ def _make_buffers(
 
 
 def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, constants: Constants) -> None:
-    """Declare the passes that compute the light that each part of the skin receives from other skin.
+    """Declare the passes that compute the light that skin receives from other skin.
 
     bindings : resources of the lighting
     constants : pipeline constants of the lights
@@ -177,7 +179,7 @@ def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, 
 
 
 def _draw_bounces(graph: Recorder, buffers: InterreflectionBuffers) -> None:
-    """Declare the passes in which light bounces between patches of skin and then reaches the atlas."""
+    """Declare the passes that compute the bounces of light between patches, then the light at each cell."""
     device = graph.device
     team = (
         1 if device.adapter.kind == "CPU" else _INVOCATIONS_PER_PATCH

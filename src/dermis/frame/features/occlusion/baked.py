@@ -63,7 +63,7 @@ def bake_occlusion(
     rows hold the vertices of the mesh.
 
     bindings : resources that lighting shaders read; the geometry and the lights among them are not used
-    surface_texels : texture of the surface point of each atlas texel
+    surface_texels : texture that maps each atlas texel to a surface point
     result_side : side of the atlas in the result [texels]
     direction_count : number of depth maps
     depth_map_side : side of a depth map [texels]
@@ -139,7 +139,7 @@ def cached_occlusion_map(
 
     hair : hair of the head, which hides a part of the sky from the skin below it
     bindings : resources that lighting shaders read; the geometry and the lights among them are not used
-    surface_texels : texture of the surface point of each atlas texel
+    surface_texels : texture that maps each atlas texel to a surface point
     """
     side = min(atlas.size, _MAX_OCCLUSION_MAP_SIDE)
 
@@ -162,8 +162,8 @@ def _hair_transmittance(
     """Return the fraction of the sky's light that passes through the hair to each point of the skin [-].
 
     Scalp hair and beard are modelled as a plane layer over the roots, which absorbs some of the diffuse
-    light; light that is not absorbed is scattered and reaches the skin. The result has the shape and the
-    order of the result of `fill_gaps`.
+    light and scatters the rest towards the skin. The points are ordered as in the result of `fill_gaps`: rows
+    of texels, then vertices.
 
     packed_texels : (s, s, 2) words of the atlas texels: triangle index plus 1, and packed barycentric weights
     result_side : side of the atlas in the result [texels]
@@ -185,7 +185,7 @@ def _hair_transmittance(
 
 
 def placeholder_occlusion(device: Device) -> Texture:
-    """Return a 1 x 1 placeholder for the occlusion map of scenes without occlusion."""
+    """Return the 1 x 1 texture to bind in place of the occlusion map for scenes without occlusion."""
     return device.cached(
         "no occlusion", lambda: make_texture(device, (1, 1), "r32float", content_source="map")
     )

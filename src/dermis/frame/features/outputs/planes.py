@@ -1,4 +1,4 @@
-"""Buffer for the outputs of a stage, one image after another, and the pass that fills the buffer."""
+"""Buffer for the outputs of a shader stage, one image after another, and the pass that fills the buffer."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PlaneArray = NDArray[Any]  # callers know the dtype by the output's name
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """Buffer for the outputs of a stage: one image after another, with interleaved channels.
+    """Buffer for the outputs of a shader stage: one image after another, with interleaved channels.
 
     stage : name of the shader that fills the buffer
     channels : number of channels of each output, in the order of the buffer
@@ -118,6 +118,6 @@ def stage_program(device: Device, planes: Planes, constants: Constants = ()) -> 
 def draw_planes(graph: Recorder, planes: Planes, shader: ComputeProgram, bindings: Bindings) -> None:
     """Declare the pass that computes the outputs of a stage for each pixel.
 
-    bindings : resources of the shader, apart from the buffer of outputs
+    bindings : resources of the shader, apart from the buffer for the outputs
     """
     graph.compute("outputs", shader, {**bindings, "planes": planes.buffer}, planes.size)

@@ -27,13 +27,13 @@ _PIXELS_PER_INVOCATION, _WORDS_PER_INVOCATION = 4, 3  # read and written by pack
 
 @dataclass(frozen=True)
 class Readback:
-    """Readback in progress, of a picture and its outputs.
+    """Readback of a picture and its outputs, which is in progress.
 
     fetched : readback of the buffers
     size : (width, height) [pixel]
     kind : dtype of the picture
     channels : number of channels of the picture: 3, or 4 with alpha
-    words : size of the packed picture in words of four bytes; in the downloaded bytes, the outputs follow the
+    words : number of 4-byte words of the packed picture; in the downloaded bytes, the outputs follow the
         picture
     outputs : resources of the outputs that are read back with the picture, None for the picture alone
     """
@@ -52,10 +52,10 @@ class Readback:
         return self._decode_picture(self.fetched.array())
 
     def image_and_outputs(self) -> tuple[PictureArray, dict[str, PlaneArray], LandmarkPositions]:
-        """Wait for the readback; return the picture, and dictionaries of outputs and of landmark sets.
+        """Wait for the readback; return the picture, and dictionaries of the outputs and of the landmarks.
 
-        The keys are the names of the outputs and of the sets. Call either this method or `image`, and only
-        once.
+        The keys are the names of the outputs and of the landmark sets. Call either this method or `image`,
+        and only once.
         """
         raw, start, arrays = self.fetched.array(), _WORD_BYTES * self.words, dict[str, PlaneArray]()
         if self.outputs is None:
@@ -130,7 +130,7 @@ def _check_size(
 def _packed_buffer(device: Device, picture: Picture, word_count: int) -> Buffer:
     """Return the buffer for the packed picture, which is kept in `Picture.packed` for later readbacks.
 
-    word_count : size of the packed picture [4 bytes]
+    word_count : number of 4-byte words of the packed picture
     """
     if word_count not in picture.packed:
         picture.packed[word_count] = device.buffer(np.zeros(word_count, np.uint32), "STORAGE")

@@ -1,4 +1,4 @@
-"""Stages that compute outputs, and the passes that they declare; each stage has the name of its shader."""
+"""Shader stages that compute outputs, and the passes that they declare; each is named like its shader."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def _needs_hair_labels(resources: Resources | None, inputs: StageInputs) -> bool
 
 
 def _draw_centres(graph: Graph, inputs: StageInputs) -> None:
-    """Declare the passes that find the triangle at each pixel centre, unless the only sample is there."""
+    """Declare the passes that find the triangle at each pixel centre, unless that is the only sample."""
     if inputs.centres is not inputs.visibility:
         draw_layers(graph, "outputs", inputs.centres, Views(inputs.camera.clips, PIXEL_CENTRE), inputs.head)
 

@@ -54,7 +54,7 @@ def draw(
 
     shading : resources of the lighting, uniform record of the shading pass, and pipeline constants of the
         lights
-    visibility : texture of the triangle at each sample
+    visibility : texture with the index of the triangle that covers each sample
     radiance_image : texture of the radiance of the picture
     """
     lighting, view, constants = shading

@@ -1,4 +1,4 @@
-"""Resources of post-processing, and its passes from radiance to the picture."""
+"""Resources of post-processing, and the passes that turn radiance into the displayed picture."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def draw(
     lighting : resources of the lighting
     view : uniform record of the shading pass
     light_constants : pipeline constants of the lights
-    visibility : texture of the triangle at each sample
+    visibility : texture with the index of the triangle that covers each sample
     """
     if resources.meter:
         shading = lighting, view, light_constants

@@ -56,7 +56,9 @@ def bake(
     texel_side_uv: float,
     pigments: tuple[float, float] | None,
 ) -> NDArray[np.float32]:
-    """Return (n, BAKED_CHANNEL_COUNT) values at surface points, in the channels of `BAKED_CHANNELS`.
+    """Return (n, BAKED_CHANNEL_COUNT) properties and light of the skin at n surface points.
+
+    `BAKED_CHANNELS` names the columns of the result.
 
     constants : pipeline constants of the shading
     bindings : resources of the frame that shading.wgsl and bake.wgsl read

@@ -17,7 +17,7 @@ from dermis.gpu import (
 
 
 def shade_program(device: Device, constants: Constants = ()) -> ComputeProgram:
-    """Return the program of the shading pass; its structs also define the records of lights and skin.
+    """Return the program of the shading pass, which also defines the structs of the light and skin records.
 
     constants : pipeline constants of the lights, the surface and the technique
     """

@@ -1,4 +1,4 @@
-"""Uniform record of the shading pass: camera rays, samples, poses of the eyes and light factors."""
+"""Uniform record of the shading pass: camera rays, samples, poses of the eyes, and factors of the light."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Pinhole(NamedTuple):
 
     eye : position of the pinhole [mm]
     axes : unit vectors to the right, up and forward
-    window : rectangle of the picture on the image plane at distance 1
+    window : half extents and centre of the picture on the image plane at distance 1
     """
 
     eye: Triple
@@ -53,9 +53,9 @@ class Pinhole(NamedTuple):
 class EyePoses(NamedTuple):
     """Poses of the modelled eyes of a head.
 
-    frames : (2, 4, 4) matrices from the space of the head to the space of each eye
-    edges_mm : (2, r, 3) points along the edges of the eyelids [mm]; None if they are unknown, as for heads
-        from files
+    frames : (2, 4, 4) matrices from the space of the head to the space of each of the two eyes
+    edges_mm : (2, r, 3) points along the eyelid edges of each eye [mm]; None if they are unknown, as for
+        heads from files
     """
 
     frames: NDArray[np.float64]
@@ -81,7 +81,7 @@ def camera_views(pinhole: Pinhole, outline: Outline, sample_count: int) -> Views
 
 
 def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: ProfileSplit) -> UniformRecord:
-    """Return the uniform record of the struct Shade: samples, weights and materials, but no camera.
+    """Return the uniform record of the struct Shade; `with_camera` adds the camera and the eye poses.
 
     Raises DermisError for a head with too many materials.
     """
@@ -120,8 +120,9 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
 
 
 def with_camera(view: UniformRecord, pinhole: Pinhole, eyes: EyePoses | None) -> UniformRecord:
-    """Return a copy of a record of the struct Shade, with camera rays and poses of the eyes.
+    """Return a copy of a Shade record with camera rays and the poses of the eyes.
 
+    view : result of `view_record`
     eyes : poses of modelled eyes, None for a head without such eyes
     """
     eye, (right, up, forward), (half, shift) = pinhole

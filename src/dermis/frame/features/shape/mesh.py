@@ -36,15 +36,15 @@ class HeadGeometry:
 
     @property
     def constants(self) -> Constants:
-        """Return the pipeline constants of passes that find the nearest surface."""
+        """Return the pipeline constants that passes need to find the nearest surface of this head."""
         return (("CUTOUTS", 1),) if self.has_cutouts else ()
 
     def with_shape(self, shape: Shape) -> HeadGeometry:
-        """Return these triangles with the posed vertices of a shape."""
+        """Return a copy of this geometry with the posed vertices of a shape."""
         return replace(self, resources=self.resources | shape.vertices)
 
     def with_vertices_of(self, other_geometry: HeadGeometry) -> HeadGeometry:
-        """Return these triangles with the vertex buffers of another geometry of the same head."""
+        """Return a copy of this geometry with the vertex buffers of another geometry of the same head."""
         return replace(
             self,
             resources={
@@ -57,12 +57,12 @@ class HeadGeometry:
 def upload_geometry(
     device: Device, mesh: Mesh, atlas: Atlas, shape: Shape, part_maps: PartMaps | None = None
 ) -> HeadGeometry:
-    """Upload the triangles of a head with their atlas coordinates, and add the vertices of its shape.
+    """Upload the triangles of a head with their atlas coordinates, to be drawn with the vertices of a shape.
 
-    part_maps : maps of the parts that are not skin. The opacity map may cut holes into a part. If None, parts
-        with holes are left out
+    part_maps : maps of the parts that are not skin, among them an opacity map that cuts holes into parts;
+        None to leave out the triangles with such holes
     """
-    table, cut_out = _triangle_table(mesh, atlas), mesh.cut_out
+    table, cut_out = _triangle_table(mesh, atlas), mesh.cut_out_mask
     if part_maps is None or not cut_out.any():
         table[0, cut_out, :3] = 0
         return _upload_triangle_table(device, table, shape.vertices)
@@ -74,7 +74,7 @@ def upload_geometry(
 
 
 def upload_triangles(device: Device, triangle_vertices: NDArray[np.integer]) -> HeadGeometry:
-    """Upload only the (t, 3) vertex indices of triangles, to draw the depths of a simplified mesh."""
+    """Upload only the (t, 3) vertex indices of triangles, for drawing the depths of a simplified mesh."""
     table = np.zeros((3, len(triangle_vertices), 4), dtype=np.uint32)
     table[0, :, :3] = triangle_vertices
     return _upload_triangle_table(device, table, {})

@@ -16,8 +16,8 @@ class Resources:
 
     shape : buffers of the posed shape
     tables : buffers that are constant for a mesh
-    rest_shape : buffers of the person at rest, None if the person's control points at rest are those of the
-        mesh, which several people may share
+    rest_shape : buffers of the person's shape at rest; None if the control points of the mesh are already
+        those of the person
     curvature : buffers of the surface's curvature, None unless the technique reads it
     """
 

@@ -30,7 +30,7 @@ MIN_RELATIVE_TANGENT = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class ShapeTables:
-    """Buffers of a head's mesh and rig that are constant over frames, and the sizes of their contents.
+    """Buffers of a head's mesh and rig that are constant over frames, with the number of points, bones etc.
 
     morphs : dictionary from names in shape_pose.wgsl to morph targets and bone weights, empty for heads that
         do not move
@@ -84,7 +84,7 @@ class Shape:
 
 
 def shape_tables(device: Device, head: Head) -> ShapeTables:
-    """Upload the mesh and the rig of a head as buffers for the passes of its shapes."""
+    """Upload the mesh and the rig of a head to the buffers from which its shape is computed."""
     rig, mesh = head.control, head.mesh
     moves, bones = bool(rig.targets.names or rig.skeleton), len(rig.skeleton.names) if rig.skeleton else 0
     return ShapeTables(
@@ -163,7 +163,7 @@ def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
 
 
 def displacements(targets: MorphTargets, template_targets: MorphTargets) -> NDArray[np.float32]:
-    """Return (n, 4) displacements [mm] with morph target indices, ordered by point, for shape_pose.wgsl.
+    """Return (n, 4) rows of displacement [mm] and morph target index, ordered by point, for shape_pose.wgsl.
 
     targets : morph targets of a person
     template_targets : morph targets of the person's template, which displace the same points in the same
@@ -189,10 +189,10 @@ def _bone_influences(skeleton: Skeleton | None, point_count: int) -> Words:
 
 
 def _contact_words(contact: LidContact | None, point_count: int) -> Words:
-    """Return (p, 3) words with which the shader keeps points outside the eyeballs, zeros for other points.
+    """Return (p, 3) words with which the shader keeps points outside the eyeballs.
 
     The words are the indices of the front and back point of the eyeball, and the bits of a float: the least
-    distance from the eyeball [mm].
+    distance from the eyeball [mm]. They are 0 for points that may be anywhere.
     """
     if contact is None:
         return np.zeros((1, 3), np.uint32)
@@ -210,9 +210,10 @@ def _stencil_tables(stencils: Stencils) -> dict[str, NDArray[np.generic]]:
 
 
 def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
-    """Return the named tables of shape_vertices.wgsl: vertices, triangle corners and ranges of corners.
+    """Return the tables that shape_vertices.wgsl reads, by name: vertices, triangle corners and spans.
 
-    Corners are ordered by point and then by vertex, so that the corners of a vertex are contiguous.
+    Corners are ordered by point and then by vertex. The spans give, for each vertex, the range of the corners
+    at its point and the range of its own corners.
     """
     count, corner = len(mesh.positions), mesh.triangles.ravel().astype(np.int64)
     table = np.zeros(count, _VERTEX_DTYPE)
@@ -232,16 +233,16 @@ def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
 
 
 def run_bounds(sorted_values: NDArray[np.integer], run_values: NDArray[np.integer]) -> Words:
-    """Return, for each of n values, the start and end of the run of this value in a sorted array, (n, 2)."""
+    """Return (n, 2) bounds: where the run of each of n values starts and ends in a sorted array."""
     ends = [np.searchsorted(sorted_values, run_values, side) for side in ("left", "right")]
     return np.stack(ends, axis=1).astype(np.uint32)
 
 
 def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
-    """Return the (v, 3) normals of a mesh, in coordinates that are constant while the surface deforms.
+    """Return the (v, 3) normals of a mesh, each in a frame that moves with its vertex.
 
-    The axes at a vertex are the smooth normal, the u direction made orthogonal to the normal, and the cross
-    product of these two axes.
+    The axes of the frame are the smooth normal, the u direction made orthogonal to the normal, and the cross
+    product of these two axes. In it, a normal of the mesh stays constant while the surface deforms.
     """
     smooth = vertex_normals(mesh.positions, mesh.point, mesh.triangles).astype(np.float64)
     axis = np.eye(3)[np.abs(smooth).argmin(axis=1)]
@@ -255,9 +256,7 @@ def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
 
 
 def _run_offsets(sorted_index: NDArray[np.integer], run_count: int) -> Words:
-    """Return where the values 0, 1, ... start in a sorted array, then the length of the array.
-
-    The shape of the result is (run_count + 1,).
+    """Return the (run_count + 1,) offsets at which the runs of 0, 1, ... start and end in a sorted array.
 
     sorted_index : sorted integers from 0 to run_count - 1
     """
@@ -270,8 +269,8 @@ class MotionBytes(NamedTuple):
     positions : position of each control point at rest, three floats [mm]
     weights : weight of each morph target, one float
     matrices : matrix of each bone, from rest to pose, twelve floats row by row [mm]
-    displacements : result of the function `displacements` for a person who uses the buffers of a template,
-        else empty
+    displacements : result of the function `displacements` if the person's morph targets replace those of the
+        template, else empty
     """
 
     positions: bytes
@@ -281,7 +280,7 @@ class MotionBytes(NamedTuple):
 
     @property
     def at_rest(self) -> MotionBytes:
-        """Return the rest pose of the head: control points, but no morph weights and bone matrices."""
+        """Return the rest pose of the head: the control points without morph weights and bone matrices."""
         return MotionBytes(self.positions)
 
 

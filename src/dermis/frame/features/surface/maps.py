@@ -51,10 +51,10 @@ def upload_maps(
 ) -> UploadedMaps:
     """Upload or paint the maps of a head, with their sampler and the table of Beckmann's distribution.
 
-    use_colour : whether to use the colour map; False replaces it by white, for profiles that contain the
-        colour
-    decode_srgb : False treats the sRGB values of the colour map as linear, a mistake shown in the talk
-        [dEonLuebke2007]
+    use_colour : whether to use the colour map; False replaces it by white, for profiles that already include
+        the colour of the skin
+    decode_srgb : False treats the sRGB values of the colour map as linear, to reproduce a mistake that the
+        talk [dEonLuebke2007] shows
     painted_side : side of painted maps [texels]
     has_expressions : whether expressions change painted maps
     """
@@ -70,9 +70,9 @@ def upload_maps(
 
 
 def detail_bindings(device: Device, has_fine_relief: bool) -> MutableBindings:
-    """Return the tiled texture of relief that is finer than the maps, and its sampler, named as in skin.wgsl.
+    """Return the tiled texture of the skin's finest relief, and its sampler, named as in skin.wgsl.
 
-    has_fine_relief : whether the skin has such relief; if False, the texture is flat
+    has_fine_relief : whether the skin has relief that is finer than its maps; if False, the texture is flat
     """
     slopes = detail_slopes() if has_fine_relief else np.zeros((1, 1, 4), np.float32)
     repeat = {f"address_mode_{axis}": "repeat" for axis in "uv"}
@@ -83,7 +83,7 @@ def detail_bindings(device: Device, has_fine_relief: bool) -> MutableBindings:
 def _paint_maps(
     device: Device, head: Head, maps: PaintedMaps, use_colour: bool, paint_options: tuple[int, bool]
 ) -> tuple[MutableBindings, ExpressionMaps | None]:
-    """Paint the maps for which the head has no file; return them, and the maps that expressions change.
+    """Paint the maps that the head does not have as files; also return the maps that expressions change.
 
     paint_options : side [texels], and whether expressions change the maps
     """
@@ -100,7 +100,7 @@ def _paint_maps(
 
 
 def _painted_surface(head: Head) -> PaintedSurface:
-    """Return the mesh over which skin is painted; all people of a template share the mesh of the template."""
+    """Return the mesh over which skin is painted: the mesh that a person shares with the template."""
     return painted_surface(head.topology.mesh, head.topology.control.stencils)
 
 

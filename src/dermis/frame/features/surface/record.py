@@ -74,7 +74,7 @@ def skin_record(
 ) -> UniformRecord:
     """Return the uniform record of the shader struct `Skin`.
 
-    Members named like a field or property of `Skin` are copied from it; all other members are derived.
+    Members with the name of a field or property of `skin` are copied from it; all other members are derived.
 
     light_count : number of lights; each part of a divided light counts as one
     """
@@ -99,7 +99,7 @@ def _derived_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, 
 
 
 def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats, float]:
-    """Return the (3,) reflectance and the refractive index of a half-space of mean skin colour [-]."""
+    """Return the (3,) reflectance and the refractive index of a half-space with the mean skin colour [-]."""
     if skin.albedo == "profile":
         colour = np.asarray(profile.albedo, np.float64)
     elif maps.mean_colour is None:
@@ -110,9 +110,10 @@ def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Float
 
 
 def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
-    """Return the members of the struct `Skin` for direction.wgsl: how skin responds to each light direction.
+    """Return the members of the struct `Skin` that direction.wgsl reads.
 
-    Reflectance and transmittance are computed for a half-space with the mean colour of the skin.
+    They describe how reflectance and transmittance depend on the direction of light, and are computed for a
+    half-space with the mean colour of the skin.
     """
     half_space = mean_half_space(skin, maps, profile)
     response = anisotropic_response(*half_space, skin.anisotropy)
@@ -132,9 +133,10 @@ def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str
 
 
 def _normal_map_level(maps: Maps) -> float:
-    """Return the mip level at which the height map is as large as the normal map, -1 if there is none.
+    """Return the mip level at which the height map is as large as the normal map, -1 if either is missing.
 
-    From the height map, only relief finer than this level is added to the normal map; for -1, all of it.
+    Shaders add to the normal map only the relief of the height map that is finer than this level; for -1,
+    they add all relief.
     """
     if maps.normal is None or maps.height is None:
         return _NO_RELIEF_LEVEL

@@ -1,4 +1,4 @@
-"""Creation of the resources of translucency, the light that crosses thin parts between cells of the skin."""
+"""Creation of the resources of translucency, the light that passes through thin parts of the head."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _CELL_COARSENING_FACTOR = 1.5  # factor of the cell side when memory does not ho
 
 
 def thin_part_tables(memo: Memo, request: FrameRequest) -> ThinParts | None:
-    """Return the transmittance of thin parts as a function of thickness, None for Lambertian skin."""
+    """Return the transmittance of thin tissue as a function of its thickness, None for Lambertian skin."""
     if request.skin.direction != "half-space":
         return None
     split, maps = request.split, request.head.maps
@@ -68,9 +68,10 @@ def _thin_part_weights(
     variance_mm2: Floats,
     level_weight: Floats,
 ) -> ThinParts:
-    """Return the transmittance of thin parts for each thickness: one weight for each blurred level.
+    """Return tables of the light that thin tissue transmits and loses, as functions of its thickness.
 
-    The weights are scaled so that no level loses more light than it has.
+    For each thickness, the tables hold one weight for each blurred level of the diffusion. The weights are
+    scaled so that no level loses more light than it has.
 
     colour : (3,) diffuse reflectance of thick skin [-]
     eta : index of refraction of skin [-]
@@ -101,14 +102,14 @@ def make_translucency(
 ) -> Translucency:
     """Return the resources for light that is transmitted through thin parts of a head.
 
-    A pair is a cell of the atlas where light enters a thin part, and a cell where this light leaves.
+    A pair consists of a cell of the atlas where light enters a thin part, and a cell where this light leaves.
 
     surface : resources of geometry.wgsl and of the atlas, for the current shape
     rest_surface : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     weight : (k, 3) weights of the blurred levels [-]
-    thickness_tables : transmittance as a function of thickness; if None, the weight of a pair is computed
-        from the Gaussians and the straight distance between its cells
+    thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
+        weight a pair by the Gaussians at the straight distance between its cells
     shares_pairs : whether skins with similar profiles use the same pairs; true for skins that may change
         between frames
     layout_key : name of the atlas layout in the cache
@@ -132,9 +133,9 @@ def _cached_cell_division(atlas: Atlas) -> Callable[[float], Cells]:
 
 
 class PairCache:
-    """Cache of the translucent pairs of a surface, for the last few divisions of its atlas into cells.
+    """Cache of the translucent pairs of a surface, for the most recent divisions of its atlas into cells.
 
-    A pair is a cell of the atlas where light enters a thin part, and a cell where this light leaves.
+    A pair consists of a cell of the atlas where light enters a thin part, and a cell where this light leaves.
 
     surface : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
     """
@@ -155,11 +156,11 @@ class PairCache:
 
 
 def rounded_sigma_mm(widest_sigma_mm: float) -> float:
-    """Round a standard deviation to the nearest power of sqrt(2) [mm].
+    """Round the standard deviation of the widest Gaussian to the nearest power of sqrt(2) [mm].
 
-    Cells of the atlas depend only on the rounded width, so that skins with similar profiles share them.
+    The cells of the atlas depend only on the rounded value, so that skins with similar profiles share them.
 
-    widest_sigma_mm : standard deviation of the widest Gaussian [mm]
+    widest_sigma_mm : standard deviation before rounding [mm]
     """
     step = round(_WIDTH_STEPS_PER_DOUBLING * float(np.log2(max(widest_sigma_mm, _MIN_WIDTH_MM))))
     return float(2.0 ** (step / _WIDTH_STEPS_PER_DOUBLING))
@@ -167,7 +168,7 @@ def rounded_sigma_mm(widest_sigma_mm: float) -> float:
 
 @logged_step("finding the thin parts")
 def find_pairs(device: Device, surface: Bindings, atlas: Atlas, cells: Cells) -> PairBuffers:
-    """Find the translucent pairs of a surface; coarser cells are used if a buffer cannot hold all pairs."""
+    """Find the translucent pairs of cells; if a buffer cannot hold all pairs, use coarser cells."""
     table, times = search_pairs(device, surface, cells), count(1)
     while table is None:
         cells = divide_into_cells(atlas, cells.max_sigma_mm, _CELL_COARSENING_FACTOR ** next(times))
@@ -176,7 +177,10 @@ def find_pairs(device: Device, surface: Bindings, atlas: Atlas, cells: Cells) ->
 
 
 def make_pair_buffers(device: Device, cells: Cells, pair_table: PairTable) -> PairBuffers:
-    """Return the pairs of a search as the buffers that the passes of a frame read."""
+    """Create the buffers of translucent pairs that the passes of a frame read.
+
+    pair_table : result of the search for pairs
+    """
     return PairBuffers(
         cells=cells,
         receivers=upload_receivers(device, cells, pair_table.receiver),
@@ -193,7 +197,7 @@ def _receiver_ranges(cells: Cells, pair_table: PairTable) -> NDArray[np.uint32]:
     """Return (m, 3) words: the packed cell of each receiver, and the first and end index of its pairs.
 
     If there are no receivers, the result is one row of zeros. Receivers with many pairs come first, so that
-    invocations of the same workgroup take about equally long, and the last workgroups finish fastest.
+    invocations of the same workgroup take similar time.
     """
     first, end = pair_table.first[:-1], pair_table.first[1:]
     order = np.argsort(first - end, kind="stable")
@@ -202,7 +206,7 @@ def _receiver_ranges(cells: Cells, pair_table: PairTable) -> NDArray[np.uint32]:
 
 
 def _zero_light(device: Device, surface_mask: NDArray[np.bool_]) -> Texture:
-    """Return a black texture over the coarse atlas, whose alpha is 1 where the mask shows surface."""
+    """Return a black texture over the coarse atlas; its alpha is 1 where `surface_mask` is set."""
     light = np.zeros((*surface_mask.shape, 4), np.float32)
     light[..., 3] = surface_mask
     texture = make_texture(device, surface_mask.shape, "rgba32float")
@@ -221,8 +225,8 @@ def with_profile(
 
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     weight : (k, 3) weights of the blurred levels [-]
-    thickness_tables : transmittance as a function of thickness; if None, the weight of a pair is computed
-        from the Gaussians and the straight distance between its cells
+    thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
+        weight a pair by the Gaussians at the straight distance between its cells
     """
     fraction = weight / np.maximum(weight.sum(axis=0), MIN_WEIGHT_SUM)
     transmitted = weight if thickness_tables is None else thickness_tables.transmitted

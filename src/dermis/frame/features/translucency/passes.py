@@ -1,4 +1,4 @@
-"""Passes of translucency: positions of the pairs, their weights, and the transmitted light."""
+"""Passes of translucency: positions of the paired cells, weights of the pairs, and the transmitted light."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _MIN_SOURCE_SMOOTHNESS = (
 
 
 def make_element_buffer(device: Device, element_count: int, element_bytes: int = 4) -> Buffer:
-    """Allocate a buffer for a number of elements of `element_bytes` bytes each; the buffer is never empty."""
+    """Allocate a buffer for elements of `element_bytes` bytes each; the buffer has room for at least one."""
     return device.storage_buffer(element_bytes * max(1, element_count))
 
 
@@ -46,10 +46,10 @@ def draw_cell_points(
     point_buffer: Buffer,
     metric_from_triangles: bool = False,
 ) -> None:
-    """Declare the pass that writes the current positions and normals of receivers or sources.
+    """Declare the pass that writes the current positions and normals of cells where light enters or leaves.
 
-    For sources, the pass also writes the area; for receivers, it writes the metric, which converts offsets in
-    the atlas to lengths.
+    For cells where light enters (sources), the pass also writes the area. For cells where light leaves
+    (receivers), it writes the metric, which converts offsets in the atlas to lengths.
 
     cell_role : "receiver" or "source"
     surface : resources of geometry.wgsl and of the atlas
@@ -68,7 +68,7 @@ def draw_cell_points(
 def draw(
     graph: Recorder, levels: PyramidLevels, blur: Blur, thin_parts: Translucency, constants: Constants = ()
 ) -> Texture:
-    """Declare the passes that sum the light from all sources at each receiver; return the sums.
+    """Declare the passes that sum, in each receiver cell, the light from all source cells; return the sums.
 
     levels : blurred light over the atlas; light enters the sources from one of the levels
     blur : Gaussian blurs of the levels
@@ -105,8 +105,8 @@ def draw_direction_factors(
 ) -> None:
     """Declare the pass that computes how the directions of incident light change the transmission.
 
-    The result is one factor for each source, which applies in full where the thin part is thick enough for
-    light to scatter many times.
+    The result is one factor for each source cell. It applies in full only where the tissue is so thick that
+    light scatters many times.
 
     constants : pipeline constants of the lights
     """
@@ -130,7 +130,7 @@ def sum_pairs(
     constants: Constants = (),
     stage_name: str = "translucency",
 ) -> None:
-    """Declare the pass that sums, at each receiver, the light of the sources times the weights of the pairs.
+    """Declare the pass that sums, in each receiver cell, the light of its sources times the pair weights.
 
     source_light : buffer of the light of each source
     light_sums : texture over the coarse atlas for the sums
@@ -154,9 +154,10 @@ def sum_pairs(
 
 
 def draw_weights(graph: Recorder, thin_parts: Translucency) -> None:
-    """Declare the passes that compute the weights of all pairs for the current shape.
+    """Declare the passes that compute the weights of all translucent pairs for the current shape.
 
-    The passes also sum the fraction of the blurred light that each receiver loses because its tissue is thin.
+    The passes also sum the fraction of the blurred light that each receiver cell loses because its tissue is
+    thin.
     """
     pairs, cells = thin_parts.pairs, thin_parts.pairs.cells
     draw_cell_points(
@@ -198,7 +199,8 @@ def weight_bindings(
 
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     weight : (k, 3) weights of the blurred levels [-]
-    thickness_tables : transmittance as a function of thickness; if None, pairs are weighted by the Gaussians
+    thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
+        weight pairs by the Gaussians
     transmittance : (THICKNESS_ROWS, k, 3) table to use: `thickness_tables.transmitted` or
         `thickness_tables.lost`
     """
@@ -220,7 +222,7 @@ def weight_bindings(
 def _transmittance_table(
     gaussian_count: int, thickness_tables: ThinParts | None, transmittance: Floats | None
 ) -> NDArray[np.float32]:
-    """Return the transmittance for each thickness and each of k Gaussians, (THICKNESS_ROWS k, 4).
+    """Return (THICKNESS_ROWS k, 4) rows: RGB transmittance for each thickness and each of k Gaussians.
 
     The fourth channel holds `ThinParts.directionality` in the first row of each thickness, else 0. Without
     `thickness_tables`, the result is one row of zeros.

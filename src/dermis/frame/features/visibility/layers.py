@@ -55,9 +55,9 @@ class ViewLayers:
     triangles : whether layers store triangle indices instead of depth
     depth : depth attachments of the rasteriser: one for each layer, or a single one if `triangles`
     targets : colour targets of the rasteriser, one for each layer; None for layers of depth
-    nearness : buffer of the compute pass: depth of each sample, in some modes packed with the triangle
-    triangle_ids : buffer of the compute pass with the triangle of each sample, allocated on first use
-    tiles : buffer of the compute pass with the state of each tile
+    nearness : buffer of the compute pass: depth at each sample, in some modes packed with the triangle index
+    triangle_ids : buffer of the compute pass: triangle index at each sample, allocated on first use
+    tiles : buffer of the compute pass: state of each tile of pixels
     """
 
     texture: Texture
@@ -96,7 +96,7 @@ def make_layers(
 def draw_layers(
     graph: Recorder, stage_name: str, layers: ViewLayers, views: Views, head: HeadGeometry
 ) -> None:
-    """Declare the passes that fill one layer for each sample position of each view.
+    """Declare the passes that fill the layers: one for each view and each of its sample positions.
 
     stage_name : name of the stage in timings
     """
@@ -107,7 +107,7 @@ def draw_layers(
 
 
 def draw(graph: Recorder, visibility: ViewLayers, views: Views, head: HeadGeometry) -> None:
-    """Declare the passes that find the triangle at each sample of the picture [Burns2013]."""
+    """Declare the passes that find the triangle that covers each sample of the picture [Burns2013]."""
     draw_layers(graph, "visibility", visibility, views, head)
 
 
@@ -224,9 +224,9 @@ def _draw_raster(
 
 
 def _raster_program(device: Device, store_triangles: bool, has_cutouts: bool) -> RenderProgram:
-    """Return the program that rasterises triangles or depth.
+    """Return the program that rasterises triangle indices or depth.
 
-    has_cutouts : whether a fragment shader cuts holes, even if only depth is drawn
+    has_cutouts : whether opacity maps cut holes, which needs a fragment shader even if only depth is drawn
     """
 
     def make() -> RenderProgram:
@@ -257,10 +257,10 @@ def _views_record(
 
 
 def _depth_range_mm(clip_matrix: Matrix) -> float:
-    """Return an upper bound of the change of distance per unit of depth [mm].
+    """Return the largest change of distance per unit of z-buffer depth, as an upper bound [mm].
 
-    Where depth is stored as an integer, the error of the distance is at most this bound divided by the number
-    of integer steps.
+    If depth is stored as an integer, the error of the distance is at most this bound divided by the number of
+    integer steps.
 
     clip_matrix : (4, 4) matrix from world to clip space
     """
@@ -278,7 +278,9 @@ def _depth_range_mm(clip_matrix: Matrix) -> float:
 
 @cache
 def _split_work(triangle_count: int, view_count: int, sample_count: int) -> tuple[Constants, int]:
-    """Return the pipeline constants and the number of workgroups of the compute pass, tuned on an H200.
+    """Divide the triangles among the workgroups of the compute pass; the numbers were tuned on an H200.
+
+    Return pipeline constants, and the number of workgroups.
 
     triangle_count : number of triangles
     view_count : number of views
@@ -296,5 +298,8 @@ def _split_work(triangle_count: int, view_count: int, sample_count: int) -> tupl
 
 
 def _tile_counts(picture_size: tuple[int, int]) -> tuple[int, int]:
-    """Return the number of tiles of the compute pass across and down a picture of size (width, height)."""
+    """Return the number of tiles, across and down, of a picture of size (width, height).
+
+    The compute pass draws the picture in these tiles.
+    """
     return -(-picture_size[0] // _TILE_PIXELS[0]), -(-picture_size[1] // _TILE_PIXELS[1])

@@ -1,4 +1,4 @@
-"""Painted maps of human skin: colour, gloss and relief at rest, and the changes that expressions make."""
+"""Painted maps of human skin: colour, gloss and relief of a face at rest, and the changes by expressions."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from dermis.gpu.shader_types import make_record, struct_dtype
 from dermis.gpu.textures import download
 from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.human.skin import face, textures
-from dermis.human.skin.face import FOLD_MOVEMENT_COUNT, HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, table_sizes
+from dermis.human.skin.face import FOLD_MOVEMENT_COUNT, HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, paint_table_sizes
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.measured import SiteDifferences
 from dermis.human.skin.painted import oxygen_range, painted_colour_tables
@@ -67,13 +67,13 @@ _FOLDING_VALUE_COUNT = FOLD_MOVEMENT_COUNT + 1  # numbers in `folding` of the sh
 
 
 def painting_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
-    """Return the lists over which the painting shaders loop: noises, dot layers, zones, noise regions."""
+    """Return the lists over which `//#each` lines in painting shaders loop, such as the list of noises."""
     return {name: _as_members(names) for name, names in _PAINTING_LISTS.items()}
 
 
 def painting_constants() -> dict[str, float]:
     """Return the named values that `//#fill` lines insert into the painting shaders."""
-    counts = {name: len(names) for name, names in _PAINTING_LISTS.items()} | table_sizes()
+    counts = {name: len(names) for name, names in _PAINTING_LISTS.items()} | paint_table_sizes()
     rows = {"noise_rows": len(noise_table()), "amount_rows": len(ZONE_AMOUNTS) // 4}
     sizes = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM}
     return sizes | counts | rows | {"folding": FOLD_MOVEMENT_COUNT, "wander_rows": ZONE_BORDER_NOISE_COUNT}
@@ -86,8 +86,8 @@ def _as_members(member_names: Sequence[str]) -> Callable[[], Sequence[ShaderList
 class PaintInputs(NamedTuple):
     """Inputs of the shader that paints skin.
 
-    paint : uniform record of the skin's appearance: pigments, gloss, age, ...
-    tables : tables of the face: noises, dots, zones, folds and hairline
+    paint : uniform record of the skin's appearance, such as pigments, gloss and age
+    tables : tables of procedural noises and dots, facial zones, folds of the skin, and the hairline
     colours : (3, n, n, 3) colour tables, linear Rec. 709 [-]: of skin with the lowest oxygen saturation, of
         skin with the highest oxygen saturation, and of lips
     surface : mesh that is painted
@@ -104,7 +104,7 @@ def paint_inputs(surface: PaintedSurface, look: SkinLook, map_side: int) -> Pain
 
     map_side : side of the maps [texels]
 
-    Raises DermisError for too many triangles.
+    Raises DermisError for a mesh with too many triangles.
     """
     if surface.count >= _MAX_PAINTED_TRIANGLES:
         actual = f"got {surface.count:,}"
@@ -131,10 +131,10 @@ def _shader_text(shader: str) -> str:
 
 
 def _face_tables(hairline_recession: float, site_differences: SiteDifferences) -> bytes:
-    """Return the tables of the face that spot.wgsl reads: noises, dots, zones, folds and the hairline.
+    """Return the tables that spot.wgsl reads: procedural noises and dots, facial zones, skin folds, hairline.
 
     hairline_recession : recession of the hairline [-]
-    site_differences : differences of pigments between the measured sites of the face
+    site_differences : differences of pigments between measured sites of the face, such as forehead and cheek
     """
     folds, edge = face.fold_curves(), face.hairline_heights(hairline_recession)
     ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)
@@ -151,7 +151,7 @@ def _face_tables(hairline_recession: float, site_differences: SiteDifferences) -
 
 
 class RestMaps(NamedTuple):
-    """Painted maps at rest; only the finest mip levels are filled.
+    """Painted maps of a face at rest; only the finest mip levels are filled.
 
     colour, specular, roughness : textures with views of their mip levels
     heights : buffer of heights with a border of one texel [mm]
@@ -168,7 +168,7 @@ class RestMaps(NamedTuple):
 def cached_rest_maps(
     device: Device, inputs: PaintInputs, map_side: int, with_expressions: bool = False
 ) -> RestMaps:
-    """Return the painted maps at rest, cached on disk for software adapters, which paint slowly.
+    """Return the painted maps of a face at rest, cached on disk for software adapters, which paint slowly.
 
     Only the first maps that a device paints are stored, because programs that render many people rarely need
     the same person again.
@@ -195,7 +195,7 @@ def cached_rest_maps(
 
 @logged_step("painting the skin")
 def paint_rest_maps(device: Device, inputs: PaintInputs, map_side: int) -> RestMaps:
-    """Paint the maps of a face without expression.
+    """Paint the maps of a face at rest.
 
     map_side : side of the maps [texels]
     """
@@ -221,7 +221,7 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, map_side: int) -> RestM
 def _surface_buffers(device: Device, inputs: PaintInputs, map_side: int) -> dict[str, Buffer]:
     """Return buffers of the mesh that is painted, and of the triangle that covers each texel of the maps.
 
-    The buffers are cached on the device for all people who share the mesh.
+    The device caches the buffers for all people who share the mesh.
     """
     surface = inputs.surface
     cache = device.cached("painted surfaces", WeakKeyDictionary[PaintedSurface, dict[int, dict[str, Buffer]]])
@@ -319,8 +319,8 @@ class PaintedTextures(NamedTuple):
 class RawPaintedArrays(NamedTuple):
     """Painted texels in the channels that the painting shader skin.wgsl writes.
 
-    colour : (n, n, 4) linear Rec. 709 albedo [-], and 1
-    specular : (n, n, 4) specular factor, amount of pores, log2 of the mm per unit of uv, and 0
+    colour : (n, n, 4) linear Rec. 709 albedo [-], and a channel of ones
+    specular : (n, n, 4) specular factor, amount of pores, log2 of the mm per unit of uv, and zeros
     roughness : (n, n, 4) roughness factor, amount of furrows, and fractions of melanin and blood
     height_mm : (n, n) heights of the relief [mm]
     """
@@ -364,7 +364,7 @@ def paint_textures(
 def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, map_side: int) -> Maps:
     """Paint the maps of a look as arrays, without pores and furrows, which are too fine for maps.
 
-    Heights fade to 0 outside the charts.
+    Heights fade to 0 outside the charts of the uv layout.
     """
     arrays = paint_raw_arrays(device, surface, look, map_side)
     rho_s = DEFAULT_RHO_S * arrays.specular[..., 0]

@@ -1,1 +1,1 @@
-"""Search for translucent pairs by shaders on the device."""
+"""Search for translucent pairs of surface cells by shaders on the device."""

@@ -1,4 +1,8 @@
-"""Search for translucent pairs of cells, restricted to tiles (groups of cells) with opposed normals."""
+"""Search for translucent pairs of surface cells.
+
+The cells are grouped into tiles, and tiles into blocks. Only pairs of tiles with opposed normals are
+searched.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +64,7 @@ class SearchPasses:
         )
 
     def read(self, buffer: Buffer, word_count: int) -> Index:
-        """Submit all passes so far, and return the first `word_count` words of a buffer."""
+        """Submit all passes that were added, and return the first `word_count` words of a buffer."""
         self.commands.submit()
         self.commands = CommandList(self.device, timed=False)
         words = np.frombuffer(self.device.handle.queue.read_buffer(buffer), np.uint32)
@@ -89,7 +93,7 @@ def list_offsets(list_lengths: Index) -> Index:
 
 @dataclass(frozen=True, eq=False)
 class TilePairs:
-    """Pairs of tiles between which translucent pairs of cells are possible.
+    """Pairs of tiles that may contain translucent pairs of cells. A tile is a square of cells.
 
     bounds : buffer of the bounding box and normal cone of each tile
     tile : (t,) indices of the tiles that are in at least one pair
@@ -104,7 +108,7 @@ class TilePairs:
 
 
 def find_tile_pairs(passes: SearchPasses, surface: Bindings, cells: Cells) -> TilePairs:
-    """Find the pairs of tiles between which translucent pairs of cells are possible.
+    """Find the pairs of tiles that may contain translucent pairs of cells.
 
     surface : resources of geometry.wgsl
     """
@@ -123,7 +127,9 @@ def find_tile_pairs(passes: SearchPasses, surface: Bindings, cells: Cells) -> Ti
 
 
 def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, tile_bounds: Buffer) -> Buffer:
-    """Return a buffer with one bit for each pair of blocks of tiles, set if translucent pairs are possible.
+    """Return a buffer with one bit for each pair of blocks, set if the blocks may contain translucent pairs.
+
+    A block is a square of tiles.
 
     tile_bounds : buffer to fill with the bounding box and normal cone of each tile
     """
@@ -143,14 +149,14 @@ def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, til
 
 @dataclass(frozen=True, eq=False)
 class CandidateCells:
-    """Cells that may be in translucent pairs, ordered by their tiles.
+    """Cells that may be in translucent pairs, ordered by the tiles that contain them.
 
     receiver : (r,) cells that receive light, as indices into `Cells.receivers`
     source : (s,) cells that emit light, as indices into the coarse atlas
-    first : (r,) index in `TilePairs.partners` where the partners of each receiver's tile start
-    end : (r,) index where these partners end
-    sources_first : (t,) index in `source` where the sources of each of the t tiles of the atlas start
-    sources_end : (t,) index where these sources end
+    first : (r,) for each receiver, index in `TilePairs.partners` where the partners of its tile start
+    end : (r,) for each receiver, index where these partners end
+    sources_first : (t,) for each of the t tiles of the atlas, index in `source` where its sources start
+    sources_end : (t,) for each of these tiles, index where its sources end
     """
 
     receiver: Index
@@ -174,7 +180,7 @@ def candidate_cells(cells: Cells, tile_pairs: TilePairs) -> CandidateCells:
 
 
 def _expand_ranges(range_starts: Index, chosen_ranges: Index) -> tuple[Index, Index]:
-    """Return the integers in chosen ranges, and for each integer the index of its range in `chosen_ranges`.
+    """Return all integers in the chosen ranges, and the index of each integer's range in `chosen_ranges`.
 
     range_starts : start of each range; a range ends where the next range starts
     chosen_ranges : indices of the chosen ranges
@@ -190,7 +196,9 @@ def _expand_ranges(range_starts: Index, chosen_ranges: Index) -> tuple[Index, In
 def compute_positions(
     passes: SearchPasses, surface: Bindings, cells: Cells, candidates: CandidateCells
 ) -> Bindings:
-    """Return a dictionary from names in shaders to buffers of the candidates' positions and normals.
+    """Compute the positions and normals of the candidate cells.
+
+    Return a dictionary from names in shaders to the buffers of the results.
 
     surface : resources of geometry.wgsl and of the atlas
     """
@@ -208,10 +216,10 @@ def compute_positions(
 
 
 def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple[Bindings, int]:
-    """Upload the ranges of sources that hits.wgsl tests for each receiver.
+    """Upload the ranges of source cells that hits.wgsl tests for each receiver cell.
 
-    Also returns the number of words that hits.wgsl writes: one for each receiver and each tile that is
-    tested. A word has one bit for each source in the tile.
+    Also return the number of words that hits.wgsl writes: one for each receiver and each tile that is tested
+    for it. A word has one bit for each source in the tile.
     """
     word = list_offsets(candidates.end - candidates.first)
     unused = np.zeros(len(candidates.receiver), np.int64)
@@ -224,7 +232,7 @@ def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple
 
 
 def draw_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, bindings: Bindings) -> Buffer:
-    """Return a buffer of the gutter texels that hold copies of source cells, see gutter_copies.wgsl.
+    """Add the pass that lists the gutter texels with copies of source cells; return its result buffer.
 
     source_cells : (n,) indices of cells that emit light
     bindings : further resources of gutter_copies.wgsl
@@ -268,10 +276,10 @@ def upload_sources(device: Device, cells: Cells, source_cells: Index) -> tuple[B
 
 @dataclass(frozen=True, eq=False)
 class PairTable:
-    """Translucent pairs as the search returns them, ordered by receiver.
+    """Translucent pairs of cells as the search returns them, ordered by receiver.
 
     receiver : (m,) cells that receive light from at least one source, as indices into `Cells.receivers`
-    first : (m + 1,) offsets into `pairs`; the pairs of receiver[i] end before those of receiver[i + 1] start
+    first : (m + 1,) offsets into `pairs`; the pairs of receiver[i] are from first[i] up to first[i + 1]
     source : (n,) cells that emit light in at least one pair
     pairs : buffer of three words for each pair: source, receiver, and the offset in the atlas between the two
     """
@@ -283,7 +291,7 @@ class PairTable:
 
 
 def search_pairs(device: Device, surface: Bindings, cells: Cells) -> PairTable | None:
-    """Return all pairs of cells between which enough light crosses thin parts, None if a buffer is too small.
+    """Return all pairs of cells between which enough light crosses the head, None if a buffer is too small.
 
     surface : resources of geometry.wgsl for the shape to search in, and of the atlas
     """
