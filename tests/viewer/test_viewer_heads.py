@@ -104,5 +104,5 @@ def test_pose_is_kept_for_equal_names(rigged: ViewerState, rigged_file: Path) ->
         opening.open(name)
         end, found = time.monotonic() + PATIENCE_S, None
         while found is None and time.monotonic() < end:
-            found = opening.take_loaded(posed)
+            found = opening.take_loaded_state(posed)
         assert found is not None and (found.scene.pose is not None) is kept

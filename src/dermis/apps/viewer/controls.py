@@ -62,7 +62,7 @@ class Controls:
             )
             self._zoom(math.exp(wheel_step), (event["x"], event["y"]), picture_size, "wheel")
         elif kind == "double_click":
-            self._focus(event, picture_size)
+            self._focus_camera(event, picture_size)
         elif kind == "key_down":
             self._on_key(str(event["key"]), event.get("modifiers", ()))
 
@@ -140,7 +140,7 @@ class Controls:
         """
         return max(1.0, min(picture_size) if self.history.state.view == ATLAS_VIEW_NAME else picture_size[1])
 
-    def _focus(self, event: Event, picture_size: Point) -> None:
+    def _focus_camera(self, event: Event, picture_size: Point) -> None:
         state, (width, height) = self.history.state, picture_size
         if state.view == ATLAS_VIEW_NAME:
             self.history.change(state.with_atlas_view(AtlasView(state.atlas_view.layer)))
@@ -181,16 +181,18 @@ class SplitView:
         """Remove the divider, so that only the live state is shown."""
         self.frozen_state, self.is_dragged = None, False
 
-    def handle(self, event: Event, width: float) -> bool:
+    def handle(self, event: Event, picture_width: float) -> bool:
         """Process a pointer event; return whether it drags the divider.
 
-        width : logical width of the picture
+        picture_width : logical width of the picture
         """
         kind = event["event_type"]
         if kind == "pointer_down" and self.frozen_state:
-            self.is_dragged = abs(event["x"] - self.divider_position * width) <= _DIVIDER_GRAB_RADIUS_PX
+            self.is_dragged = (
+                abs(event["x"] - self.divider_position * picture_width) <= _DIVIDER_GRAB_RADIUS_PX
+            )
         elif kind in ("pointer_move", "pointer_up") and self.is_dragged:
-            self.divider_position = min(1.0, max(0.0, event["x"] / max(1.0, width)))
+            self.divider_position = min(1.0, max(0.0, event["x"] / max(1.0, picture_width)))
             self.is_dragged = kind == "pointer_move"
             return True
         return self.is_dragged

@@ -79,7 +79,7 @@ class HeadLoader:
         self._future = self._executor.submit(_load_head_or_scene, self._name)
         self._future.add_done_callback(lambda _: self.request_frame())
 
-    def take_loaded(self, state: ViewerState) -> ViewerState | None:
+    def take_loaded_state(self, state: ViewerState) -> ViewerState | None:
         """Return the state with a newly loaded head or scene; None if none was loaded since the last call.
 
         state : current state; a loaded head replaces the head of this state, a loaded scene the whole state
@@ -189,20 +189,20 @@ class Session:
         """Return the state on screen: the current state, posed by the motion while the motion plays."""
         return self.player.displayed_state
 
-    def change(self, state: ViewerState, gesture: str = "") -> None:
+    def change(self, state: ViewerState, gesture_name: str = "") -> None:
         """Set a new state as a step of the undo history.
 
-        gesture : name of the gesture; consecutive changes by one gesture are undone together
+        gesture_name : name of the gesture; consecutive changes by one gesture are undone together
         """
-        self.history.change(state, gesture)
+        self.history.change(state, gesture_name)
         self.message = ""
 
-    def report_error(self, failure: str, error: Exception) -> None:
+    def report_error(self, failure_text: str, error: Exception) -> None:
         """Report an unexpected error once, as text over the picture and with its traceback in the log.
 
-        failure : what cannot be done, such as "The head cannot be opened"
+        failure_text : what cannot be done, such as "The head cannot be opened"
         """
-        message = f"{failure} ({type(error).__name__}: {_shorten(str(error))})"
+        message = f"{failure_text} ({type(error).__name__}: {_shorten_message(str(error))})"
         if message not in self._reported_errors:
             self._reported_errors.add(message)
             self.message = message
@@ -217,7 +217,7 @@ class Session:
         if "name" in state.head:  # the scene refers to an uploaded file by its original name
             name = self.heads.uploaded_name(str(state.head["name"]))
             state = replace(state, head={**state.head, "name": name})
-        self._write_or_offer(path, lambda target: save_state(target, state))
+        self._write_or_offer_download(path, lambda target: save_state(target, state))
         self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:
@@ -230,10 +230,10 @@ class Session:
         self.change(state)
         self.message = f"loaded {path}"
 
-    def take_head(self) -> None:
+    def show_loaded_head(self) -> None:
         """Show the head that was loaded in the background, or the reason why it cannot be loaded."""
         try:
-            state = self.heads.take_loaded(self.state)
+            state = self.heads.take_loaded_state(self.state)
         except DermisError as error:
             self.message = str(error)
             return
@@ -270,13 +270,13 @@ class Session:
             )
         if suffix == ".exr" and view not in (PICTURE_VIEW_NAME, *PART_VIEWS):
             refuse(f"view {view} as .exr", "a view of linear light", "it shows display colours", "Use .png")
-        self._write_or_offer(
+        self._write_or_offer_download(
             picture_path,
             lambda target: self.view_renderer.screenshot(target, self.displayed_state, picture_size),
         )
         self.message = f"wrote {picture_path}, {picture_size[0]} x {picture_size[1]}"
 
-    def _write_or_offer(self, path: Path, write_file: Callable[[Path], None]) -> None:
+    def _write_or_offer_download(self, path: Path, write_file: Callable[[Path], None]) -> None:
         if self.offer_download is None:
             write_file(path)
             return
@@ -286,12 +286,12 @@ class Session:
             self.offer_download(path.name, target.read_bytes())
 
 
-def _shorten(message: str) -> str:
+def _shorten_message(message: str) -> str:
     line = " ".join(message.split())
     return line if len(line) <= _MAX_REASON_CHARACTERS else f"{line[:_MAX_REASON_CHARACTERS]} ..."
 
 
-def apply_regions(
+def with_region_table(
     state: ViewerState, table_name: str, known_states: Iterable[ViewerState] = ()
 ) -> ViewerState:
     """Return the state with the roughness and specular maps of a table of face regions, or without them.

@@ -169,7 +169,9 @@ class ViewRenderer:
         self.is_preparing = True
         try:
             for moving in (True, False):
-                self.renderer.prepare(state.scene, self._settings(state, _PREPARATION_FRAME_SIZE, moving))
+                self.renderer.prepare(
+                    state.scene, self._frame_settings(state, _PREPARATION_FRAME_SIZE, moving)
+                )
             on_resources_ready()
             for moving in (True, False):
                 self.render_image(state, state.scene.camera, _PREPARATION_FRAME_SIZE, moving)
@@ -207,7 +209,7 @@ class ViewRenderer:
         Raises DermisError if the state cannot be rendered or the device fails.
         """
         self._size = view_size
-        settings = self._settings(state, view_size, is_moving)
+        settings = self._frame_settings(state, view_size, is_moving)
         inputs = self._image_inputs
         is_cached = inputs and inputs[0] is state and inputs[1:] == (camera, settings)
         if is_cached and self.last_image is not None:
@@ -226,8 +228,8 @@ class ViewRenderer:
         self, frozen_state: ViewerState, camera: Camera, view_size: tuple[int, int], is_moving: bool
     ) -> Texture:
         """Return a copy of the image of the frozen state, reused until the camera or the settings change."""
-        settings, frozen = self._settings(frozen_state, view_size, is_moving), self._frozen
-        still_settings = self._settings(frozen_state, view_size, is_moving=False)
+        settings, frozen = self._frame_settings(frozen_state, view_size, is_moving), self._frozen
+        still_settings = self._frame_settings(frozen_state, view_size, is_moving=False)
         is_cached = frozen and frozen.state is frozen_state and frozen.camera == camera
         if frozen and is_cached and frozen.settings in (settings, still_settings):
             return frozen.image
@@ -237,7 +239,7 @@ class ViewRenderer:
         self._frozen = FrozenImage(frozen_state, camera, settings, image_copy)
         return image_copy
 
-    def _settings(self, state: ViewerState, view_size: tuple[int, int], is_moving: bool) -> Settings:
+    def _frame_settings(self, state: ViewerState, view_size: tuple[int, int], is_moving: bool) -> Settings:
         """Return the settings of a frame; in motion, their quality is limited, except in the atlas view."""
         return self.quality_controller.limited_settings(
             state.settings, view_size, is_moving and state.view != ATLAS_VIEW_NAME
@@ -249,7 +251,7 @@ class ViewRenderer:
         if not self._image_inputs:
             return False
         state, _, settings = self._image_inputs
-        return self._settings(state, self._size, is_moving=False) == settings
+        return self._frame_settings(state, self._size, is_moving=False) == settings
 
     def screenshot(self, picture_path: Path, state: ViewerState, picture_size: tuple[int, int]) -> None:
         """Render the view of a state to a file: .png (tone-mapped) or .exr (linear).

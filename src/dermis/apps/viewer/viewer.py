@@ -165,7 +165,7 @@ class Viewer:
 
     def _draw(self, now: float) -> None:
         session, size = self.session, self._picture_size()
-        session.take_head()
+        session.show_loaded_head()
         session.player.advance()
         state, elapsed = session.displayed_state, min(now - self._last_draw, _MAX_EASING_STEP_S)
         old_camera = self._easing.camera
@@ -176,7 +176,7 @@ class Viewer:
         images = self._render_images(state, camera, size, self._is_moving(now))
         session.status = self._status_text(size)
         target = self._context.get_current_texture().create_view()
-        self._blit.draw(self._patches(*images, size), target)
+        self._blit.draw(self._image_patches(*images, size), target)
         self.panel.draw(target, self.canvas.get_logical_size(), self.canvas.get_pixel_ratio())
 
     def _panel_width(self) -> int:
@@ -189,7 +189,7 @@ class Viewer:
         width, height = self.canvas.get_physical_size()
         return max(1, width - self._panel_width()), max(1, height)
 
-    def _patches(
+    def _image_patches(
         self, live_image: Texture, frozen_image: Texture | None, picture_size: tuple[int, int]
     ) -> list[Patch]:
         """Return patches that show the live image and, if there is one, the frozen image left of the divider.
@@ -243,8 +243,8 @@ class Viewer:
         self._rejected_state = state
         self.session.message = message
 
-    def _is_moving(self, now: float) -> bool:
-        return self.session.player.is_playing or now - self._last_change < _STILL_FRAME_DELAY_S
+    def _is_moving(self, now_s: float) -> bool:
+        return self.session.player.is_playing or now_s - self._last_change < _STILL_FRAME_DELAY_S
 
     def _status_text(self, picture_size: tuple[int, int]) -> str:
         view_renderer = self.session.view_renderer

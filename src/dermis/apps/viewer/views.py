@@ -39,7 +39,7 @@ ATLAS_LAYERS = (*BLUR_LEVELS_BY_VIEW, "stretch", "thickness")
 VIEW_NAMES = ("picture", *PART_VIEWS, *ATLAS_LAYERS, "shadow", "normals", ATLAS_VIEW_NAME)
 """Names of all views."""
 
-_INTERMEDIATE_SHADER = Path(__file__).parent / "intermediate.wgsl"
+_INTERMEDIATE_SHADER_PATH = Path(__file__).parent / "intermediate.wgsl"
 _SHADER_QUANTITY_NUMBERS = {
     "stretch": 1,
     "thickness": 2,
@@ -71,7 +71,7 @@ class IntermediateViews:
         inputs = self._renderer.prepare(scene, settings, divider_side)
         unused = ("ENVIRONMENT", "HALF_SPACE", "INTERREFLECTION", "STRANDS")  # not declared by the shader
         constants = tuple(switch for switch in inputs.light_constants if switch[0] not in unused)
-        shader = program(self._renderer.device, _INTERMEDIATE_SHADER, constants)
+        shader = program(self._renderer.device, _INTERMEDIATE_SHADER_PATH, constants)
         layer, scale = self._atlas_layer(inputs, view_name, settings)
         view_fields = ("eye", "forward", "right", "up", "shift", "samples", "jitter")
         record = shader.record("ViewParameters", **{name: inputs.view[name] for name in view_fields})
@@ -134,15 +134,15 @@ class IntermediateViews:
             return texture, self._exposure(inputs) / blur.scale
         if layer_name == "stretch":
             stretch = inputs.layouts[0].atlas.resources["stretch_map"]
-            return stretch, self._mean_density(stretch)
-        return self._thickness(inputs) if layer_name == "thickness" else self._empty_texture, 1.0
+            return stretch, self._mean_texel_density(stretch)
+        return self._thickness_texture(inputs) if layer_name == "thickness" else self._empty_texture, 1.0
 
     def _exposure(self, inputs: FrameInputs) -> float:
         """Return the exposure factor of the last frame, whether metered or fixed [-]."""
         meter, exposure = inputs.resources.post.meter, inputs.settings.exposure
         return read_meter(self._renderer.device, meter) if meter else float(exposure)
 
-    def _thickness(self, inputs: FrameInputs) -> Texture:
+    def _thickness_texture(self, inputs: FrameInputs) -> Texture:
         translucency = inputs.layouts[0].translucency
         if translucency is None:
             refuse("view thickness", "a scene with translucency", "it is off", "Set transmission to thin")
@@ -154,13 +154,13 @@ class IntermediateViews:
             self._thickness_maps[translucency.pairs] = texture
         return draw_thickness(self._renderer.device, translucency, self._thickness_maps[translucency.pairs])
 
-    def _mean_density(self, stretch: Texture) -> float:
+    def _mean_texel_density(self, stretch_map: Texture) -> float:
         """Return the geometric mean of the texel density that a stretch map contains [texels/mm]."""
-        if stretch not in self._density:
-            metric = download(self._renderer.device, stretch)[..., :2].astype(np.float64)
+        if stretch_map not in self._density:
+            metric = download(self._renderer.device, stretch_map)[..., :2].astype(np.float64)
             covered = metric[(metric > 0.0).all(axis=-1)]
-            self._density[stretch] = float(np.exp(np.log(covered).mean())) if len(covered) else 1.0
-        return self._density[stretch]
+            self._density[stretch_map] = float(np.exp(np.log(covered).mean())) if len(covered) else 1.0
+        return self._density[stretch_map]
 
 
 def draw_thickness(device: Device, translucency: Translucency, target_texture: Texture) -> Texture:

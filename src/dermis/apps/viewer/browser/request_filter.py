@@ -181,24 +181,34 @@ class RequestFilter:
                 send = self._add_cookie(send)
             await self._app(scope, receive, send)
 
-    def _refusal_reason(self, scope: Message) -> str:
+    def _refusal_reason(self, request_scope: Message) -> str:
         """Return the reason why a request is rejected, or an empty string if it is accepted."""
-        host = next(iter(_header_values(scope, b"host")), "")
-        if not self._token and not is_local(_host_name(host)):
+        host = next(iter(_header_values(request_scope, b"host")), "")
+        if not self._token and not is_local_host(_host_name(host)):
             return _WRONG_HOST_REASON  # DNS rebinding: the name of another site resolves to this machine
-        scheme = _HTTP_SCHEMES.get(scope["scheme"], scope["scheme"])
-        if any(origin != f"{scheme}://{host}" for origin in _header_values(scope, b"origin")):
+        scheme = _HTTP_SCHEMES.get(request_scope["scheme"], request_scope["scheme"])
+        if any(origin != f"{scheme}://{host}" for origin in _header_values(request_scope, b"origin")):
             return _OTHER_SITE_REASON
-        if self._token and not self._has_query_token(scope) and not self._has_cookie_token(scope):
+        if (
+            self._token
+            and not self._has_query_token(request_scope)
+            and not self._has_cookie_token(request_scope)
+        ):
             return _NO_TOKEN_REASON
-        return _TOO_MANY_PAGES_REASON if scope["type"] == "websocket" and self._pages >= MAX_PAGES else ""
+        return (
+            _TOO_MANY_PAGES_REASON
+            if request_scope["type"] == "websocket" and self._pages >= MAX_PAGES
+            else ""
+        )
 
-    def _has_query_token(self, scope: Message) -> bool:
-        tokens = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [])
+    def _has_query_token(self, request_scope: Message) -> bool:
+        tokens = parse_qs(request_scope.get("query_string", b"").decode("latin-1")).get("token", [])
         return bool(self._token) and any(map(self._equals_token, tokens))
 
-    def _has_cookie_token(self, scope: Message) -> bool:
-        cookies = (cookie.strip() for line in _header_values(scope, b"cookie") for cookie in line.split(";"))
+    def _has_cookie_token(self, request_scope: Message) -> bool:
+        cookies = (
+            cookie.strip() for line in _header_values(request_scope, b"cookie") for cookie in line.split(";")
+        )
         pairs = (cookie.partition("=") for cookie in cookies)
         return any(self._equals_token(value) for name, _, value in pairs if name == self._cookie)
 
@@ -217,7 +227,7 @@ class RequestFilter:
         return send_with_cookie
 
 
-def is_local(host: str) -> bool:
+def is_local_host(host: str) -> bool:
     """Return whether a host name or address can be reached only from this machine."""
     if host == "localhost":
         return True

@@ -14,7 +14,7 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from dermis.apps.viewer.browser.canvas import PageCanvas
-from dermis.apps.viewer.browser.request_filter import RequestFilter, is_local
+from dermis.apps.viewer.browser.request_filter import RequestFilter, is_local_host
 from dermis.apps.viewer.browser.uploads import Uploads
 from dermis.apps.viewer.player import MotionFile
 from dermis.apps.viewer.state import ViewerState
@@ -182,7 +182,7 @@ def bind(host: str, port: int, *, require_token: bool = False) -> tuple[socket.s
     except OSError as error:
         listener.close()
         refuse(f"{host}:{port}", "an address to listen on", f"{error.strerror}", "Choose another --port")
-    token = "" if is_local(host) and not require_token else secrets.token_urlsafe(_ACCESS_TOKEN_BYTES)
+    token = "" if is_local_host(host) and not require_token else secrets.token_urlsafe(_ACCESS_TOKEN_BYTES)
     return listener, Address(host, int(listener.getsockname()[1]), token)
 
 

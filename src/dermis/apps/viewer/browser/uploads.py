@@ -40,8 +40,8 @@ class Uploads:
         paths
     """
 
-    def __init__(self, app: App, canvas: PageCanvas, folder: Path) -> None:
-        self._app, self._canvas, self._folder = app, canvas, folder
+    def __init__(self, app: App, canvas: PageCanvas, upload_folder: Path) -> None:
+        self._app, self._canvas, self._folder = app, canvas, upload_folder
         self._count = self._bytes = 0
         self._is_busy = False
 

@@ -21,7 +21,7 @@ from dermis.apps.viewer.panel.fields import (
     record_position,
     run_action,
 )
-from dermis.apps.viewer.session import Session, apply_regions
+from dermis.apps.viewer.session import Session, with_region_table
 from dermis.apps.viewer.state import ViewerState, validated_copy
 from dermis.base.errors import DermisError
 from dermis.human.regions.region_table import DEFAULT_TABLE_NAME
@@ -58,12 +58,17 @@ def draw_profile(session: Session) -> None:
     """Draw the controls of the diffusion profile: its name, its colour, and its pigments or layers."""
     skin, with_skin = session.state.scene.skin, session.state.with_skin
 
-    def with_profile(profile_name: str) -> ViewerState:
+    def state_with_profile(profile_name: str) -> ViewerState:
         return with_skin(profile=profile_name, pigments=None, layers=())
 
     other_media = (name for name in preset_names() if name not in _SKIN_PROFILES)
     draw_combo(
-        session, "profile", skin.profile, (*_SKIN_PROFILES, "", *other_media), with_profile, PROFILE_NAMES
+        session,
+        "profile",
+        skin.profile,
+        (*_SKIN_PROFILES, "", *other_media),
+        state_with_profile,
+        PROFILE_NAMES,
     )
     draw_fields(session, skin, with_skin, ALBEDO_STYLES, ["albedo"])
     if skin.profile in SKINS:
@@ -85,16 +90,20 @@ def draw_surface(session: Session) -> None:
             current = str(state.head.get("regions", AUTO))
             names = dict.fromkeys((AUTO, NO_REGIONS, DEFAULT_TABLE_NAME, current))
             draw_combo(
-                session, "regions", current, names, lambda name: apply_regions(state, name, earlier_states)
+                session,
+                "regions",
+                current,
+                names,
+                lambda name: with_region_table(state, name, earlier_states),
             )
         if name == "rho_s" and has_region_table(state.head):
             imgui.text_disabled("rho_s is set by the regions")
         elif name not in _PROFILE_FIELDS:
             draw_fields(session, state.scene.skin, state.with_skin, SURFACE_STYLES, [name])
-    _draw_tone(session)
+    _draw_skin_tone_text(session)
 
 
-def _draw_tone(session: Session) -> None:
+def _draw_skin_tone_text(session: Session) -> None:
     """Draw a text that describes the mean colour of the head's skin."""
     colour = session.state.scene.head.maps.mean_colour
     if colour is not None:
@@ -108,20 +117,20 @@ def _draw_pigments(session: Session, skin: Skin) -> None:
     numbers = [name for name in Pigments.model_fields if name != "structure"]
     defaults = {name: getattr(preset, name) for name in numbers} | {"structure": DEFAULT_STRUCTURE}
     values = Pigments(**defaults | pigments.model_dump(exclude_none=True))
-    make_state = session.state.with_pigments
-    draw_fields(session, values, make_state, _PIGMENT_STYLES, ["structure"])
+    state_with_fields = session.state.with_pigments
+    draw_fields(session, values, state_with_fields, _PIGMENT_STYLES, ["structure"])
     if values.structure != _EPIDERMAL_BLOOD_STRUCTURE:
         numbers.remove("epidermal_blood")
     imgui.separator_text("epidermis")
     draw_fields(
         session,
         values,
-        make_state,
+        state_with_fields,
         _PIGMENT_STYLES,
         [name for name in numbers if name not in _DERMIS_PIGMENTS],
     )
     imgui.separator_text("dermis")
-    draw_fields(session, values, make_state, _PIGMENT_STYLES, _DERMIS_PIGMENTS)
+    draw_fields(session, values, state_with_fields, _PIGMENT_STYLES, _DERMIS_PIGMENTS)
 
 
 def _plot_profile(session: Session) -> None:
@@ -170,10 +179,10 @@ def _draw_layers(session: Session, layers: Layers) -> None:
 def _draw_layer(session: Session, layers: Layers, layer_index: int) -> None:
     layer, label_suffix = layers[layer_index], f"##{layer_index + 1}"
 
-    def make_state(**fields: object) -> ViewerState:
+    def state_with_fields(**fields: object) -> ViewerState:
         return _replace_layer(session, layers, layer_index, validated_copy(layer, **fields))
 
-    draw_fields(session, layer, make_state, LAYER_STYLES, label_suffix=label_suffix)
+    draw_fields(session, layer, state_with_fields, LAYER_STYLES, label_suffix=label_suffix)
     imgui.text_disabled("red, green, blue [1/mm]")
     if len(layers) < MAX_LAYERS and draw_button(session, f"add above{label_suffix}"):
         copy = validated_copy(layer, thickness_mm=layer.thickness_mm or _NEW_LAYER_THICKNESS_MM)
