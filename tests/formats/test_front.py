@@ -11,7 +11,7 @@ from eyed_head import EYE_MM, write_head
 from small_figure import write_obj
 from vrm_file import VrmFile
 
-from dermis.formats.axes import Axes, Axis, file_axis, to_y_up
+from dermis.formats.axes import Axes, Axis, head_axis_in_file, to_y_up
 from dermis.formats.load import RiggedMesh, load_rigged
 from dermis.human.person import Human
 from dermis.mesh.mesh import Mesh, build_mesh
@@ -83,5 +83,5 @@ def test_avatar_format_defines_the_front(
 @AXES
 def test_note_names_the_axis_of_the_file(up: Axis, front: Axis) -> None:
     axes = Axes(up, front)
-    assert [file_axis(one, axes) for one in ("y", "z")] == [up, front]
-    assert file_axis("-z", axes) == front.removeprefix("-") if "-" in front else f"-{front}"
+    assert [head_axis_in_file(one, axes) for one in ("y", "z")] == [up, front]
+    assert head_axis_in_file("-z", axes) == front.removeprefix("-") if "-" in front else f"-{front}"

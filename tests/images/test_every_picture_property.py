@@ -40,7 +40,7 @@ def linear(path: Any) -> Any:
 
 
 def photograph(path: Any) -> Any:
-    return read_colours(path, upright=True)[0]
+    return read_colours(path, apply_exif_orientation=True)[0]
 
 
 def embedded(path: Path) -> Any:

@@ -1,4 +1,4 @@
-"""Prefiltering of a panorama: irradiance by normal, and reflected radiance by roughness."""
+"""Prefiltering of a panorama to irradiance for each normal, and reflected radiance for each roughness."""
 
 from __future__ import annotations
 
@@ -79,9 +79,9 @@ def prefilter(panorama_name: str) -> Prefiltered:
 
 
 def isotropic_lobe_factors(m: float) -> Floats:
-    """Return the factors (161,) by which convolution with a lobe of roughness m multiplies each degree.
+    """Return the factors by which convolution with a lobe of roughness m multiplies harmonic coefficients.
 
-    The lobe is normalised to unit integral.
+    There is one factor for each degree of the spherical harmonics, (161,). The lobe has unit integral.
     """
     factors = zonal_factors(lambda theta: isotropic_lobe(theta, m), _MAX_HARMONIC_DEGREE)
     return np.asarray(factors / factors[0])

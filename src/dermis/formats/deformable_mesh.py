@@ -1,7 +1,7 @@
 """Deformation data of exported meshes: morph targets and bone weights of every vertex.
 
-Export formats allow four bones per vertex. The bones and weights of a subdivided mesh are fitted: its skinned
-vertices are as close as possible to the vertices that subdivision of the skinned control mesh would give.
+Export formats allow four bones per vertex. For a subdivided mesh, the bones and weights of each vertex are
+fitted. They move the vertex as closely as possible to its position on the subdivided, skinned control mesh.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ class DeformableMesh:
     def _control_displacements(self, target_index: int) -> Doubles:
         """Return the displacements (p, 3) of the control points by a morph target at weight 1 [mm]."""
         targets, displacement = self.rig.targets, np.zeros((len(self.rig.positions_mm), 3))
-        part = targets.rows(target_index)
+        part = targets.displacement_rows(target_index)
         displacement[targets.point[part]] = targets.delta_mm[part]
         return displacement
 
@@ -224,7 +224,8 @@ def _quadratic_error(
     The function is w H w - 2 g w [mm²], up to a constant. The vector w (u,) contains the weights of u
     candidate bones. The result is the matrices H (n, u, u) and the vectors g (n, u) of all points.
 
-    descendant_weights : (p, b) sum of a control point's weights for each bone and the descendants of the bone
+    descendant_weights : (p, b) for each control point and bone, the sum of the weights of the bone and of
+        its descendants
     refinement : (n, p) subdivision matrix from control points to the n points
     descendant_matrix : (b, u) 1 where candidate bone u is bone b or one of its descendants, else 0
     """

@@ -99,8 +99,10 @@ class RawMesh:
             self, triangles=self.triangles[triangle_mask], material=self.material[triangle_mask], quads=quads
         )
 
-    def with_corners(self, corner_points: Index) -> RawMesh:
-        """Return the mesh with new point indices at corners; vertices with several points are duplicated.
+    def with_corner_points(self, corner_points: Index) -> RawMesh:
+        """Return the mesh with new point indices at the corners of triangles.
+
+        A vertex whose corners lie at several points is duplicated, once for each of these points.
 
         corner_points : (f, 3) new point index at each corner
         """
@@ -113,7 +115,10 @@ class RawMesh:
         return replace(self._select_vertices(source), point=point, triangles=triangles)
 
     def compact(self) -> RawMesh:
-        """Return the mesh without unused vertices and points, and without quads that were split apart."""
+        """Return the mesh without unused vertices and points.
+
+        Pairs of triangles that no longer share two vertices are removed from `quads`.
+        """
         used, triangles = compact_vertices(self.triangles)
         point = np.unique(self.point[used], return_inverse=True)[1].reshape(-1).astype(np.int32)
         first, second = triangles[self.quads[:, 0]], triangles[self.quads[:, 1]]
@@ -256,7 +261,7 @@ def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
         f"separated the sheets that meet at {_count_with_noun(count, 'edge')} of more than two triangles"
     )
     links = np.vstack((mesh.sides.pairs, _pair_continuing_sides(mesh)))
-    mesh = mesh.with_corners(_split_points(mesh, links))
+    mesh = mesh.with_corner_points(_split_points(mesh, links))
     sides = mesh.sides
     if (sides.counts > 2).any():  # sheets that are also connected around both ends of an edge
         kept = np.zeros(len(sides.side), bool)
@@ -264,16 +269,16 @@ def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
         kept[np.concatenate((sides.pairs, _pair_continuing_sides(mesh, max_pairs_per_edge=1)))] = True
         apart, corners = ~kept.reshape(-1, 3).all(axis=1), mesh.corners.copy()
         corners[apart] = corners.max() + 1 + np.arange(3 * int(apart.sum())).reshape(-1, 3)
-        mesh = mesh.with_corners(corners)
+        mesh = mesh.with_corner_points(corners)
     return mesh
 
 
 def _pair_continuing_sides(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGLES_PER_EDGE // 2) -> Index:
-    """Return pairs of triangle sides (n, 2) that connect the sheets of a surface at non-manifold edges.
+    """Return pairs of triangle sides (n, 2) across which a surface continues at non-manifold edges.
 
-    The pairs of an edge are chosen one after another. Pairs of the same material are preferred, then pairs
-    that run in opposite directions, then pairs whose two triangles are closest to a flat surface.
-    All pairs of an edge except the first must run in opposite directions.
+    The pairs of an edge are chosen one after another. Two sides of the same material are preferred, then two
+    sides that run in opposite directions, then two sides whose triangles are closest to a common plane.
+    The sides of all pairs of an edge except the first must run in opposite directions.
 
     max_pairs_per_edge : largest number of pairs at an edge
     """
@@ -353,17 +358,17 @@ def _split_points(mesh: RawMesh, side_pairs: Index) -> Index:
 
 def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
     """Return the mesh with consistently wound triangles and outward normals."""
-    piece, reverse = _find_pieces(mesh)
+    piece, reverse = _components_and_reversals(mesh)
     x = np.ascontiguousarray(mesh.positions.T, np.float64)
     a, b, c = (x.take(one, axis=1) for one in np.ascontiguousarray(mesh.triangles.T))
     area = cross_columns(b - a, c - a) * np.where(reverse, -1.0, 1.0)
-    surface = _PieceSurface(piece, area, np.stack((a, b, c)))
+    surface = _ComponentSurface(piece, area, np.stack((a, b, c)))
     agreement = surface.mean_cosine(_corner_normal_sums(mesh))
     doubtful = (surface.mean_cosine(surface.outward_directions()) < _MIN_MEAN_CONVEXITY_COSINE) | (
         agreement < _MAX_COSINE_OF_OPPOSITE_NORMALS
     )
     if doubtful.any():
-        turned = _inside_out_pieces(surface, doubtful, agreement)
+        turned = _inside_out_components(surface, doubtful, agreement)
         reverse ^= turned[piece]
         agreement[turned] *= -1
     if reverse.any():
@@ -380,7 +385,7 @@ def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
     return mesh
 
 
-def _find_pieces(mesh: RawMesh) -> tuple[Index, Mask]:
+def _components_and_reversals(mesh: RawMesh) -> tuple[Index, Mask]:
     """Return each triangle's connected component (f,), and the mask (f,) of triangles to reverse.
 
     After reversal of these triangles, the winding of each component is consistent, and the same as before on
@@ -411,7 +416,7 @@ def _corner_normal_sums(mesh: RawMesh) -> Doubles:
 
 
 @dataclass(frozen=True)
-class _PieceSurface:
+class _ComponentSurface:
     """Triangles, and the connected component ("piece") of each.
 
     piece : (f,) index of each triangle's component
@@ -446,17 +451,18 @@ class _PieceSurface:
         total = np.bincount(self.piece, dot_columns(self.area_normals, direction))
         return total / np.where(length > 0, length, 1)
 
-    def visible_sides(self, doubtful_pieces: Mask) -> tuple[Doubles, bool]:
-        """Return which side of each component is visible from outside, and whether most samples show backs.
+    def visible_sides(self, doubtful_components: Mask) -> tuple[Doubles, bool]:
+        """Return which side of each connected component is visible from outside, and whether backs prevail.
 
-        The side is a number for each component: 1 if only its front is visible, -1 if only its back is
-        visible, values between if both are, and 0 if hardly any part is visible. The second result is whether
-        more than two thirds of the visible samples of the whole mesh show the back of a triangle.
+        The first result is a number for each component: 1 if only its front is visible, -1 if only its back
+        is visible, a number between -1 and 1 if both are visible, and 0 if hardly any of it is visible. The
+        second result is whether backs of triangles are visible at more than two thirds of the sample points
+        on the mesh that are visible at all.
 
-        doubtful_pieces : mask of components that get additional samples, because they may be small
+        doubtful_components : mask of components that may be inside out; they get additional sample points
         """
         component_area = np.bincount(self.piece, self.double_area)
-        more = _DOUBTFUL_SAMPLE_FRACTION * doubtful_pieces / (component_area * doubtful_pieces.sum())
+        more = _DOUBTFUL_SAMPLE_FRACTION * doubtful_components / (component_area * doubtful_components.sum())
         triangle, sample = self._draw_samples(
             self.double_area * ((1 - _DOUBTFUL_SAMPLE_FRACTION) / component_area.sum() + more[self.piece])
         )
@@ -504,23 +510,31 @@ class _PieceSurface:
         return triangle, points - self.corners.mean(axis=(0, 2))[:, None]
 
 
-def _inside_out_pieces(surface: _PieceSurface, doubtful_pieces: Mask, normals_cosine: Doubles) -> Mask:
+def _inside_out_components(
+    surface: _ComponentSurface, doubtful_components: Mask, normals_cosine: Doubles
+) -> Mask:
     """Return the mask of connected components that are wound inside out.
 
-    A component is inside out if mainly its back is visible from outside. If both sides or neither side is
-    visible, the component is inside out if the normals of the file say so. If neither side is visible, it is
-    also inside out if the whole mesh mainly shows the backs of triangles.
+    A component is inside out in any of these cases:
 
-    doubtful_pieces : mask of components that may be inside out
+    1. Mainly its back is visible from outside.
+    2. Its front is not the side that is mainly visible, and the file's normals are opposite to those of the
+       triangles.
+    3. Neither side is visible, and the visible triangles of the whole mesh mainly show their backs.
+
+    doubtful_components : mask of components that may be inside out
     normals_cosine : for each component, the mean cosine between the file's normals and the triangles' normals
     """
-    balance, backs_prevail = surface.visible_sides(doubtful_pieces)
+    balance, backs_prevail = surface.visible_sides(doubtful_components)
     opposed = (normals_cosine < _MAX_COSINE_OF_OPPOSITE_NORMALS) & (balance <= _MIN_VISIBILITY_BALANCE)
     return np.asarray((balance < -_MIN_VISIBILITY_BALANCE) | opposed | ((balance == 0) & backs_prevail))
 
 
 def _move_uv(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: list[str]) -> RawMesh:
-    """Return the mesh with uv charts moved by whole tiles and clamped, if they then fit into [0, 1]."""
+    """Return the mesh with uv charts moved by whole tiles to [0, 1]; charts that do not fit stay in place.
+
+    The uv of charts that fit are clamped to [0, 1].
+    """
     if mesh.uv.min() >= -UV_TOLERANCE and mesh.uv.max() <= 1 + UV_TOLERANCE:
         return mesh
     place = weld(np.column_stack((mesh.point, mesh.uv)))

@@ -1,4 +1,4 @@
-"""OBJ files as mesh parts, and the maps of their materials."""
+"""Reading of OBJ files as mesh parts, and of the maps of their materials."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dermis.base.reading import parsing, read_file
 from dermis.formats import size_limits as limits
 from dermis.formats.maps import check_finite, load_maps
 from dermis.formats.obj_geometry import parse_geometry
-from dermis.formats.obj_materials import MtlTexture, picture_name, read_library, with_materials
+from dermis.formats.obj_materials import MtlTexture, picture_file_name, read_library, with_materials
 from dermis.formats.parts import DEFAULT_COLOUR, MaterialGroup, MeshFile, MeshPart
 from dermis.formats.referenced_files import find_referenced_file
 from dermis.formats.text_files import decode_text
@@ -90,7 +90,7 @@ def obj_maps(
     remaining = MAX_TOTAL_PIXELS
     for role in (one for one in roles if one in textures):
         texture = textures[role]
-        file = find_referenced_file(path, picture_name(texture))
+        file = find_referenced_file(path, picture_file_name(texture))
         if file is None:
             continue
         try:

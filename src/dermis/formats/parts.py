@@ -1,4 +1,4 @@
-"""Parts of mesh files: groups of triangles, with the length unit and the uv of the file."""
+"""Parts of mesh files: groups of triangles, whose lengths and uv are as in the file."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class MaterialGroup:
 
 @dataclass(frozen=True)
 class MeshPart:
-    """Triangles of one group in the rest pose, with the length unit and the v direction of the file.
+    """Triangles of one group in the rest pose; the length unit and the v direction are those of the file.
 
     positions : (v, 3) vertex positions
     uv : (v, 2) uv of the vertices, or None

@@ -144,7 +144,7 @@ def triangulate(corner_counts: Index, triangle_order: TriangleOrder) -> tuple[In
 
     corner_counts : (n,) number of corners of each polygon; corners are numbered consecutively
     triangle_order : "by polygon", or "by kind": all triangles first, then the first halves of all quads, then
-        the second halves, then all other polygons; polygons that are all quads are always ordered by kind
+        the second halves, then all other polygons; if all polygons are quads, "by kind" is always used
     """
     sizes = corner_counts - 2
     polygon, step = expand_runs(np.zeros_like(sizes), sizes)

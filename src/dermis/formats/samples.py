@@ -40,7 +40,7 @@ class Sample:
     attribution : authors to credit
     unit_mm : length of one unit of the mesh [mm]
     v_origin : edge of the maps where v = 0, "top" or "bottom"
-    height_mm : relief of one grey level of the 8-bit height map [mm]
+    height_mm : height difference of one grey level of the 8-bit height map [mm]
     """
 
     name: str

@@ -98,7 +98,7 @@ def write_person_glb(
     """
     notes = {"person": person_parameters(person)}
     data = encode_head(
-        head, roughness=roughness, weights=weights, slopes=relief_slopes(head), notes=notes, eyes=eyes
+        head, roughness=roughness, weights=weights, slopes=relief_slopes(head), asset_extras=notes, eyes=eyes
     )
     with atomic_file(path) as temporary:
         temporary.write_bytes(data)

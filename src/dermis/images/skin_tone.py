@@ -1,4 +1,4 @@
-"""Descriptions of a skin's colour: CIELAB, hue angle, individual typology angle (ITA) and nearest classes."""
+"""Descriptions of a skin's colour: CIELAB, hue, individual typology angle (ITA) and classes of two scales."""
 
 from __future__ import annotations
 

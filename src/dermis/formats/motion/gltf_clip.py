@@ -10,7 +10,7 @@ import numpy as np
 from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
 from dermis.formats.gltf.animations import AnimationCurve, AnimationTrack, read_clip
-from dermis.formats.motion.captures import frame_rate, refuse_unmatched
+from dermis.formats.motion.captures import estimate_frame_rate, refuse_unmatched_motion
 from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
 from dermis.mesh.pose import MAX_WEIGHT, Pose
@@ -26,12 +26,12 @@ class _BoneTransforms(NamedTuple):
     scale: Doubles
 
 
-class _UsedTrack(NamedTuple):
-    """Animation curve of a track, with the n bones or morph targets of the track that the head has.
+class _TrackOfHead(NamedTuple):
+    """Animation curve of a track, with n of its bones or morph targets: those that the head also has.
 
     path : "translation", "rotation", "scale" or "weights"
-    columns : (n,) indices of the bones or morph targets in the track
-    indices : (n,) indices of the same bones or morph targets in the result of `_used_names`
+    columns : (n,) indices of these bones or morph targets in the track
+    indices : (n,) indices of their names in the result of `_animated_names_of_head`
     """
 
     path: str
@@ -50,12 +50,16 @@ def load_gltf_clip(path: Path, head: Head, clip_name: str | None) -> Clip:
     Raises DermisError for a damaged clip, and if no name matches the head.
     """
     clip, skeleton = read_clip(path, clip_name), head.control.skeleton
-    bones = _used_names([track for track in clip.tracks if track.path != "weights"], head.bones)
-    targets = _used_names([track for track in clip.tracks if track.path == "weights"], head.targets)
+    bones = _animated_names_of_head([track for track in clip.tracks if track.path != "weights"], head.bones)
+    targets = _animated_names_of_head(
+        [track for track in clip.tracks if track.path == "weights"], head.targets
+    )
     names = tuple(dict.fromkeys(name for track in clip.tracks for name in track.names))
     if not bones and not targets:
-        refuse_unmatched(f"{path}: clip {clip.name!r}", names, head)
-    used_tracks = [_used_track(track, targets if track.path == "weights" else bones) for track in clip.tracks]
+        refuse_unmatched_motion(f"{path}: clip {clip.name!r}", names, head)
+    used_tracks = [
+        _track_of_head(track, targets if track.path == "weights" else bones) for track in clip.tracks
+    ]
     rest = _rest_transforms(skeleton, bones) if skeleton is not None and bones else None
 
     def sample(seconds: float) -> Pose:
@@ -75,21 +79,21 @@ def load_gltf_clip(path: Path, head: Head, clip_name: str | None) -> Clip:
         return Pose(weight_of_target, dict(zip(bones, matrices, strict=True)))
 
     times = [track.curve.times_s for track in clip.tracks]
-    end, rate = max(float(keys[-1]) for keys in times), frame_rate(max(times, key=len))
+    end, rate = max(float(keys[-1]) for keys in times), estimate_frame_rate(max(times, key=len))
     unused = tuple(name for name in names if name not in (*bones, *targets))
     return Clip(clip.name, end, rate, tuple(targets), tuple(bones), unused, sample)
 
 
-def _used_names(tracks: list[AnimationTrack], head_names: tuple[str, ...]) -> list[str]:
+def _animated_names_of_head(tracks: list[AnimationTrack], head_names: tuple[str, ...]) -> list[str]:
     """Return the names of animated bones or morph targets that the head has, without duplicates."""
     return [
         name for name in dict.fromkeys(name for track in tracks for name in track.names) if name in head_names
     ]
 
 
-def _used_track(track: AnimationTrack, used_names: list[str]) -> _UsedTrack:
+def _track_of_head(track: AnimationTrack, used_names: list[str]) -> _TrackOfHead:
     columns = [k for k, name in enumerate(track.names) if name in used_names]
-    return _UsedTrack(track.path, track.curve, columns, [used_names.index(track.names[k]) for k in columns])
+    return _TrackOfHead(track.path, track.curve, columns, [used_names.index(track.names[k]) for k in columns])
 
 
 def _rest_transforms(skeleton: Skeleton, bones: list[str]) -> _BoneTransforms:

@@ -139,7 +139,7 @@ def encode_map_exr(map_name: str, texels: Floats) -> bytes:
     """Return a map as OpenEXR, with channels R, G, B for colours and vectors, and Y for scalars."""
     names = "Y" if texels.ndim == 2 else "RGB"
     channels = [texels] if texels.ndim == 2 else list(np.moveaxis(texels, -1, 0))
-    return encode_exr_parts({map_name: dict(zip(names, channels, strict=True))}, run_length=True)
+    return encode_exr_parts({map_name: dict(zip(names, channels, strict=True))}, use_run_length_encoding=True)
 
 
 def quantise_map(texels: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], RangeEntries]:
