@@ -78,7 +78,7 @@ def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) -
     names = [field.name for field in fields(FormFactors)]
     if shipped := shipped_arrays(mesh, form_factor_table_name(mapped_triangles), names):
         return FormFactors(**shipped)
-    cut_out = [np.packbits(mesh.cut_out)] if mesh.cut_out.any() else []
+    cut_out = [np.packbits(mesh.cut_out_mask)] if mesh.cut_out_mask.any() else []
     digest = hashlib.sha256(
         f"{_FORM_FACTOR_CACHE_VERSION} {CELLS_PER_SIDE} {SAMPLES_PER_PATCH} "
         f"{LINE_BUNDLE_COUNT} {LINES_PER_SIDE_RANGE} {_MIN_FORM_FACTOR}".encode()
@@ -134,7 +134,7 @@ def _trace_lines(
     bundle_count : number of bundles of parallel lines, one per direction
     lines_per_side : number of lines along each side of a bundle
     """
-    blocks = ~mesh.cut_out
+    blocks = ~mesh.cut_out_mask
     corner_uv, mapped_triangles = corner_uv[blocks], mapped_triangles[blocks]
     used, corner = np.unique(mesh.triangles[blocks], return_inverse=True)
     vertices, corner = mesh.positions[used].astype(np.float64), corner.reshape(-1, 3)

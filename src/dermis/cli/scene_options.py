@@ -164,12 +164,12 @@ def note_subdivision(head_or_scene: str, options: SceneOptions, head: Head) -> N
     head_or_scene : head or scene file as named on the command line
     """
     from dermis.scene.files import head_table
-    from dermis.scene.heads import MIN_HUMAN_LEVELS, is_person_name
+    from dermis.scene.heads import MIN_HUMAN_SUBDIVISION_LEVELS, is_person_name
 
     head_options = (
         head_table(Path(head_or_scene)) if Path(head_or_scene).suffix.lower() == ".toml" else options.head
     )
-    min_levels = MIN_HUMAN_LEVELS if is_person_name(head.name) else 0
+    min_levels = MIN_HUMAN_SUBDIVISION_LEVELS if is_person_name(head.name) else 0
     if head_options.get("subdivide", AUTO) == AUTO and head.levels > min_levels:
         count = f"{len(head.mesh.triangles):,} triangles"
         note(f"note: --subdivide {head.levels} for a smooth outline in this picture: {count}")

@@ -18,7 +18,7 @@ from dermis.gpu.memo import are_equal, dataclass_field_names, has_value_equality
 from dermis.gpu.program import ComputeProgram
 from dermis.gpu.recorder import Recorder, Workgroups
 from dermis.gpu.types import Bindings, Buffer, NativeObject
-from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
+from dermis.gpu.uniforms import UNIFORM_CHUNK_BYTES, Uniforms
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
@@ -95,7 +95,7 @@ class Recording(Recorder):
 
 def _uniform_chunk(device: Device, chunks: list[Buffer], chunk_index: int) -> Buffer:
     if chunk_index == len(chunks):
-        chunks.append(device.make_uniform_buffer(CHUNK_BYTES))
+        chunks.append(device.make_uniform_buffer(UNIFORM_CHUNK_BYTES))
     return chunks[chunk_index]
 
 

@@ -36,7 +36,7 @@ class ShaderListMember(NamedTuple):
 
     name : name in scene files; in shaders, {name} has underscores for hyphens and {NAME} is in capitals
     file : shader file to include; None for a member without a file
-    words : pairs of a further {word} in `//#each` lines and its replacement
+    words : pairs (word, replacement) for other {word}s in `//#each` lines
     """
 
     name: str

@@ -247,7 +247,7 @@ def full_body(head: Head) -> Camera:
 def cheek(head: Head) -> Camera:
     """Return a camera for a close-up of the left cheek.
 
-    The key light of the light preset "studio" grazes the pores there.
+    The key light of the light preset "studio" meets the skin there at grazing incidence.
     """
     beside = (40.0, -35.0) if head.skull_mm is not None else (0.0, 0.0)
     focus = _to_scene_axes(head, head.frontmost(*beside))

@@ -59,7 +59,7 @@ class MapOptions:
 
     @property
     def replaced_roles(self) -> set[str]:
-        """Return the map roles, such as "colour", whose pictures in the mesh file the user replaces."""
+        """Return the map roles, such as "colour", for which the user replaces the mesh file's pictures."""
         relief = {"normal", "height", "bump"}
         return {*self.user_files, *(relief if relief & self.user_files.keys() else ())}
 

@@ -62,10 +62,12 @@ Coordinate = Annotated[
     Reason("mm: beyond a kilometre single precision is too coarse for skin"),
 ]
 Vector = tuple[Coordinate, Coordinate, Coordinate]
-_Component = Annotated[
+_DirectionComponent = Annotated[
     float, Field(ge=-MAX_COORDINATE_MM, le=MAX_COORDINATE_MM), Reason("only their ratios count")
 ]
-Direction = Annotated[tuple[_Component, _Component, _Component], AfterValidator(_checked_direction)]
+Direction = Annotated[
+    tuple[_DirectionComponent, _DirectionComponent, _DirectionComponent], AfterValidator(_checked_direction)
+]
 Intensity = Annotated[
     float, Field(ge=0, le=1e6), Reason("light is not negative, and the sun on skin is about 3")
 ]
@@ -142,7 +144,7 @@ class SliderRange(NamedTuple):
     """Range of the slider with which the viewer sets a numeric field.
 
     low, high : values at the ends of the slider
-    logarithmic : whether equal steps of the slider are equal ratios of the value
+    logarithmic : whether equal slider steps multiply the value by equal factors
     """
 
     low: float
@@ -154,7 +156,7 @@ def slider(low: float, high: float, *, logarithmic: bool = False) -> dict[str, A
     """Return the `json_schema_extra` that gives a field a slider range narrower than its bounds.
 
     low, high : values at the ends of the slider
-    logarithmic : whether equal steps of the slider are equal ratios of the value
+    logarithmic : whether equal slider steps multiply the value by equal factors
     """
     return {"slider": SliderRange(low, high, logarithmic)}
 

@@ -33,7 +33,9 @@ def gaze_directions(scene: Scene) -> Doubles | None:
     head, motion = scene.head, _pose_motion(scene)
     if head.eyes is None:
         return None
-    directions = np.einsum("kij,ki->kj", head.eyes.frames(head.control, motion)[:, :3, :3], head.eyes.gaze)
+    directions = np.einsum(
+        "kij,ki->kj", head.eyes.eye_matrices(head.control, motion)[:, :3, :3], head.eyes.gaze
+    )
     in_camera = (
         directions / np.linalg.norm(directions, axis=1, keepdims=True) @ _camera_extrinsics(scene)[0].T
     )

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 HUMAN = "human"
 _MAX_SEED_DIGITS = 20
-MIN_HUMAN_LEVELS = 1
+MIN_HUMAN_SUBDIVISION_LEVELS = 1
 """Lowest level of subdivision of the parametric human."""
 REMOVED_HEADS = ("bust", "bust_many_charts")
 """Heads of earlier releases, replaced by `HUMAN`."""
@@ -248,7 +248,9 @@ def _load_human(
     map_files: dict[str, Any] = {role: file for role, file in user_files.items() if file is not None}
     loaded = load_maps(**map_files, height_mm=height_mm, normal_y=normal_y) if map_files else None
     level_of = levels if callable(levels) else lambda plain: levels
-    head = load_person(head_name).head(subdivide=lambda plain: max(MIN_HUMAN_LEVELS, level_of(plain)))
+    head = load_person(head_name).head(
+        subdivide=lambda plain: max(MIN_HUMAN_SUBDIVISION_LEVELS, level_of(plain))
+    )
     user_maps = {role: getattr(loaded, role) for role in map_files}  # the other maps are painted
     return replace(head, name=head_name, maps=replace(head.maps, **user_maps))
 

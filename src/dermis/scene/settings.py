@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from dermis.base.registry import RegisteredName
 from dermis.scene.field_errors import Keywords, Reason
 from dermis.scene.frozen_model import Colour, FrozenModel, slider
-from dermis.scene.talk import Gamma, SeamColour, Seams, Stretch
+from dermis.scene.talk import GammaHandling, SeamColour, SeamTreatment, StretchCorrection
 from dermis.scene.techniques import TECHNIQUES
 
 _PictureSide = Annotated[int, Field(ge=1, le=16384), Reason("pixels: what the largest GPUs hold")]
@@ -80,8 +80,8 @@ class Settings(FrozenModel):
     """Samples per pixel for antialiasing."""
     technique: Annotated[str, RegisteredName(TECHNIQUES)] = "texture-space"
     """Technique for subsurface scattering."""
-    stretch: Stretch = "full"
-    seams: Seams = "stitch"
+    stretch: StretchCorrection = "full"
+    seams: SeamTreatment = "stitch"
     seam_colour: SeamColour = (0.5, 0.35, 0.3)
     transmission: Literal["thin", "none"] = "thin"
     """Translucency: "thin" for thin parts such as ears and nostrils, "none" to leave it out."""
@@ -98,7 +98,7 @@ class Settings(FrozenModel):
     """Fraction of the light that the lens scatters."""
     tone: Literal["none", "filmic", "neutral"] = "none"
     """Tone curve before the sRGB encoding; "neutral" is the Khronos Group's curve."""
-    gamma: Gamma = "right"
+    gamma: GammaHandling = "right"
     background: Background = "none"
     """Backdrop behind the head, which emits no light: "none" for pictures with alpha, a grey studio
     "gradient", the "environment", or a colour as linear Rec. 709 or #rrggbb."""

@@ -12,7 +12,7 @@ from dermis.optics.pigments.parameters import Structure
 from dermis.optics.reduced_scattering import check_reduced
 from dermis.scene.field_errors import Reason
 from dermis.scene.frozen_model import FrozenModel, slider
-from dermis.scene.talk import Energy, SpecularColour
+from dermis.scene.talk import EnergyConservation, SpecularColour
 from dermis.specular.models import FresnelName, SpecularName
 
 DiffuseDirectionName = Literal["lambertian", "half-space"]
@@ -95,7 +95,7 @@ class TissueLayer(FrozenModel):
 class Skin(FrozenModel):
     """Surface reflection and subsurface scattering of skin.
 
-    Source: [dEonLuebke2007] sections 14.3-14.5; values of [Dudash2007].
+    Sources: [dEonLuebke2007] sections 14.3-14.5, [Dudash2007].
 
     Examples
     --------
@@ -134,7 +134,7 @@ class Skin(FrozenModel):
     fresnel: FresnelName = "schlick"
     """Fresnel reflectance: Schlick's approximation with F0 = 0.028, or exact for an index of 1.4."""
     specular_colour: SpecularColour = "white"
-    energy: Energy = "full"
+    energy: EnergyConservation = "full"
     direction: DiffuseDirectionName = "half-space"
     """Directional dependence of diffuse light: "lambertian" for none; "half-space" as for a scattering
     half-space of the skin's mean colour, which reflects more at oblique incidence and for oblique views."""

@@ -26,7 +26,7 @@ from dermis.mesh.rotations import angles_matrix, matrix_angles
 from dermis.scene.environment import Environment
 from dermis.scene.files import load_scene
 from dermis.scene.gaze import looking_at
-from dermis.scene.heads import MIN_HUMAN_LEVELS, load_head
+from dermis.scene.heads import MIN_HUMAN_SUBDIVISION_LEVELS, load_head
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 from dermis.scene.settings import Settings
@@ -157,7 +157,7 @@ def _subdivision_levels(picture_size: tuple[int, int]) -> int:
 
     The number is the same for all sampled people, so that all their heads have the same topology.
     """
-    return max(MIN_HUMAN_LEVELS, SmoothIn(size=picture_size)(Human().head(subdivide=0)))
+    return max(MIN_HUMAN_SUBDIVISION_LEVELS, SmoothIn(size=picture_size)(Human().head(subdivide=0)))
 
 
 def _hair_count_fraction(picture_size: tuple[int, int]) -> float:

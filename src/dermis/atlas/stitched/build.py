@@ -38,7 +38,7 @@ LAYOUT_ARRAY_NAMES = "piece", "scale", "origins"
 """Names of the arrays of `find_stitched_layout`."""
 
 
-def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
+def find_chart_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
     """Divide charts into pieces; return a piece index (f,) and a uv scale (f,) for each triangle.
 
     A piece is a chart, or a part of a chart whose uv is mirrored. Triangles in no piece have the index -1.
@@ -97,7 +97,7 @@ def build_stitched(mesh: Mesh, atlas_side: int, gutter_mm: float) -> Atlas | Non
     gutter_mm : width of the gutters [mm]
     """
     surface = flat_surface(mesh)
-    piece, scale = find_pieces(surface)
+    piece, scale = find_chart_pieces(surface)
     width = GutterWidth(gutter_mm, _MAX_GUTTER_FRACTION * atlas_side)
     shipped = (
         shipped_arrays(mesh, layout_table_name(gutter_mm), LAYOUT_ARRAY_NAMES)
@@ -136,7 +136,7 @@ def find_stitched_layout(mesh: Mesh, gutter_mm: float) -> dict[str, NDArray[Any]
     Raises ValueError if the charts do not fit.
     """
     surface = flat_surface(mesh)
-    piece, scale = find_pieces(surface)
+    piece, scale = find_chart_pieces(surface)
     piece = cut_overlaps(surface, piece, gutter_mm)
     width = GutterWidth(gutter_mm, _MAX_GUTTER_FRACTION * MAX_CELLS_PER_SIDE)
     layout = find_piece_layout(surface, piece, scale, MAX_CELLS_PER_SIDE, width)

@@ -73,7 +73,7 @@ class Conflicts(NamedTuple):
 
 
 class _PieceGrid(NamedTuple):
-    """Texel grid with one piece and its gutters.
+    """Texel grid with one chart piece and its gutters.
 
     owner : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
     row : (h, w) index of each texel in `anchored`

@@ -42,7 +42,7 @@ def smooth_charts(triangle_chart: Index, triangles: Index) -> Index:
     triangle_chart : (f,) index of the chart of each triangle
     triangles : (f, 3) vertex indices
     """
-    return merge_stray_pieces(_smooth_borders(triangle_chart, triangles), triangles)
+    return merge_stray_pieces(_smooth_chart_borders(triangle_chart, triangles), triangles)
 
 
 def merge_stray_pieces(triangle_chart: Index, triangles: Index) -> Index:
@@ -68,7 +68,7 @@ def merge_stray_pieces(triangle_chart: Index, triangles: Index) -> Index:
     return triangle_chart
 
 
-def _smooth_borders(triangle_chart: Index, triangles: Index) -> Index:
+def _smooth_chart_borders(triangle_chart: Index, triangles: Index) -> Index:
     """Return the most frequent chart (f,) among the triangles around each triangle."""
     corner = triangles.ravel()
     triangle_count = np.maximum(np.bincount(corner), 1)[:, None]
