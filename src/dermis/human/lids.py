@@ -136,20 +136,26 @@ def _project_lids(
     points[..., lid_side.contact, :] = centre + size * relative * scale[..., None]
 
 
-def lid_contact(first_eye_point: int, eyeball_point_count: int, apex: int, back: int) -> LidContact:
+def lid_contact(
+    first_eye_point: int, eyeball_point_count: int, apex_point: int, back_point: int
+) -> LidContact:
     """Return the lid points that slide over the eyeballs, with minimum distances from the eyeballs.
 
     first_eye_point : index of the first point of the left eyeball
     eyeball_point_count : number of points of an eyeball; the right eyeball's points follow the left eyeball's
-    apex, back : indices of the front and rear poles within an eyeball's points
+    apex_point, back_point : indices of the front and rear poles within an eyeball's points
     """
     both = lid_sides()
     return LidContact(
         np.concatenate([side.contact for side in both]).astype(np.int32),
         np.repeat(np.arange(2, dtype=np.int32), [len(side.contact) for side in both]),
         np.concatenate([side.clearances_mm for side in both]).astype(np.float32),
-        np.array([first_eye_point + apex, first_eye_point + eyeball_point_count + apex], np.int32),
-        np.array([first_eye_point + back, first_eye_point + eyeball_point_count + back], np.int32),
+        np.array(
+            [first_eye_point + apex_point, first_eye_point + eyeball_point_count + apex_point], np.int32
+        ),
+        np.array(
+            [first_eye_point + back_point, first_eye_point + eyeball_point_count + back_point], np.int32
+        ),
         lid_rings()[..., _EDGE_COLUMN].astype(np.int32),
     )
 

@@ -42,7 +42,7 @@ MATERIAL_OF_GROUP = {
 }
 """Materials by group of quads."""
 _EQUAL_MACRO_WEIGHT = 1 / 6
-MEAN_WEIGHTS = {
+MEAN_PERSON_WEIGHTS = {
     f"macrodetails/{people}-{sex}-young": _EQUAL_MACRO_WEIGHT
     for people in ("african", "asian", "caucasian")
     for sex in ("female", "male")
@@ -185,7 +185,7 @@ class Template:
 @cache
 def template(layout: Layout, levels: int) -> Template:
     """Return the template for a uv layout and a number of subdivision levels; templates are cached."""
-    head = control_head = build_head(MEAN_WEIGHTS, Maps(), layout, EyeLook())
+    head = control_head = build_head(MEAN_PERSON_WEIGHTS, Maps(), layout, EyeLook())
     refined = refinement(control_head.mesh, levels) if levels else None
     if refined is not None:
         rig = replace(control_head.control, stencils=refined.stencils)

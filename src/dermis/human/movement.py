@@ -53,14 +53,14 @@ def expression_targets() -> MorphTargets:
         if name.startswith(EXPRESSION_PREFIX):
             part = np.arange(*targets.first[index : index + 2])
             names.append(name.removeprefix(EXPRESSION_PREFIX))
-            rows.append(part[_moved_points()[targets.point[part]]])
+            rows.append(part[_blend_shape_point_mask()[targets.point[part]]])
     first, chosen = np.cumsum([0, *map(len, rows)]), np.concatenate(rows)
     point, delta_mm = targets.point[chosen].astype(np.int32), targets.delta_mm[chosen]
     return MorphTargets(tuple(names), first.astype(np.int32), point, delta_mm)
 
 
 @cache
-def _moved_points() -> NDArray[np.bool_]:
+def _blend_shape_point_mask() -> NDArray[np.bool_]:
     """Return a mask (n,) of MakeHuman's points that blend shapes may move: all but joints and eyeballs."""
     arrays = model_data()
     balls = [index for index, name in enumerate(arrays["group_names"]) if str(name).endswith("-eye")]

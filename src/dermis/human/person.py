@@ -191,15 +191,15 @@ def _sample_ancestry(
     return ancestry, groups
 
 
-def _pick_name(weight_of_name: Mapping[str, float], cumulative_chance: float) -> str:
+def _pick_name(weight_of_name: Mapping[str, float], uniform_sample: float) -> str:
     """Return a random name, with probabilities proportional to weights.
 
     weight_of_name : weight of each name
-    cumulative_chance : uniformly distributed random number, 0 to 1, which selects the name
+    uniform_sample : uniformly distributed random number, 0 to 1, which selects the name
     """
     ends = np.cumsum(list(weight_of_name.values()))
     return list(weight_of_name)[
-        min(int(np.searchsorted(ends, cumulative_chance, "right")), len(weight_of_name) - 1)
+        min(int(np.searchsorted(ends, uniform_sample, "right")), len(weight_of_name) - 1)
     ]
 
 
@@ -522,7 +522,7 @@ class Human:
 
     def weights(self) -> dict[str, float]:
         """Return the nonzero weights of MakeHuman's morph targets for this person, by target name."""
-        weights = {**self._ancestry_weights(), **self._build_weights()}
+        weights = {**self._ancestry_weights(), **self._physique_weights()}
         for name, weight in self.targets.items():
             weights[name] = weights.get(name, 0.0) + weight
         return {name: weight for name, weight in weights.items() if weight}
@@ -535,7 +535,7 @@ class Human:
             for kind, fraction in self._adult_fractions().items()
         }
 
-    def _build_weights(self) -> dict[str, float]:
+    def _physique_weights(self) -> dict[str, float]:
         """Return the weights of morph targets for body weight and muscle; average build needs no targets."""
         weights = {}
         for kind, fraction in self._adult_fractions().items():

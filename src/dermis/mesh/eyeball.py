@@ -52,7 +52,7 @@ def iris_plane_mm() -> float:
     return apex_mm() - IRIS_DEPTH_MM
 
 
-def profile_mm(angle_from_axis: Doubles) -> Doubles:
+def surface_distance_mm(angle_from_axis: Doubles) -> Doubles:
     """Return the distance from the ball's centre to the outer surface of ball and cornea [mm].
 
     angle_from_axis : angle between the eye's axis and the direction in which the distance is measured [rad]
@@ -74,7 +74,7 @@ def radial_distances_mm(points: Doubles, eye_axis: Doubles) -> tuple[Doubles, Do
     """
     distance = np.linalg.norm(points, axis=-1)
     cosine = (points * eye_axis).sum(axis=-1) / np.maximum(distance, 1e-9)
-    return distance, profile_mm(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return distance, surface_distance_mm(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -136,7 +136,7 @@ def build_eyeball(quads_per_edge: int = QUADS_PER_EDGE, position_scale: float = 
     cube = np.concatenate(points)
     _, first, welded = np.unique(np.rint(1e6 * cube), axis=0, return_index=True, return_inverse=True)
     direction = cube[first] / np.linalg.norm(cube[first], axis=1, keepdims=True)
-    radius = profile_mm(np.arccos(np.clip(direction[:, 2], -1.0, 1.0)))
+    radius = surface_distance_mm(np.arccos(np.clip(direction[:, 2], -1.0, 1.0)))
     return position_scale * radius[:, None] * direction, welded.reshape(-1)[np.concatenate(quads)]
 
 

@@ -36,7 +36,7 @@ class Eyes(ShortRepr):
     centre_offset_mm: Doubles = field(default_factory=lambda: np.zeros(2))
     gaze: Doubles = field(default_factory=lambda: np.tile([0.0, 0.0, 1.0], (2, 1)))
 
-    def frames(self, rig: Rig, motion: Motion) -> Doubles:
+    def eye_matrices(self, rig: Rig, motion: Motion) -> Doubles:
         """Return the matrices (k, 4, 4) from head coordinates [mm] to the coordinates of each eye.
 
         Eye coordinates are scaled to an eye with a cornea of adult size [mm], with z along the axis of the

@@ -38,11 +38,11 @@ class MorphTargets(ShortRepr):
         """Return the permutation (n,) that sorts the displacements by point, then by target."""
         return np.argsort(self.point, kind="stable")
 
-    def rows(self, target_index: int) -> slice:
+    def displacement_rows(self, target_index: int) -> slice:
         """Return the slice of the rows of `point` and `delta_mm` that belong to a target."""
         return slice(int(self.first[target_index]), int(self.first[target_index + 1]))
 
-    def dense(self, points: Intp, point_count: int) -> Floats:
+    def dense_displacements(self, points: Intp, point_count: int) -> Floats:
         """Return the displacements (t, n, 3) of n points by all targets at weight 1 [mm].
 
         points : (n,) indices of the points

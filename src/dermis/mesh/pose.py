@@ -192,7 +192,7 @@ def _bone_transforms(
         try:
             if len(bone_values[name]) == 3:
                 angles = checked_array(culprit, bone_values[name], (3,), -MAX_DEGREES, MAX_DEGREES)
-                rows.append(skeleton.bone_rotation(bone, angles.tolist()))
+                rows.append(skeleton.joint_rotation_matrix(bone, angles.tolist()))
                 by_angles.append(k)
             else:
                 changes[k] = checked_array(

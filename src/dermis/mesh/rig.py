@@ -194,13 +194,13 @@ class Rig(ShortRepr):
         There are k eyes with r points around each opening, see `LidContact.edge`.
         """
         assert self.contact is not None
-        points, weights, outline = self._lid_edge_data
+        points, weights, outline = self._posable_lid_edges
         rest = np.vstack([motion.positions_mm[points].T, outline.rest_mm[3]])
         posed = replace(outline, rest_mm=rest).pose(motion.weights, motion.matrices)
         return np.asarray(weights @ posed).reshape(*self.contact.edge.shape, 3)
 
     @cached_property
-    def _lid_edge_data(self) -> tuple[Intp, Doubles, RigOutline]:
+    def _posable_lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
         """Return the precomputed data for `lid_edges_mm`.
 
         The data are the indices (n,) of the control points around the lid edges, the weights (e, n) of these
@@ -223,7 +223,7 @@ class Rig(ShortRepr):
         points : (n,) indices of the control points
         """
         positions = motion.positions_mm[points].astype(np.float64)
-        if self._has_targets[points].any():
+        if self._target_moved_mask[points].any():
             positions += np.einsum("t,tpk->pk", motion.weights, self._dense_displacements(points))
         if self.skeleton is None:
             return positions
@@ -232,7 +232,7 @@ class Rig(ShortRepr):
         return np.asarray(np.einsum("pk,pkij,pj->pi", weight, matrices, homogeneous))
 
     @cached_property
-    def _has_targets(self) -> Mask:
+    def _target_moved_mask(self) -> Mask:
         """Return a mask (p,) of the control points that some morph target moves."""
         displaced = np.zeros(len(self.positions_mm), bool)
         displaced[self.targets.point] = True
@@ -242,7 +242,7 @@ class Rig(ShortRepr):
         """Return the displacements (t, n, 3) of n control points by all targets; cache the last result."""
         last_points, dense = vars(self).get("_last", (None, None))
         if dense is None or not np.array_equal(last_points, points):
-            dense = self.targets.dense(points.astype(np.intp), len(self.positions_mm))
+            dense = self.targets.dense_displacements(points.astype(np.intp), len(self.positions_mm))
             vars(self)["_last"] = points, dense
         return np.asarray(dense)
 

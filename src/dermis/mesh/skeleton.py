@@ -63,7 +63,7 @@ class Skeleton(ShortRepr):
         origins: list[list[float]] = (self.to_head @ self._bone_to_file(self.local))[:, :3, 3].tolist()
         return origins
 
-    def bone_rotation(self, bone_index: int, degrees: Sequence[float]) -> list[float]:
+    def joint_rotation_matrix(self, bone_index: int, degrees: Sequence[float]) -> list[float]:
         """Return the head-space matrix that rotates about a bone's joint at rest, as 16 numbers row by row.
 
         degrees : angles about x, y and z, see `angles_matrix`
@@ -163,7 +163,7 @@ class Skeleton(ShortRepr):
         return [np.array(bones, np.intp) for bones in descendants]
 
     @cached_property
-    def follower_counts(self) -> Doubles:
+    def subtree_weight_sums(self) -> Doubles:
         """Return for each bone (b,) the sum of the skin weights of the bone and of its descendants."""
         own = np.bincount(self.bone.ravel(), self.weight.ravel(), minlength=len(self.names))
         return np.array([own[bones].sum() for bones in self._descendants])

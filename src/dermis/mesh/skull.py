@@ -70,7 +70,7 @@ def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
     )
 
 
-def skull_below(positions: NDArray[np.floating], crown_height: float) -> Point:
+def skull_centre_below(positions: NDArray[np.floating], crown_height: float) -> Point:
     """Return the centre of the skull of a head whose crown is at a given height [mm].
 
     positions : (v, 3) vertices of the head, Y up [mm]
@@ -82,7 +82,7 @@ def skull_below(positions: NDArray[np.floating], crown_height: float) -> Point:
     return centre_x, crown_height - _CROWN_TO_CENTRE_MM, centre_z
 
 
-def body_skull(positions: Floats, triangles: Ints, eyes: Floats) -> Point | None:
+def body_skull_centre(positions: Floats, triangles: Ints, eyes: Floats) -> Point | None:
     """Return the centre of the skull of a body: at the level of its eyes, or at the top of a standing figure.
 
     The result is None for a mesh without eyes that is not a standing figure, and for a mesh that is too small
@@ -97,9 +97,9 @@ def body_skull(positions: Floats, triangles: Ints, eyes: Floats) -> Point | None
     if len(eyes):
         x, y, z = 0.5 * (eyes.min(axis=0) + eyes.max(axis=0))
         near = np.hypot(positions[:, 0] - x, positions[:, 2] - z) < _MAX_EYES_TO_HAIR_MM
-        return skull_below(positions[near], float(y) + _CROWN_TO_CENTRE_MM)
+        return skull_centre_below(positions[near], float(y) + _CROWN_TO_CENTRE_MM)
     if is_standing_figure(positions, triangles):
-        return skull_below(positions, float(positions[:, 1].max()))
+        return skull_centre_below(positions, float(positions[:, 1].max()))
     return None
 
 

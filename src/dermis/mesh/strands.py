@@ -78,10 +78,10 @@ def to_root_frames(mesh: Mesh, roots: Roots, offsets_mm: Doubles) -> Floats:
 
     offsets_mm : (n, k, 3) offsets in head space, on the mesh at rest
     """
-    return to_frames(root_frames(mesh, roots, mesh.points_mm)[1], offsets_mm)
+    return offsets_in_frames(root_frames(mesh, roots, mesh.points_mm)[1], offsets_mm)
 
 
-def to_frames(root_axes: Doubles, offsets_mm: Doubles) -> Floats:
+def offsets_in_frames(root_axes: Doubles, offsets_mm: Doubles) -> Floats:
     """Express knot offsets (n, k, 3), measured from each root, in the frame of that root.
 
     root_axes : (n, 3, 3) axes of the frames as rows, as returned by `root_frames`
@@ -109,7 +109,7 @@ def quad_weights(bilinear_position: NDArray[np.floating]) -> Doubles:
     return np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
 
 
-def cover_of_points(mesh: Mesh, roots: Roots, area_mm2: Doubles) -> Doubles:
+def hair_cover_of_points(mesh: Mesh, roots: Roots, area_mm2: Doubles) -> Doubles:
     """Return the projected area of the strands rooted around each point of a mesh, per area of skin (p,) [-].
 
     Because hair is inclined, half the area of a strand seen from the side counts as its projected area. The

@@ -26,7 +26,7 @@ MAX_SUBDIVISION_LEVELS = 3
 _CACHE_VERSION = "subdivision 1"  # change it when weights or corners change for the same mesh
 _MIN_CACHED_TRIANGLES = 500_000
 """Smallest number of triangles of a finer mesh whose weights are cached on disk, to save half a second."""
-Corners = NDArray[np.integer]
+CornerIndices = NDArray[np.integer]
 
 
 class SubdividedMesh(NamedTuple):
@@ -54,14 +54,16 @@ class Refinement:
     material: Ints
     quads: Ints
 
-    def mesh(self, coarse: Mesh) -> Mesh:
+    def mesh(self, coarse_mesh: Mesh) -> Mesh:
         """Return a subdivided mesh.
 
-        coarse : mesh before subdivision, with the triangles for which this refinement was computed
+        coarse_mesh : mesh before subdivision, with the triangles for which this refinement was computed
         """
-        positions = (self.weights @ coarse.points_mm)[self.point]
+        positions = (self.weights @ coarse_mesh.points_mm)[self.point]
         topology = {"point": self.point, "quads": self.quads}
-        return build_mesh(positions, self.uv, self.triangles, self.material, coarse.materials, **topology)
+        return build_mesh(
+            positions, self.uv, self.triangles, self.material, coarse_mesh.materials, **topology
+        )
 
 
 def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
@@ -206,12 +208,12 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
         levels, count = levels - 1, count // 4
     skipped = head.levels - levels
     if skipped == 0:
-        return mesh.triangles[~mesh.cut_out]
+        return mesh.triangles[~mesh.cut_out_mask]
     if by_quads:
-        solid = mesh.quads[~mesh.cut_out[mesh.quads[:, 0]]]
+        solid = mesh.quads[~mesh.cut_out_mask[mesh.quads[:, 0]]]
         quads = np.column_stack((mesh.triangles[solid[:, 0]], mesh.triangles[solid[:, 1], 1]))
         return _coarsen_quads(quads, mesh.positions, skipped, tolerance_mm)
-    return _coarsen_triangles(mesh.triangles[~mesh.cut_out], mesh.positions, skipped, tolerance_mm)
+    return _coarsen_triangles(mesh.triangles[~mesh.cut_out_mask], mesh.positions, skipped, tolerance_mm)
 
 
 def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
@@ -226,12 +228,12 @@ def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, toler
     for _ in range(levels):
         coarse, finer = coarse.reshape(-1, 4, 3)[:, :3, 0], coarse
     middles = finer.reshape(-1, 4, 3)[:, :3, 1]
-    deviation = _deviation_mm(positions_mm, middles, coarse, np.roll(coarse, -1, axis=1))
+    deviation = _edge_deviation_mm(positions_mm, middles, coarse, np.roll(coarse, -1, axis=1))
     is_curved = deviation.max(axis=1) > tolerance_mm
     return np.concatenate((coarse[~is_curved], triangles[np.repeat(is_curved, 4**levels)]))
 
 
-def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
+def _coarsen_quads(quads: CornerIndices, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
     """Return triangles (t, 3) of a mesh after Catmull-Clark subdivision, with fewer levels in flat regions.
 
     quads : (q, 4) quads of the finest level; the rules divide a polygon into quads, one from each corner to
@@ -248,15 +250,15 @@ def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_
     first = np.flatnonzero(is_first)[polygon]
     following = np.where(is_last, corner[first], np.roll(corner, -1))
     is_curved = np.zeros(polygon[-1] + 1, bool)
-    is_curved[polygon[_deviation_mm(positions_mm, side, corner, following) > tolerance_mm]] = True
+    is_curved[polygon[_edge_deviation_mm(positions_mm, side, corner, following) > tolerance_mm]] = True
     in_fan = ~is_first & ~is_last & ~is_curved[polygon]
     fans = np.column_stack((corner[first], corner, following))[in_fan]
     fine = quads[np.repeat(is_curved[polygon], 4 ** (levels - 1))]
     return np.concatenate((fans, split_quads(fine))).astype(np.int32)
 
 
-def _deviation_mm(
-    positions_mm: Floats, middle_vertex: Corners, start_vertex: Corners, end_vertex: Corners
+def _edge_deviation_mm(
+    positions_mm: Floats, middle_vertex: CornerIndices, start_vertex: CornerIndices, end_vertex: CornerIndices
 ) -> Floats:
     """Return the distance between the middle vertex of each coarse edge and the midpoint of this edge [mm].
 

@@ -19,7 +19,7 @@ KNOTS_PER_HAIR = 9
 _MAX_HAIRS = 760  # number of hairs of the bushiest brow
 # Artist's values along the brow, from its inner to its outer end, in a view from the front [mm]: position,
 # half height, angle of the hairs from outwards to upwards, density and length.
-_TABLE_POSITIONS = np.array([0.0, 0.1, 0.25, 0.45, 0.65, 0.85, 1.0])
+_POSITIONS_ALONG_BROW = np.array([0.0, 0.1, 0.25, 0.45, 0.65, 0.85, 1.0])
 _CENTRELINE_X = np.array([10.5, 14.5, 21.0, 30.0, 39.5, 48.5, 54.5])
 _CENTRELINE_Y = np.array([12.6, 13.2, 14.7, 17.0, 18.4, 16.4, 12.8])
 _BROW_HALF_HEIGHT = np.array([2.8, 3.4, 3.7, 3.5, 2.9, 2.0, 1.0])
@@ -40,7 +40,7 @@ class SurfacePoints(NamedTuple):
     derivative_x: Doubles
     derivative_y: Doubles
 
-    def front_plane_step(self, directions: Doubles, length: Doubles) -> tuple[Doubles, Doubles]:
+    def xy_steps(self, directions: Doubles, length: Doubles) -> tuple[Doubles, Doubles]:
         """Return the changes (n,) of x and (n,) of y by steps along the skin [mm].
 
         directions : (n, 3) directions of the steps, whose components along the normal are ignored
@@ -58,7 +58,7 @@ def _row_dots(a: Doubles, b: Doubles) -> Doubles:
     return np.asarray(np.einsum("nc,nc->n", a, b))
 
 
-def grid_points() -> tuple[Doubles, Doubles]:
+def brow_grid_points() -> tuple[Doubles, Doubles]:
     """Return x and y (n,) of the grid nodes at which `BrowSurface` samples the skin of the left brow [mm]."""
     x, y = np.meshgrid(*_grid_axes(), indexing="ij")
     return x.ravel(), y.ravel()
@@ -74,8 +74,8 @@ def _grid_axes() -> tuple[Doubles, Doubles]:
 class BrowSurface:
     """Skin around the brows of a person, sampled on a grid; brow hairs follow this surface as they grow.
 
-    node_mm : (2 n, 3) skin points in front of the n nodes of `grid_points`, and then in front of the mirrored
-        nodes of the right brow [mm]
+    node_mm : (2 n, 3) skin points in front of the n nodes of `brow_grid_points`, and then in front of the
+        mirrored nodes of the right brow [mm]
     normal : (2 n, 3) unit normals of the skin at these points
     """
 
@@ -87,17 +87,17 @@ class BrowSurface:
         slopes = [tangent.reshape(-1, 3) for tangent in tangents]
         self._node = np.concatenate([node_mm, normal, *slopes, plane], axis=1)
 
-    def sample(self, side: Doubles, x: Doubles, y: Doubles) -> SurfacePoints:
+    def sample(self, side_sign: Doubles, x: Doubles, y: Doubles) -> SurfacePoints:
         """Return the n skin points with given x and y; positions outside the grid are moved to its border.
 
-        side : (n,) 1 for the left brow, -1 for the right brow
+        side_sign : (n,) 1 for the left brow, -1 for the right brow
         x, y : (n,) distance from the middle of the face outwards, and height [mm]
         """
         grid = (np.stack([x, y]) - np.array(_GRID_LOW)[:, None]) / _GRID_CELL_MM
         grid = np.clip(grid, 0.0, self._last[:, None] - 1e-9)
         cell = grid.astype(np.int64)
         s, t = grid - cell
-        first = cell[0] * (self._last[1] + 1) + cell[1] + (side < 0) * (len(self._node) // 2)
+        first = cell[0] * (self._last[1] + 1) + cell[1] + (side_sign < 0) * (len(self._node) // 2)
         near = first[:, None] + [0, 1, self._last[1] + 1, self._last[1] + 2]
         weights = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=-1)
         values = np.einsum("nk,nkc->nc", weights, self._node.take(near, axis=0))
@@ -116,34 +116,34 @@ def sample_positions(rng: np.random.Generator) -> tuple[Doubles, Doubles, Double
     """
     u = rng.random(4 * _MAX_HAIRS)
     accepted = rng.random(len(u)) < np.interp(
-        u, _TABLE_POSITIONS, _HAIR_DENSITY * _BROW_HALF_HEIGHT / _BROW_HALF_HEIGHT.max()
+        u, _POSITIONS_ALONG_BROW, _HAIR_DENSITY * _BROW_HALF_HEIGHT / _BROW_HALF_HEIGHT.max()
     )
     u = u[accepted][:_MAX_HAIRS]
     v = np.clip(rng.normal(0.0, 0.52, len(u)), -1.5, 1.5)
     ahead, behind = np.minimum(u + 0.02, 1.0), np.maximum(u - 0.02, 0.0)
     along = np.stack(
         [
-            np.interp(ahead, _TABLE_POSITIONS, c) - np.interp(behind, _TABLE_POSITIONS, c)
+            np.interp(ahead, _POSITIONS_ALONG_BROW, c) - np.interp(behind, _POSITIONS_ALONG_BROW, c)
             for c in (_CENTRELINE_X, _CENTRELINE_Y)
         ]
     )
     along /= np.linalg.norm(along, axis=0)
-    offset = v * np.interp(u, _TABLE_POSITIONS, _BROW_HALF_HEIGHT)
-    x = np.interp(u, _TABLE_POSITIONS, _CENTRELINE_X) - along[1] * offset + rng.normal(0, 0.4, len(u))
-    y = np.interp(u, _TABLE_POSITIONS, _CENTRELINE_Y) + along[0] * offset + rng.normal(0, 0.3, len(u))
+    offset = v * np.interp(u, _POSITIONS_ALONG_BROW, _BROW_HALF_HEIGHT)
+    x = np.interp(u, _POSITIONS_ALONG_BROW, _CENTRELINE_X) - along[1] * offset + rng.normal(0, 0.4, len(u))
+    y = np.interp(u, _POSITIONS_ALONG_BROW, _CENTRELINE_Y) + along[0] * offset + rng.normal(0, 0.3, len(u))
     return u, v, x, y
 
 
-def brow_outline(across: float) -> Doubles:
+def brow_outline(position_across: float) -> Doubles:
     """Return a polyline (k, 2) along the left brow from its inner to its outer end, seen from the front [mm].
 
-    across : -1 for the lower edge of the brow, 0 for its centreline, 1 for the upper edge
+    position_across : -1 for the lower edge of the brow, 0 for its centreline, 1 for the upper edge
     """
     along = np.gradient(np.stack([_CENTRELINE_X, _CENTRELINE_Y], axis=-1), axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     x, y = (
-        _CENTRELINE_X - across * _BROW_HALF_HEIGHT * along[:, 1],
-        _CENTRELINE_Y + across * _BROW_HALF_HEIGHT * along[:, 0],
+        _CENTRELINE_X - position_across * _BROW_HALF_HEIGHT * along[:, 1],
+        _CENTRELINE_Y + position_across * _BROW_HALF_HEIGHT * along[:, 0],
     )
     return np.stack([x, y], axis=-1)
 
@@ -165,17 +165,19 @@ def sample_shapes(u: Doubles, v: Doubles, rng: np.random.Generator, look: HairLo
     n = len(u)
     # hairs of the upper and the lower half lean towards each other
     angle = (
-        np.interp(u, _TABLE_POSITIONS, _HAIR_ANGLES)
+        np.interp(u, _POSITIONS_ALONG_BROW, _HAIR_ANGLES)
         - 0.6 * v * np.minimum(2.5 * u, 1.0)
         + rng.normal(0, 0.13, n)
     )
     bend = (
-        -0.5 * np.clip(angle - np.interp(np.minimum(u + 0.2, 1), _TABLE_POSITIONS, _HAIR_ANGLES), 0, 1)
+        -0.5 * np.clip(angle - np.interp(np.minimum(u + 0.2, 1), _POSITIONS_ALONG_BROW, _HAIR_ANGLES), 0, 1)
         - 0.25 * v * u
     )
     bend += rng.normal(0, 0.14, n)
     length = (
-        np.interp(u, _TABLE_POSITIONS, _HAIR_LENGTH_MM) * rng.uniform(0.6, 1.1, n) * (0.85 + 0.3 * look.bushy)
+        np.interp(u, _POSITIONS_ALONG_BROW, _HAIR_LENGTH_MM)
+        * rng.uniform(0.6, 1.1, n)
+        * (0.85 + 0.3 * look.bushy)
     )
     rise = np.clip(rng.gamma(4.0, 0.15, n), 0.15, 1.3)
     radius = rng.uniform(0.03, 0.05, n) * (0.9 + 0.2 * look.bushy)
@@ -183,27 +185,27 @@ def sample_shapes(u: Doubles, v: Doubles, rng: np.random.Generator, look: HairLo
 
 
 def grow_brow_hairs(
-    skin: BrowSurface, root_mm: Doubles, side: Doubles, front_mm: Doubles, shape: Doubles
+    skin: BrowSurface, root_mm: Doubles, side_sign: Doubles, root_xy_mm: Doubles, shape_parameters: Doubles
 ) -> tuple[Doubles, Doubles]:
     """Return the knots (n, k, 3) and radii (n, k) of brow hairs traced over the skin [mm].
 
     root_mm : (n, 3) positions of the roots on the skin [mm]
-    side : (n,) 1 for hairs of the left brow, -1 for the right
-    front_mm : (2, n) x and y of the roots, from `sample_positions` [mm]
-    shape : (5, n) shape parameters from `sample_shapes`
+    side_sign : (n,) 1 for hairs of the left brow, -1 for the right
+    root_xy_mm : (2, n) x and y of the roots, from `sample_positions` [mm]
+    shape_parameters : (5, n) shape parameters from `sample_shapes`
     """
-    (x, y), (first_angle, bend, length, rise, radius) = front_mm, shape
+    (x, y), (first_angle, bend, length, rise, radius) = root_xy_mm, shape_parameters
     t = np.linspace(0.0, 1.0, KNOTS_PER_HAIR)
     height = rise[:, None] * (1 - (1 - t) ** 2.2) * (1 - 0.35 * t) - 0.25 * (1 - t) ** 8
-    skin_points = skin.sample(side, x, y)
+    skin_points = skin.sample(side_sign, x, y)
     root_offset = tangent_component(root_mm - skin_points.position_mm, skin_points.normal)
     base_points, normals = [skin_points.position_mm + root_offset], [skin_points.normal]
     for k in range(2, KNOTS_PER_HAIR, 2):  # odd knots are interpolated, with an error of at most 0.16 mm
         angle = first_angle + bend * (t[k - 1] + t[k]) / 2
-        direction = np.stack([side * np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=-1)
-        across, up = skin_points.front_plane_step(direction, 2 * length / (KNOTS_PER_HAIR - 1))
+        direction = np.stack([side_sign * np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=-1)
+        across, up = skin_points.xy_steps(direction, 2 * length / (KNOTS_PER_HAIR - 1))
         x, y = x + across, y + up
-        skin_points = skin.sample(side, x, y)
+        skin_points = skin.sample(side_sign, x, y)
         base = skin_points.position_mm + root_offset
         base_points += [(base_points[-1] + base) / 2, base]
         normals += [(normals[-1] + skin_points.normal) / 2, skin_points.normal]

@@ -178,7 +178,7 @@ def _sum_zones(amount_name: str, zone_rows: Floats, points: Doubles) -> Doubles:
 
 
 @cache
-def skin_vertices_near_hair(root_finder: RootFinder) -> Index:
+def skin_vertices_near_brows(root_finder: RootFinder) -> Index:
     """Return the indices of the vertices of the subdivided mesh that brow hairs may touch."""
     from scipy.spatial import cKDTree
 

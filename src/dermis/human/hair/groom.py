@@ -14,13 +14,13 @@ import numpy as np
 from dermis.base.arrays import Doubles
 from dermis.human.hair import brows, lashes
 from dermis.human.hair.brows import BrowSurface
-from dermis.human.hair.density import skin_vertices_near_hair
+from dermis.human.hair.density import skin_vertices_near_brows
 from dermis.human.hair.head_hair import make_groom
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.root_finder import SIDE_SIGNS, RootFinder, eye_centres
 from dermis.human.hair.skin_surface import GrowthSurface, HairGroup, RootFrames, SkinSurface
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Roots, Strands, to_frames
+from dermis.mesh.strands import Roots, Strands, offsets_in_frames
 from dermis.specular.hair import absorption_per_mm
 
 _LASH_PIGMENT_FACTOR = 1.6
@@ -43,7 +43,7 @@ def add_hair(
     hair_fraction : fraction of scalp and beard hairs to generate; the hairs are widened by the inverse of
         this fraction, so that coverage stays the same
     """
-    near = skin_vertices_near_hair(root_finder)
+    near = skin_vertices_near_brows(root_finder)
     skin = SkinSurface(head.mesh.positions[near], head.mesh.normals[near])
     surface = GrowthSurface(head, control_head.mesh, skin, hair_fraction)
     rngs = [np.random.default_rng((look.seed, int(side > 0))) for side in SIDE_SIGNS]
@@ -95,23 +95,23 @@ def _grow_lashes(
     yield from _split_group(group, [len(part.quad) for part in roots])
 
 
-def _split_group(group: HairGroup, counts: list[int]) -> Iterator[HairGroup]:
-    """Yield consecutive slices of a hair group; `counts` holds the number of hairs in each slice."""
-    for end, count in zip(np.cumsum(counts).tolist(), counts, strict=True):
+def _split_group(group: HairGroup, hair_counts: list[int]) -> Iterator[HairGroup]:
+    """Yield consecutive slices of a hair group; `hair_counts` holds the number of hairs in each slice."""
+    for end, count in zip(np.cumsum(hair_counts).tolist(), hair_counts, strict=True):
         part = slice(end - count, end)
         roots = Roots(group.roots.quad[part], group.roots.position[part])
         yield group._replace(roots=roots, knots=group.knots[part], radius=group.radius[part])
 
 
 def _hair_group(
-    frames: RootFrames, knots_mm: Doubles, radius_mm: Doubles, pigment_factor: float
+    root_frames: RootFrames, knots_mm: Doubles, radius_mm: Doubles, pigment_factor: float
 ) -> HairGroup:
     """Return a hair group, with knots converted from the coordinates of the head to the root frames.
 
     knots_mm, radius_mm : (n, k, 3) positions and (n, k) radii of the knots [mm]
     """
-    offsets = to_frames(frames.frame, knots_mm - frames.positions_mm[:, None])
-    return HairGroup(frames.roots, offsets, radius_mm.astype(np.float32), pigment_factor)
+    offsets = offsets_in_frames(root_frames.frame, knots_mm - root_frames.positions_mm[:, None])
+    return HairGroup(root_frames.roots, offsets, radius_mm.astype(np.float32), pigment_factor)
 
 
 def _join_groups(groups: list[HairGroup], absorption: Doubles) -> Strands:
@@ -127,8 +127,8 @@ def _join_groups(groups: list[HairGroup], absorption: Doubles) -> Strands:
     return Strands(roots, knots, radius, strand_absorption, cover.astype(np.float32))
 
 
-def _concatenate_roots(parts: Iterable[Roots]) -> Roots:
-    quads, positions = zip(*parts, strict=True)
+def _concatenate_roots(root_groups: Iterable[Roots]) -> Roots:
+    quads, positions = zip(*root_groups, strict=True)
     return Roots(np.concatenate(quads), np.concatenate(positions))
 
 

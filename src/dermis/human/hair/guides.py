@@ -165,16 +165,16 @@ COMBS: dict[str, Callable[[Doubles, Style], Doubles]] = {
 
 
 @cache
-def body_surface(root_finder: RootFinder, ears: bool = True) -> SkinSurface:
+def body_surface(root_finder: RootFinder, has_ears: bool = True) -> SkinSurface:
     """Return the skin of the mean person: head, neck and shoulders.
 
     root_finder : root finder of the mean person
-    ears : whether the skin has ears; if False, a smooth surface replaces them
+    has_ears : whether the skin has ears; if False, a smooth surface replaces them
     """
-    mesh = root_finder.mean_mesh
+    mesh = root_finder.once_subdivided_mesh
     skin = np.unique(mesh.triangles[mesh.material == 0])
     points, normals = mesh.positions[skin].astype(np.float64), mesh.normals[skin].astype(np.float64)
-    if ears:
+    if has_ears:
         return SkinSurface(points, normals)
     y, z = np.abs(points[:, 1:] - _EAR_CENTRE_MM[1:]).T
     ear = (np.abs(points[:, 0]) > _EAR_BEGIN_X) & (y < 36.0) & (z < 28.0)
@@ -205,23 +205,23 @@ def ear_weight(points: Doubles) -> Doubles:
     return np.asarray(np.exp(-(away[:, 1:] ** 2).sum(axis=1)))
 
 
-def grow_guides(root_finder: RootFinder, points: Doubles, style: Style) -> tuple[Doubles, Doubles, Doubles]:
+def grow_guides(root_finder: RootFinder, roots_mm: Doubles, style: Style) -> tuple[Doubles, Doubles, Doubles]:
     """Return the knots (g, k, 3) of guides [mm], with skin normals (g, k, 3) and heights (g, k) [mm].
 
     The normals are those of the skin below the knots, and the heights are measured from this skin.
 
-    points : (g, 3) roots on the skin of the mean person [mm]
+    roots_mm : (g, 3) roots on the skin of the mean person [mm]
     """
-    surface = body_surface(root_finder, ears=style.comb not in _COMBS_OVER_EARS)
-    _, normal = surface.project(points)
-    state = Growth(points, normal, points, _root_directions(points, normal, style), normal,
-                   np.zeros(len(points)), np.zeros(len(points)), np.full(len(points), np.inf))  # fmt: skip
-    knots = [(points, normal, state.height_mm)]
+    surface = body_surface(root_finder, has_ears=style.comb not in _COMBS_OVER_EARS)
+    count, (_, normal) = len(roots_mm), surface.project(roots_mm)
+    state = Growth(roots_mm, normal, roots_mm, _root_directions(roots_mm, normal, style), normal,
+                   np.zeros(count), np.zeros(count), np.full(count, np.inf))  # fmt: skip
+    knots = [(roots_mm, normal, state.height_mm)]
     segment = style.max_length_mm / (GUIDE_KNOTS - 1)
     substeps = max(1, int(np.ceil(segment / _MAX_STEP_MM)))
     for _ in range(GUIDE_KNOTS - 1):
         for _ in range(substeps):
-            state = _advance(surface, state, segment / substeps, style)
+            state = _grow_one_step(surface, state, segment / substeps, style)
         knots.append((state.position_mm, state.skin_normal, state.height_mm))
     positions, normals, heights = (np.stack(part, axis=1) for part in zip(*knots, strict=True))
     return positions, normals, heights
@@ -235,25 +235,25 @@ def _root_directions(points: Doubles, normals: Doubles, style: Style) -> Doubles
     return unit(np.reshape(lift, (-1, 1)) * normals + combed)
 
 
-def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> Growth:
+def _grow_one_step(surface: SkinSurface, state: Growth, step_mm: float, style: Style) -> Growth:
     """Return the state of guides after one step of growth.
 
-    step : length of the step [mm]
+    step_mm : length of the step [mm]
     """
-    direction, length, tied = _steer(state, style), state.length_mm + step, state.tied_mm
+    direction, length, tied = _next_directions(state, style), state.length_mm + step_mm, state.tied_mm
     if style.comb == "gather":
         near = (
             np.linalg.norm(state.position_mm - style.tie_mm - _tie_offsets(state, style), axis=1)
             < _TIE_REACH_MM
         )
         tied = np.where(near & ~np.isfinite(tied), length, tied)
-    moved = state.position_mm + step * direction
+    moved = state.position_mm + step_mm * direction
     base, normal = surface.project(moved)
     height = ((moved - base) * normal).sum(axis=1)
     height_of_ears = _EAR_HEIGHT_MM * ear_weight(base) if style.comb in _COMBS_OVER_EARS else 0.0
     layer = style.volume_mm * (1.0 - np.exp(-length / _LAYER_LENGTH_MM)) * np.minimum(length / 20.0, 1.0)
     least = np.minimum(length / 6.0, 1.0) * (_MIN_HEIGHT_MM + layer + height_of_ears)
-    pushed = np.clip(least - height, 0.0, 0.8 * step)[:, None]
+    pushed = np.clip(least - height, 0.0, 0.8 * step_mm)[:, None]
     moved += pushed * normal
     if style.comb == "fall":
         loose = fringe_weight(state.root_mm, style)[:, None] < 0.5
@@ -272,7 +272,7 @@ def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> 
                           length_mm=length, tied_mm=tied)  # fmt: skip
 
 
-def _steer(state: Growth, style: Style) -> Doubles:
+def _next_directions(state: Growth, style: Style) -> Doubles:
     """Return the unit directions (g, 3) in which guides grow in the next step."""
     free = np.minimum(state.length_mm / 60.0, 1.0)[:, None] + 0.15
     pull = 4.0 * style.gravity * free * np.array([0.0, -1.0, 0.0])
@@ -302,10 +302,10 @@ def _tie_offsets(state: Growth, style: Style) -> Doubles:
     return np.asarray(_TIE_RADIUS_MM * np.minimum(reach / 60.0, 1.0) * unit(away))
 
 
-def _tail_directions(state: Growth, style: Style, pull: Doubles) -> Doubles:
+def _tail_directions(state: Growth, style: Style, gravity_pull: Doubles) -> Doubles:
     """Return the directions (g, 3) of hair beyond the hair tie: outwards, then down and slightly apart.
 
-    pull : (g, 3) pull of gravity, as vectors
+    gravity_pull : (g, 3) pull of gravity, as vectors
     """
     outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)[None]
     since = np.maximum(state.length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, 0.0), 0.0)[
@@ -313,21 +313,23 @@ def _tail_directions(state: Growth, style: Style, pull: Doubles) -> Doubles:
     ]
     apart = _tie_offsets(state, style) / _TIE_RADIUS_MM
     spread = 0.12 * np.exp(-since / 60.0) - 0.03 * smoothstep(150.0, 400.0, since)
-    return unit(0.85 * state.direction + 0.15 * pull + 0.3 * np.exp(-since / 25.0) * outward + spread * apart)
+    return unit(
+        0.85 * state.direction + 0.15 * gravity_pull + 0.3 * np.exp(-since / 25.0) * outward + spread * apart
+    )
 
 
-def _length_beyond_tie(state: Growth, length: Doubles) -> Doubles:
+def _length_beyond_tie(state: Growth, length_mm: Doubles) -> Doubles:
     """Return the length (g,) of each guide beyond the hair tie [mm]; 0 before the guide reaches the tie.
 
-    length : (g,) lengths from the roots [mm]
+    length_mm : (g,) lengths from the roots [mm]
     """
-    return np.maximum(length - np.where(np.isfinite(state.tied_mm), state.tied_mm, length), 0.0)
+    return np.maximum(length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, length_mm), 0.0)
 
 
-def _bun_points(state: Growth, length: Doubles, style: Style) -> Doubles:
+def _bun_points(state: Growth, length_mm: Doubles, style: Style) -> Doubles:
     """Return points (g, 3) on guides that are wound into a bun beyond the hair tie [mm].
 
-    length : (g,) lengths from the roots to the points [mm]
+    length_mm : (g,) lengths from the roots to the points [mm]
     """
     outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
     side = unit(np.cross(outward, [0.0, 1.0, 0.0]))
@@ -335,7 +337,7 @@ def _bun_points(state: Growth, length: Doubles, style: Style) -> Doubles:
     offset = _tie_offsets(state, style)
     turn = np.arctan2(offset @ up, offset @ side)
     rank = np.linalg.norm(offset, axis=1) / _TIE_RADIUS_MM
-    since = _length_beyond_tie(state, length)
+    since = _length_beyond_tie(state, length_mm)
     radius = style.coil_mm * (0.7 + 0.3 * rank)
     tilt = 1.9 - 1.5 * smoothstep(0.0, 260.0, since) + 0.25 * np.sin(3.0 * turn)
     turn = turn + since / (0.8 * radius)
@@ -392,15 +394,15 @@ def _first_crossing_fractions(knots: Doubles, height_mm: Doubles) -> Doubles:
 
 
 def bind_guides(
-    control_mesh: Mesh, points_mm: Doubles, knots: Doubles, heights: Doubles, cut: Doubles
+    control_mesh: Mesh, points_mm: Doubles, knots: Doubles, heights_mm: Doubles, cut_fraction: Doubles
 ) -> Guides:
     """Return guides that move with the skin: each knot follows the quads nearest to it.
 
     control_mesh : control mesh of the mean person
     points_mm : (p, 3) positions of the control points on the subdivided mean person [mm]
     knots : (g, k, 3) knots from `grow_guides` [mm]
-    heights : (g, k) heights of the knots above the skin, from `grow_guides` [mm]
-    cut : (g,) fractions from `cut_fractions`
+    heights_mm : (g, k) heights of the knots above the skin, from `grow_guides` [mm]
+    cut_fraction : (g,) fractions from `cut_fractions`
     """
     from scipy.spatial import cKDTree
 
@@ -416,8 +418,8 @@ def bind_guides(
         corners[near].astype(np.int32),
         local.astype(np.float32),
         weight.astype(np.float32),
-        np.concatenate([knots, heights[..., None]], axis=2).astype(np.float32),
-        cut.astype(np.float32),
+        np.concatenate([knots, heights_mm[..., None]], axis=2).astype(np.float32),
+        cut_fraction.astype(np.float32),
     )
 
 

@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.root_finder import RootFinder
-from dermis.human.hair.strand_roots import BEARD_STRANDS_PER_CM2, STRANDS_PER_CM2, style_tables
+from dermis.human.hair.strand_roots import BEARD_STRANDS_PER_CM2, STRANDS_PER_CM2, style_strands
 from dermis.human.hair.styles import BEARD, Style, styles
 from dermis.human.skin.face import hairline_heights
 from dermis.mesh.groom import Groom
 from dermis.specular.hair import absorption_per_mm
 
-MAX_PER_CM2 = 200.0
+MAX_HAIRS_PER_CM2 = 200.0
 """Density of the densest hair of the head [1/cm2]."""
-BEARD_PER_CM2 = 60.0
+BEARD_HAIRS_PER_CM2 = 60.0
 """Density of beards [1/cm2]."""
 _HAIR_RADIUS_MM, _BEARD_RADIUS_MM = 0.034, 0.048
 _MIN_EUMELANIN = 0.07  # white hair is not quite white
@@ -63,7 +63,7 @@ def make_groom(
         scalp = None
     if scalp is None and not bearded:
         return None
-    tables = style_tables(scalp, bearded, root_finder, levels)
+    tables = style_strands(scalp, bearded, root_finder, levels)
     parts = [_scalp_parameters(scalp, look, recession)] if scalp else []
     parts += [_beard_parameters(look)] if bearded else []
     parameters, strands = np.array(parts, PART_DTYPE), round(hair_fraction * len(tables.roots))
@@ -73,14 +73,17 @@ def make_groom(
 
 def _scalp_parameters(style: Style, look: HairLook, recession: float) -> tuple[object, ...]:
     length, fade = min(look.length_mm, style.max_length_mm), look.fade if style.fade else 0.0
-    densities = STRANDS_PER_CM2, MAX_PER_CM2, look.density
+    densities = STRANDS_PER_CM2, MAX_HAIRS_PER_CM2, look.density
     return _part_parameters(
         style, look, length, densities, _HAIR_RADIUS_MM, fade, max(recession, style.crown), 1.0
     )
 
 
 def _beard_parameters(look: HairLook) -> tuple[object, ...]:
-    length, densities = min(look.beard_mm, BEARD.max_length_mm), (BEARD_STRANDS_PER_CM2, BEARD_PER_CM2, 1.0)
+    length, densities = (
+        min(look.beard_mm, BEARD.max_length_mm),
+        (BEARD_STRANDS_PER_CM2, BEARD_HAIRS_PER_CM2, 1.0),
+    )
     return _part_parameters(BEARD, look, length, densities, _BEARD_RADIUS_MM)
 
 

@@ -90,20 +90,22 @@ def sample_shapes(row: LashRow, u: Doubles, rng: np.random.Generator, first_clum
     return np.stack([splay, first, last, length, radius, clump, pull])
 
 
-def grow_lashes(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> tuple[Doubles, Doubles]:
+def grow_lashes(
+    root_mm: Doubles, eye_mm: Doubles, side_sign: Doubles, shape_parameters: Doubles
+) -> tuple[Doubles, Doubles]:
     """Return the knots (n, k, 3) and radii (n, k) of lashes [mm].
 
     root_mm : (n, 3) roots on the lids [mm]
     eye_mm : (n, 3) centre of the eye to which each lash belongs [mm]
-    side : (n,) 1 for lashes of the left eye, -1 for lashes of the right eye
-    shape : (7, n) shape parameters from `sample_shapes`; the lashes of a clump must be on the same lid
+    side_sign : (n,) 1 for lashes of the left eye, -1 for lashes of the right eye
+    shape_parameters : (7, n) result of `sample_shapes`; the lashes of a clump must be on the same lid
     """
-    splay, first, last, length, radius, clump, pull = shape
+    splay, first, last, length, radius, clump, pull = shape_parameters
     ahead = root_mm - eye_mm
     ahead = ahead * [0.55, 0.0, 1.0]  # lashes fan out less than the normals of the eye
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     up = np.array([0.0, 1.0, 0.0])
-    out = np.cross(up, ahead) * side[:, None]
+    out = np.cross(up, ahead) * side_sign[:, None]
     t = np.linspace(0.0, 1.0, KNOTS_PER_HAIR)
     angle = first + (last - first) * ((t[1:] - 0.5 / (KNOTS_PER_HAIR - 1)) ** 0.8)[:, None]
     directions = np.cos(angle)[..., None] * ahead + np.sin(angle)[..., None] * up
@@ -115,14 +117,16 @@ def grow_lashes(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles
     return clumped, radius[:, None] * np.maximum(1.0 - t, 0.0) ** 0.55 * np.minimum(1.0, 0.8 + t)
 
 
-def _clump_tips(knots: Doubles, clump: NDArray[np.int64], strength: Doubles, t: Doubles) -> Doubles:
+def _clump_tips(
+    knots: Doubles, clump: NDArray[np.int64], attraction: Doubles, knot_position: Doubles
+) -> Doubles:
     """Return knots (n, k, 3) of lashes whose tips are pulled towards the mean tip of their clump.
 
     clump : (n,) index of the clump of each lash
-    strength : (n,) attraction of each lash to its clump, 0 to 1
-    t : (k,) position of the knots along the lash, from 0 at the root to 1 at the tip
+    attraction : (n,) attraction of each lash to its clump, 0 to 1
+    knot_position : (k,) position of the knots along the lash, from 0 at the root to 1 at the tip
     """
     count = np.maximum(np.bincount(clump), 1)
     mean = np.stack([np.bincount(clump, knots[:, -1, c]) / count for c in range(3)], axis=-1)
-    pull = (mean[clump] - knots[:, -1]) * strength[:, None]
-    return np.asarray(knots + (t**1.6)[None, :, None] * pull[:, None])
+    pull = (mean[clump] - knots[:, -1]) * attraction[:, None]
+    return np.asarray(knots + (knot_position**1.6)[None, :, None] * pull[:, None])

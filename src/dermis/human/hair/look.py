@@ -114,7 +114,7 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
     eumelanin, pheomelanin : pigment concentrations of the hair, see `HairLook`
     """
     old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
-    curl, woman = demographics.weighted_mean(_TYPICAL_CURL), demographics.sex < 0.5
+    curl, woman = demographics.shape_weighted_mean(_TYPICAL_CURL), demographics.sex < 0.5
     loose, tight = ("shoulder-length", "afro") if woman else ("short", "cropped")
     return HairLook(
         style=tight if curl > _MIN_TIGHT_CURL else loose,
@@ -151,16 +151,16 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
     )
 
 
-def _pick_style(chance: float, is_man: bool, is_tightly_coiled: bool) -> str:
+def _pick_style(uniform_sample: float, is_man: bool, is_tightly_coiled: bool) -> str:
     """Return the name of a random hair style, with the probabilities in styles.toml.
 
-    chance : uniformly distributed random number, 0 to 1, which selects the style
+    uniform_sample : uniformly distributed random number, 0 to 1, which selects the style
     is_man : whether the person is a man
     is_tightly_coiled : whether the hair is tightly coiled
     """
     worn = {name: one for name, one in styles().items() if (one.tight if is_tightly_coiled else one.loose)}
     chances = np.array([_BALD_CHANCES[is_man], *(one.men if is_man else one.women for one in worn.values())])
-    index = int(np.searchsorted(np.cumsum(chances) / chances.sum(), chance, side="right"))
+    index = int(np.searchsorted(np.cumsum(chances) / chances.sum(), uniform_sample, side="right"))
     return ("none", *worn)[min(index, len(worn))]
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles
 from dermis.human.hair import lashes
-from dermis.human.hair.brows import grid_points
+from dermis.human.hair.brows import brow_grid_points
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, quad_corners
 from dermis.mesh.subdivide import subdivide
@@ -20,7 +20,7 @@ Index = NDArray[np.int64]
 SIDE_SIGNS = 1.0, -1.0
 """Sign of x on the left and on the right side."""
 _QUAD_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # corners in quad coordinates
-_MIN_WEIGHT = -1e-9  # smallest barycentric weight of points that count as inside a triangle
+_MIN_BARYCENTRIC_WEIGHT = -1e-9  # smallest barycentric weight of points that count as inside a triangle
 _GRID_CELL_MM = 2.0  # cells of the grid of triangle lists
 _GRID_LOW, _GRID_HIGH = (
     np.array([-70.0, -20.0]),
@@ -78,7 +78,7 @@ class RootFinder:
 
         x, y : (n,) coordinates of the roots [mm]
         """
-        front = self._front
+        front = self._front_triangles
         cell = np.floor((np.column_stack([x, y]) - _GRID_LOW) / _GRID_CELL_MM).astype(np.int64)
         last_cell = np.array(front.triangle_lists.shape[:2]) - 1
         triangles = front.triangle_lists[tuple(np.clip(cell, 0, last_cell).T)]
@@ -90,7 +90,9 @@ class RootFinder:
         v = ((px - ax) * (cy - ay) - (cx - ax) * (py - ay)) / det
         w = ((bx - ax) * (py - ay) - (px - ax) * (by - ay)) / det
         u = 1 - v - w
-        inside = np.flatnonzero((u >= _MIN_WEIGHT) & (v >= _MIN_WEIGHT) & (w >= _MIN_WEIGHT))
+        inside = np.flatnonzero(
+            (u >= _MIN_BARYCENTRIC_WEIGHT) & (v >= _MIN_BARYCENTRIC_WEIGHT) & (w >= _MIN_BARYCENTRIC_WEIGHT)
+        )
         z = (az + v * (bz - az) + w * (cz - az))[inside]
         front_index = np.full(len(x), -1)
         order = inside[np.argsort(z)]
@@ -107,7 +109,7 @@ class RootFinder:
         return Roots(quad.astype(np.int32), np.clip(position, 0.0, 1.0).astype(np.float32)), hit
 
     @cached_property
-    def mean_mesh(self) -> Mesh:
+    def once_subdivided_mesh(self) -> Mesh:
         """Return the mesh of the mean person after one level of subdivision.
 
         Its first points correspond to the control points.
@@ -116,8 +118,8 @@ class RootFinder:
 
     @cached_property
     def brow_grid_roots(self) -> Roots:
-        """Return roots at the nodes of `grid_points`, which cover the left brow, then at the mirrored nodes."""
-        x, y = grid_points()
+        """Return roots at the nodes of `brow_grid_points`, on the left brow, then at the mirrored nodes."""
+        x, y = brow_grid_points()
         return self.front_roots(
             np.concatenate([side * x for side in SIDE_SIGNS]), np.tile(y, len(SIDE_SIGNS))
         )[0]
@@ -165,7 +167,7 @@ class RootFinder:
         return quad_corners(self.mesh, np.arange(len(self.mesh.quads)))
 
     @cached_property
-    def _front(self) -> _FrontTriangles:
+    def _front_triangles(self) -> _FrontTriangles:
         quad = np.repeat(np.arange(len(self.mesh.quads)), 2)
         half = np.tile([0, 1], len(self.mesh.quads))
         corner = self.points_mm[np.take_along_axis(self._quad_points[quad], _HALF_QUAD_CORNERS[half], axis=1)]

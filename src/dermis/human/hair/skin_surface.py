@@ -13,7 +13,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, refine_roots, root_frames
 
-_NEIGHBOURS = 6  # vertices whose tangent planes are averaged
+_NEIGHBOUR_COUNT = 6  # vertices whose tangent planes are averaged
 
 
 class SkinSurface:
@@ -29,7 +29,7 @@ class SkinSurface:
 
     def project(self, points_mm: Doubles) -> tuple[Doubles, Doubles]:
         """Project points (n, 3) onto the skin along its normals; return projections [mm] and unit normals."""
-        distance, near = self._tree.query(points_mm, k=_NEIGHBOURS)
+        distance, near = self._tree.query(points_mm, k=_NEIGHBOUR_COUNT)
         weights = 1.0 / (distance**2 + 0.05)
         weights /= weights.sum(axis=1, keepdims=True)
         plane = np.einsum("nk,nkc->nc", weights, self._planes.take(near, axis=0))

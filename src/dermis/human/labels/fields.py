@@ -15,7 +15,7 @@ from dermis.base.arrays import Floats
 from dermis.human.hair import brows
 from dermis.human.hair.density import height_above_hairline
 from dermis.human.labels.classes import class_number
-from dermis.human.regions.average import AVERAGE_HUMAN, average_head, is_human, part_quads
+from dermis.human.regions.average import AVERAGE_HUMAN, average_head, is_human, quads_of_parts
 from dermis.human.regions.labels import known_landmarks, warp_to_average
 from dermis.human.regions.region_table import neck_distance_mm, nose_distance_mm, torso_distance_mm
 from dermis.human.skin.surface import BORDER_FIELDS, average_surface, lid_rings
@@ -79,7 +79,7 @@ def label_fields() -> Doubles:
     return np.stack([fields[name] for name in HUMAN_FIELDS])
 
 
-def dense_fields() -> tuple[Doubles, Doubles]:
+def dense_label_fields() -> tuple[Doubles, Doubles]:
     """Return points (n, 3) on the average human's outer skin, and their label fields (k, n) [mm].
 
     Points and fields are those of a subdivided mesh, with the signed distances of `label_fields`.
@@ -135,7 +135,7 @@ def _ear_field() -> Doubles:
     mesh = average_head().mesh
     around = quad_corners(mesh, np.arange(len(mesh.quads)))
     within = np.zeros(len(around))
-    within[part_quads()["ears"]] = 1.0
+    within[quads_of_parts()["ears"]] = 1.0
     count = len(average_head().positions_mm)
     quad_values = within, np.ones(len(around))
     ears, quads = (np.bincount(around.ravel(), np.repeat(values, 4), count) for values in quad_values)
@@ -175,18 +175,18 @@ class MeshLabels(NamedTuple):
 def mesh_labels(head: Head) -> MeshLabels:
     """Return the label classes of a head; for parametric humans the result is cached by mesh topology."""
     if not is_human(head):
-        return _build_labels(head)
+        return _build_mesh_labels(head)
     digest = hashlib.blake2b(head.mesh.triangles.tobytes(), digest_size=16).digest()
     key = digest + bytes([head.strands is not None])
     with _LABEL_CACHE_LOCK:
         if key not in _LABEL_CACHE:
             while len(_LABEL_CACHE) >= _MAX_CACHED_TOPOLOGIES:
                 _LABEL_CACHE.pop(next(iter(_LABEL_CACHE)))
-            _LABEL_CACHE[key] = _build_labels(head)
+            _LABEL_CACHE[key] = _build_mesh_labels(head)
         return _LABEL_CACHE[key]
 
 
-def _build_labels(head: Head) -> MeshLabels:
+def _build_mesh_labels(head: Head) -> MeshLabels:
     material_classes = np.array([class_number(_material_class(one)) for one in head.mesh.materials], np.uint8)
     for material, side in zip(
         () if head.eyes is None else head.eyes.material, reversed(SIDE_NAMES), strict=False
@@ -216,7 +216,7 @@ def _iris_fields(head: Head) -> dict[str, Doubles]:
         return {}
     mesh, points = head.mesh, head.mesh.points_mm
     fields = {}
-    frames = head.eyes.frames(head.control, head.control.rest)
+    frames = head.eyes.eye_matrices(head.control, head.control.rest)
     for frame, material, side in zip(frames, head.eyes.material, reversed(SIDE_NAMES), strict=False):
         eyeball_points = np.unique(mesh.point[mesh.triangles[mesh.material == material]])
         local = points[eyeball_points] @ frame[:3, :3].T + frame[:3, 3]
@@ -261,6 +261,6 @@ def _warped_fields(head: Head, landmarks: Mapping[str, tuple[float, float, float
     from scipy.spatial import cKDTree
 
     points = head.mesh.points_mm
-    average, values = dense_fields()
+    average, values = dense_label_fields()
     _, near = cKDTree(average).query(warp_to_average(head, landmarks, points))
     return {name: values[k][near] for k, name in enumerate(HUMAN_FIELDS) if not name.endswith("_eye")}

@@ -94,25 +94,25 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE_NAM
 
 
 def _region_map(
-    atlas: Atlas, points: NDArray[np.float64], region_values: NDArray[np.float64], own_map: Floats | None
+    atlas: Atlas, points: NDArray[np.float64], region_values: NDArray[np.float64], existing_map: Floats | None
 ) -> Floats:
     """Return a map (h, w) of a regional quantity, multiplied by the fine detail of an existing map.
 
     points : (n, 3) positions of the covered texels of the atlas [mm]
     region_values : (n,) quantity at these texels, smoothed across region borders
-    own_map : (h, w) existing map of the quantity, or None
+    existing_map : (h, w) existing map of the quantity, or None
     """
-    if own_map is None:
+    if existing_map is None:
         return _texel_image(atlas, region_values)
     y, x = np.nonzero(atlas.coverage)
-    height, width = own_map.shape
-    values = own_map[y * height // MIN_MAP_SIDE, x * width // MIN_MAP_SIDE].astype(np.float64)
+    height, width = existing_map.shape
+    values = existing_map[y * height // MIN_MAP_SIDE, x * width // MIN_MAP_SIDE].astype(np.float64)
     local_mean = gaussian_mean(points, values[:, None], _DETAIL_BLUR_MM)[:, 0]
     local_mean = np.maximum(local_mean, _MIN_RELATIVE_LOCAL_MEAN * values.mean())
     local_mean = np.maximum(local_mean, np.finfo(np.float32).eps)
     shape = max(height, MIN_MAP_SIDE), max(width, MIN_MAP_SIDE)
     detail = np.minimum(
-        _resize_map(own_map, shape) / _resize_map(_texel_image(atlas, local_mean), shape),
+        _resize_map(existing_map, shape) / _resize_map(_texel_image(atlas, local_mean), shape),
         _MAX_RELATIVE_DETAIL,
     )
     return np.asarray(detail * _resize_map(_texel_image(atlas, region_values), shape))
@@ -128,13 +128,13 @@ def _texel_image(atlas: Atlas, texel_values: NDArray[np.float64]) -> Floats:
     return np.asarray(image[y, x])
 
 
-def _resize_map(picture: Floats, map_shape: tuple[int, int]) -> Floats:
+def _resize_map(region_map: Floats, map_shape: tuple[int, int]) -> Floats:
     from scipy.ndimage import zoom
 
-    if picture.shape == map_shape:
-        return picture
-    factors = map_shape[0] / picture.shape[0], map_shape[1] / picture.shape[1]
-    return np.asarray(zoom(picture, factors, order=1, mode="nearest", grid_mode=True), np.float32)
+    if region_map.shape == map_shape:
+        return region_map
+    factors = map_shape[0] / region_map.shape[0], map_shape[1] / region_map.shape[1]
+    return np.asarray(zoom(region_map, factors, order=1, mode="nearest", grid_mode=True), np.float32)
 
 
 def gaussian_mean(points: Doubles, point_values: Doubles, sigma_mm: float) -> Doubles:

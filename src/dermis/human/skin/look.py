@@ -147,11 +147,11 @@ class Demographics(NamedTuple):
     skin_groups: Mapping[str, float]
     ita: float | None = None
 
-    def weighted_mean(self, value_of_ancestry: dict[str, float]) -> float:
+    def shape_weighted_mean(self, value_of_ancestry: dict[str, float]) -> float:
         """Return the mean of one value per ancestry, weighted by the ancestry fractions of the shape."""
         return _weighted_mean((self.african, self.asian, self.caucasian), value_of_ancestry)
 
-    def pigmented_mean(self, value_of_ancestry: dict[str, float]) -> float:
+    def skin_weighted_mean(self, value_of_ancestry: dict[str, float]) -> float:
         """Return the mean of one value per ancestry, weighted by the ancestry fractions of the skin."""
         return _weighted_mean(pigment_ancestry(self.skin_groups), value_of_ancestry)
 
@@ -175,7 +175,7 @@ def _typical_look(demographics: Demographics, pigments: MeasuredPigments, sites:
     spot_progress = max(demographics.age - _AGE_SPOTS_FROM_YEARS, 0.0) / (OLD_AGE - _AGE_SPOTS_FROM_YEARS)
     return SkinLook(
         **pigments._asdict(),
-        freckles=demographics.pigmented_mean(_TYPICAL_FRECKLES),
+        freckles=demographics.skin_weighted_mean(_TYPICAL_FRECKLES),
         moles=0.3,
         spots=0.7 * spot_progress * (0.4 + 0.6 * pigment_ancestry(demographics.skin_groups)[2]),
         veins=0.2 + 0.5 * old,
@@ -193,7 +193,7 @@ def _pigment_arguments(demographics: Demographics) -> tuple[Mapping[str, float],
 def typical_eyes(demographics: Demographics) -> EyeLook:
     """Return the typical eye look: brown irises, lighter for a larger fraction of European ancestry."""
     redness = 0.15 + 0.2 * (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
-    return EyeLook(eumelanin=demographics.pigmented_mean(_TYPICAL_IRIS_EUMELANIN), redness=redness)
+    return EyeLook(eumelanin=demographics.skin_weighted_mean(_TYPICAL_IRIS_EUMELANIN), redness=redness)
 
 
 def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook:

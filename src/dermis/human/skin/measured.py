@@ -124,7 +124,7 @@ class SiteDifferences:
             )
             object.__setattr__(self, one.name, checked)
 
-    def array(self) -> Doubles:
+    def as_array(self) -> Doubles:
         """Return the differences as an array (6, 3) in the order of `FACE_SITES`."""
         return np.array([getattr(self, name) for name in FACE_SITES], np.float64)
 
@@ -225,23 +225,23 @@ class MeasuredTable(NamedTuple):
 def measured_table() -> MeasuredTable:
     """Return the distributions of the pigments of measured people, read from the package's file."""
     text = resources.files("dermis.human").joinpath("data", "measured.json").read_text("utf-8")
-    return parse_table(json.loads(text))
+    return parse_measured_table(json.loads(text))
 
 
-def parse_table(document: Mapping[str, Any]) -> MeasuredTable:
+def parse_measured_table(json_object: Mapping[str, Any]) -> MeasuredTable:
     """Return the distributions of the pigments of measured people from a JSON object.
 
-    document : content of measured.json
+    json_object : content of measured.json
     """
     groups = {
         name: _Group(*(np.array(one[field], np.float64) for field in _Group._fields))
-        for name, one in document["groups"].items()
+        for name, one in json_object["groups"].items()
     }
     arrays = {
-        name: np.array(document[name], np.float64)
+        name: np.array(json_object[name], np.float64)
         for name in ("probabilities", "sex", "age", "site_slope", "site_spread")
     }
-    return MeasuredTable(groups=groups, mean_age_term=float(document["mean_age_term"]), **arrays)
+    return MeasuredTable(groups=groups, mean_age_term=float(json_object["mean_age_term"]), **arrays)
 
 
 def age_term(age: ArrayLike) -> Doubles:

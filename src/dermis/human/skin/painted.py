@@ -28,7 +28,7 @@ def mean_colour(look: SkinLook) -> NDArray[np.float64]:
 
 def oxygen_range(look: SkinLook) -> tuple[float, float]:
     """Return the lowest and the highest oxygen saturation of the skin of a head [-]."""
-    differences = look.sites.array()[:, 2]
+    differences = look.sites.as_array()[:, 2]
     low, high = (
         look.oxygen + float(one) for one in (min(differences.min(), 0.0), max(differences.max(), 0.0))
     )

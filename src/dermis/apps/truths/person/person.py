@@ -122,5 +122,5 @@ def posed_person(scene: Scene, textures: SkinTextures) -> Person:
     )
     centred = np.eye(4)
     centred[:3, 3] = head.centre_mm
-    eyes = head.eyes.frames(rig, motion) @ centred
+    eyes = head.eyes.eye_matrices(rig, motion) @ centred
     return Person(head.name, posed_mesh, eyes, tuple(head.eyes.material.tolist()), hairs, textures)

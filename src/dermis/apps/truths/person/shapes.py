@@ -20,7 +20,7 @@ from dermis.apps.truths.mitsuba_solid import ClosedSurface, closed_skin, offset_
 from dermis.apps.truths.person.medium import COAT_IOR, COAT_TRANSMITTANCE
 from dermis.apps.truths.person.person import HairFibres, Person, SkinTextures
 from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, SceneDict, mitsuba_rgb
-from dermis.mesh.eyeball import LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_plane_mm, profile_mm
+from dermis.mesh.eyeball import LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_plane_mm, surface_distance_mm
 from dermis.optics.media import Medium
 from dermis.specular.two_lobe import MAX_ROUGHNESS, MIN_ROUGHNESS, NARROW_FACTOR, NARROW_WEIGHT, WIDE_FACTOR
 
@@ -198,7 +198,7 @@ def eyeball_mesh() -> tuple[Doubles, Index, Doubles, Doubles]:
     azimuth = 2.0 * np.pi * np.arange(_EYEBALL_STEPS_AROUND + 1) / _EYEBALL_STEPS_AROUND
     a, t = (grid.ravel() for grid in np.meshgrid(angle, azimuth, indexing="ij"))
     outwards = np.stack([np.sin(a) * np.cos(t), np.sin(a) * np.sin(t), np.cos(a)], axis=-1)
-    positions = profile_mm(a)[:, None] * outwards
+    positions = surface_distance_mm(a)[:, None] * outwards
     cornea = positions - [0.0, 0.0, cornea_centre_mm()]
     cornea /= np.linalg.norm(cornea, axis=1, keepdims=True)
     clear = cornea_weight(np.hypot(positions[:, 0], positions[:, 1]), positions[:, 2])[:, None]
@@ -233,7 +233,7 @@ def cornea_weight_map() -> Doubles:
     """Return `cornea_weight` as a texture (n, n) over the polar uv of the eyeball."""
     u = (np.arange(_CORNEA_TEXTURE_SIDE) + 0.5) / _CORNEA_TEXTURE_SIDE - 0.5
     angle = np.minimum(np.hypot(*np.meshgrid(u, u)) / EYE_UV_RADIUS, 1.0) * np.pi
-    radius = profile_mm(angle)
+    radius = surface_distance_mm(angle)
     return cornea_weight(radius * np.sin(angle), radius * np.cos(angle))
 
 
