@@ -54,7 +54,7 @@ class _CodeCache(numba_caching.NullCache):  # type: ignore[misc, name-defined]
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the cached machine code for a signature, or None if there is no cached code."""
         target_context.refresh()
-        found = load_arrays(_CACHE_FOLDER, self._key(sig, target_context.codegen()), [_CODE_ARRAY_NAME])
+        found = load_arrays(_CACHE_FOLDER, self._entry_key(sig, target_context.codegen()), [_CODE_ARRAY_NAME])
         if found is None:
             return None
         return numba_compiler.CompileResult._rebuild(
@@ -66,9 +66,9 @@ class _CodeCache(numba_caching.NullCache):  # type: ignore[misc, name-defined]
         if data.lifted or _embeds_addresses(data):
             return
         code = np.frombuffer(numba_serialize.dumps(data._reduce()), np.uint8)
-        try_save_arrays(_CACHE_FOLDER, self._key(sig, data.codegen), {_CODE_ARRAY_NAME: code})
+        try_save_arrays(_CACHE_FOLDER, self._entry_key(sig, data.codegen), {_CODE_ARRAY_NAME: code})
 
-    def _key(self, signature: Any, codegen: Any) -> str:
+    def _entry_key(self, signature: Any, codegen: Any) -> str:
         text = f"{self._source_key} {signature} {codegen.magic_tuple()}"
         return hashlib.sha256(text.encode()).hexdigest()[:40]
 

@@ -35,16 +35,16 @@ def print_lines(*lines: str) -> None:
     sys.stdout.flush()
 
 
-def print_report(as_json: bool, report: object, lines: Callable[[], Iterable[str]]) -> None:
+def print_report(as_json: bool, report: object, make_lines: Callable[[], Iterable[str]]) -> None:
     """Print the result of a command as JSON or as text.
 
     as_json : whether to print `report` as JSON
-    lines : function that returns the lines of the text; called only if the text is printed
+    make_lines : function that returns the lines of the text; called only if the text is printed
     """
     if as_json:
         print_json(report)
     else:
-        print_lines(*lines())
+        print_lines(*make_lines())
 
 
 def note(note_text: str) -> None:

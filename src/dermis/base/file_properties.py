@@ -62,6 +62,6 @@ def keys_of(properties: Iterable[FileProperty], *treatments: Treatment) -> tuple
     return tuple(dict.fromkeys(key for item in chosen for key in item.keys))
 
 
-def markdown_code(keys: Iterable[str]) -> str:
+def markdown_code(words: Iterable[str]) -> str:
     """Return words formatted as code in Markdown, separated by commas."""
-    return ", ".join(f"`{key}`" for key in keys)
+    return ", ".join(f"`{key}`" for key in words)

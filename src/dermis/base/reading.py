@@ -176,22 +176,22 @@ def _open_regular_descriptor(path: str | Path, culprit: object, expected: str) -
     return descriptor
 
 
-def _parse_finite_float(text: str) -> float:
-    number = float(text)
+def _parse_finite_float(number_text: str) -> float:
+    number = float(number_text)
     if not math.isfinite(number):
-        raise ValueError(f"{text[:20]} is too large for a number")
+        raise ValueError(f"{number_text[:20]} is too large for a number")
     return number
 
 
-def _parse_bounded_int(text: str) -> int:
-    number = int(text)
+def _parse_bounded_int(number_text: str) -> int:
+    number = int(number_text)
     if number.bit_length() > _MAX_INTEGER_BITS:
-        raise ValueError(f"{text[:20]}... is too large for a whole number")
+        raise ValueError(f"{number_text[:20]}... is too large for a whole number")
     return number
 
 
-def _check_toml_integers(tables: dict[str, Any]) -> None:
-    pending: list[Any] = [tables]
+def _check_toml_integers(toml_tables: dict[str, Any]) -> None:
+    pending: list[Any] = [toml_tables]
     while pending:
         value = pending.pop()
         if isinstance(value, dict):
@@ -202,8 +202,8 @@ def _check_toml_integers(tables: dict[str, Any]) -> None:
             raise ValueError(f"a whole number has {value.bit_length()} bits, more than {_MAX_INTEGER_BITS}")
 
 
-def _refuse_json_constant(text: str) -> NoReturn:
-    raise ValueError(f"{text} is not a number")
+def _refuse_json_constant(constant_name: str) -> NoReturn:
+    raise ValueError(f"{constant_name} is not a number")
 
 
 def _format_megabytes(byte_count: int) -> str:

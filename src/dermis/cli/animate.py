@@ -321,7 +321,7 @@ def motion_file(head_or_scene: str, motion: str | None) -> str:
 
 
 def load_clip(
-    head_or_scene: str, head: Head, motion: str, clip: str | None, head_options: Options, span: TimeSpan
+    head_or_scene: str, head: Head, motion: str, clip: str | None, head_options: Options, time_span: TimeSpan
 ) -> Clip:
     """Load the clip that animates a head from a motion file.
 
@@ -329,14 +329,14 @@ def load_clip(
     motion : motion file
     clip : name of a clip in the motion file; None for the only clip
     head_options : options of the head; `unit_mm`, `up` and `front` also apply to mesh sequences
-    span : time span; only the frame rates are used
+    time_span : time span; only the frame rates are used
     """
     from dermis.formats.motion.sequence import is_sequence
     from dermis.scene.motion import load_motion
 
-    rate = span.motion_rate
-    if rate is None and span.rate and is_sequence(Path(motion)):  # one file per frame
-        rate = float(span.rate)
+    rate = time_span.motion_rate
+    if rate is None and time_span.rate and is_sequence(Path(motion)):  # one file per frame
+        rate = float(time_span.rate)
     fields = {**_head_table(head_or_scene), **head_options}
     units = {key: fields[key] for key in ("unit_mm", "up", "front") if key in fields}
     return load_motion(motion, head, clip=clip, fps=rate, **units)

@@ -191,18 +191,18 @@ def head(
 
 
 def _build_person(
-    seed: int | None, field_values: Options, skin_tone: Options, targets: dict[str, float]
+    seed: int | None, field_values: Options, skin_tone: Options, target_weights: dict[str, float]
 ) -> Human:
     """Return the average person, or the random person of a seed, with some parameters and targets replaced.
 
     field_values : dictionary from fields of `Human` to their new values
     skin_tone : skin ancestry and ITA (individual typology angle), which determine the person's skin
-    targets : dictionary from MakeHuman shape targets to weights
+    target_weights : dictionary from MakeHuman shape targets to weights
     """
     from dermis.human.person import Human
 
     base = Human(**skin_tone) if seed is None else Human.drawn(seed, **skin_tone)
-    return replace(base, **field_values, targets={**base.targets, **targets})
+    return replace(base, **field_values, targets={**base.targets, **target_weights})
 
 
 def _look_with_values(look: Look, option_values: list[str] | None, option_name: str) -> Look:

@@ -139,11 +139,14 @@ def _parse_named_numbers(
 
 
 def pose_from_options(
-    weights: Mapping[str, float], bone_angles: Mapping[str, Sequence[float]], head: Head, head_name: str
+    target_weights: Mapping[str, float],
+    bone_angles: Mapping[str, Sequence[float]],
+    head: Head,
+    head_name: str,
 ) -> Pose:
     """Return the pose that the options --pose and --bone describe.
 
-    weights : dictionary from morph targets to weights [-]
+    target_weights : dictionary from morph targets to weights [-]
     bone_angles : dictionary from bones to rotation angles about x, y and z [degrees]
     head_name : head as named on the command line, for error messages
 
@@ -151,7 +154,7 @@ def pose_from_options(
     """
     from dermis.mesh.pose import Pose
 
-    parts = {POSE_OPTION: Pose(weights), BONE_OPTION: Pose(bones=bone_angles)}
+    parts = {POSE_OPTION: Pose(target_weights), BONE_OPTION: Pose(bones=bone_angles)}
     for option, part in parts.items():
         try:
             part.motion(head.control, option)
@@ -159,7 +162,7 @@ def pose_from_options(
             if not (head.targets or head.bones):
                 raise
             raise DermisError(f"{fault} All names: dermis animate {head_name} --names.") from None
-    return Pose(weights, bone_angles)
+    return Pose(target_weights, bone_angles)
 
 
 def pose_with_gaze(option_value: str, scene: Scene) -> Pose:

@@ -215,10 +215,10 @@ class AnimationOutput:
         return files.missing_frames(frame_numbers, frame_size)
 
     @contextmanager
-    def open_writer(self, frame_size: tuple[int, int], rate: Fraction) -> Iterator[WriteFrame]:
+    def open_writer(self, frame_size: tuple[int, int], frame_rate: Fraction) -> Iterator[WriteFrame]:
         """Yield a function that queues a frame for writing; the with block ends after all frames are written.
 
-        rate : frame rate of a movie [1/s]
+        frame_rate : frame rate of a movie [1/s]
         """
         from dermis.images.movie import DEFAULT_CRF, MovieWriter
         from dermis.images.writer import FrameFiles, ImageWriter
@@ -228,5 +228,7 @@ class AnimationOutput:
             with ImageWriter() as writer:
                 yield lambda number, picture: writer.write(files.path(number), picture)
             return
-        with MovieWriter(self.path, frame_size, rate, DEFAULT_CRF if self.crf is None else self.crf) as movie:
+        with MovieWriter(
+            self.path, frame_size, frame_rate, DEFAULT_CRF if self.crf is None else self.crf
+        ) as movie:
             yield lambda _, picture: movie.write(cast("Bytes", picture))

@@ -181,14 +181,14 @@ def profile(
     return 0
 
 
-def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
+def _check_outputs(profile_path: Path | None, plot_path: Path | None, adds_monte_carlo: bool) -> None:
     from dermis.base.atomic_write import check_output
 
-    if output is not None:
-        check_output(output, (".toml",), "Give it the suffix .toml")
-    if plot is not None:
-        check_output(plot, (".png", ".svg", ".pdf"))
-    elif check:
+    if profile_path is not None:
+        check_output(profile_path, (".toml",), "Give it the suffix .toml")
+    if plot_path is not None:
+        check_output(plot_path, (".png", ".svg", ".pdf"))
+    elif adds_monte_carlo:
         refuse("--check", "the option --plot", "it is missing", "Add --plot picture.png")
 
 
@@ -228,17 +228,19 @@ def _load_tissue(medium_name: str, options: Options, eta: float | None) -> Tissu
     return tissue if eta is None else replace(tissue, medium=tissue.medium.with_eta(eta))
 
 
-def _reflectance_spectrum(tissue: Tissue, model: ProfileModelName | None, clamp: Clamp) -> Floats | None:
-    if model is None or model == "counted" or model == "montecarlo":
-        return tissue.spectrum(clamp=clamp)
-    return tissue.spectrum(model, clamp)
+def _reflectance_spectrum(
+    tissue: Tissue, model_name: ProfileModelName | None, source_clamp: Clamp
+) -> Floats | None:
+    if model_name is None or model_name == "counted" or model_name == "montecarlo":
+        return tissue.spectrum(clamp=source_clamp)
+    return tissue.spectrum(model_name, source_clamp)
 
 
 def _compute_profile(
-    tissue: Tissue, model: ProfileModelName | None, clamp: Clamp, tracing_options: Options
+    tissue: Tissue, model_name: ProfileModelName | None, source_clamp: Clamp, tracing_options: Options
 ) -> RadialProfile:
-    if model != "montecarlo":
-        return tissue.profile(model, clamp)
+    if model_name != "montecarlo":
+        return tissue.profile(model_name, source_clamp)
     from dermis.apps.truths.slab_mc import monte_carlo_profile
 
     with progress_bar("tracing photons") as report:

@@ -48,7 +48,7 @@ def _to_lists(nested_arrays: object) -> object:
 def gaussian_fit(
     radial_profile: RadialProfile,
     published_gaussians: GaussianSum | None,
-    term_count: int,
+    gaussian_count: int,
     *,
     shared_variances: bool,
     keep_energy: bool,
@@ -56,7 +56,7 @@ def gaussian_fit(
     """Return the Gaussians fitted to a diffusion profile; if there are published Gaussians, return these.
 
     published_gaussians : Gaussians to return unchanged; None to fit the profile
-    term_count : number of Gaussians to fit
+    gaussian_count : number of Gaussians to fit
     shared_variances : whether all colour channels have the same variances
     keep_energy : whether the weights must sum to the total reflectance
     """
@@ -64,7 +64,11 @@ def gaussian_fit(
         return GaussianFit(published_gaussians, np.zeros(3), np.zeros(3), "pointwise", shared=True)
     target = radial_profile.points() if radial_profile.finite_at_centre else radial_profile.rings()
     return fit_gaussians(
-        target, term_count, shared=shared_variances, keep_energy=keep_energy, profile_name=radial_profile.name
+        target,
+        gaussian_count,
+        shared=shared_variances,
+        keep_energy=keep_energy,
+        profile_name=radial_profile.name,
     )
 
 

@@ -178,17 +178,17 @@ def _parse_pigment_change(
 
 
 def _print_report(
-    unmixing_result: UnmixResult, written_files: list[Path], seconds: float, as_json: bool
+    unmixing_result: UnmixResult, written_files: list[Path], duration_s: float, as_json: bool
 ) -> None:
     summary = unmixing_result.summary() | {
         "files": [str(path) for path in written_files],
-        "seconds": round(seconds, 3),
+        "seconds": round(duration_s, 3),
     }
     if as_json:
         print_json(summary)
         return
     height, width = unmixing_result.melanin.shape
-    lines = [f"{width} x {height} texels, {100.0 * summary['skin']:.0f} % of them skin ({seconds:.1f} s)"]
+    lines = [f"{width} x {height} texels, {100.0 * summary['skin']:.0f} % of them skin ({duration_s:.1f} s)"]
     if "melanin" in summary:
         for name in ("melanin", "blood"):
             values = summary[name]

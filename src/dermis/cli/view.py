@@ -112,14 +112,14 @@ def _initial_state(head_or_scene: str, options: SceneOptions, adapter: str) -> V
     return initial_state(scene, settings, table, rig if options.lights is None else options.lights)
 
 
-def _load_motion(motion_path: str | None, fps: float | None, state: ViewerState) -> MotionFile | None:
+def _load_motion(motion_path: str | None, fps: float | None, viewer_state: ViewerState) -> MotionFile | None:
     """Load the motion file for the head, before the window opens; return None if no file is named."""
     if motion_path is None:
         return None
     from dermis.apps.viewer.player import MotionFile
 
     motion = MotionFile(motion_path, fps)
-    if text := motion.load_clip(state.scene.head).note:
+    if text := motion.load_clip(viewer_state.scene.head).note:
         note(text)
     return motion
 

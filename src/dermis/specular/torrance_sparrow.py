@@ -40,16 +40,21 @@ def torrance_sparrow_smith(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = sc
 
 
 def masked_lobe(
-    cosines: Cosines, distribution_times_pi: Floats, fresnel: Fresnel, masking: Callable[[Floats], Floats]
+    cosines: Cosines,
+    distribution_times_pi: Floats,
+    fresnel: Fresnel,
+    masking_function: Callable[[Floats], Floats],
 ) -> Floats:
     """Return the BRDF D F G1(l) G1(v) / (4 n.l n.v) for any distribution D and masking G1 [1/sr].
 
     distribution_times_pi : values of pi D, such as the result of `beckmann`
     fresnel : function that returns F from the cosine v.h
-    masking : function that returns G1 from the cosine n.l or n.v
+    masking_function : function that returns G1 from the cosine n.l or n.v
     """
     n_l, n_v = _clamped_cosines(cosines)
-    return _microfacet_brdf(cosines, distribution_times_pi, fresnel, masking(n_l) * masking(n_v))
+    return _microfacet_brdf(
+        cosines, distribution_times_pi, fresnel, masking_function(n_l) * masking_function(n_v)
+    )
 
 
 def smith_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
@@ -73,10 +78,10 @@ def _clamped_cosines(cosines: Cosines) -> tuple[Floats, Floats]:
 
 
 def _microfacet_brdf(
-    cosines: Cosines, distribution_times_pi: Floats, fresnel: Fresnel, masking: Floats
+    cosines: Cosines, distribution_times_pi: Floats, fresnel: Fresnel, masking_factor: Floats
 ) -> Floats:
     n_l, n_v = _clamped_cosines(cosines)
-    lobe = distribution_times_pi / np.pi * fresnel(cosines.v_h) * masking / (4.0 * n_l * n_v)
+    lobe = distribution_times_pi / np.pi * fresnel(cosines.v_h) * masking_factor / (4.0 * n_l * n_v)
     return np.where(cosines.is_above, lobe, 0.0)
 
 

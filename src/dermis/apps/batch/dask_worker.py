@@ -35,7 +35,7 @@ class _PluginState:
 
     child : worker process, started for the first task
     lock : lock that is held while a task is processed
-    cleanup : context managers to leave, and callbacks to call, when the process is stopped
+    cleanup : context managers to exit, and callbacks to call, when the process is stopped
     stopped : event that is set when the run has ended and rendering must stop
     """
 
@@ -72,7 +72,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
 
     @classmethod
     def for_run(cls, options: RunOptions, adapter: str) -> Self:
-        """Return the plugin for the options of a run and a choice of adapters."""
+        """Return the plugin for the options of a run and the requested graphics adapters."""
         folder, out = options.spec.folder.resolve(), options.out.resolve()
         return cls(options.spec.to_toml(), folder, out, options.encoders, options.keep_going, adapter)
 

@@ -36,7 +36,7 @@ TableRows = Iterable[Sequence[object]]
 def write_datasheet(dataset_folder: Path, spec: Spec) -> None:
     """Write README.md and dataset.json of a data set from its spec, index and shards.
 
-    Data sets with equal specs and equal shards get equal files.
+    Data sets with equal specs and identical shards get identical files.
 
     Raises DermisError if the index is missing, or if a file cannot be written.
     """
@@ -76,7 +76,7 @@ def _readme_text(dataset_folder: Path, spec: Spec, manifests: Sequence[ShardMani
         landmarks=_landmarks_section(spec),
         labels=_labels_section(spec),
         parameters=_markdown_table(("parameter", "images", "values"), parameter_summaries(dataset_folder)),
-        tests=_tests_table(fit_tests(dataset_folder, spec)),
+        tests=_fit_tests_table(fit_tests(dataset_folder, spec)),
         licences=_markdown_table(("part", "by", "licence"), asset_licences(spec)),
         made_with=_software_table(manifests),
         left_out=failed + _markdown_table(("image", "reason"), left_out[:_MAX_LISTED_FAILURES])
@@ -99,10 +99,10 @@ def _files_table(spec: Spec) -> str:
     return _markdown_table(("file", "content", "unit", "stored as", "background value"), rows)
 
 
-def _tests_table(tests: Iterable[FitTest]) -> str:
+def _fit_tests_table(fit_test_results: Iterable[FitTest]) -> str:
     rows = [
         (*one[:4], *(f"{number:.2g}" for number in one[4:]), "" if one.passes else "differs from the spec")
-        for one in tests
+        for one in fit_test_results
     ]
     columns = "parameter", "samples", "spec", "sampled", "distance", "expected distance", "p-value", ""
     return _markdown_table(columns, rows)

@@ -158,7 +158,7 @@ def read_record(json_bytes: bytes, culprit: object) -> Record:
 
 @contextmanager
 def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
-    """Open a shard, and yield functions that read its files, indexed by image key and file suffix.
+    """Open a shard and yield, for each image key and file suffix, a function that reads the file.
 
     The functions can be called inside the with block.
 

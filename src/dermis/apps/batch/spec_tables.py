@@ -106,7 +106,7 @@ class CorrelationGroup(FrozenModel):
     """Correlation of all pairs, or a symmetric matrix with one row per name."""
 
     @model_validator(mode="after")
-    def _check_matrix(self) -> CorrelationGroup:
+    def _check_correlation_matrix(self) -> CorrelationGroup:
         count = len(self.of)
         require(
             2 <= len(set(self.of)) == count <= _MAX_CORRELATED_PARAMETERS,
