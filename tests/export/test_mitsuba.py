@@ -148,6 +148,6 @@ def _edge_error(mi: Any, bench: Any, subject: Subject, rows: Any, boundary: str,
     sigma, albedo = (get_numbers(rows, name)[channel] for name in ("sigma_t", "albedo"))
     medium = bench.IsotropicMedium((sigma,) * 3, (albedo,) * 3)
     d = float(bench.fit_burley_width(subject.curve)[channel])
-    measured, _, _ = bench.measured_edge(mi, medium, boundary, d, 768)
+    measured, _, _ = bench.measured_edge_response(mi, medium, boundary, d, 768)
     curve: CumulativeProfile = subject.curve
-    return float(np.abs(measured - bench.pixel_averages(curve, channel, d)).max())
+    return float(np.abs(measured - bench.pixel_edge_response(curve, channel, d)).max())

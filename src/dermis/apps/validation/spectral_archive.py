@@ -54,7 +54,7 @@ class Archive(NamedTuple):
         return lab(self.spectra @ rgb_weights(WAVELENGTHS_NM).T)
 
     def select_rows(self, selection: NDArray[np.bool_] | NDArray[np.int64]) -> Archive:
-        """Return selected measurements, by a mask or by indices."""
+        """Return the measurements that a mask or indices select."""
         columns: Any = (column[selection] for column in self)
         return Archive(*columns)
 

@@ -43,7 +43,7 @@ Array = NDArray[np.floating]
 Mask = NDArray[np.bool_]
 PointFilter = Callable[[Array], Mask]
 FLAT_PATCH_SIDE = 256  # side of flat patches [texels]
-HUMAN_FILE = "heads/makehuman/head_young_male_light.obj"
+MAKEHUMAN_HEAD_FILE = "heads/makehuman/head_young_male_light.obj"
 SPHERE_RADII_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
 BALL_ATLAS_SIDE, HEAD_ATLAS_SIDE = 320, 1024
 STRIPE_SPACING_MM, STRIPE_WIDTH_MM = 12.0, 6.0  # of stripes of light across seams
@@ -55,15 +55,15 @@ def blur(adapter: str = "auto") -> None:
 
     The tables of spheres and of seams need the folder `tests` of a checkout.
     """
-    print_tables({name: str(text) for name, text in point_tables(open_device(adapter)).items()})
+    print_tables({name: str(text) for name, text in blur_error_texts(open_device(adapter)).items()})
     print_tables(surface_tables(adapter))
 
 
-def point_tables(device: Device) -> dict[str, object]:
+def blur_error_texts(device: Device) -> dict[str, object]:
     """Return texts on the errors of blurred light for docs/templates/accuracy.md, keyed by placeholder."""
     return {
-        "rows": "\n".join(point_row(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0)),
-        "leaning": "\n".join(sheared_row(device, degrees) for degrees in (90, 80, 60, 45)),
+        "rows": "\n".join(lit_texel_row(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0)),
+        "leaning": "\n".join(sheared_uv_row(device, degrees) for degrees in (90, 80, 60, 45)),
         "constant": f"{constant_light_error(device):.1e}",
         "rounding": half_store_rounding(device),
     }
@@ -81,7 +81,7 @@ def blurred_levels(device: Device, mesh: Mesh, irradiance: Array, stretch_mode: 
     return [resampled_level(device, levels, blur, k + 1) for k in range(len(blur.variance_mm2))]
 
 
-def point_row(device: Device, texels_per_mm: float) -> str:
+def lit_texel_row(device: Device, texels_per_mm: float) -> str:
     """Return a Markdown row with the shape and energy errors of a lit texel, blurred on a flat surface.
 
     The reference is the analytic sum of Gaussians.
@@ -104,7 +104,7 @@ def point_row(device: Device, texels_per_mm: float) -> str:
     return f"| {texels_per_mm:g} | {100 * shape:.2f} % | {100 * energy:+.4f} % |"
 
 
-def sheared_row(device: Device, shear_degrees: float) -> str:
+def sheared_uv_row(device: Device, shear_degrees: float) -> str:
     """Return a Markdown row with the widths of a lit texel, blurred on a flat surface with a sheared uv map.
 
     The widths are divided by the exact width. The cells are the smallest and the largest width with the
@@ -142,11 +142,11 @@ def surface_tables(adapter: str) -> dict[str, str]:
     """Return Markdown rows on curvature and seams for docs/templates/techniques.md, keyed by placeholder."""
     add_tests_to_path()
     renderer = dermis.Renderer(adapter)
-    curved = [harmonic_row(renderer, radius) for radius in SPHERE_RADII_MM]
+    curved = [sphere_blur_row(renderer, radius) for radius in SPHERE_RADII_MM]
     return {"curvature": "\n".join(curved), "seams": "\n".join(seam_rows(renderer))}
 
 
-def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
+def sphere_blur_row(renderer: Renderer, radius_mm: float) -> str:
     """Return a Markdown row that compares three ways to blur light on a sphere.
 
     They are the blur on the atlas, the heat equation on the sphere, and an integral over the sphere in which
@@ -160,7 +160,7 @@ def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
     mesh = cut_sphere(radius_mm, 20)
     atlas = build_atlas(mesh, BALL_ATLAS_SIDE, "stitched")
     light = np.nan_to_num(shown(atlas, mesh, own=True))[..., :1] / radius_mm
-    remaining = widest_level(renderer, *blur_light(renderer.device, mesh, atlas, light))
+    remaining = widest_gaussian_level(renderer, *blur_light(renderer.device, mesh, atlas, light))
     density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
     area = atlas.lit[..., None] / density
     map_fraction = (area * remaining * light).sum() / (area * light**2).sum()
@@ -204,7 +204,7 @@ def resampled_level(device: Device, levels: PyramidLevels, blur: Blur, level_ind
     return np.asarray(zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True))
 
 
-def widest_level(renderer: Renderer, levels: PyramidLevels, blur: Blur) -> Array:
+def widest_gaussian_level(renderer: Renderer, levels: PyramidLevels, blur: Blur) -> Array:
     """Return the light (n, n, 1) blurred by the widest Gaussian, at the full resolution of the atlas."""
     return resampled_level(renderer.device, levels, blur, len(blur.halvings) - 1)[..., None]
 
@@ -217,40 +217,47 @@ def seam_rows(renderer: Renderer) -> list[str]:
     from cut_meshes import cut_sphere
 
     human = dermis.load_head("human")
-    makehuman = replace(dermis.load_head(data_file(HUMAN_FILE), unit_mm=100, subdivide=0), maps=Maps())
+    makehuman = replace(
+        dermis.load_head(data_file(MAKEHUMAN_HEAD_FILE), unit_mm=100, subdivide=0), maps=Maps()
+    )
     rows = (
-        ("sphere in six charts", Head("sphere", cut_sphere(30.0, 20), Maps()), BALL_ATLAS_SIDE, all_points),
-        ("human, neck and back of the head", human, HEAD_ATLAS_SIDE, visible_points),
-        ("human, eye sockets and inside of the mouth", human, HEAD_ATLAS_SIDE, hidden_points),
-        ("MakeHuman, neck", makehuman, HEAD_ATLAS_SIDE, neck_points),
-        ("MakeHuman, back of the head", makehuman, HEAD_ATLAS_SIDE, back_points),
+        (
+            "sphere in six charts",
+            Head("sphere", cut_sphere(30.0, 20), Maps()),
+            BALL_ATLAS_SIDE,
+            all_points_mask,
+        ),
+        ("human, neck and back of the head", human, HEAD_ATLAS_SIDE, visible_seams_mask),
+        ("human, eye sockets and inside of the mouth", human, HEAD_ATLAS_SIDE, hidden_seams_mask),
+        ("MakeHuman, neck", makehuman, HEAD_ATLAS_SIDE, neck_mask),
+        ("MakeHuman, back of the head", makehuman, HEAD_ATLAS_SIDE, back_of_head_mask),
     )
     return [seam_row(renderer, *row) for row in rows]
 
 
-def all_points(positions: Array) -> Mask:
+def all_points_mask(positions: Array) -> Mask:
     """Return a mask (n,) that selects all positions (n, 3)."""
     return np.ones(len(positions), bool)
 
 
-def neck_points(positions: Array) -> Mask:
+def neck_mask(positions: Array) -> Mask:
     """Return the mask of positions on and below the neck."""
     return np.asarray((positions[:, 1] < -90.0) & (positions[:, 2] < 60.0))
 
 
-def back_points(positions: Array) -> Mask:
+def back_of_head_mask(positions: Array) -> Mask:
     """Return the mask of positions on the back of the head."""
     return np.asarray((positions[:, 1] > -90.0) & (positions[:, 2] < -30.0))
 
 
-def visible_points(positions: Array) -> Mask:
+def visible_seams_mask(positions: Array) -> Mask:
     """Return the mask of positions where seams of the package's human are visible: neck and back."""
-    return np.asarray(neck_points(positions) | back_points(positions))
+    return np.asarray(neck_mask(positions) | back_of_head_mask(positions))
 
 
-def hidden_points(positions: Array) -> Mask:
+def hidden_seams_mask(positions: Array) -> Mask:
     """Return the mask of positions where seams of the package's human are hidden: eye sockets and mouth."""
-    return ~visible_points(positions)
+    return ~visible_seams_mask(positions)
 
 
 def seam_row(
@@ -264,7 +271,7 @@ def seam_row(
     first, second = seam_side_points(head, point_filter)
     cells = []
     for method in SEAM_METHODS:
-        jumps = seam_jumps(renderer, striped_scene(head), method, atlas_side, first, second)
+        jumps = seam_discontinuities(renderer, striped_scene(head), method, atlas_side, first, second)
         cells.append(f"{100 * jumps.mean():.1f} / {100 * np.percentile(jumps, 95):.1f}")
     return f"| {row_title} | {len(first.triangle)} | {' | '.join(cells)} |"
 
@@ -308,7 +315,7 @@ def striped_scene(head: Head) -> Scene:
     return Scene(replace(head, maps=Maps()), lights=lights, skin=skin)
 
 
-def seam_jumps(
+def seam_discontinuities(
     renderer: Renderer,
     scene: Scene,
     seam_method: str,

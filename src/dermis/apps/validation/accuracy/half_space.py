@@ -48,15 +48,15 @@ def direction_table(head: Head, adapter: str) -> str:
     layer = published_media()["skin1"].layers[0]
     albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
     forward = layer.sigma_s_prime / (layer.sigma_a * (1.0 - FORWARD_G) + layer.sigma_s_prime)
-    median, high = _studio_ratios(head, adapter)
+    median, high = _studio_brightness_ratios(head, adapter)
     oblique, errors = "light from 81° over light from above", "relative RMSE over all pairs of directions"
     photons = f"photons of mean cosine {FORWARD_G:g}"
     rows: dict[str, Sequence[float]] = {
         f"{oblique}, index-matched": [_oblique_ratio(one, 1.0) for one in albedo],
         f"{oblique}, index {SKIN_IOR:g}": [_oblique_ratio(one, SKIN_IOR) for one in albedo],
-        "the same, photons": [_monte_carlo_ratio(one, 0.0, SKIN_IOR) for one in albedo],
-        f"the same, {photons}": [_monte_carlo_ratio(one, FORWARD_G, SKIN_IOR) for one in forward],
-        f"index-matched, {photons}": [_monte_carlo_ratio(one, FORWARD_G, 1.0) for one in forward],
+        "the same, photons": [_monte_carlo_oblique_ratio(one, 0.0, SKIN_IOR) for one in albedo],
+        f"the same, {photons}": [_monte_carlo_oblique_ratio(one, FORWARD_G, SKIN_IOR) for one in forward],
+        f"index-matched, {photons}": [_monte_carlo_oblique_ratio(one, FORWARD_G, 1.0) for one in forward],
         f"{errors}, lambertian": [_direction_errors(one)[0] for one in albedo],
         f"{errors}, half-space": [_direction_errors(one)[1] for one in albedo],
         "default skin in the studio over lambertian, median": median,
@@ -107,7 +107,7 @@ def _direction_errors(albedo: float) -> tuple[float, float]:
     return relative_rmse(lambertian), relative_rmse(half_space)
 
 
-def _monte_carlo_ratio(albedo: float, mean_cosine: float, eta: float) -> float:
+def _monte_carlo_oblique_ratio(albedo: float, mean_cosine: float, eta: float) -> float:
     """Return the ratio of the reflectance at 81 degrees to that at normal incidence, by Monte Carlo [-].
 
     mean_cosine : mean cosine of the scattering angle [-]
@@ -158,7 +158,7 @@ def _scattered_cosines(downward_cosines: Floats, g: float, rng: np.random.Genera
     return np.asarray(np.clip(deflected, -1.0, 1.0))
 
 
-def _studio_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
+def _studio_brightness_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
     """Return ratios of a picture with skin direction "half-space" to one with "lambertian", in studio light.
 
     The ratios are the median and the 99th percentile over the pixels of the head, each by channel.

@@ -131,23 +131,23 @@ def reflection_error(
 
 
 def reflected_radiance(
-    directions: Array, light: Array, normal: Array, view: Array, roughness_m: float
+    texel_directions: Array, texel_light: Array, normal: Array, view: Array, roughness_m: float
 ) -> Array:
     """Return the radiance that a specular lobe reflects, as a sum over all texels of a panorama.
 
     Texels where the lobe is below 1e-10 of its peak are skipped.
 
-    directions : (n, 3) directions of the texels
-    light : (n, 3) radiance of the texels, multiplied by their solid angles
+    texel_directions : (n, 3) directions of the texels
+    texel_light : (n, 3) radiance of the texels, multiplied by their solid angles
     normal, view : (3,) unit vectors
     roughness_m : roughness of the lobe
     """
-    n_l, n_v, v_l = directions @ normal, float(normal @ view), directions @ view
+    n_l, n_v, v_l = texel_directions @ normal, float(normal @ view), texel_directions @ view
     n_h = (n_l + n_v) / np.sqrt(np.maximum(2 + 2 * v_l, 1e-12))
     near = np.flatnonzero((n_l > 0) & (n_h > 1 / np.sqrt(1 + (4.8 * roughness_m) ** 2)))
     v_h = np.sqrt(0.5 + 0.5 * v_l[near])
     angles = Cosines(n_l[near], np.full(len(near), n_v), n_h[near], v_h)
-    return np.asarray((kelemen(angles, roughness_m) * n_l[near]) @ light[near])
+    return np.asarray((kelemen(angles, roughness_m) * n_l[near]) @ texel_light[near])
 
 
 def lobe_parameters(cosine: float, roughness_m: float) -> Array:
@@ -163,12 +163,12 @@ def lobe_parameters(cosine: float, roughness_m: float) -> Array:
     return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], rows))
 
 
-def lobe_radiance(layers: Array, directions: Array, roughness_m: float) -> Array:
+def lobe_radiance(prefiltered_layers: Array, directions: Array, roughness_m: float) -> Array:
     """Return the radiance (k, 3) of a prefiltered panorama in the directions of isotropic lobes.
 
     The radiance is interpolated between the two layers whose roughness is nearest to that of the lobes.
 
-    layers : (n, h, w, 3) layers of the prefiltered panorama, in order of roughness
+    prefiltered_layers : (n, h, w, 3) layers of the prefiltered panorama, in order of roughness
     directions : (k, 3) directions of the lobes
     roughness_m : roughness of the lobes
     """
@@ -179,7 +179,7 @@ def lobe_radiance(layers: Array, directions: Array, roughness_m: float) -> Array
     )
     low = int(np.clip(level, 0, len(LAYER_ROUGHNESSES) - 2))
     f = float(np.clip(level - low, 0, 1))
-    below, above = (sample_panorama(layers[1 + k], directions) for k in (low, low + 1))
+    below, above = (sample_panorama(prefiltered_layers[1 + k], directions) for k in (low, low + 1))
     return np.asarray((1 - f) * below + f * above)
 
 

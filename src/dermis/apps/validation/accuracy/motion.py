@@ -117,14 +117,14 @@ def picture_error(
     rebuilt = rebuilt_head(head, posed_points(head, person_points, target_weights))
     lights, camera = LIGHT_AND_CAMERA[view_name]
     scene = Scene(rebuilt, load_lights(lights), load_camera(camera, rebuilt))
-    posed_head = _with_centre(replace(head), rebuilt)
+    posed_head = _with_centre_of(replace(head), rebuilt)
     pose = Pose(target_weights, positions_mm=person_points)
     posed = renderer.draw(replace(scene, head=posed_head, pose=pose), SETTINGS).linear()
     reference = renderer.draw(scene, SETTINGS).linear()
     return float(np.sqrt(((posed - reference) ** 2).mean() / (reference**2).mean()))
 
 
-def _with_centre(head: Head, shaped_head: Head) -> Head:
+def _with_centre_of(head: Head, shaped_head: Head) -> Head:
     """Change the centre of a head in place to the centre of `shaped_head`, and return the head.
 
     Lights and cameras are relative to the centre.
@@ -194,11 +194,11 @@ def _seam_row(renderer: Renderer, row_title: str, head: Head, shaped_head: Head,
     shaped_head : head loaded in the shape of the pose; used to find the points beside seams
     """
     cells = []
-    for where in (blur.neck_points, blur.back_points):
+    for where in (blur.neck_mask, blur.back_of_head_mask):
         sides = blur.seam_side_points(shaped_head, where)
         scene = replace(blur.striped_scene(head), pose=pose)
-        _with_centre(scene.head, shaped_head)
-        errors = blur.seam_jumps(renderer, scene, "stitch", blur.HEAD_ATLAS_SIDE, *sides)
+        _with_centre_of(scene.head, shaped_head)
+        errors = blur.seam_discontinuities(renderer, scene, "stitch", blur.HEAD_ATLAS_SIDE, *sides)
         cells.append(f"{100 * errors.mean():.1f} / {100 * np.percentile(errors, 95):.1f}")
     return f"| {row_title} | {' | '.join(cells)} |"
 

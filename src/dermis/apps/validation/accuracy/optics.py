@@ -50,7 +50,7 @@ def tissue_by_name(tissue_name: str) -> Tissue:
     return Tissue(published_media()[tissue_name].with_eta(1.3)) if tissue_name.startswith("skin") else tissue
 
 
-def models_table() -> str:
+def diffusion_models_table() -> str:
     """Return Markdown rows with errors of diffusion models against Monte Carlo, by tissue.
 
     The errors are those of the total energy, and of the energies in rings around the point of entry.
@@ -99,7 +99,7 @@ def photon_counts_table() -> str:
     return "\n".join(rows)
 
 
-def fits_table() -> str:
+def fitted_profiles_table() -> str:
     """Return Markdown rows with errors of fitted Gaussians and fitted Burley profiles, by tissue.
 
     They are fitted to the energies of a layered-diffusion profile in rings around its centre.
@@ -114,7 +114,7 @@ def fits_table() -> str:
     return "\n".join(rows)
 
 
-def point_fits_table() -> str:
+def gaussian_point_fits_table() -> str:
     """Return Markdown rows with errors of six Gaussians fitted to the radial values of diffusion profiles.
 
     Each profile is fitted twice: without a constraint, and with its total energy conserved. The first fit has
@@ -170,7 +170,7 @@ def error_against_published_sum(profile: RadialProfile) -> Floats:
     return np.sqrt(squared_error / np.trapezoid((r * table) ** 2, log_r, axis=0))
 
 
-def published_errors() -> str:
+def published_profile_errors_text() -> str:
     """Return text with `error_against_published_sum` of three diffusion profiles of the tissue "dj3"."""
     variants: tuple[tuple[str, DiffusionModel, Clamp], ...] = (
         ("multipole as printed", "multipole", "none"),
@@ -187,12 +187,12 @@ def published_errors() -> str:
 def tables() -> dict[str, str]:
     """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     return {
-        "models": models_table(),
+        "models": diffusion_models_table(),
         "counted": photon_counts_table(),
-        "fits": fits_table(),
-        "pointwise": point_fits_table(),
+        "fits": fitted_profiles_table(),
+        "pointwise": gaussian_point_fits_table(),
         "transmission": transmission_table(),
-        "published": published_errors(),
+        "published": published_profile_errors_text(),
         "photons": f"{PHOTON_COUNT:,}",
         "spectral_photons": f"{SPECTRAL_PHOTON_COUNT:,}",
     }

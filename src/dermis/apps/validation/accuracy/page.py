@@ -15,7 +15,7 @@ def page(adapter: str = "auto") -> None:
     fill_page(
         PAGE,
         adapter=f"{device.adapter.name}, {device.adapter.backend}",
-        **blur.point_tables(device),
+        **blur.blur_error_texts(device),
         **cycles_comparison.tables(),
         **specular.tables(),
         **light.tables(adapter),

@@ -174,12 +174,12 @@ class ComparisonRunner:
             self._people[person_name] = head, textures
         return self._people[person_name]
 
-    def _shared_skin(self, person: PersonName, head: Head, truth: TruthName) -> SharedSkin:
-        key = person, truth
+    def _shared_skin(self, person_name: PersonName, head: Head, truth_name: TruthName) -> SharedSkin:
+        key = person_name, truth_name
         if key not in self._skins:
-            folder = self.folder / person
+            folder = self.folder / person_name
             folder.mkdir(exist_ok=True)
-            self._skins[key] = shared_skin(self.renderer, head, truth, folder)
+            self._skins[key] = shared_skin(self.renderer, head, truth_name, folder)
         return self._skins[key]
 
     def measure_head(self, head_name: str, light_name: str, medium: Medium) -> Figures:
@@ -337,16 +337,18 @@ def person(
     person_page()
 
 
-_Job = tuple[str, str, Callable[[], Figures]]
+_MeasurementJob = tuple[str, str, Callable[[], Figures]]
 
 
-def _measurement_jobs(runner: ComparisonRunner) -> list[_Job]:
+def _measurement_jobs(runner: ComparisonRunner) -> list[_MeasurementJob]:
     """Return the comparisons in the order in which they are run, each with its group, its key and a function.
 
     The group and the key locate its results in the file of results. The function returns these results.
     """
-    people: list[_Job] = [("people", one.key, partial(runner.measure, one)) for one in list_measurements()]
-    heads: list[_Job] = [
+    people: list[_MeasurementJob] = [
+        ("people", one.key, partial(runner.measure, one)) for one in list_measurements()
+    ]
+    heads: list[_MeasurementJob] = [
         (
             "heads",
             f"{name} / {light} / {medium}",
@@ -377,7 +379,7 @@ def person_page() -> None:
     )
 
 
-def with_error(estimate: Sequence[float] | Estimate | None, digits: int = 3) -> str:
+def estimate_text(estimate: Sequence[float] | Estimate | None, digits: int = 3) -> str:
     """Return an estimate with its standard error as text, such as "0.102 ± 0.004"."""
     if estimate is None:
         return NOT_MEASURED
@@ -387,45 +389,47 @@ def with_error(estimate: Sequence[float] | Estimate | None, digits: int = 3) -> 
 
 def _error_cells(figures: Figures | None) -> str:
     """Return table cells with the relative RMSE and the energy ratio of a comparison."""
-    return f"{with_error(figures['error'])} | {figures['energy'][0]:.3f}" if figures else f"{NOT_MEASURED} | "
+    return (
+        f"{estimate_text(figures['error'])} | {figures['energy'][0]:.3f}" if figures else f"{NOT_MEASURED} | "
+    )
 
 
-def view_rows(people: Figures) -> str:
+def view_rows(people_figures: Figures) -> str:
     """Return Markdown rows, one per view of the human, with the errors against each path-traced reference."""
     lines = []
     for view, where in ALL_VIEWS.items():
-        rows = {truth: people.get(Measurement("human", view, truth).key) for truth in TRUTHS}
+        rows = {truth: people_figures.get(Measurement("human", view, truth).key) for truth in TRUTHS}
         matched = rows["matched"]
         shipped = matched["default"] if matched else None
-        default = f"{with_error(shipped[:2])} | {shipped[2]:.3f}" if shipped else f"{NOT_MEASURED} | "
+        default = f"{estimate_text(shipped[:2])} | {shipped[2]:.3f}" if shipped else f"{NOT_MEASURED} | "
         cells = " | ".join(_error_cells(rows[truth]) for truth in TRUTHS)
         paths = matched["paths"] if matched else ""
         lines.append(f"| {view} | {where.light} | {paths} | {cells} | {default} |")
     return "\n".join(lines)
 
 
-def people_rows(people: Figures) -> str:
+def people_rows(people_figures: Figures) -> str:
     """Return Markdown rows with the errors of all people except "human"."""
     keys = [(one, view) for one in get_args(PersonName)[1:] for view in _PEOPLE_VIEWS]
-    rows = ((one, view, people.get(Measurement(one, view, "matched").key)) for one, view in keys)
+    rows = ((one, view, people_figures.get(Measurement(one, view, "matched").key)) for one, view in keys)
     return "\n".join(f"| {one} | {view} | {_error_cells(row)} |" for one, view, row in rows)
 
 
-def head_rows(heads: Figures) -> str:
+def head_rows(head_figures: Figures) -> str:
     """Return Markdown rows with the errors of heads without maps, by head and medium."""
     lines = []
     for medium in _HEAD_MEDIA:
         for name in _HEAD_FILES:
             cells = " | ".join(
-                _error_cells(heads.get(f"{name} / {light} / {medium}")) for light in _HEAD_LIGHTS
+                _error_cells(head_figures.get(f"{name} / {light} / {medium}")) for light in _HEAD_LIGHTS
             )
             lines.append(f"| {name} | {medium} | {cells} |")
     return "\n".join(lines)
 
 
-def region_table(people: Figures) -> str:
+def region_table(people_figures: Figures) -> str:
     """Return a Markdown table with the ratio of light in frames to that in references, by region and view."""
-    rows = {view: people.get(Measurement("human", view, "matched").key) for view in ALL_VIEWS}
+    rows = {view: people_figures.get(Measurement("human", view, "matched").key) for view in ALL_VIEWS}
     found = {view: row["regions"] for view, row in rows.items() if row}
     names = list(dict.fromkeys(name for regions in found.values() for name in regions))
     lines = [f"| region | {' | '.join(found)} |", "|---" * (len(found) + 1) + "|"]
@@ -435,7 +439,7 @@ def region_table(people: Figures) -> str:
     return "\n".join(lines)
 
 
-def cause_table(people: Figures) -> str:
+def cause_table(people_figures: Figures) -> str:
     """Return a Markdown table with the relative RMSE and energy ratio when one cause of error is left out.
 
     Each row is for one cause, and the first for none.
@@ -445,14 +449,16 @@ def cause_table(people: Figures) -> str:
         "|---" * (2 * len(_ABLATED_VIEWS) + 1) + "|",
     ]
     for cause in (None, *CAUSES):
-        rows = (people.get(Measurement("human", view, "matched", cause).key) for view in _ABLATED_VIEWS)
+        rows = (
+            people_figures.get(Measurement("human", view, "matched", cause).key) for view in _ABLATED_VIEWS
+        )
         lines.append(f"| {cause or 'nothing'} | {' | '.join(_error_cells(row) for row in rows)} |")
     return "\n".join(lines)
 
 
-def iris_cells(people: Figures) -> dict[str, str]:
+def iris_cells(people_figures: Figures) -> dict[str, str]:
     """Return texts with errors of the iris in the view "eye", keyed by the placeholder that each replaces."""
-    row = people.get(Measurement("human", "eye", "matched").key) or {}
+    row = people_figures.get(Measurement("human", "eye", "matched").key) or {}
     iris = row.get("iris", {})
     names = "right", "down", "brightness", "left_half", "right_half"
-    return {name: with_error(iris.get(name), 2) for name in names}
+    return {name: estimate_text(iris.get(name), 2) for name in names}

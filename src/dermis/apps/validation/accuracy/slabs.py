@@ -43,25 +43,25 @@ def slabs(adapter: str = "auto") -> None:
     print_tables(tables(adapter))
 
 
-def exact_response(medium: Medium, thickness_mm: float, g: float = 0.0) -> Array:
+def exact_slab_response(medium: Medium, thickness_mm: float, mean_cosine: float = 0.0) -> Array:
     """Return reflectance and transmittance (2, n, 3) of a slab by adding and doubling, for n angles.
 
     The angles of incidence are `INCIDENT_DEGREES`.
 
     thickness_mm : thickness of the slab [mm]
-    g : mean cosine of the scattering angle [-]; `medium` has reduced scattering coefficients for any g
+    mean_cosine : mean cosine of the scattering angle [-]; `medium` contains the reduced scattering
     """
     layer, response = medium.layers[0], np.empty((2, len(INCIDENT_DEGREES), 3))
     inner_cosine = refracted_cosine(np.cos(np.radians(INCIDENT_DEGREES)), medium.eta)
     for c in range(3):
         albedo, depth = float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness_mm
-        slab = adding_doubling.solve_slabs(albedo, depth, medium.eta, g=g)
+        slab = adding_doubling.solve_slabs(albedo, depth, medium.eta, g=mean_cosine)
         sides = slab.reflected[0], slab.transmitted[0]
         response[..., c] = [np.interp(inner_cosine, slab.cosine, side) for side in sides]
     return response
 
 
-def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness_mm: float) -> Array:
+def rendered_slab_response(renderer: dermis.Renderer, skin: Skin, thickness_mm: float) -> Array:
     """Return reflectance and transmittance (2, n, 3) of a slab rendered by dermis, for n angles of incidence.
 
     They are measured far from the rim of the slab.
@@ -95,7 +95,7 @@ def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
     return {name: Skin.model_validate(values | {"direction": name}) for name in ("lambertian", "half-space")}
 
 
-def error_rows(renderer: dermis.Renderer) -> str:
+def slab_error_rows(renderer: dermis.Renderer) -> str:
     """Return Markdown rows with errors of reflectance and transmittance, by slab and skin direction."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -103,13 +103,13 @@ def error_rows(renderer: dermis.Renderer) -> str:
             medium = published_media()[name].with_eta(eta)
             for direction, skin in skins_by_direction(medium, folder).items():
                 for thickness in THICKNESSES_MM:
-                    rendered = rendered_response(renderer, skin, thickness)
-                    cells = _error_cells(rendered, exact_response(medium, thickness))
+                    rendered = rendered_slab_response(renderer, skin, thickness)
+                    cells = _error_cells(rendered, exact_slab_response(medium, thickness))
                     rows.append(f"| {name}, index {eta:g} | {direction} | {thickness:g} mm | {cells} |")
     return "\n".join(rows)
 
 
-def forward_error_rows(renderer: dermis.Renderer) -> str:
+def forward_scattering_error_rows(renderer: dermis.Renderer) -> str:
     """Return Markdown rows with errors of rendered slabs against references that scatter light forwards.
 
     The slabs are rendered with the skin direction "half-space". Half of the rows ignore forward scattering;
@@ -123,13 +123,13 @@ def forward_error_rows(renderer: dermis.Renderer) -> str:
             for g in (0.0, FORWARD_G):
                 skin = half_space.model_copy(update={"anisotropy": g})
                 for thickness in THICKNESSES_MM:
-                    rendered = rendered_response(renderer, skin, thickness)
-                    cells = _error_cells(rendered, exact_response(medium, thickness, FORWARD_G))
+                    rendered = rendered_slab_response(renderer, skin, thickness)
+                    cells = _error_cells(rendered, exact_slab_response(medium, thickness, FORWARD_G))
                     rows.append(f"| {name}, index {eta:g} | {g:g} | {thickness:g} mm | {cells} |")
     return "\n".join(rows)
 
 
-def forward_direction_rows() -> str:
+def forward_scattering_direction_rows() -> str:
     """Return Markdown rows with errors of the skin direction "half-space", over light and view directions.
 
     The medium is "skin1" with forward scattering. A row is for one value of the skin's `anisotropy`. A cell
@@ -145,12 +145,12 @@ def forward_direction_rows() -> str:
     return "\n".join(rows)
 
 
-def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
+def _direction_pairs_error(albedo: float, eta: float, skin_anisotropy: float) -> float:
     a, weights, exact = adding_doubling.half_space_radiance(
         albedo, eta, adding_doubling.DIRECTION_NODES, FORWARD_G
     )
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
-    angular = anisotropic_response(float(directional_reflectance(1.0, albedo, eta)), eta, g)
+    angular = anisotropic_response(float(directional_reflectance(1.0, albedo, eta)), eta, skin_anisotropy)
     table = np.interp(np.sqrt(air), np.linspace(0.0, 1.0, DIRECTION_ROWS), angular.relative_reflectance[:, 0])
     single = 1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta)
     response = table + angular.single_scattering[0] * single
@@ -174,7 +174,7 @@ def _error_cells(response: Array, reference: Array) -> str:
     return " | ".join(cells)
 
 
-def forward_rows() -> str:
+def forward_scattering_rows() -> str:
     """Return Markdown rows with transmittance and reflectance of slabs in red light, by Monte Carlo.
 
     Each row compares isotropic scattering with forward scattering.
@@ -198,8 +198,8 @@ def tables(adapter: str = "auto") -> dict[str, str]:
     """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     renderer = dermis.Renderer(adapter)
     return {
-        "slab_errors": error_rows(renderer),
-        "slab_forward": forward_rows(),
-        "slab_forward_errors": forward_error_rows(renderer),
-        "forward_directions": forward_direction_rows(),
+        "slab_errors": slab_error_rows(renderer),
+        "slab_forward": forward_scattering_rows(),
+        "slab_forward_errors": forward_scattering_error_rows(renderer),
+        "forward_directions": forward_scattering_direction_rows(),
     }

@@ -24,7 +24,7 @@ ENERGY_MODELS = {
     "full": ENERGY_SCHEMES["full"],
 }
 ROUGHNESS_AND_STRENGTH = ((0.1, 0.18), (0.3, 0.18), (0.5, 0.18), (0.3, 1.0))
-REFERENCE_NODE_COUNTS = (96, 96)
+REFERENCE_QUADRATURE_NODE_COUNTS = (96, 96)
 
 
 def specular() -> None:
@@ -49,7 +49,7 @@ def albedo_rows() -> str:
     for name, model in MODELS.items():
         if name == "kelemen-direct":
             continue
-        dense = directional_albedo(c, m, model.lobe, node_counts=REFERENCE_NODE_COUNTS)
+        dense = directional_albedo(c, m, model.lobe, node_counts=REFERENCE_QUADRATURE_NODE_COUNTS)
         ms = 1e3 * min(timeit.repeat(partial(albedo_table.__wrapped__, name), number=1, repeat=5))
         errors = (directional_albedo(c, m, model.lobe), read_albedo(name, c, m)[..., 0])
         cells = [f"{100 * np.abs(one / dense - 1).max():.1g} %" for one in errors]

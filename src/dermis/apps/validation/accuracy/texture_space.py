@@ -54,10 +54,10 @@ def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
             integral, uniform = surface_integral(subject, 0), uniform_light_integral(subject)
             normalised = replace(integral, image=integral.image / np.maximum(uniform, MIN_UNIFORM_INTEGRAL))
             rows["by_atlas"] += atlas_rows(subject, integral, normalised, light)
-            rows["zero_width"].append(zero_width_row(subject, light))
+            rows["zero_width"].append(narrow_profile_row(subject, light))
             rows["places"] += region_rows(subject, integral, light) if light in LANDMARKS_BY_REGION else []
             if light == "front":
-                rows["even"].append(mean_and_percentile(uniform[integral.mask]))
+                rows["even"].append(mean_and_percentile_text(uniform[integral.mask]))
     return {name: "\n".join(lines) for name, lines in rows.items()}
 
 
@@ -98,7 +98,7 @@ def atlas_rows(
     return rows
 
 
-def zero_width_row(subject: ComparisonSubject, light_name: str) -> str:
+def narrow_profile_row(subject: ComparisonSubject, light_name: str) -> str:
     """Return a Markdown row with the sampling error of the surface integral.
 
     With a very narrow profile, the exact integral equals the irradiance. The row therefore compares the
@@ -122,12 +122,12 @@ def uniform_light_integral(subject: ComparisonSubject) -> Floats:
     return image
 
 
-def mean_and_percentile(uniform_light: Floats) -> str:
+def mean_and_percentile_text(uniform_integral: Floats) -> str:
     """Return text with the mean and the 95th percentile of each channel.
 
-    uniform_light : (n, 3) surface integral in uniform light, at n pixels
+    uniform_integral : (n, 3) surface integral in uniform light, at n pixels
     """
-    pairs = zip(uniform_light.mean(axis=0), np.percentile(uniform_light, 95, axis=0), strict=True)
+    pairs = zip(uniform_integral.mean(axis=0), np.percentile(uniform_integral, 95, axis=0), strict=True)
     return ", ".join(f"{mean:.3f} ({high:.3f})" for mean, high in pairs)
 
 

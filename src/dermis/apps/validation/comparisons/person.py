@@ -107,24 +107,24 @@ class SharedSkin:
     profile: Path
 
 
-def shared_skin(renderer: Renderer, head: Head, truth: TruthName, folder: Path) -> SharedSkin:
+def shared_skin(renderer: Renderer, head: Head, truth_name: TruthName, folder: Path) -> SharedSkin:
     """Return the skin of a person for a kind of path-traced reference, and write its diffusion profile.
 
     Homogeneous skin has the mean scattering distance of the default skin.
 
-    truth : kind of path-traced reference, one of `TRUTHS`
+    truth_name : kind of path-traced reference, one of `TRUTHS`
     folder : existing folder in which the file of the profile is written
     """
-    maps, eta = head.maps, SKIN_ETA if truth == "refracting" else 1.0
+    maps, eta = head.maps, SKIN_ETA if truth_name == "refracting" else 1.0
     assert isinstance(maps, PaintedMaps)
     colour = mean_colour(maps.look)
-    if truth == "layered":
+    if truth_name == "layered":
         look = maps.look
         parameters = SkinParameters(look.melanin, look.eumelanin, look.blood, look.oxygen, look.epidermis_mm)
         medium = pigmented_skin(parameters, colour, eta)
     else:
         medium = uniform_skin(colour, mean_distance_mm(renderer.skin_profile(Skin())), eta)
-    file = folder / f"{truth}.toml"
+    file = folder / f"{truth_name}.toml"
     write_profile(file, medium_gaussians(medium, "montecarlo"), {"model": "montecarlo"})
     return SharedSkin(medium, file)
 
@@ -371,25 +371,25 @@ class IrisErrors(NamedTuple):
     right_half: Estimate
 
 
-def iris_errors(comparison: PersonComparison, frame_mm: float) -> IrisErrors:
+def iris_errors(comparison: PersonComparison, view_height_mm: float) -> IrisErrors:
     """Return the errors of the iris in a comparison whose pictures show an eye from the front, at the centre.
 
-    frame_mm : height of the visible area [mm]
+    view_height_mm : height of the visible area [mm]
     """
     ours, reference = comparison.ours.mean(axis=2), comparison.reference.mean(axis=2)
     noise = comparison.variance.mean(axis=2)  # an upper bound, since channels may share paths
     side = len(ours)
-    along = (np.arange(side) + 0.5 - 0.5 * side) * frame_mm / side
+    along = (np.arange(side) + 0.5 - 0.5 * side) * view_height_mm / side
     x, y = np.meshgrid(along, along)
     radius = np.hypot(x, y)
     ring = (radius > _IRIS_INNER_RADIUS_MM) & (radius < _IRIS_OUTER_RADIUS_MM)
-    dull = _without_highlights(ours, ring) & _without_highlights(reference, ring)
+    dull = _highlight_free_mask(ours, ring) & _highlight_free_mask(reference, ring)
     right, down = _image_shift(ours, reference, noise, dull & (radius < _PUPIL_RADIUS_MM))
     masks = (ring & dull & half for half in (radius > 0, x < 0, x >= 0))
     return IrisErrors(right, down, *(_brightness_ratio(ours, reference, noise, mask) for mask in masks))
 
 
-def _without_highlights(image: Floats, iris_ring: Mask) -> Mask:
+def _highlight_free_mask(image: Floats, iris_ring: Mask) -> Mask:
     """Return the mask (h, w) of the pixels that are not much brighter than the median of the iris.
 
     iris_ring : (h, w) mask of the iris

@@ -115,7 +115,7 @@ def _cosines_to_normals(normals: Floats, directions: Floats) -> Floats:
     return np.asarray((normals * directions).sum(axis=1) / np.linalg.norm(directions, axis=1))
 
 
-def _picture_mask(visible: Mask, region_points: Mask) -> Mask:
-    mask = np.zeros(visible.shape, bool)
-    mask[visible] = region_points
+def _picture_mask(visible_pixels: Mask, region_points: Mask) -> Mask:
+    mask = np.zeros(visible_pixels.shape, bool)
+    mask[visible_pixels] = region_points
     return mask

@@ -31,7 +31,7 @@ _SAMPLE_SPACING_MM, _MIN_SAMPLE_SPACING_MM = 3.0, 0.2
 _HEAT_PATCH_RADIUS_MM = 10.0
 _MIN_VARIANCE_MM2 = 0.25  # for narrower Gaussians the surface is nearly flat
 _FULL_COVERAGE = 0.999  # fraction of a pixel from which it counts as covered
-PIXEL_SAMPLES = 16
+SAMPLES_PER_PIXEL = 16
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def surface_heat_around(
     subject: ComparisonSubject,
     target_mm: tuple[float, float, float],
     radius_mm: float,
-    light: IrradianceSamples,
+    surface_irradiance: IrradianceSamples,
     min_variance_mm2: float = _MIN_VARIANCE_MM2,
 ) -> ReferenceImage:
     """Return the reference image in which light diffuses according to the heat equation, in a round patch.
@@ -111,7 +111,7 @@ def surface_heat_around(
 
     target_mm : point relative to the head's centre; the nearest visible point is the centre of the patch [mm]
     radius_mm : radius of the patch in which pixels are compared [mm]
-    light : samples of the irradiance on the whole head, see `irradiance_samples`
+    surface_irradiance : samples of the irradiance on the whole head, see `irradiance_samples`
     min_variance_mm2 : variance below which Gaussians are integrated by Euclidean distance instead [mm2]
     """
     from dermis.apps.truths.surface_diffusion import diffuse_on_surface
@@ -125,13 +125,13 @@ def surface_heat_around(
     target = np.array(target_mm) + subject.scene.head.centre_mm
     centre = points[np.linalg.norm(points - target, axis=1).argmin()]
     patch = mesh_patch(subject.scene.head.mesh, centre, radius_mm, variances[~narrow])
-    irradiance = _irradiance(subject, *patch.vertex_barycentrics())
+    irradiance = _irradiance_at_points(subject, *patch.vertex_barycentrics())
     levels = diffuse_on_surface(patch.positions, patch.triangles, irradiance, variances[~narrow])
     fine, weights = patch.locate(visible.triangle, visible.barycentric)
     inside = (fine >= 0) & patch.contains(points)
     diffused = np.einsum("knc,kc->nc", levels, weight[~narrow])
     exitance = patch.interpolate(diffused, fine[inside], weights[inside])
-    exitance += _integrate_gaussians(points[inside], light, weight[narrow], variances[narrow])
+    exitance += _integrate_gaussians(points[inside], surface_irradiance, weight[narrow], variances[narrow])
     mask = visible.mask.copy()
     mask[visible.mask] = inside
     compared = SurfacePoints(mask, visible.triangle[inside], visible.barycentric[inside])
@@ -144,10 +144,12 @@ def irradiance_samples(subject: ComparisonSubject) -> IrradianceSamples:
     """Return samples of the irradiance on the whole head, as dense as the references need."""
     from dermis.apps.truths.irradiance_samples import MeshPoints, sample_irradiance
 
-    def light(points: MeshPoints) -> Floats:
-        return _irradiance(subject, points.face, points.barycentric)
+    def irradiance_at_points(points: MeshPoints) -> Floats:
+        return _irradiance_at_points(subject, points.face, points.barycentric)
 
-    return sample_irradiance(subject.scene.head.mesh, light, _SAMPLE_SPACING_MM, _MIN_SAMPLE_SPACING_MM)
+    return sample_irradiance(
+        subject.scene.head.mesh, irradiance_at_points, _SAMPLE_SPACING_MM, _MIN_SAMPLE_SPACING_MM
+    )
 
 
 def path_traced_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage:
@@ -183,20 +185,22 @@ REFERENCES: dict[str, Callable[[ComparisonSubject, int], ReferenceImage]] = {
 def _reference_image(path_traced: PathTraced, *notes: str) -> ReferenceImage:
     image, variance = path_traced.image.astype(np.float64), path_traced.variance.astype(np.float64)
     mask, notes = path_traced.mask > _FULL_COVERAGE, (*notes, *path_traced.notes)
-    return ReferenceImage(image, variance, mask, PIXEL_SAMPLES, path_traced.seconds, notes)
+    return ReferenceImage(image, variance, mask, SAMPLES_PER_PIXEL, path_traced.seconds, notes)
 
 
-def _irradiance(subject: ComparisonSubject, triangle: NDArray[np.int64], barycentric: Floats) -> Floats:
+def _irradiance_at_points(
+    subject: ComparisonSubject, triangle: NDArray[np.int64], barycentric: Floats
+) -> Floats:
     return irradiance_at(subject.renderer, subject.scene, subject.settings, triangle, barycentric)
 
 
 def _integrate_gaussians(
-    points: Floats, light: IrradianceSamples, gaussian_weight: Floats, variance_mm2: Floats
+    points: Floats, irradiance: IrradianceSamples, gaussian_weight: Floats, variance_mm2: Floats
 ) -> Floats:
     """Return the radiant exitance (n, 3) at points by integrating Gaussians of the Euclidean distance.
 
     points : (n, 3) positions [mm]
-    light : irradiance on the surface
+    irradiance : irradiance on the surface
     gaussian_weight : (k, 3) weights of the Gaussians
     variance_mm2 : (k,) variances of the Gaussians [mm^2]
     """
@@ -205,7 +209,7 @@ def _integrate_gaussians(
 
     if not len(variance_mm2):
         return np.zeros_like(points)
-    return integrate_exitance(points, light, Profile(gaussian_weight, variance_mm2))
+    return integrate_exitance(points, irradiance, Profile(gaussian_weight, variance_mm2))
 
 
 def hit_positions(subject: ComparisonSubject, visible: SurfacePoints) -> Floats:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 PAGE_FILE = Path(__file__).with_name("babylon.html")
 RESULTS_FILE = RESULTS / "engines_babylon.json"
-LIBRARY_VARIABLE = "DERMIS_BABYLON"
+LIBRARY_FOLDER_VARIABLE = "DERMIS_BABYLON"
 CANVAS_SIDE, FULLY_LIT_RADIANCE = 640, 0.9
 PIXELS_PER_BURLEY_WIDTH = 14.0  # number of pixels that the largest Burley width covers
 AZIMUTH_COUNT = 5
@@ -40,13 +40,15 @@ def babylon_library() -> Path:
 
     Raises DermisError when DERMIS_BABYLON does not name such a folder.
     """
-    folder = Path(os.environ.get(LIBRARY_VARIABLE, ""))
+    folder = Path(os.environ.get(LIBRARY_FOLDER_VARIABLE, ""))
     if not (folder / "babylonjs" / "babylon.js").is_file():
         actual = (
-            f"{folder} has no babylonjs/babylon.js" if os.environ.get(LIBRARY_VARIABLE) else "it is not set"
+            f"{folder} has no babylonjs/babylon.js"
+            if os.environ.get(LIBRARY_FOLDER_VARIABLE)
+            else "it is not set"
         )
         refuse(
-            LIBRARY_VARIABLE,
+            LIBRARY_FOLDER_VARIABLE,
             "a folder that npm has installed babylonjs into",
             actual,
             "npm install babylonjs",

@@ -45,7 +45,9 @@ SEED_COUNT = 2  # pictures per channel; their difference gives the noise
 HEAD_SIDE, HEAD_SAMPLES, HEAD_SEEDS = 192, 32, 2
 PICTURE_SIDE, PICTURE_SAMPLES = 320, 48
 METHODS_BY_VERSION = {"4.5": ("random-walk-skin",), "5.2": ("random-walk-skin", "random-walk", "burley")}
-PLANE_TASK = BlenderTask("Cycles", "to render a half-lit plane", "See the message of Blender in brackets")
+HALF_LIT_PLANE_TASK = BlenderTask(
+    "Cycles", "to render a half-lit plane", "See the message of Blender in brackets"
+)
 
 
 def blender(python_45: Path, python_52: Path, *parts: Measurement) -> None:
@@ -60,26 +62,26 @@ def blender(python_45: Path, python_52: Path, *parts: Measurement) -> None:
     parts:
         Measurements to make [all]; other measurements keep their last results.
     """
-    pythons = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
+    python_by_version = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
     parts = parts or get_args(Measurement)
     results: JsonObject = read_results(RESULTS_FILE) if RESULTS_FILE.exists() else {}
     results["columns_in_d"] = column_positions().reshape(EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=1).tolist()
     if "edges" in parts:
-        results["edges"] = list(measure_edges(pythons))
+        results["edges"] = list(measure_edges(python_by_version))
         write_results(RESULTS_FILE, results)
     if "heads" in parts:
-        results["heads"] = list(measure_heads(pythons))
+        results["heads"] = list(measure_heads(python_by_version))
         write_results(RESULTS_FILE, results)
     if "picture" in parts:
-        write_picture(pythons)
+        write_hair_picture(python_by_version)
 
 
-def measure_edges(pythons: dict[str, Path]) -> Iterator[JsonObject]:
-    """Yield results of `measure_edge` for each Blender version, subsurface method and skin."""
-    for version, python in pythons.items():
+def measure_edges(python_by_version: dict[str, Path]) -> Iterator[JsonObject]:
+    """Yield results of `measure_edge_response` for each Blender version, subsurface method and skin."""
+    for version, python in python_by_version.items():
         for method in SUBSURFACE_METHODS:
             for name in COMPARED_SKINS:
-                yield measure_edge(python, version, method, name)
+                yield measure_edge_response(python, version, method, name)
                 print_lines(f"{version} {method} {name}")
 
 
@@ -88,7 +90,7 @@ def column_positions() -> Floats:
     return 12.0 * (np.arange(EDGE_BIN_COUNT * PIXELS_PER_BIN) + 0.5) / (EDGE_BIN_COUNT * PIXELS_PER_BIN) - 6.0
 
 
-def measure_edge(python: Path, version: str, subsurface_method: str, skin_name: str) -> JsonObject:
+def measure_edge_response(python: Path, version: str, subsurface_method: str, skin_name: str) -> JsonObject:
     """Return the measured and the predicted edge response of an exported skin, and its errors.
 
     An edge response is the radiance of a half-lit plane by distance from the edge of the light.
@@ -108,7 +110,7 @@ def measure_edge(python: Path, version: str, subsurface_method: str, skin_name: 
         folder = Path(folder_name)
         target.write(subject, rows, folder, version)
         (folder / "passes.json").write_text(json.dumps(passes), encoding="utf-8")
-        run_blender(python, SCRIPT, [str(folder)], 3600.0, PLANE_TASK)
+        run_blender(python, SCRIPT, [str(folder)], 3600.0, HALF_LIT_PLANE_TASK)
         output = json.loads((folder / "done.json").read_text(encoding="utf-8"))
     columns = np.array([[output["columns"][3 * k + c] for c in range(3)] for k in range(SEED_COUNT)])[..., 0]
     means = columns.reshape(SEED_COUNT, 3, EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=-1)
@@ -143,7 +145,7 @@ def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
     return np.asarray(np.array(columns).reshape(3, EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=-1))
 
 
-def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
+def measure_heads(python_by_version: dict[str, Path]) -> Iterator[JsonObject]:
     """Yield differences in outline and colour between pictures of a bald head by Cycles and dermis.
 
     There is one result for each Blender version and subsurface method.
@@ -153,7 +155,7 @@ def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
     head = replace(subject.scene.head, hair=None, strands=None)
     bald = replace(subject, scene=replace(subject.scene, head=head))
     ours = render_dermis(bald, HEAD_SIDE)
-    for version, python in pythons.items():
+    for version, python in python_by_version.items():
         for method in METHODS_BY_VERSION[version]:
             pictures = render_cycles(bald, method, version, python, HEAD_SIDE, HEAD_SAMPLES, HEAD_SEEDS)
             results = {"version": version, "method": method, "samples": HEAD_SEEDS * HEAD_SAMPLES}
@@ -162,13 +164,13 @@ def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
             yield results
 
 
-def write_picture(pythons: dict[str, Path]) -> None:
+def write_hair_picture(python_by_version: dict[str, Path]) -> None:
     """Write a picture that shows a head with hair, rendered by dermis and by each version of Cycles."""
     subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
     columns = [render_dermis(subject, PICTURE_SIDE)]
-    for version, python in pythons.items():
+    for version, python in python_by_version.items():
         method = METHODS_BY_VERSION[version][0]
         columns += render_cycles(subject, method, version, python, PICTURE_SIDE, PICTURE_SAMPLES, 1)
-    over_grey = [one[..., :3] + 0.4 * (1.0 - one[..., 3:]) for one in columns]
-    levels = encode_srgb(np.clip(np.concatenate(over_grey, axis=1), 0.0, 1.0))
+    composite_over_grey = [one[..., :3] + 0.4 * (1.0 - one[..., 3:]) for one in columns]
+    levels = encode_srgb(np.clip(np.concatenate(composite_over_grey, axis=1), 0.0, 1.0))
     Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=88)

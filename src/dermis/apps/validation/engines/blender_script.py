@@ -59,22 +59,22 @@ def main(folder: Path) -> None:
     (folder / "done.json").write_text(json.dumps(report), encoding="utf-8")
 
 
-def isolate_channel(shader: Any, description: dict[str, Any], channel: int) -> None:
+def isolate_channel(shader: Any, subsurface_parameters: dict[str, Any], channel: int) -> None:
     """Give all three channels the albedo and subsurface radius of one channel.
 
     Each path then contributes to the measurement of this channel.
 
-    description : subsurface parameters of the exported skin, with values for all channels
+    subsurface_parameters : subsurface parameters of the exported skin, with values for all channels
     """
-    shader.inputs["Base Color"].default_value = (*[description["colour"][channel]] * 3, 1.0)
-    radius = description["inputs"]["Subsurface Radius"][channel]
+    shader.inputs["Base Color"].default_value = (*[subsurface_parameters["colour"][channel]] * 3, 1.0)
+    radius = subsurface_parameters["inputs"]["Subsurface Radius"][channel]
     shader.inputs["Subsurface Radius"].default_value = [radius] * 3
 
 
-def add_rectangle(skin: Any, material: Any, left_m: float, right_m: float, height_m: float) -> Any:
+def add_rectangle(skin_script: Any, material: Any, left_m: float, right_m: float, height_m: float) -> Any:
     """Add a horizontal rectangle between two x coordinates, at a height; return its object.
 
-    skin : exported script, imported as a module
+    skin_script : exported script, imported as a module
     """
     mesh = bpy.data.meshes.new("rectangle")
     corners = [
@@ -85,7 +85,7 @@ def add_rectangle(skin: Any, material: Any, left_m: float, right_m: float, heigh
     ]
     mesh.from_pydata([(x, y, height_m) for x, y in corners], [], [(0, 1, 2, 3)])
     mesh.materials.append(material)
-    return skin.add_object("rectangle", mesh)
+    return skin_script.add_object("rectangle", mesh)
 
 
 def black_material() -> Any:
@@ -99,18 +99,18 @@ def black_material() -> Any:
 
 
 def column_radiance(
-    skin: Any, camera: Any, path: Path, width_m: float, picture_size: Any, **parameters: int
+    skin_script: Any, camera: Any, path: Path, width_m: float, picture_size: Any, **parameters: int
 ) -> Any:
     """Render a picture across the edge of the light, and return the mean radiance of each pixel column.
 
-    skin : exported script, imported as a module
+    skin_script : exported script, imported as a module
     width_m : width of the picture [m]
     """
     camera.ortho_scale = width_m
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = picture_size
     arguments = [word for name, value in parameters.items() for word in (f"--{name}", str(value))]
-    skin.finish(skin.parse_options(["--", "--render", str(path), *arguments]))
+    skin_script.finish(skin_script.parse_options(["--", "--render", str(path), *arguments]))
     picture = bpy.data.images.load(str(path))
     pixels = np.empty(picture_size[0] * picture_size[1] * 4, np.float32)
     picture.pixels.foreach_get(pixels)

@@ -13,7 +13,7 @@ COMPARED_SKINS = "skin1", "skin2", "marble", "dj3", "gpu-gems-3"
 GLTF_TARGET_VERSION = TARGET.versions[-1]
 
 
-def skin_results(skin_name: str) -> JsonObject:
+def gltf_results(skin_name: str) -> JsonObject:
     """Return the fitted glTF parameters of a skin, and predicted scattering errors.
 
     Errors are given for the fitted parameters, for parameters chosen without a fit, and for fitted parameters
@@ -48,6 +48,6 @@ def gltf() -> None:
     figures = {
         "version": GLTF_TARGET_VERSION,
         "draft": DRAFT_NOTICE,
-        "skins": {name: skin_results(name) for name in COMPARED_SKINS},
+        "skins": {name: gltf_results(name) for name in COMPARED_SKINS},
     }
     write_results(RESULTS_FILE, figures, 4)

@@ -86,7 +86,7 @@ def half_lit_plane(
     )
 
 
-def measured_edge(
+def measured_edge_response(
     mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, samples: int
 ) -> tuple[Floats, Floats, float]:
     """Measure the light scattered across the edge of a half-lit plane in Mitsuba.
@@ -111,7 +111,7 @@ def measured_edge(
     return response.mean(axis=0), response.std(axis=0, ddof=1) / np.sqrt(_PASS_COUNT), total
 
 
-def pixel_averages(curve: CumulativeProfile, channel: int, d_mm: float) -> Floats:
+def pixel_edge_response(curve: CumulativeProfile, channel: int, d_mm: float) -> Floats:
     """Return the predicted edge response (n,) of one channel of a profile, averaged over each pixel.
 
     curve : cumulative form of the profile
@@ -142,10 +142,12 @@ def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int
     for c in range(3):
         sigma, albedo = (get_numbers(rows, name)[c] for name in ("sigma_t", "albedo"))
         medium = IsotropicMedium((sigma,) * 3, (albedo,) * 3)
-        edge, error, total = measured_edge(mi, medium, boundary, float(d[c]), samples)
-        difference = edge - pixel_averages(predicted, c, float(d[c]))
+        edge, error, total = measured_edge_response(mi, medium, boundary, float(d[c]), samples)
+        difference = edge - pixel_edge_response(predicted, c, float(d[c]))
         results["predicted"].append(float(np.abs(difference).max()))
-        results["exported"].append(float(np.abs(edge - pixel_averages(subject.curve, c, float(d[c]))).max()))
+        results["exported"].append(
+            float(np.abs(edge - pixel_edge_response(subject.curve, c, float(d[c]))).max())
+        )
         results["noise"].append(float(error.mean()))
         results["rms"].append(float(np.sqrt((difference**2).mean())))
         # Radiance inside the medium is larger by the square of the index.

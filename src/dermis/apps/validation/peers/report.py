@@ -111,10 +111,10 @@ def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) ->
     }
 
 
-def software_versions(scenes: list[PeerRenders]) -> dict[str, str]:
+def software_versions(scene_renders: list[PeerRenders]) -> dict[str, str]:
     """Return the versions of Python, NumPy and all renderers, by name."""
     versions = {name: version(name) for name in ("dermis", "wgpu", "mitsuba", "numpy")}
-    passes = [turns[0][0] for one in scenes for turns in one.cycles.values() if turns]
+    passes = [turns[0][0] for one in scene_renders for turns in one.cycles.values() if turns]
     if passes:
         versions["Blender"] = passes[0].version
     return versions | {"Python": platform.python_version()}
@@ -136,11 +136,11 @@ def scenes_text(report: JsonObject) -> str:
     return "\n\n".join(sections)
 
 
-def scene_text(scene: JsonObject) -> str:
+def scene_text(scene_report: JsonObject) -> str:
     """Return a Markdown table of the renderers in one scene, and sentences about it."""
     head = f"| {' | '.join(_COLUMN_TITLES)} |\n|{'---|' * len(_COLUMN_TITLES)}"
-    table = [head, *(_table_line(row) for row in scene["rows"])]
-    return "\n".join([*table, "", *(f"- {sentence}" for sentence in _scene_sentences(scene))])
+    table = [head, *(_table_line(row) for row in scene_report["rows"])]
+    return "\n".join([*table, "", *(f"- {sentence}" for sentence in _scene_sentences(scene_report))])
 
 
 def machine_text(report: JsonObject) -> str:
@@ -167,34 +167,38 @@ def _estimate_cell(renderer_row: JsonObject, error_name: str) -> str:
     )
 
 
-def _scene_sentences(scene: JsonObject) -> list[str]:
-    sentences = [_random_walk_sentence(setting, times) for setting, times in scene.get("as_near", {}).items()]
-    corrected = "; ".join(f"{name} {error:.3f}" for name, error in scene["ours_energy_put_right"].items())
+def _scene_sentences(scene_report: JsonObject) -> list[str]:
+    sentences = [
+        _random_walk_sentence(setting, times) for setting, times in scene_report.get("as_near", {}).items()
+    ]
+    corrected = "; ".join(
+        f"{name} {error:.3f}" for name, error in scene_report["ours_energy_put_right"].items()
+    )
     sentences.append(f"Ours, each channel scaled to the reference's energy: {corrected}.")
     sentences += [
         f"The {name} take {ratio['ratio']:.2f} times as long as the first of ours, "
         f"{ratio['core_ratio']:.2f} times in CPU time."
-        for name, ratio in scene.get("published", {}).items()
+        for name, ratio in scene_report.get("published", {}).items()
     ]
-    if "burley_against_random_walk" in scene:
-        sentences.append(_burley_sentence(scene))
-    return sentences + [f"Skipped: {name}. {reason}" for name, reason in scene["left_out"].items()]
+    if "burley_against_random_walk" in scene_report:
+        sentences.append(_burley_sentence(scene_report))
+    return sentences + [f"Skipped: {name}. {reason}" for name, reason in scene_report["left_out"].items()]
 
 
-def _random_walk_sentence(setting: str, times: dict[str, dict[str, float]]) -> str:
-    walk, clean = f"{setting}: Cycles' random walk", f"noise of 5 % takes {_cost_text(times['clean'])}"
-    if "same_error" not in times:
+def _random_walk_sentence(setting: str, cycles_times: dict[str, dict[str, float]]) -> str:
+    walk, clean = f"{setting}: Cycles' random walk", f"noise of 5 % takes {_cost_text(cycles_times['clean'])}"
+    if "same_error" not in cycles_times:
         return f"{walk} never has as small an error, because its bias is larger; {clean}."
-    same = times["same_error"]
+    same = cycles_times["same_error"]
     reached = "reached" if same["ratio"] >= TARGET_TIME_RATIO else "not reached"
     goal = f"goal {TARGET_TIME_RATIO:.0f} {reached}"
     return f"{walk} has the same error after {_cost_text(same)}, {goal}; {clean}."
 
 
-def _cost_text(times: dict[str, float]) -> str:
+def _cost_text(cycles_times: dict[str, float]) -> str:
     """Return text with the time and paths of Cycles, and with its time relative to a frame of dermis."""
-    elapsed, cpu = (_ratio_text(times[name]) for name in ("ratio", "core_ratio"))
-    cost = f"{times['seconds']:.3g} s ({times['samples']:.0f} paths per pixel)"
+    elapsed, cpu = (_ratio_text(cycles_times[name]) for name in ("ratio", "core_ratio"))
+    cost = f"{cycles_times['seconds']:.3g} s ({cycles_times['samples']:.0f} paths per pixel)"
     return f"{cost}: {elapsed} times our frame, {cpu} in CPU time"
 
 
@@ -202,15 +206,15 @@ def _ratio_text(ratio: float) -> str:
     return f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.1f}"
 
 
-def _burley_sentence(scene: JsonObject) -> str:
+def _burley_sentence(scene_report: JsonObject) -> str:
     """Return a sentence that compares the error of Burley's profile with that of dermis.
 
     The error of Burley's profile is relative to Cycles' random walk, the error of dermis to path tracing.
     """
-    burley_error, error = scene["burley_against_random_walk"]
+    burley_error, error = scene_report["burley_against_random_walk"]
     verdicts = []
-    for row in scene["rows"]:
-        if row["setting"] in scene["ours_energy_put_right"]:
+    for row in scene_report["rows"]:
+        if row["setting"] in scene_report["ours_energy_put_right"]:
             reached = "reached" if row["relrmse"] <= burley_error else "not reached"
             verdicts.append(f"{row['setting']} {row['relrmse']:.4f}, {reached}")
     return (

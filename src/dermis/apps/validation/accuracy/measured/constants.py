@@ -162,14 +162,18 @@ def fit_constants(
     shared = [CONSTANTS[name] for name in free_constants]
     z = np.array([one.coordinate(dict(fixed_constants or {}).get(one.name, one.start)) for one in shared])
 
-    def constants_at(point: Floats) -> dict[str, float]:
-        values = {one.name: float(one.parameter_values(point[i : i + 1])[0]) for i, one in enumerate(shared)}
+    def constants_at(coordinates: Floats) -> dict[str, float]:
+        values = {
+            one.name: float(one.parameter_values(coordinates[i : i + 1])[0]) for i, one in enumerate(shared)
+        }
         return dict(fixed_constants or {}) | values
 
-    def fit_unknowns(point: Floats, start: SpectralFit | None, iterations: int) -> tuple[SpectralFit, Floats]:
-        model = extended_model(constants_at(point))
-        first = None if start is None else start.values
-        found = invert_spectra(spectra, model, separate, criterion, first, iterations)
+    def fit_unknowns(
+        coordinates: Floats, start_fit: SpectralFit | None, iteration_count: int
+    ) -> tuple[SpectralFit, Floats]:
+        model = extended_model(constants_at(coordinates))
+        first = None if start_fit is None else start_fit.values
+        found = invert_spectra(spectra, model, separate, criterion, first, iteration_count)
         return found, found.weighted_residual(criterion).ravel()
 
     fit, r = fit_unknowns(z, None, 25)

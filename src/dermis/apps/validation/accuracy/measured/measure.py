@@ -59,7 +59,7 @@ _OXYGEN_LIMIT_TOLERANCE, _MAX_MATCHED_DELTA_E = (
     1e-6,
     0.25,
 )  # tolerance of oxygen at a bound [-], and of a matched colour [CIEDE2000]
-_REGRESSION_NEIGHBOURS = 80  # of other people, for the local regression of colours
+_REGRESSION_NEIGHBOUR_COUNT = 80  # of other people, for the local regression of colours
 _ERROR_PERCENTILES = 50.0, 95.0
 _DONNER_JENSEN_SKIN = SkinParameters(baseline=1.0, epidermis_mm=0.25, oxygen=0.75)
 _EDGE_LOSS_MELANIN = 0.01, 0.03, 0.1, 0.3
@@ -95,12 +95,12 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
         "counts": lambda: {"spectra": len(archive.spectra), "folds": FOLD_COUNT},
         "models": lambda: _default_skin_errors(archive),
         "surface": lambda: _smooth_surface_errors(archive),
-        "limits": lambda: _limit_fractions(archive),
+        "limits": lambda: _implausible_fit_fractions(archive),
         "folds": lambda: _fold_errors(archive),
         "alternatives": lambda: _published_model_errors(
             archive.sample_rows(_SPECTRA_SAMPLE_COUNT, 2), bioskin
         ),
-        "additions": lambda: _addition_errors(archive.sample_rows(_CONSTANTS_SAMPLE_COUNT, 3)),
+        "additions": lambda: _additional_constant_errors(archive.sample_rows(_CONSTANTS_SAMPLE_COUNT, 3)),
         "sites": lambda: _site_fits(archive),
         "site_folds": lambda: _site_fold_errors(archive),
         "edge": lambda: _edge_loss_errors(archive.sample_rows(_CONSTANTS_SAMPLE_COUNT, 3)),
@@ -197,11 +197,11 @@ def _surface_distances(archive_part: Archive) -> Floats:
     mean, scale = colours.mean(axis=0), colour_metric(np.median(colours, axis=0)[None])[0]
     axes = np.linalg.svd((colours - mean) @ scale.T, full_matrices=False)[2]
     point = (colours - mean) @ scale.T @ axes.T
-    nearest = np.asarray(cKDTree(point[:, :2]).query(point[:, :2], k=_REGRESSION_NEIGHBOURS + 40)[1])
+    nearest = np.asarray(cKDTree(point[:, :2]).query(point[:, :2], k=_REGRESSION_NEIGHBOUR_COUNT + 40)[1])
     on_surface = point.copy()
     for k, neighbours in enumerate(nearest):
         others = neighbours[archive_part.person[neighbours] != archive_part.person[k]][
-            :_REGRESSION_NEIGHBOURS
+            :_REGRESSION_NEIGHBOUR_COUNT
         ]
         A = np.column_stack([np.ones(len(others)), point[others, :2] - point[k, :2]])
         on_surface[k, 2] = np.linalg.lstsq(A, point[others, 2], rcond=None)[0][0]
@@ -209,7 +209,7 @@ def _surface_distances(archive_part: Archive) -> Floats:
     return delta_e_2000(linear_of_lab(nearby), linear_of_lab(colours))
 
 
-def _limit_fractions(archive: Archive) -> JsonObject:
+def _implausible_fit_fractions(archive: Archive) -> JsonObject:
     """Return the fractions of implausible or failed fits of three unknowns to measured colours.
 
     The keys are "none" for a fitted oxygenation of 0, "all" for an oxygenation of 1, and "unmatched" for fits
@@ -227,7 +227,7 @@ def _limit_fractions(archive: Archive) -> JsonObject:
 def _category_errors(
     archive: Archive,
     categories: Sequence[object],
-    labels: np.ndarray,
+    category_by_spectrum: np.ndarray,
     two_unknown_fit: SpectralFit,
     three_unknown_fit: SpectralFit,
     five_unknown_fit: SpectralFit,
@@ -238,11 +238,11 @@ def _category_errors(
     measured and fitted spectra for five unknowns.
 
     categories : all groups or all sites
-    labels : (n,) group or site of each spectrum
+    category_by_spectrum : (n,) group or site of each spectrum
     """
     rows = []
     for category in categories:
-        chosen = labels == category
+        chosen = category_by_spectrum == category
         medians = [float(np.median(one.delta_e()[chosen])) for one in (two_unknown_fit, three_unknown_fit)]
         rows.append([int(chosen.sum()), *medians, float(np.median(five_unknown_fit.rms[chosen]))])
     return rows
@@ -337,7 +337,7 @@ def _jacques_model(parameter_values: ParameterValues) -> Floats:
     )
 
 
-def _addition_errors(sample: Archive) -> list[JsonObject]:
+def _additional_constant_errors(archive_sample: Archive) -> list[JsonObject]:
     """Return fit errors of the skin model with each additional constant, for three and for five unknowns."""
     rows = []
     for name, free in _CONSTANTS_BY_ADDITION.items():
@@ -346,7 +346,7 @@ def _addition_errors(sample: Archive) -> list[JsonObject]:
             shared = ("baseline", "epidermis_mm") if label == "three" else ("baseline",)
             if label == "five" and free == ("scattering",):
                 continue
-            found = fit_constants(sample.spectra, unknowns, (*shared, *free))
+            found = fit_constants(archive_sample.spectra, unknowns, (*shared, *free))
             row[label] = {
                 "rms": float(np.sqrt((found.fit.residual**2).mean())),
                 "constants": found.constants,
@@ -406,7 +406,7 @@ def _site_fold_errors(archive: Archive) -> JsonObject:
     }
 
 
-def _edge_loss_errors(sample: Archive) -> JsonObject:
+def _edge_loss_errors(archive_sample: Archive) -> JsonObject:
     """Return the edge loss of each aperture, and constants fitted to spectra corrected for it.
 
     The edge loss is the fraction of the reflected light that an aperture of a spectrophotometer misses.
@@ -423,15 +423,16 @@ def _edge_loss_errors(sample: Archive) -> JsonObject:
         loss = np.array([np.interp(WAVELENGTHS_NM, _EDGE_LOSS_WAVELENGTHS_NM, one[name]) for one in losses])
         seen = true * (1.0 - loss)
         factor = np.stack(
-            [1.0 - np.interp(sample.spectra[:, k], seen[::-1, k], loss[::-1, k]) for k in range(31)], axis=-1
+            [1.0 - np.interp(archive_sample.spectra[:, k], seen[::-1, k], loss[::-1, k]) for k in range(31)],
+            axis=-1,
         )
-        found = fit_constants(sample.spectra / factor, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
+        found = fit_constants(archive_sample.spectra / factor, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
         results[name] = {
             "loss": [one[name] for one in losses],
             "constants": found.constants,
             "rms": float(np.sqrt((found.fit.residual**2).mean())),
         }
-    uncorrected = fit_constants(sample.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
+    uncorrected = fit_constants(archive_sample.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
     results["uncorrected"] = {
         "constants": uncorrected.constants,
         "rms": float(np.sqrt((uncorrected.fit.residual**2).mean())),
