@@ -61,7 +61,7 @@ def add_mesh(arrays: dict[str, Any], materials: list[Any]) -> None:
 
 
 def make_material(material_description: dict[str, Any], maps: dict[str, Any]) -> Any:
-    """Return a new material.
+    """Return a new Blender material with the shader and the parameters of a description.
 
     material_description : shader and parameters of the material
     maps : dictionary from name to image array

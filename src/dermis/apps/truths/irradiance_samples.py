@@ -1,4 +1,4 @@
-"""Irradiance samples at the corners of small triangles of a mesh, denser where the light changes."""
+"""Irradiance samples at the corners of small triangles on a mesh, denser where the irradiance varies."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class IrradianceSamples:
 
     positions : (n, 3) sample positions [mm]
     triangles : (m, 3) sample indices of the corners; the triangles cover the surface without overlaps
-    irradiance : (n, 3) irradiance at each sample, 0 or more
+    irradiance : (n, 3) irradiance at each sample, never negative
     """
 
     positions: Floats

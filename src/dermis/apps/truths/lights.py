@@ -150,7 +150,7 @@ def cycles_point(light: PointLight) -> SceneDict:
 
 
 def cycles_spot(light: SpotLight) -> SceneDict:
-    """Return Cycles' spot light; its edge falls off smoothly in the cosine, as in dermis."""
+    """Return Cycles' spot light; its intensity falls off smoothly at the edge of the cone, as in dermis."""
     inner, outer = (float(np.cos(np.radians(a))) for a in (light.inner_degrees, light.outer_degrees))
     size, blend = 2.0 * np.radians(light.outer_degrees), (inner - outer) / (1.0 - outer)
     return _cycles_point_light("SPOT", light, spot_size=size, spot_blend=blend)

@@ -61,7 +61,7 @@ def load_mitsuba() -> Mitsuba:
 
 @contextmanager
 def mitsuba_variant(mi: Mitsuba, variant_name: str) -> Iterator[None]:
-    """Set a variant of Mitsuba during a context, and restore the previous variant afterwards."""
+    """Set a variant of Mitsuba inside a `with` block, and restore the previous variant afterwards."""
     before = mi.variant()
     mi.set_variant(variant_name)
     try:

@@ -110,7 +110,7 @@ def _gather_triangle(
 ) -> int:
     """Add to `exitance` the light that reaches a point from a triangle; return the number of parts visited.
 
-    The triangle is split until each part is small compared with its distance from the point.
+    The triangle is split until the light of each part is approximated well by points at its side midpoints.
     """
     triangle_stack.corners[0], triangle_stack.irradiance[0], triangle_stack.area[0] = (
         tree.corners[triangle_index],

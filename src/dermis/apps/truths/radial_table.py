@@ -104,8 +104,8 @@ class ProfileTable(NamedTuple):
 def tabulate_profile(profile: Profile) -> ProfileTable:
     """Return the table of a profile, with bounds of its derivatives and the permitted error at each radius.
 
-    The permitted error is mainly proportional to the square root of the curvature. This keeps the number of
-    surface patches small for which the surface integral evaluates the profile.
+    The permitted error is mainly proportional to the square root of the curvature. As a result, a surface
+    integral evaluates the profile for a small number of surface patches.
     """
     end = profile.end_mm
     root = np.linspace(0.0, np.sqrt(end), PROFILE_TABLE_ROWS)
@@ -131,9 +131,9 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
 
 
 def _bound_beyond_radius(radial_values: Floats, energy: Floats, has_energy: NDArray[np.bool_]) -> Floats:
-    """Return for each row the largest value (rows,) that any channel has at this or a larger radius.
+    """Return for each row the largest value (rows,) that any channel has in this row or in a later row.
 
-    radial_values : (rows, 3) function of the radius by channel
+    radial_values : (rows, 3) function of the radius by channel, in order of increasing radius
     energy : (3,) energy of the profile by channel; the values of each channel are divided by it
     has_energy : (3,) mask of channels with energy
     """

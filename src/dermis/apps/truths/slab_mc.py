@@ -298,7 +298,7 @@ class ScatteringLayer:
 
 @dataclass(frozen=True, eq=False)
 class SlabResult:
-    """Reflected, transmitted and absorbed fractions of the beam's power, each with its standard error [-].
+    """Reflected, transmitted and absorbed fractions of the beam's power, with standard errors [-].
 
     The specular, total, unscattered, absorbed and unfinished fractions sum to 1. Names that end in `_se` are
     standard errors. They are those of a binomial distribution, and 0 where no photon was counted.

@@ -98,9 +98,9 @@ def resolved_levels(variances_mm2: ArrayLike, edge_mm: float) -> NDArray[np.bool
 
 
 def max_edge_mm(variances_mm2: ArrayLike) -> float:
-    """Return the largest edge length of a mesh that resolves all given Gaussian blurs [mm].
+    """Return the largest edge length at which a mesh resolves all given Gaussian blurs [mm].
 
-    It is half the smallest standard deviation that a blur adds to the next smaller blur.
+    This length is half the smallest standard deviation that a blur adds to the next smaller blur.
 
     variances_mm2 : (k,) increasing variances of the blurs, above 0 [mm2]
     """
@@ -241,7 +241,7 @@ def intrinsic_triangulation(positions: Floats, triangles: Index) -> IntrinsicTri
 
 
 def intrinsic_delaunay(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
-    """Flip the edges of a triangulation until it is an intrinsic Delaunay triangulation; return the result.
+    """Return the intrinsic Delaunay triangulation of the same surface, computed by edge flips.
 
     The two angles opposite each edge then sum to at most pi, so heat flows from hot to cold along every edge,
     even if the mesh has obtuse angles. An edge is not flipped if it lies on a border, if more than two

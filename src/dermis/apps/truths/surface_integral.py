@@ -33,7 +33,7 @@ def integrate_exitance(
 
     points : (n, 3) positions x on the surface [mm]
     samples : irradiance E, linear on triangles that must be small enough for shadows and other details
-    profile : profile R, a function of the Euclidean distance, so light also passes through ears and nostrils
+    profile : profile R, a function of the Euclidean distance, so light also passes through ears
     relative_error : expected root mean square error of the integral divided by its mean, 1e-5 to 0.05 [-]
 
     Source: [JensenBuhler2002], but with Taylor's remainder as criterion in place of the solid angle.

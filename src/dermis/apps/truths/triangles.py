@@ -39,7 +39,7 @@ def triangle_edges(positions: Floats, corners: Index) -> tuple[Index, Index, Flo
 def split_triangles(
     corners: Index, barycentric: Floats, side_midpoints: Index, positions: Floats | None = None
 ) -> tuple[Index, Index, Floats]:
-    """Split triangles at halved sides; return the new triangles with their parents and weights.
+    """Split triangles at halved sides; return the new triangles, and where they lie in the old triangles.
 
     The results are the vertex indices (m, 3) of the new triangles; the index (m,) of the triangle that each
     of them is a part of; and the barycentric weights (m, 3, 3) of their corners, defined as in `barycentric`.

@@ -89,7 +89,7 @@ class InitialGuess:
     specular strengths only scale these radiances, so each trial solves small normal equations without
     rendering.
 
-    frames : renderer of the face
+    face_renderer : renderer of the face
     point : pigments and candidate suns for which the frames are rendered
     photo_radiance : (p, 3) radiance of the photograph's pixels in the mask
     pixel_weight : (p, 3) inverse standard deviations of these pixels
@@ -153,7 +153,7 @@ class InitialGuess:
 
         The skins are the nodes of a grid of melanin, blood and specular strength.
 
-        log_skin : (4,) logarithms of the skin unknowns, of which only the roughness is used
+        log_skin : (4,) logarithms of the skin parameters (see `FitPoint`); only the roughness is used
         sun_indices : indices of the candidate suns
         """
         grid = product(np.log(melanin_grid), np.log(_BLOOD_GRID), np.log(_SPECULAR_STRENGTH_GRID))
@@ -163,7 +163,7 @@ class InitialGuess:
     def _select_suns(self, log_skin: Floats, sun_count: int) -> list[int]:
         """Return the indices of `sun_count` suns, chosen greedily: each lowers the residual the most.
 
-        log_skin : (4,) logarithms of the skin unknowns
+        log_skin : (4,) logarithms of the skin parameters, see `FitPoint`
         """
         selected: list[int] = []
         for _ in range(sun_count):
@@ -177,7 +177,7 @@ class InitialGuess:
         The rendered diffuse radiance is scaled to the colour of the skin, and the rendered specular radiance
         to its specular strength.
 
-        log_skin : (4,) logarithms of the skin unknowns
+        log_skin : (4,) logarithms of the skin parameters, see `FitPoint`
         sun_indices : indices of the candidate suns
         """
         lights = np.array([*range(AMBIENT_LOBE_COUNT), *(AMBIENT_LOBE_COUNT + k for k in sun_indices)])
@@ -215,8 +215,8 @@ def fit(
 ) -> FitResult:
     """Fit light and skin to a photograph of a head of known shape.
 
-    All lights have the same colour. The exposure is given, because a photograph cannot tell the exposure from
-    the strength of the light.
+    All lights have the same colour. The exposure is not estimated, because a photograph does not distinguish
+    between a longer exposure and stronger light.
 
     Parameters
     ----------

@@ -87,7 +87,7 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
         colours = repair_radiance(name, np.asarray(colours, np.float32))
     else:
         usable &= colours.max(axis=2) < _CLIPPED_LEVEL_FRACTION * full
-    return Photograph(space.linear(colours).astype(np.float64), usable.astype(np.float64))
+    return Photograph(space.to_linear(colours).astype(np.float64), usable.astype(np.float64))
 
 
 def _area_average(picture: Floats, new_size: tuple[int, int]) -> Floats:

@@ -158,7 +158,7 @@ def _landmark_derivative(
 
 
 def _prior_log_focal(photo_size: tuple[int, int]) -> float:
-    """Return the logarithm of the focal length in pixels of a usual portrait: the mean of the prior.
+    """Return the logarithm of a usual portrait's focal length in pixels, which is the mean of the prior.
 
     photo_size : width and height of the photograph [pixel]
     """

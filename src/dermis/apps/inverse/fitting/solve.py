@@ -216,9 +216,9 @@ def _normal_equations(problem: FitProblem, fit_state: FitState, derivatives: Flo
 
 
 def _eliminate_lights(fit_state: FitState, J: Floats) -> tuple[Floats, Floats]:
-    """Return derivatives (3 p, u) orthogonal to changes of light strengths, and weighted residuals (3 p,).
+    """Return derivatives (3 p, u) with changes of the lights projected out, and weighted residuals (3 p,).
 
-    The strength of a sun is kept fixed if it is 0, because it cannot decrease further.
+    A sun of strength 0 keeps this strength, because it cannot decrease further.
 
     J : (3 p, u) derivatives of the radiance, multiplied by the weights
     """

@@ -78,7 +78,7 @@ def pigmented_skin(parameters: SkinParameters, colour: ArrayLike, eta: float) ->
 
 
 def with_deepest_albedo(medium: Medium, albedo: ArrayLike) -> Medium:
-    """Return a medium with a new single-scattering albedo (3,) in its last layer, at the same extinction."""
+    """Return the medium with another single-scattering albedo (3,) of its last layer, at equal extinction."""
     *above, last = medium.layers
     extinction, albedo = last.sigma_t_prime, np.asarray(albedo)
     return replace(
@@ -141,7 +141,7 @@ def _half_space_albedo(colour: ArrayLike, eta: float) -> Doubles:
 def _half_space_reflectance_table(eta: float) -> tuple[Doubles, Doubles]:
     """Return reflectances of half-spaces at normal incidence, and sqrt(1 - single-scattering albedo) of each.
 
-    The reflectances are exact for an index of refraction of 1, and counted by Monte Carlo for `SKIN_ETA`.
+    The reflectances are exact for an index of refraction of 1, and from Monte Carlo for `SKIN_ETA`.
     """
     roots = np.linspace(1.0, _MIN_ROOT_ABSORPTION, _HALF_SPACE_TABLE_ALBEDO_COUNT)
     if eta == 1.0:

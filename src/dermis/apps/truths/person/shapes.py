@@ -95,7 +95,7 @@ def refracting_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject
 
 
 def lambertian_skin_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
-    """Return the BSDF of skin with two specular lobes over a Lambertian base with the colour map."""
+    """Return the BSDF of skin with two specular lobes over a Lambertian base, which has the colour map."""
     fraction = 1.0 - COAT_TRANSMITTANCE
     base = {
         "type": "diffuse",
@@ -209,10 +209,10 @@ def eyeball_mesh() -> tuple[Doubles, Index, Doubles, Doubles]:
 
 
 def _grid_triangles(row_count: int, column_count: int) -> Index:
-    """Return the triangles of a grid of points on a surface of revolution.
+    """Return the triangles between rings of points on a surface of revolution.
 
-    row_count : number of angles from the axis
-    column_count : number of azimuths
+    row_count : number of rings around the axis
+    column_count : number of points in each ring
     """
     first = (np.arange(row_count - 1)[:, None] * column_count + np.arange(column_count - 1)).ravel()
     a, b, c, d = first, first + column_count, first + column_count + 1, first + 1
@@ -353,7 +353,7 @@ def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating])
 
 
 def bspline_control_points(knots: Doubles) -> Doubles:
-    """Return the control points (n, k + 2, c) of uniform cubic B-splines through knots, uncurved at the ends.
+    """Return the control points (n, k + 2, c) of uniform cubic B-splines through knots, straight at the ends.
 
     knots : (n, k, c) points through which the curves pass
     """
