@@ -321,10 +321,10 @@ def _sparse_form_factors(
 
 
 def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) -> tuple[Index, Words, Words]:
-    """Divide the uv square into patches; return cells' patches, and triangles and weights of sample points.
+    """Divide the uv square into patches, and choose the sample points of each patch.
 
-    The patch indices have the shape (CELLS_PER_SIDE^2,) and are -1 for cells without texels. The weights are
-    packed barycentric weights, as in `FormFactors`.
+    Returns the patch index of each cell (CELLS_PER_SIDE^2,), which is -1 for cells without texels. Also
+    returns the triangles and the packed weights of the sample points, as in `FormFactors`.
     """
     triangle, weights, rank = _sample_points(mesh, mapped_triangles)
     half, cell = CELLS_PER_SIDE // 2, _cell_index(corner_uv[triangle], weights)

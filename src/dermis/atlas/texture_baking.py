@@ -133,7 +133,7 @@ class _Baker:
         if "opacity" in material.textures:
             colour_map[..., 3:] *= self._sample_picture(tile, material.textures["opacity"], "opacity")
         is_opaque = material.alpha_mode == "opaque"
-        colour_map[..., 3] = 1.0 if is_opaque else colour_map[..., 3] + 0.5 - material.cutoff
+        colour_map[..., 3] = 1.0 if is_opaque else colour_map[..., 3] + 0.5 - material.opacity_cutoff
         if self.surface.colours is not None:
             colour_map[..., :3] *= self._interpolate_to_texels(tile, self.surface.colours[tile.vertices])
 
@@ -141,7 +141,7 @@ class _Baker:
         """Return a picture resampled to the texels of a tile, (h, w, k)."""
         picture = read_linear_picture(texture, role)
         base = base_texture(self._tile_material(tile))
-        if base is not None and base.mapping == texture.mapping:
+        if base is not None and base.uv_mapping == texture.uv_mapping:
             (width, height), span = tile.size, tile.high - tile.low
             u = tile.low[0] + (np.arange(width) + 0.5) / width * span[0]
             v = tile.low[1] + (np.arange(height) + 0.5) / height * span[1]

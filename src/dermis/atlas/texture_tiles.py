@@ -57,9 +57,9 @@ class Tile:
 
 
 def base_texture(material: FileMaterial) -> Texture | None:
-    """Return the texture of a material whose uv mapping its tile uses; None for a material without textures.
+    """Return the texture that determines the uv mapping of a material's tile; None without textures.
 
-    This is the colour texture or, if the material has none, its first texture.
+    This is the colour texture of the material or, if there is none, its first texture.
     """
     return material.textures.get("colour") or next(iter(material.textures.values()), None)
 

@@ -44,7 +44,7 @@ class Recording(Recorder):
 
     @cached_property
     def access(self) -> Access:
-        """Return the resources that the recording reads, and those other than scratch that it writes."""
+        """Return the resources that the recording reads, and the non-scratch resources that it writes."""
         writes = tuple(state for state in self._writes if not state.scratch)
         return Access(new_access_id(), tuple(self._reads), writes)
 

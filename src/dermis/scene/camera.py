@@ -14,7 +14,7 @@ from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
 from dermis.base.renamed import renamed_attribute
 from dermis.mesh.head import Head
-from dermis.scene.field_errors import Reason
+from dermis.scene.field_errors import BoundsReason
 from dermis.scene.frozen_model import Direction, FrozenModel, Vector
 from dermis.scene.opencv import OpenCvCamera, camera_fields, extrinsics, intrinsics
 
@@ -24,7 +24,7 @@ _FRAME_SIZE_PER_MESH_SIZE = 1.08  # size of the frame relative to a mesh that is
 _WORLD_UP = (0.0, 1.0, 0.0)
 
 
-_PictureFraction = Annotated[float, Field(ge=-10, le=10), Reason("lenses do not shift farther")]
+_PictureFraction = Annotated[float, Field(ge=-10, le=10), BoundsReason("lenses do not shift farther")]
 
 
 class Window(NamedTuple):
@@ -66,12 +66,16 @@ class Camera(FrozenModel):
     """Point on the optical axis, normally in the middle of the picture [mm]."""
     up: Direction = (0.0, 1.0, 0.0)
     """Direction that is up in the picture."""
-    frame_mm: Annotated[float, Field(ge=0.01, le=1e5), Reason("mm: from a part of a pore to a crowd")] = 340.0
+    frame_mm: Annotated[
+        float, Field(ge=0.01, le=1e5), BoundsReason("mm: from a part of a pore to a crowd")
+    ] = 340.0
     """Height of the picture in the plane of the target [mm]."""
     principal_point: tuple[_PictureFraction, _PictureFraction] = (0.5, 0.5)
     """Point of the picture on the optical axis, as fractions of width and height from the upper left
     corner."""
-    pixel_aspect: Annotated[float, Field(ge=0.1, le=10), Reason("pixels of sensors are nearly square")] = 1.0
+    pixel_aspect: Annotated[
+        float, Field(ge=0.1, le=10), BoundsReason("pixels of sensors are nearly square")
+    ] = 1.0
     """Width of a pixel divided by its height."""
 
     @model_validator(mode="after")

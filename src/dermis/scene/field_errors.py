@@ -23,8 +23,8 @@ _MAX_NAME_LENGTH = 80
 _MAX_TABLE_LENGTH = 160
 
 
-class Keywords:
-    """Annotation of a numeric field that also accepts words, as in `Annotated[float, Keywords("auto")]`."""
+class AcceptedWords:
+    """Annotation of a numeric field for words that it also accepts, as in `AcceptedWords("auto")`."""
 
     def __init__(self, *words: str) -> None:
         self.words = words
@@ -42,7 +42,7 @@ class Keywords:
         )
 
 
-class Reason(str):
+class BoundsReason(str):
     """Annotation of a numeric field: the reason for the field's bounds, which error messages quote."""
 
     __slots__ = ()
@@ -77,7 +77,7 @@ def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
     for name, info in model.model_fields.items():
         kinds = set(_leaf_types(info.annotation))
         if kinds & {float, int} and kinds <= {float, int, NoneType}:
-            found[name] = any(isinstance(one, Keywords) or hasattr(one, "func") for one in info.metadata)
+            found[name] = any(isinstance(one, AcceptedWords) or hasattr(one, "func") for one in info.metadata)
     return found
 
 
@@ -103,7 +103,7 @@ def to_python_numbers(field_value: Any, accepts_text: bool = False) -> Any:
 
 def field_keywords(model: type[BaseModel], field: str) -> tuple[str, ...]:
     """Return the words that a numeric field accepts besides numbers, such as "auto"."""
-    found = [one.words for one in model.model_fields[field].metadata if isinstance(one, Keywords)]
+    found = [one.words for one in model.model_fields[field].metadata if isinstance(one, AcceptedWords)]
     return found[0] if found else ()
 
 
@@ -147,7 +147,7 @@ def _format_error(pydantic_error: ErrorDetails, model: type[BaseModel]) -> str:
 def _range_text(location: tuple[int | str, ...], model: type[BaseModel]) -> str:
     """Return the range of a number as text, such as "a number from 0 to 1"; "" for a number without bounds.
 
-    If the field has a `Reason` for its bounds, the text ends with this reason in parentheses.
+    If the field has a `BoundsReason`, the text ends with this reason in parentheses.
 
     location : path of the number in the model: the field name, then indices
     """
@@ -157,7 +157,7 @@ def _range_text(location: tuple[int | str, ...], model: type[BaseModel]) -> str:
     if len(location) > 1 and get_args(info.annotation):
         info = FieldInfo.from_annotation(get_args(info.annotation)[-1])
     low, high = field_bounds(info)
-    reasons = [one for one in info.metadata if isinstance(one, Reason)]
+    reasons = [one for one in info.metadata if isinstance(one, BoundsReason)]
     reason = f" ({reasons[0]})" if reasons else ""
     kind = "a whole number" if set(_leaf_types(info.annotation)) <= {int, NoneType} else "a number"
     return f"{kind} from {low:.10g} to {high:.10g}{reason}" if low is not None and high is not None else ""

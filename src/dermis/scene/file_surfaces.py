@@ -57,15 +57,15 @@ def directly_usable_material(rigged: RiggedMesh, materials: Sequence[FileMateria
         return material
     uv = mesh.uv[np.unique(mesh.triangles[skin[mesh.material]])]
     inside = uv.min() > -UV_TOLERANCE and uv.max() < 1.0 + UV_TOLERANCE
-    plain = all(texture.mapping == (0, IDENTITY_UV_TRANSFORM) for texture in material.textures.values())
+    plain = all(texture.uv_mapping == (0, IDENTITY_UV_TRANSFORM) for texture in material.textures.values())
     return material if inside and plain and not _has_colours(mesh, surface, skin) else None
 
 
 def with_material_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]) -> Maps:
     """Return the maps of a skin material, multiplied by the factors of the material in the file.
 
-    A file stores the square root of the Beckmann roughness m. The product of its roughness map and roughness
-    factor is therefore squared.
+    Files store the square root of the Beckmann roughness m. The product of the roughness map and the
+    roughness factor is therefore squared.
 
     user_roles : roles, such as "colour", of maps that the user replaces; these maps are not multiplied
     """
@@ -209,7 +209,7 @@ def _with_surface(material: Material, file_material: FileMaterial | None, has_ma
         roughness=file_material.roughness,
         metalness=file_material.metalness,
         emission=file_material.emission,
-        opacity_cutoff=0.0 if file_material.alpha_mode == "opaque" else file_material.cutoff,
+        opacity_cutoff=0.0 if file_material.alpha_mode == "opaque" else file_material.opacity_cutoff,
     )
 
 

@@ -18,7 +18,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.pose import MAX_WEIGHT, Pose
 from dermis.scene.camera import CAMERA_PRESETS, Camera, find_camera_preset
 from dermis.scene.environment import Environment
-from dermis.scene.field_errors import InvalidFieldsError, Reason
+from dermis.scene.field_errors import BoundsReason, InvalidFieldsError
 from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.head_table import AUTO, NO_REGIONS, HeadTable, has_region_table
 from dermis.scene.heads import load_head
@@ -32,7 +32,7 @@ P = TypeVar("P", bound=FrozenModel)
 _SCENE_TABLE_NAMES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
 _MAP_ROLES = ("colour", "normal", "height", "specular", "roughness")
 _TargetWeight = Annotated[
-    float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), Reason("faces break apart long before")
+    float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), BoundsReason("faces break apart long before")
 ]
 
 

@@ -30,8 +30,8 @@ from pydantic_core import PydanticUndefined
 from dermis.base.errors import format_value, refuse
 from dermis.base.registry import RegisteredName
 from dermis.scene.field_errors import (
+    BoundsReason,
     InvalidFieldsError,
-    Reason,
     field_bounds,
     field_keywords,
     messages_by_field,
@@ -59,17 +59,17 @@ def _checked_direction(vector: tuple[float, float, float]) -> tuple[float, float
 Coordinate = Annotated[
     float,
     Field(ge=-MAX_COORDINATE_MM, le=MAX_COORDINATE_MM),
-    Reason("mm: beyond a kilometre single precision is too coarse for skin"),
+    BoundsReason("mm: beyond a kilometre single precision is too coarse for skin"),
 ]
 Vector = tuple[Coordinate, Coordinate, Coordinate]
 _DirectionComponent = Annotated[
-    float, Field(ge=-MAX_COORDINATE_MM, le=MAX_COORDINATE_MM), Reason("only their ratios count")
+    float, Field(ge=-MAX_COORDINATE_MM, le=MAX_COORDINATE_MM), BoundsReason("only their ratios count")
 ]
 Direction = Annotated[
     tuple[_DirectionComponent, _DirectionComponent, _DirectionComponent], AfterValidator(_checked_direction)
 ]
 Intensity = Annotated[
-    float, Field(ge=0, le=1e6), Reason("light is not negative, and the sun on skin is about 3")
+    float, Field(ge=0, le=1e6), BoundsReason("light is not negative, and the sun on skin is about 3")
 ]
 Colour = tuple[Intensity, Intensity, Intensity]
 

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from dermis.base.registry import Registry
 from dermis.mesh.head import Head
-from dermis.scene.field_errors import Reason
+from dermis.scene.field_errors import BoundsReason
 from dermis.scene.frozen_model import Colour, Direction, FrozenModel, Vector, slider
 
 __all__ = [
@@ -33,9 +33,9 @@ __all__ = [
 _ConeHalfAngle = Annotated[
     float,
     Field(ge=0.01, le=89, json_schema_extra=slider(0.5, 88, logarithmic=True)),
-    Reason("degrees: half angle of a cone in front of the lamp"),
+    BoundsReason("degrees: half angle of a cone in front of the lamp"),
 ]
-_LAMP_LENGTH_REASON = Reason("mm: from the thickness of paper to 100 m")
+_LAMP_LENGTH_REASON = BoundsReason("mm: from the thickness of paper to 100 m")
 _LampLength = Annotated[
     float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, logarithmic=True)), _LAMP_LENGTH_REASON
 ]
@@ -65,7 +65,7 @@ class _LightBase(FrozenModel):
     softness_mm: Annotated[
         float,
         Field(ge=1e-3, le=1000, json_schema_extra=slider(0.1, 100, logarithmic=True)),
-        Reason("mm: from the wavelength of light to a metre"),
+        BoundsReason("mm: from the wavelength of light to a metre"),
     ] = 1.5
     """Width over which the edge of a shadow fades, at most 12 texels of the shadow map; for area lights the
     minimum width [mm]."""
@@ -193,7 +193,9 @@ class DirectionalLight(_LightBase):
     """Word for this kind of light in scene files."""
     direction: Direction = Field(kw_only=False)
     """Direction in which the light travels."""
-    angle_degrees: Annotated[float, Field(ge=0, le=20), Reason("degrees: wider light is not parallel")] = 0.0
+    angle_degrees: Annotated[
+        float, Field(ge=0, le=20), BoundsReason("degrees: wider light is not parallel")
+    ] = 0.0
     """Angular diameter of the source, 0.53 for the sun; shadows are sharper near the surface that casts
     them."""
 

@@ -129,7 +129,7 @@ def layout_table_name(gutter_mm: float) -> str:
 
 
 def find_stitched_layout(mesh: Mesh, gutter_mm: float) -> dict[str, NDArray[Any]]:
-    """Compute the stitched layout of a mesh, which the package stores under the name `layout_table_name`.
+    """Compute the stitched layout of a mesh as arrays, which the package stores for its own head.
 
     Returns three arrays: the piece index (f,) of each triangle, and scale and origins of the `PieceLayout`.
 

@@ -228,7 +228,7 @@ def _cut_length_mm(surface: FlatSurface, member_triangles: Index, part_of_triang
 def _cut_piece(
     surface: FlatSurface, mapped_triangles: Mask, member_triangles: Index, gutter_mm: float
 ) -> Index | None:
-    """Cut a chart piece where its gutters meet; return part indices (t,) of its triangles, None without cuts.
+    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), None for no cut.
 
     member_triangles : (t,) indices of the piece's triangles
     """

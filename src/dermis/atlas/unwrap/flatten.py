@@ -229,7 +229,6 @@ def _make_map_rigid(
 
     positions : (n,) positions before the first iteration, as complex numbers
     vertex_component : (n,) index of the connected component of each vertex
-
     triangle_shapes : (f, 3) desired shape and size of the triangles
     stretch_weight : (f,) weight of each triangle's stretch in the minimised sum [-]
     """
