@@ -47,7 +47,7 @@ def levels() -> Levels:
 
 def linear(path: Path) -> NDArray[np.float32]:
     pixels, space = read_colours(path)
-    return space.linear(pixels)
+    return space.to_linear(pixels)
 
 
 def by_littlecms(levels: Levels, profile: bytes) -> Levels:
@@ -106,7 +106,7 @@ def test_16_bits_with_a_profile_keep_their_depth(tmp_path: Path) -> None:
     assert colours is not None and len(np.unique(colours[..., 1])) == 64
     expected = profile_colour_space(rgb_profile("Wide", PROPHOTO, 1.8))
     assert expected is not None
-    np.testing.assert_allclose(colours, expected.linear(deep), rtol=1e-6)
+    np.testing.assert_allclose(colours, expected.to_linear(deep), rtol=1e-6)
 
 
 def test_neutral_stays_neutral_in_every_space(levels: Levels) -> None:
@@ -118,7 +118,7 @@ def test_neutral_stays_neutral_in_every_space(levels: Levels) -> None:
     ]
     for space in spaces:
         assert space is not None and not space.is_default
-        grey = space.linear(np.full((1, 1, 3), 0.5, np.float32))
+        grey = space.to_linear(np.full((1, 1, 3), 0.5, np.float32))
         np.testing.assert_allclose(grey, 0.5, rtol=2e-4)
 
 
@@ -127,7 +127,7 @@ def test_known_display_p3_colour_is_converted() -> None:
     space = coded_colour_space(12, 13)
     assert space is not None and space.to_rec709 is not None
     np.testing.assert_allclose(space.to_rec709[:, 0], (1.2249, -0.0420, -0.0197), atol=2e-4)
-    np.testing.assert_array_equal(space.linear(np.uint8([[[255, 0, 0]]])), [[[1.0, 0.0, 0.0]]])
+    np.testing.assert_array_equal(space.to_linear(np.uint8([[[255, 0, 0]]])), [[[1.0, 0.0, 0.0]]])
 
 
 def test_grey_with_profile_is_converted(tmp_path: Path, levels: Levels) -> None:
@@ -260,4 +260,4 @@ def test_avif_states_code_points(tmp_path: Path) -> None:
 def test_srgb_levels_are_decoded_unchanged(levels: Levels) -> None:
     space = gamma_colour_space("", None, None)
     assert space.is_default
-    np.testing.assert_allclose(encode_srgb(space.linear(levels)) * 255, levels, atol=1e-3)
+    np.testing.assert_allclose(encode_srgb(space.to_linear(levels)) * 255, levels, atol=1e-3)

@@ -36,7 +36,7 @@ INKS = np.random.default_rng(6).integers(0, 256, (16, 32, 4)).astype(np.uint8)
 
 def linear(path: Any) -> Any:
     pixels, space = read_colours(path)
-    return space.linear(pixels)
+    return space.to_linear(pixels)
 
 
 def photograph(path: Any) -> Any:

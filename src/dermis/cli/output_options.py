@@ -211,7 +211,7 @@ class AnimationOutput:
         if not self.is_numbered:
             return frame_numbers
         files = FrameFiles(self.path)
-        files.start(frame_digest, force=self.overwrite)
+        files.start_sequence(frame_digest, force=self.overwrite)
         return files.missing_frames(frame_numbers, frame_size)
 
     @contextmanager

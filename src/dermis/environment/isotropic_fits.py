@@ -107,7 +107,7 @@ def _parameter_direction(parameter_kind: int, *lobe_amounts: tuple[int, float]) 
     return change.ravel()
 
 
-def _free_directions(target: LobeTarget, view_index: int) -> Floats:
+def _free_directions(target_lobe: LobeTarget, view_index: int) -> Floats:
     """Return the k directions (20, k) in the space of lobe parameters along which a fit may vary.
 
     Directions for the lobes in the plane of incidence come first, then directions for the pair of lobes (see
@@ -126,7 +126,7 @@ def _free_directions(target: LobeTarget, view_index: int) -> Floats:
         for k in range(_IN_PLANE_LOBE_COUNTS[view_index])
         for kind in kinds
     ]
-    if _is_elongated(target):
+    if _is_elongated(target_lobe):
         pair = [_parameter_direction(kind, one) for one in (left, right) for kind in kinds]
     else:
         pair = [_parameter_direction(kind, left, right) for kind in kinds]
@@ -134,11 +134,11 @@ def _free_directions(target: LobeTarget, view_index: int) -> Floats:
     return np.stack([*in_plane, *pair], axis=1)
 
 
-def _is_elongated(target: LobeTarget) -> bool:
-    return target.along_deviation > _MIN_LOBE_ELONGATION * target.across_deviation
+def _is_elongated(target_lobe: LobeTarget) -> bool:
+    return target_lobe.along_deviation > _MIN_LOBE_ELONGATION * target_lobe.across_deviation
 
 
-def _arrange_lobe_pair(initial_parameters: Floats, target: LobeTarget, view_index: int) -> Floats:
+def _arrange_lobe_pair(initial_parameters: Floats, target_lobe: LobeTarget, view_index: int) -> Floats:
     """Return initial parameters (4, 5) of a fit, with the last two lobes ("the pair") placed as follows.
 
     If the specular lobe is elongated, both lobes of the pair are placed in the plane of incidence. Otherwise
@@ -149,14 +149,17 @@ def _arrange_lobe_pair(initial_parameters: Floats, target: LobeTarget, view_inde
     """
     lobes = initial_parameters.copy()
     separation = lobes[_IN_PLANE_POSITION, -1] - lobes[_IN_PLANE_POSITION, -2]
-    if _is_elongated(target) and abs(separation) < _PAIR_SEPARATION_DEVIATIONS:
+    if _is_elongated(target_lobe) and abs(separation) < _PAIR_SEPARATION_DEVIATIONS:
         lobes[_IN_PLANE_POSITION, -2:] = (
             lobes[_IN_PLANE_POSITION, -2:].mean() + np.array([-0.5, 0.5]) * _PAIR_SEPARATION_DEVIATIONS
         )
-    if not _is_elongated(target) and abs(lobes[_OUT_OF_PLANE_POSITION, -2]) < _PAIR_SEPARATION_DEVIATIONS:
+    if (
+        not _is_elongated(target_lobe)
+        and abs(lobes[_OUT_OF_PLANE_POSITION, -2]) < _PAIR_SEPARATION_DEVIATIONS
+    ):
         lobes[_OUT_OF_PLANE_POSITION, -2:] = _PAIR_SEPARATION_DEVIATIONS, -_PAIR_SEPARATION_DEVIATIONS
     lobes[_OUT_OF_PLANE_POSITION, :-2] = 0.0
-    if _is_elongated(target) or view_index == VIEW_COUNT - 1:
+    if _is_elongated(target_lobe) or view_index == VIEW_COUNT - 1:
         lobes[_OUT_OF_PLANE_POSITION] = 0.0
     if view_index == VIEW_COUNT - 1:
         lobes[_IN_PLANE_POSITION] = 0.0
@@ -164,7 +167,7 @@ def _arrange_lobe_pair(initial_parameters: Floats, target: LobeTarget, view_inde
 
 
 def _fit_parameters(
-    target: LobeTarget, view_index: int, initial_parameters: Floats, neighbour_mean: Floats
+    target_lobe: LobeTarget, view_index: int, initial_parameters: Floats, neighbour_mean: Floats
 ) -> Floats:
     """Fit five isotropic lobes to a specular lobe and return their parameters (4, 5).
 
@@ -179,16 +182,17 @@ def _fit_parameters(
     """
     from scipy.optimize import least_squares
 
-    scale, active = harmonic_terms(target.degree)[2], _active_lobes(view_index)
-    free = _free_directions(target, view_index)
+    scale, active = harmonic_terms(target_lobe.degree)[2], _active_lobes(view_index)
+    free = _free_directions(target_lobe, view_index)
     lengths = (free**2).sum(axis=0)
     initial_parameters, neighbour_mean = (
-        _arrange_lobe_pair(one, target, view_index).ravel() for one in (initial_parameters, neighbour_mean)
+        _arrange_lobe_pair(one, target_lobe, view_index).ravel()
+        for one in (initial_parameters, neighbour_mean)
     )
     first, mean = (free.T @ one / lengths for one in (initial_parameters, neighbour_mean))
     fixed = np.where(free.any(axis=1), 0.0, initial_parameters)
     kinds = np.abs(free).argmax(axis=0) // LOBE_COUNT
-    low, high = _parameter_bounds(target, kinds)
+    low, high = _parameter_bounds(target_lobe, kinds)
     regularisation = _REGULARISATION_WEIGHT * np.where(kinds == _LOG_WEIGHT, 0.5, 1.0)
 
     @lru_cache(maxsize=2)
@@ -200,11 +204,11 @@ def _fit_parameters(
         x = np.frombuffer(parameter_bytes)
         parameters = (fixed + free @ x).reshape(4, LOBE_COUNT)
         total, slopes = isotropic_sum_harmonics(
-            _to_isotropic_lobes(parameters, target, active), target.degree
+            _to_isotropic_lobes(parameters, target_lobe, active), target_lobe.degree
         )
-        slopes[:, _IN_PLANE_POSITION] *= target.along_deviation
-        slopes[:, _OUT_OF_PLANE_POSITION] *= target.across_deviation
-        residuals = np.append((total - target.coefficients) * scale, regularisation * (x - mean))
+        slopes[:, _IN_PLANE_POSITION] *= target_lobe.along_deviation
+        slopes[:, _OUT_OF_PLANE_POSITION] *= target_lobe.across_deviation
+        residuals = np.append((total - target_lobe.coefficients) * scale, regularisation * (x - mean))
         jacobian = np.einsum("nk,kj->nj", slopes.reshape(len(slopes), -1), free) * scale[:, None]
         system = np.column_stack([np.vstack([jacobian, np.diag(regularisation)]), residuals])
         return qr_factor(np.vstack([system.real, system.imag]))
@@ -222,25 +226,27 @@ def _fit_parameters(
     return np.asarray(fixed + free @ solution.x).reshape(4, LOBE_COUNT)
 
 
-def _parameter_bounds(target: LobeTarget, parameter_kinds: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    smoothest, roughest = np.log([MIN_LAYER_ROUGHNESS, MAX_LAYER_ROUGHNESS]) - np.log(target.across_deviation)
+def _parameter_bounds(target_lobe: LobeTarget, parameter_kinds: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    smoothest, roughest = np.log([MIN_LAYER_ROUGHNESS, MAX_LAYER_ROUGHNESS]) - np.log(
+        target_lobe.across_deviation
+    )
     low, high = (np.full(4, side * _MAX_LOBE_OFFSET_DEVIATIONS) for side in (-1.0, 1.0))
     low[_OUT_OF_PLANE_POSITION], high[_OUT_OF_PLANE_POSITION] = (
         0.0,
-        min(_MAX_LOBE_OFFSET_DEVIATIONS, 0.45 * np.pi / target.across_deviation),
+        min(_MAX_LOBE_OFFSET_DEVIATIONS, 0.45 * np.pi / target_lobe.across_deviation),
     )
     low[_LOG_WIDTH], high[_LOG_WIDTH] = smoothest, max(roughest, smoothest + 0.1)
     return low[parameter_kinds], high[parameter_kinds]
 
 
 def _to_isotropic_lobes(
-    parameters: Floats, target: LobeTarget, active_lobes: NDArray[np.bool_]
+    parameters: Floats, target_lobe: LobeTarget, active_lobes: NDArray[np.bool_]
 ) -> IsotropicLobes:
     position, out_of_plane, log_width, log_weight = parameters
     weight = np.where(active_lobes, np.exp(log_weight - log_weight[active_lobes].max()), 0.0)
     return IsotropicLobes(
-        target.mean_angle + position * target.along_deviation,
-        out_of_plane * target.across_deviation,
-        np.log(target.across_deviation) + log_width,
+        target_lobe.mean_angle + position * target_lobe.along_deviation,
+        out_of_plane * target_lobe.across_deviation,
+        np.log(target_lobe.across_deviation) + log_width,
         weight / weight.sum(),
     )

@@ -63,25 +63,30 @@ class IsotropicLobes(NamedTuple):
     weight: Floats
 
 
-def lobe_target(lobe: Lobe, view_cosine: float, m: float) -> LobeTarget:
+def lobe_target(lobe: Lobe, view_cosine: float, roughness: float) -> LobeTarget:
     """Expand a specular lobe in spherical harmonics, to which isotropic lobes are then fitted.
 
     view_cosine : cosine of the angle between view direction and surface normal
-    m : roughness [-]
+    roughness : roughness m of the surface [-]
 
     The quadrature covers one side of the plane of incidence, as the lobe is symmetric about this plane.
     """
     t = (np.arange(_NODES_ACROSS_INCIDENCE) + 0.5) / _NODES_ACROSS_INCIDENCE
-    widest = min(10.0 * m + 0.05, 0.5 * np.pi)
+    widest = min(10.0 * roughness + 0.05, 0.5 * np.pi)
     out_of_plane, steps = widest * t**2, 2.0 * widest * t / _NODES_ACROSS_INCIDENCE  # denser near the plane
-    mirror, reach = np.arccos(view_cosine), 12.0 * m + 0.1
+    mirror, reach = np.arccos(view_cosine), 12.0 * roughness + 0.1
     low, high = max(mirror - reach, -0.5 * np.pi), min(mirror + reach, 0.5 * np.pi)
     angles = low + (high - low) * (np.arange(_NODES_ALONG_INCIDENCE) + 0.5) / _NODES_ALONG_INCIDENCE
     a, y = np.meshgrid(angles, out_of_plane, indexing="ij")
     light = np.stack([np.sin(a) * np.cos(y), np.sin(y), np.cos(a) * np.cos(y)], axis=-1)
     view = np.array([-np.sqrt(1.0 - view_cosine**2), 0.0, view_cosine])
     with np.errstate(under="ignore"):
-        weight = lobe(cosines(np.array([0.0, 0.0, 1.0]), light, view), m) * light[..., 2] * np.cos(y) * steps
+        weight = (
+            lobe(cosines(np.array([0.0, 0.0, 1.0]), light, view), roughness)
+            * light[..., 2]
+            * np.cos(y)
+            * steps
+        )
     weight = weight / weight.sum()
     mean_angle = np.arctan2((weight * light[..., 0]).sum(), (weight * light[..., 2]).sum())
     along, across = (float(np.sqrt((weight * x**2).sum())) for x in (a - mean_angle, light[..., 1]))
@@ -90,7 +95,7 @@ def lobe_target(lobe: Lobe, view_cosine: float, m: float) -> LobeTarget:
     )
     around = np.exp(-1j * np.outer(np.arange(degree + 1), angles)) @ weight
     order = harmonic_terms(degree)[1]
-    coefficients = (around[order] * _legendre_at_quadrature_angles(m, degree)).sum(axis=1)
+    coefficients = (around[order] * _legendre_at_quadrature_angles(roughness, degree)).sum(axis=1)
     return LobeTarget(degree, coefficients, float(mean_angle), along, across)
 
 

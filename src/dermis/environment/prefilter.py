@@ -20,11 +20,11 @@ LAYER_HEIGHT = 192
 _MAX_HARMONIC_DEGREE = 160  # the factor of the smoothest lobe is 2e-4 here, so there is little ringing
 
 
-def isotropic_lobe(theta: Floats, m: float) -> Floats:
+def isotropic_lobe(theta: Floats, roughness: float) -> Floats:
     """Return the weight of light at an angle to the mirror direction, for a view along the normal.
 
     theta : angle from the mirror direction [rad], 0 to pi / 2
-    m : roughness [-]
+    roughness : roughness m of the Beckmann distribution [-]
 
     The weight is the Kelemen lobe times cos(theta), up to a constant factor. Normal, view and mirror
     direction are assumed to be equal [Karis2013], so the half vector is at the angle theta / 2 from the
@@ -32,7 +32,7 @@ def isotropic_lobe(theta: Floats, m: float) -> Floats:
     """
     half = np.cos(0.5 * theta)
     with np.errstate(under="ignore"):
-        return np.asarray(beckmann(half, m) * np.cos(theta) / half**2)
+        return np.asarray(beckmann(half, roughness) * np.cos(theta) / half**2)
 
 
 def reflection_constants() -> dict[str, float]:
@@ -78,10 +78,12 @@ def prefilter(panorama_name: str) -> Prefiltered:
     return Prefiltered(np.maximum(layers, 0.0).astype(np.float32), tuple(suns))
 
 
-def isotropic_lobe_factors(m: float) -> Floats:
-    """Return the factors by which convolution with a lobe of roughness m multiplies harmonic coefficients.
+def isotropic_lobe_factors(roughness: float) -> Floats:
+    """Return the factors by which convolution with an isotropic lobe multiplies harmonic coefficients.
 
     There is one factor for each degree of the spherical harmonics, (161,). The lobe has unit integral.
+
+    roughness : roughness m of the lobe [-]
     """
-    factors = zonal_factors(lambda theta: isotropic_lobe(theta, m), _MAX_HARMONIC_DEGREE)
+    factors = zonal_factors(lambda theta: isotropic_lobe(theta, roughness), _MAX_HARMONIC_DEGREE)
     return np.asarray(factors / factors[0])

@@ -139,7 +139,7 @@ def _load_uncached(
         in_file = [mesh_file.materials[index] if index >= 0 else None for index in assigned.in_file]
         raw, repairs = repair_mesh(RawMesh(*arrays, np.arange(len(used))), in_file, assigned.skin)
         raw, assigned, emptied = _without_empty_materials(raw, assigned)
-        mesh, vertices, point = raw.build(assigned.materials), raw.vertices, raw.point
+        mesh, vertices, point = raw.build_mesh(assigned.materials), raw.vertices, raw.point
         has_pictures = any(one.textures for one in mesh_file.materials)
         check_mesh(mesh, mesh_path, has_pictures=has_pictures)
         rig = build_rig(

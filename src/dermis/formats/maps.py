@@ -68,8 +68,8 @@ def colour_map(path: PathLike, apply_exif_orientation: bool = False) -> Floats:
     _check_map_side(path, "a colour map")
     image, space = read_colours(path, apply_exif_orientation)
     if image.dtype == np.float32:
-        return _check_unit_range(path, "a colour map", space.linear(check_finite(path, image)))
-    return _convert_in_strips(image, (3,), space.linear)
+        return _check_unit_range(path, "a colour map", space.to_linear(check_finite(path, image)))
+    return _convert_in_strips(image, (3,), space.to_linear)
 
 
 def height_map(path: PathLike, relief_mm: np.float32) -> Floats:

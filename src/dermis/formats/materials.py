@@ -42,7 +42,7 @@ class Texture:
     channel: int | None = None
 
     @property
-    def mapping(self) -> tuple[int, UvTransform]:
+    def uv_mapping(self) -> tuple[int, UvTransform]:
         """Return the uv set and the transform, which determine the texture coordinates."""
         return self.uv_set, self.transform
 
@@ -94,7 +94,7 @@ class FileMaterial:
         return 1.0 if self.stated_metalness is None else self.stated_metalness
 
     @property
-    def cutoff(self) -> float:
+    def opacity_cutoff(self) -> float:
         """Return the opacity below which the surface is cut away; blended materials are also cut."""
         return self.alpha_cutoff if self.alpha_mode == "mask" else _BLENDED_OPACITY_CUTOFF
 

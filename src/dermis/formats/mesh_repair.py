@@ -77,7 +77,7 @@ class RawMesh:
     vertices: MeshPart
     file_vertex: Index
 
-    def build(self, materials: tuple[Material, ...]) -> Mesh:
+    def build_mesh(self, materials: tuple[Material, ...]) -> Mesh:
         """Build the `Mesh`, with points and normals."""
         arrays = self.positions, self.uv, self.triangles, self.material
         return build_mesh(*arrays, materials, self.normals, self.point, self.quads)
@@ -114,7 +114,7 @@ class RawMesh:
         point = np.concatenate((self.point, copies % stride)).astype(np.int32)
         return replace(self._select_vertices(source), point=point, triangles=triangles)
 
-    def compact(self) -> RawMesh:
+    def without_unused(self) -> RawMesh:
         """Return the mesh without unused vertices and points.
 
         Pairs of triangles that no longer share two vertices are removed from `quads`.
@@ -156,7 +156,9 @@ def repair_mesh(
     if flat.mean() > _MAX_FLAT_FRACTION:
         return mesh, ()
     repaired = _turn_outwards(_separate_sheets(_drop_triangles(mesh, flat, is_skin, notes), notes), notes)
-    return _move_uv(repaired if repaired is mesh else repaired.compact(), materials, notes), tuple(notes)
+    return _move_uv(repaired if repaired is mesh else repaired.without_unused(), materials, notes), tuple(
+        notes
+    )
 
 
 def _count_with_noun(item_count: int, noun: str) -> str:
@@ -223,7 +225,7 @@ class _Sides(NamedTuple):
     end: Index
 
     @property
-    def pairs(self) -> Index:
+    def manifold_pairs(self) -> Index:
         """Return the two sides of each edge that has exactly two triangles, (n, 2)."""
         first = self.first[self.counts == 2]
         return np.column_stack((self.side[first], self.side[first + 1]))
@@ -260,13 +262,15 @@ def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
     notes.append(
         f"separated the sheets that meet at {_count_with_noun(count, 'edge')} of more than two triangles"
     )
-    links = np.vstack((mesh.sides.pairs, _pair_continuing_sides(mesh)))
+    links = np.vstack((mesh.sides.manifold_pairs, _pair_continuing_sides(mesh)))
     mesh = mesh.with_corner_points(_split_points(mesh, links))
     sides = mesh.sides
     if (sides.counts > 2).any():  # sheets that are also connected around both ends of an edge
         kept = np.zeros(len(sides.side), bool)
         kept[sides.side[sides.first[sides.counts == 1]]] = True
-        kept[np.concatenate((sides.pairs, _pair_continuing_sides(mesh, max_pairs_per_edge=1)))] = True
+        kept[np.concatenate((sides.manifold_pairs, _pair_continuing_sides(mesh, max_pairs_per_edge=1)))] = (
+            True
+        )
         apart, corners = ~kept.reshape(-1, 3).all(axis=1), mesh.corners.copy()
         corners[apart] = corners.max() + 1 + np.arange(3 * int(apart.sum())).reshape(-1, 3)
         mesh = mesh.with_corner_points(corners)
@@ -291,7 +295,10 @@ def _pair_continuing_sides(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGL
     )
     table = -np.sort(-table, axis=1)
     inwards = _directions_from_sides(mesh, table)
-    forward, piece = sides.start < sides.end, _label_components(len(mesh.triangles), sides.pairs // 3)
+    forward, piece = (
+        sides.start < sides.end,
+        _label_components(len(mesh.triangles), sides.manifold_pairs // 3),
+    )
     found = [np.empty((0, 2), np.int64)]
     for turn in range(max_pairs_per_edge):
         best, chosen = np.full(len(table), np.inf), np.zeros((len(table), 2), np.int64)
@@ -391,7 +398,7 @@ def _components_and_reversals(mesh: RawMesh) -> tuple[Index, Mask]:
     After reversal of these triangles, the winding of each component is consistent, and the same as before on
     most of its area. A component that cannot be wound consistently, such as a Moebius strip, is unchanged.
     """
-    count, pairs = len(mesh.triangles), mesh.sides.pairs
+    count, pairs = len(mesh.triangles), mesh.sides.manifold_pairs
     forward = mesh.sides.start < mesh.sides.end
     links = pairs // 3
     conflict = forward[pairs[:, 0]] == forward[pairs[:, 1]]
@@ -567,7 +574,7 @@ def _uv_periods(material: FileMaterial | None) -> tuple[float, float]:
     """Return the number of tiles along u and v after which a material's pictures repeat."""
     periods = [(1.0, 1.0)]
     for texture in material.textures.values() if material else ():
-        if texture.mapping == (0, IDENTITY_UV_TRANSFORM):
+        if texture.uv_mapping == (0, IDENTITY_UV_TRANSFORM):
             periods.append((_UV_PERIOD_OF_WRAP[texture.wrap[0]], _UV_PERIOD_OF_WRAP[texture.wrap[1]]))
         elif texture.uv_set == 0:
             periods.append((_UNLIMITED_UV_PERIOD, _UNLIMITED_UV_PERIOD))

@@ -64,7 +64,7 @@ def parse_obj(path: Path, obj_text: str) -> MeshFile:
 
 def obj_maps(
     path: Path,
-    material: str,
+    material_name: str,
     *,
     overridden_roles: Collection[str] = (),
     height_mm: float | None = None,
@@ -77,12 +77,12 @@ def obj_maps(
     them, or heights, which require `height_mm`. Normals and heights are scaled by the option -bm. map_Pr
     contains the square root of the roughness m.
 
-    material : name of the material in the .mtl files
+    material_name : name of the material in the .mtl files
     overridden_roles : roles of the maps that the caller sets by other means, and that are not read from the
         file
     height_mm, normal_y : see `load_maps`
     """
-    textures = read_library(path, read_obj_text(path)).materials[material].textures
+    textures = read_library(path, read_obj_text(path)).materials[material_name].textures
     maps, faults = Maps(), list[str]()
     roles = [role for role in ("colour", "specular", "roughness") if role not in overridden_roles]
     if not set(_RELIEF_MAP_ROLES) & set(overridden_roles):

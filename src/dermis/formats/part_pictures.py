@@ -34,11 +34,11 @@ class PartPictures:
     maps: PartMaps
 
     @classmethod
-    def of(cls, head: Head) -> PartPictures | None:
+    def from_head(cls, head: Head) -> PartPictures | None:
         """Return the pictures of a head's parts that are not skin; None for a head without maps of parts."""
         return None if head.maps.parts is None else cls(head.mesh, head.maps.parts)
 
-    def roles(self, material: Material) -> set[PartRole]:
+    def needed_roles(self, material: Material) -> set[PartRole]:
         """Return the roles of the pictures that a part with a given material needs."""
         is_cut, is_metal = material.opacity_cutoff > 0.0, material.metalness > 0.0
         is_rough = material.roughness is not None
@@ -58,12 +58,12 @@ class PartPictures:
     def encode(self, roles: Iterable[PartRole]) -> dict[PartRole, bytes]:
         """Return the pictures as 8-bit PNG files by role; roles that no part needs are left out."""
         parts = [self.mesh.materials[index] for index in np.unique(self.mesh.material)]
-        used = set[PartRole]().union(*map(self.roles, parts))
+        used = set[PartRole]().union(*map(self.needed_roles, parts))
         levels = {role: _ENCODER_OF_ROLE[role](self.maps) for role in roles if role in used}
         with ThreadPoolExecutor() as pool:  # compression releases the interpreter lock
             return dict(zip(levels, pool.map(encode_png, levels.values()), strict=True))
 
-    def emission(self, material: Material) -> tuple[float, tuple[float, ...]]:
+    def emission_strength_and_colour(self, material: Material) -> tuple[float, tuple[float, ...]]:
         """Return the emission of a part as a strength and a colour; their product is a radiance.
 
         With an emission map, the strength is the largest radiance in the map and the colour is white. Without

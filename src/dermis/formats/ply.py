@@ -432,19 +432,28 @@ class _ListStep(NamedTuple):
     item_size: int
 
 
-def _polygon_corners(path: Path, faces: _Columns, strips: _Columns, vertex_count: int) -> tuple[Index, Index]:
+def _polygon_corners(
+    path: Path, face_columns: _Columns, strip_columns: _Columns, vertex_count: int
+) -> tuple[Index, Index]:
     """Return the number of corners of each face and strip triangle, and the vertex index of each corner.
 
     vertex_count : number of vertices in the file
     """
-    own, counts, index = faces.take_list(_FACE_LIST_NAMES), np.empty(0, np.int64), np.empty(0, np.int64)
-    if faces and own is None:
+    own, counts, index = (
+        face_columns.take_list(_FACE_LIST_NAMES),
+        np.empty(0, np.int64),
+        np.empty(0, np.int64),
+    )
+    if face_columns and own is None:
         refuse(
-            path, f"faces with {_FACE_LIST_NAMES[0]}", f"they have {list_names(faces)}", limits.DAMAGED_ADVICE
+            path,
+            f"faces with {_FACE_LIST_NAMES[0]}",
+            f"they have {list_names(face_columns)}",
+            limits.DAMAGED_ADVICE,
         )
     if own is not None:
         counts, index = own.lengths, own.items.astype(np.int64)
-    if (strip := strips.take_list(_FACE_LIST_NAMES)) is not None:
+    if (strip := strip_columns.take_list(_FACE_LIST_NAMES)) is not None:
         triangles = _strip_triangles(strip)
         counts = np.concatenate([counts, np.full(len(triangles), 3)])
         index = np.concatenate([index, triangles.ravel()])

@@ -58,7 +58,7 @@ class ColourSpace:
         """Return whether integer pixels are sRGB, and float pixels are linear Rec. 709."""
         return self.to_rec709 is None and self.curves is None
 
-    def linear(self, pixels: Numbers) -> Floats:
+    def to_linear(self, pixels: Numbers) -> Floats:
         """Convert pixels (..., C) with 1, 3 or 4 channels to linear Rec. 709 (..., 3).
 
         Grey is repeated in all channels; alpha is dropped.
@@ -135,7 +135,7 @@ def profile_name(icc_profile: bytes) -> str:
 def profile_colour_space(icc_profile: bytes) -> ColourSpace | None:
     """Return the colour space of an ICC profile; None if the profile has lookup tables or no curves.
 
-    `ColourSpace.linear` converts colours at the full bit depth of a picture, whereas LittleCMS in Pillow
+    `ColourSpace.to_linear` converts colours at the full bit depth of a picture, whereas LittleCMS in Pillow
     supports only 8 bits.
 
     Raises ValueError, ArithmeticError and struct.error for a damaged profile.

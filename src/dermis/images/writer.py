@@ -138,7 +138,7 @@ class FrameFiles:
             refuse_output(self.pattern.parent, fault)
         check_output(self.path(0))
 
-    def start(self, content_key: str, *, force: bool = False) -> None:
+    def start_sequence(self, content_key: str, *, force: bool = False) -> None:
         """Start or continue a sequence; existing pictures are kept if the record file has this content key.
 
         content_key : text that is equal for sequences with equal frames

@@ -13,7 +13,7 @@ import numpy as np
 
 from dermis.base.errors import format_value, refuse
 from dermis.base.reading import checked_path
-from dermis.formats.gltf.materials import skin_pictures
+from dermis.formats.gltf.materials import encode_skin_maps
 from dermis.formats.mesh_formats import find_format
 from dermis.formats.part_pictures import PartPictures
 from dermis.formats.samples import SAMPLES
@@ -79,7 +79,7 @@ class Subject:
     @cached_property
     def part_pictures(self) -> PartPictures | None:
         """Return the texture images of the parts of the head that are not skin; None if there are none."""
-        return None if self.head is None else PartPictures.of(self.head)
+        return None if self.head is None else PartPictures.from_head(self.head)
 
     @property
     def identifier(self) -> str:
@@ -146,7 +146,7 @@ class Subject:
         """
         if self.head is None:
             return {}
-        pictures, _ = skin_pictures(self.head.maps, relief_slopes(self.head))
+        pictures, _ = encode_skin_maps(self.head.maps, relief_slopes(self.head))
         return {role: pictures[role] for role in _MAP_ROLES if role in pictures}
 
 

@@ -60,7 +60,7 @@ class SkinAdditions:
         return extended | {"pbrMetallicRoughness": surface, "extras": extras}
 
 
-def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], Tree]:
+def encode_skin_maps(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], Tree]:
     """Return the maps of a skin as PNG files, and their description for the extras of the glTF material.
 
     The first dictionary contains the PNG file of each picture by its name. The second contains an entry
@@ -104,7 +104,7 @@ def surface_material(
 
     The textures of the material reference pictures by name, as {"index": name}.
 
-    map_entries : description of the maps for the extras of the skin material, see `skin_pictures`
+    map_entries : description of the maps for the extras of the skin material, see `encode_skin_maps`
     roughness : Beckmann's m of skin without a roughness map [-]
     """
     if material.kind != "skin":
@@ -125,7 +125,7 @@ def surface_material(
     return gltf | {"extensions": _SKIN_IOR_EXTENSION, "extras": {"dermis": dict(map_entries)}}
 
 
-def part_pictures(part_maps: PartPictures) -> dict[str, bytes]:
+def encode_part_pictures(part_maps: PartPictures) -> dict[str, bytes]:
     """Return the pictures of parts that are not skin, as PNG files by name.
 
     The colour picture has an alpha channel if any part needs alpha.
@@ -138,11 +138,11 @@ def part_pictures(part_maps: PartPictures) -> dict[str, bytes]:
 
 
 def part_material(material: Material, part_maps: PartPictures) -> Tree:
-    """Return the glTF material of a part that is not skin, with the pictures of `part_pictures`.
+    """Return the glTF material of a part that is not skin, with the pictures of `encode_part_pictures`.
 
     The textures of the material reference pictures by name, as {"index": name}.
     """
-    roles = part_maps.roles(material)
+    roles = part_maps.needed_roles(material)
     surface: Tree = {
         "baseColorTexture": _part_texture("colour"),
         "metallicFactor": float("metalness" in roles),
@@ -158,7 +158,7 @@ def part_material(material: Material, part_maps: PartPictures) -> Tree:
     if "emission" in roles:
         gltf["emissiveTexture"] = _part_texture("emission")
     if max(material.emission) > 0.0:
-        strength, colour = part_maps.emission(material)
+        strength, colour = part_maps.emission_strength_and_colour(material)
         gltf["emissiveFactor"] = [min(strength, 1.0) * value for value in colour]
         if strength > 1.0:
             gltf["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
@@ -169,7 +169,7 @@ def _part_texture(role: PartRole) -> Tree:
     return {"index": f"parts {role}"}
 
 
-def eye_pictures(eyes: EyeTextures) -> dict[str, bytes]:
+def encode_eye_pictures(eyes: EyeTextures) -> dict[str, bytes]:
     """Return the colour map and the normal map of an eyeball as PNG files by name."""
     return {
         EYE_PICTURE: encode_colours_png(eyes.colour),

@@ -14,12 +14,12 @@ from dermis.formats.gltf.document import FrozenTree, Tree
 from dermis.formats.gltf.materials import (
     SkinAdditions,
     encode_colours_png,
+    encode_eye_pictures,
+    encode_part_pictures,
+    encode_skin_maps,
     eye_material,
-    eye_pictures,
     hair_material,
     part_material,
-    part_pictures,
-    skin_pictures,
     surface_material,
 )
 from dermis.formats.gltf.primitives import FibreTubes, HairPrimitive, PrimitiveSource, SurfacePrimitive
@@ -58,7 +58,7 @@ def encode_head(
     skin_additions : properties to add to the material of skin
     """
     binary, deformable = BufferBuilder(), DeformableMesh(head)
-    pictures, roles = skin_pictures(head.maps, slopes)
+    pictures, roles = encode_skin_maps(head.maps, slopes)
     pictures |= {} if skin_additions is None else skin_additions.pictures
     parts, materials = _primitive_sources(deformable, pictures, roles, roughness, eyes)
     if skin_additions is not None:
@@ -101,15 +101,15 @@ def _primitive_sources(
     """Return the geometry and the material of each glTF primitive, as two lists in the same order.
 
     pictures : PNG files by name; this function adds the pictures of eyes, hairs and parts that are not skin
-    map_entries : description of the maps for the extras of the skin material, see `skin_pictures`
+    map_entries : description of the maps for the extras of the skin material, see `encode_skin_maps`
     """
     head = deformable.head
     eye_materials = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
     if eyes is not None and eye_materials:
-        pictures |= eye_pictures(eyes)
-    part_maps = PartPictures.of(head)
+        pictures |= encode_eye_pictures(eyes)
+    part_maps = PartPictures.from_head(head)
     if part_maps is not None:
-        pictures |= part_pictures(part_maps)
+        pictures |= encode_part_pictures(part_maps)
     parts, materials = list[PrimitiveSource](), list[Tree]()
     for index in np.unique(head.mesh.material).tolist():
         eye = eye_materials.index(index) if index in eye_materials else -1

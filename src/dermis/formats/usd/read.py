@@ -70,7 +70,7 @@ def read_usd(path: Path) -> MeshFile:
     answer = run_decoder(_DECODER_MODULE, request, len(data), path, "a valid USD file")
     scene: Tree = parse_json(text_from_array(answer["scene"]), path, "a valid USD file")
     pictures = _UsdPictures(path, data)
-    materials = tuple(pictures.material(tree) for tree in scene["materials"])
+    materials = tuple(pictures.read_material(tree) for tree in scene["materials"])
     check_pictures(path, materials)
     parts, notes = list[MeshPart](), dict.fromkeys(scene["notes"])
     for number, mesh in enumerate(scene["meshes"]):
@@ -148,7 +148,7 @@ class _UsdPictures:
             self.package = zipfile.ZipFile(io.BytesIO(file_bytes))
             self.sizes = {one.filename: one.file_size for one in self.package.infolist()}
 
-    def material(self, material_tree: Tree) -> FileMaterial:
+    def read_material(self, material_tree: Tree) -> FileMaterial:
         """Return a material; pictures that are missing are left out, with a note.
 
         material_tree : material as returned by `MaterialReader.read`

@@ -165,7 +165,7 @@ def _picture_roles_by_material(subject: Subject) -> dict[int, set[PartRole]]:
     if pictures is None:
         return {}
     used = {*np.unique(head.mesh.material).tolist()} - {*(head.eyes.material.tolist() if head.eyes else ())}
-    roles = {k: pictures.roles(head.mesh.materials[k]) for k in sorted(used)}
+    roles = {k: pictures.needed_roles(head.mesh.materials[k]) for k in sorted(used)}
     return {k: part_roles for k, part_roles in roles.items() if part_roles}
 
 

@@ -164,11 +164,13 @@ def opaque_material(material: Material) -> OpenPbrMaterial:
 
 def part_material(material: Material, pictures: PartPictures) -> OpenPbrMaterial:
     """Return the OpenPBR material of a part of the head, such as hair or clothes, with texture images."""
-    roles = pictures.roles(material)
+    roles = pictures.needed_roles(material)
     maps = {name: f"{PART_PREFIX}{role}" for role, name in _PART_INPUTS.items() if role in roles}
     values = {**opaque_material(material).values, "specular_ior": _PART_IOR}
     if max(material.emission) > 0.0:
-        values["emission_luminance"], values["emission_color"] = pictures.emission(material)
+        values["emission_luminance"], values["emission_color"] = pictures.emission_strength_and_colour(
+            material
+        )
     return OpenPbrMaterial(
         material.name, {key: value for key, value in values.items() if key not in maps}, maps
     )

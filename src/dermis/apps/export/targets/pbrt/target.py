@@ -261,7 +261,7 @@ def _scene_lines(
     for index in np.unique(head.mesh.material).tolist():
         material, name = head.mesh.materials[index], f"{file_prefix}part_{index}.ply"
         files[name] = mesh_ply(head.mesh, head.mesh.material == index, head.centre_mm, is_v_upwards=True)
-        roles = subject.part_pictures.roles(material) if subject.part_pictures else set()
+        roles = subject.part_pictures.needed_roles(material) if subject.part_pictures else set()
         if material.kind == "skin":
             texts = [_skin_material(parameters, textures.material_textures)]
         else:
