@@ -95,7 +95,7 @@ def profile(
     ----------
     name:
         Medium (dj3, skin1, skin2, marble ...), pigmented skin (spectral, light, medium, dark), the published
-        table gpu-gems-3, or a .toml file that has [[layers]] or a table [skin], or that -o has written.
+        table gpu-gems-3, or a .toml file: with [[layers]], with a table [skin], or written by -o.
     model:
         Model of the profile. counted: tabulated photon counts, the default for one semi-infinite layer of
         index 1 or 1.4; layered: layered diffusion, the default for all other media; layered-point: layered

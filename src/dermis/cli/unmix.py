@@ -39,10 +39,10 @@ def unmix(
 ) -> int:
     """Estimate melanin and blood of each texel of a skin colour map, and recolour it.
 
-    The command writes melanin.exr and blood.exr (volume fractions, as in `dermis profile`), their standard
-    deviations melanin_sd.exr and blood_sd.exr, and residual.exr, the colour map divided by the
-    colour of the estimated pigments. The residual contains what pigments cannot explain, such as paint and
-    hair.
+    The command writes melanin.exr and blood.exr (volume fractions, as in `dermis profile`), and their
+    standard deviations melanin_sd.exr and blood_sd.exr. It also writes residual.exr, the colour map divided
+    by the colour of the estimated pigments. The residual contains what pigments cannot explain, such as paint
+    and hair.
 
     With --spectra, the command instead prints the pigments for each measured reflectance spectrum in a table.
 

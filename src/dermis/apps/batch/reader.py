@@ -73,10 +73,10 @@ def read_dataset(
     Returns
     -------
     iterator of dict
-        Each image has the keys "number", "picture" ((h, w, 3 or 4), sRGB bytes), "camera" (K, R and t in
-        OpenCV's convention), "head_pose" (3, 4), "gaze" ((2, 3) or None), "landmarks" (`LandmarkPoints` by
-        the name of the set), "parameters" (by name), "skin_tone" (numbers that describe the colour of the
-        skin, or None), and one key for each output of the data set, such as "depth" or "normal".
+        Each image has one key for each output of the data set, such as "depth" or "normal", and these keys:
+        "number"; "picture", sRGB bytes (h, w, 3 or 4); "parameters", by name; "camera", with K, R and t in
+        OpenCV's convention; "head_pose" (3, 4); "gaze" (2, 3) or None; "landmarks", `LandmarkPoints` by the
+        name of the set; and "skin_tone", numbers that describe the colour of the skin, or None.
 
     Raises
     ------

@@ -147,9 +147,9 @@ class _PoolState:
     def _gets_another_task(self, worker: _WorkerProcess) -> bool:
         """Return whether to send a worker another task.
 
-        A worker without tasks gets one if the queue is not empty. A worker with one task gets a second one,
-        to avoid a pause between tasks, if the first task never failed before and the queue has at least as
-        many tasks as there are workers.
+        A worker without tasks gets one if the queue is not empty. A worker with one task gets a second one if
+        the first task never failed before, and if the queue has at least as many tasks as there are workers.
+        The second task avoids a pause between tasks.
         """
         if not worker.tasks:
             return bool(self._queue)
