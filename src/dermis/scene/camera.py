@@ -89,7 +89,7 @@ class Camera(FrozenModel):
     def from_opencv(cls, K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int]) -> Camera:
         """Return the camera of an OpenCV calibration without lens distortion.
 
-        If lens distortion was part of the calibration, the camera fits the undistorted pictures.
+        For a calibration with lens distortion, the camera matches the undistorted pictures.
 
         Parameters
         ----------

@@ -222,14 +222,14 @@ def _load_human(
     height_mm: float | None,
     normal_y: NormalY,
     mesh_options: dict[str, Any],
-    levels: SubdivisionLevels,
+    subdivision_levels: SubdivisionLevels,
 ) -> Head:
     """Return the head of a parametric human in the uv layout "own".
 
     head_name : "human", "human:SEED", or a person's .json file
     user_files : dictionary from map roles, such as "colour", to files that replace the painted maps
     mesh_options : options that apply only to mesh files; DermisError is raised unless all have their defaults
-    levels : subdivision levels, or a function of the head that returns them
+    subdivision_levels : number of levels, or a function of the head that returns it
     """
     texts = {"v_origin": "auto", "front": "auto", "eyes": "fitted"}
     defaults = {
@@ -247,7 +247,7 @@ def _load_human(
     check_relief(height_mm, user_files["height"])
     map_files: dict[str, Any] = {role: file for role, file in user_files.items() if file is not None}
     loaded = load_maps(**map_files, height_mm=height_mm, normal_y=normal_y) if map_files else None
-    level_of = levels if callable(levels) else lambda plain: levels
+    level_of = subdivision_levels if callable(subdivision_levels) else lambda plain: subdivision_levels
     head = load_person(head_name).head(
         subdivide=lambda plain: max(MIN_HUMAN_SUBDIVISION_LEVELS, level_of(plain))
     )

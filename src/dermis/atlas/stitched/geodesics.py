@@ -70,7 +70,7 @@ class GeodesicEnds(NamedTuple):
         third_weight: Doubles,
         reached_target: bool,
     ) -> None:
-        """Store where some geodesics end.
+        """Store the end points of some geodesics.
 
         rays : geodesics that end in their current triangle
         first_corner : corner (0, 1, 2) of the triangle with the weight 1 - second_weight - third_weight

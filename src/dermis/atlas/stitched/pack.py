@@ -52,21 +52,21 @@ def place_shapes(shapes: Sequence[Sequence[CellRun]], cells_per_side: int) -> li
     return corners
 
 
-def _free_positions(occupied_cells: int, spans: Sequence[CellRun], cells_per_side: int) -> int:
+def _free_positions(occupied_cells: int, shape_runs: Sequence[CellRun], cells_per_side: int) -> int:
     """Return the free positions for the upper left cell of a shape, as a bit mask of n x n cells.
 
     occupied_cells : bit mask of the occupied cells
-    spans : cells of the shape as runs, see `place_shapes`
+    shape_runs : cells of the shape as runs, see `place_shapes`
     """
-    height = 1 + max(row for row, _, _ in spans)
-    width = 1 + max(last for _, _, last in spans)
+    height = 1 + max(row for row, _, _ in shape_runs)
+    width = 1 + max(last for _, _, last in shape_runs)
     if max(height, width) > cells_per_side:
         return 0
     blocked, ahead = (
         0,
         [occupied_cells],
     )  # ahead: cells from which one of the next 1, 2, 4, ... cells is occupied
-    for row, first, last in spans:
+    for row, first, last in shape_runs:
         length = last - first + 1
         step = length.bit_length() - 1
         while len(ahead) <= step:
@@ -291,12 +291,12 @@ def _try_scale(
     return PieceLayout(scale, corners + low)
 
 
-def _scaled_mask(mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
-    """Return the mask (h, w) of all cells that a piece touches after scaling, and its scaled margin.
+def _scaled_mask(piece_mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
+    """Return the mask (h, w) of all cells that a chart piece touches after scaling, and its scaled margin.
 
-    scale : factor from the scale of `mask` to the new scale
+    scale : factor from the scale of `piece_mask` to the new scale
     """
-    row, first, last = (mask.spans.T - mask.margin[[1, 0, 0], None]) * scale
+    row, first, last = (piece_mask.spans.T - piece_mask.margin[[1, 0, 0], None]) * scale
     top, bottom = np.floor(row).astype(int), np.ceil(row + scale).astype(int) - 1
     left, right = np.floor(first).astype(int), np.ceil(last + scale).astype(int) - 1
     low = np.array([left.min(), top.min()])
