@@ -131,7 +131,7 @@ def refracted_cosine(cosine: ArrayLike, eta: float) -> Floats:
 
 
 class _HalfSpace:
-    """Isotropically scattering half-space below a smooth surface, at discrete directions.
+    """Isotropically scattering half-space below a smooth surface, for a set of discrete directions.
 
     The operator R describes reflection by the medium, and the operator r internal reflection by the surface.
     One linear system is solved to sum the series R + R r R + ... of multiple reflections.

@@ -79,7 +79,7 @@ def half_space(
 def fractions_within(
     half_space_kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayLike
 ) -> Callable[[Floats], Floats]:
-    """Return a function from radii (n,) [mm] to the fractions (n, 3) of the emerging light within them [-].
+    """Return a function from radii (n,) [mm] to tabulated fractions (n, 3) of light within them [-].
 
     half_space_kind : surface and illumination of the half-space
     albedo : (3,) single-scattering albedo, clamped to the range of the table [-]
@@ -138,8 +138,8 @@ def _photon_table(half_space_kind: HalfSpaceKind) -> _PhotonTable:
 def has_photon_table(medium: Medium) -> bool:
     """Return whether a photon-count table covers a medium.
 
-    The medium must be a half-space with three channels, and a table must contain its index of refraction and
-    its reduced albedos.
+    The medium must be a half-space with three channels. There must be a table for its index of refraction,
+    and its reduced albedos must be in the range of the table.
     """
     layer = medium.layers[0]
     single = len(medium.layers) == 1 and medium.semi_infinite and medium.channels == 3
@@ -151,7 +151,7 @@ def has_photon_table(medium: Medium) -> bool:
 def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
     """Return the cumulative profile of a medium from a photon-count table, or None if no table covers it.
 
-    The table is for isotropic scattering, with the reduced coefficients of the medium.
+    The medium is taken to scatter isotropically, with its reduced coefficients.
     """
     kind, layer = tabulated_kind_for_index(medium.eta), medium.layers[0]
     if kind is None or not has_photon_table(medium):
@@ -162,7 +162,7 @@ def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
 def tabulated_profile(medium: Medium) -> RadialProfile | None:
     """Return the radial profile of a medium from a photon-count table, or None if no table covers it.
 
-    The table is for isotropic scattering, with the reduced coefficients of the medium.
+    The medium is taken to scatter isotropically, with its reduced coefficients.
     """
     cumulative, kind, layer = (
         tabulated_cumulative(medium),

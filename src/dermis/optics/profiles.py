@@ -93,7 +93,7 @@ def load_profile(
 
 
 def find_gaussians(name: str | Path) -> GaussianSum | None:
-    """Return the Gaussians that a preset or file contains, or None if it describes a tissue instead.
+    """Return the Gaussians of a preset or file, or None if the preset or file describes a tissue.
 
     Raises DermisError for an unknown name, and for Gaussians that are not a valid profile.
     """
@@ -115,10 +115,9 @@ def find_gaussians(name: str | Path) -> GaussianSum | None:
 
 @lru_cache(_MAX_CACHED_FILES)
 def _read_gaussians(path: Path, file_state: tuple[int, ...]) -> GaussianSum | None:
-    """Return the Gaussians in a file, or None if it describes a tissue; cache the result for later frames.
+    """Return the Gaussians in a file, or None if the file describes a tissue; cache the result.
 
-    file_state : state of the file from `_file_state`; if it differs from that of the cached result, the file
-        is read again
+    file_state : state of the file from `_file_state`; the file is read again if its state has changed
     """
     if path.suffix.lower() == ".toml":
         document = read_toml(path)

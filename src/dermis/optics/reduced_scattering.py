@@ -74,7 +74,7 @@ def _reduced_scattering(mu_s: float, g: float) -> float:
 
 
 def _parse_numbers(cells: list[str]) -> list[float]:
-    """Return the numbers in cells of text, or an empty list if any cell is not a number."""
+    """Return the cells as numbers, or an empty list if any cell is not a number."""
     try:
         return [float(cell) for cell in cells]
     except ValueError:

@@ -88,7 +88,7 @@ class Slabs:
     """Power reflected and transmitted by slabs in air, for n thicknesses and m incident directions.
 
     cosine : (m,) cosines of the directions, after refraction into the slab [-]
-    flux : (m,) fraction of the light entering from a uniform sky that has each direction; the sum is 1 [-]
+    flux : (m,) fraction of the entering light of a uniform sky that takes each direction; the sum is 1 [-]
     reflected : (n, m) fraction of the entering light that scatters and leaves on the side of entry [-]
     transmitted : (n, m) fraction of the entering light that scatters and leaves on the far side [-]
     """

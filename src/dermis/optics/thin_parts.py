@@ -153,7 +153,7 @@ class _SlabTotals(NamedTuple):
 
 
 def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> Iterator[_SlabTotals]:
-    """Yield the totals of slabs for each channel, interpolated by cubic splines between cached depths."""
+    """Yield the `_SlabTotals` of each channel, interpolated by cubic splines between cached depths."""
     from scipy.interpolate import CubicSpline
 
     roots = np.sqrt(1.0 - layer.alpha_prime).tolist()

@@ -21,7 +21,7 @@ _NEAR_ZERO_FREQUENCY = np.array([1e-8])  # so low that a Hankel transform equals
 
 
 class _Sublayer(NamedTuple):
-    """Layer, or the part of a layer above or below the point source."""
+    """Layer, or one of the two parts into which a layer is divided."""
 
     layer: Layer
     thickness_mm: float | Floats
@@ -73,7 +73,8 @@ def solve_layers(
     frequency : (n,) frequencies s > 0 [1/mm]
     A : boundary mismatch with air; internal interfaces are index-matched [-]
     source_kind : "beam" if light first scatters along the beam, in which case R(r) diverges logarithmically
-        at r = 0; "point" if all light first scatters one mean free path deep, in which case R(r) is finite
+        at r = 0; "point" if all light first scatters at a depth of one mean free path, in which case R(r) is
+        finite
 
     Source: [Haskell1994] for the boundary, [Kienle1998] for layers, [Farrell1992] for the beam.
     """

@@ -40,7 +40,7 @@ class SkinUnknown:
 def _measured_unknown(
     pigment_name: str, lower_limit: float, upper_limit: float, log_step: float
 ) -> SkinUnknown:
-    """Return an unknown pigment; its prior is the pigment's distribution in measured people of all groups."""
+    """Return a pigment as an unknown; its prior is its distribution among measured people of all groups."""
     mean, sd = skin_prior().moments(pigment_name)
     return SkinUnknown(pigment_name, float(np.exp(mean)), sd, lower_limit, upper_limit, log_step)
 

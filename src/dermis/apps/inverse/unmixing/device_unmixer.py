@@ -37,7 +37,7 @@ _TEXTURE_FORMAT = "rgba32float"
 
 
 class Unmixer:
-    """Inversion of a skin model on the device: from the colour of each texel to its melanin and blood.
+    """Unmixer of pictures on the device: it inverts a skin model to find each texel's melanin and blood.
 
     device : device on which pictures are unmixed
     model : table of skin colours that is inverted

@@ -111,7 +111,7 @@ def _ring_fractions(tissue: Tissue) -> Floats:
 
 
 def _mixture_weights(skin_ring_fractions: Floats, profile_ring_fractions: Floats) -> Floats:
-    """Return weights (n, k) of k profiles, whose mixtures approximate the profiles of n skins.
+    """Return the weights (n, k) with which mixtures of k profiles approximate the profiles of n skins.
 
     The weights are fitted to fractions of the reflectance, see `_ring_fractions`. The weights of each skin
     are not negative and sum to 1.

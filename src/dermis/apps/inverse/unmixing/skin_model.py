@@ -47,7 +47,7 @@ class SkinModel:
     prior_sd: float
 
     def evaluate(self, unknowns: Floats) -> tuple[Floats, Floats]:
-        """Return the logarithms (t, 3) of colours, and their derivatives (t, 3, 3).
+        """Return the logarithms (t, 3) of the model's colours, and their derivatives (t, 3, 3).
 
         The second axis of the derivatives is the channel, and the third axis is the unknown. The table is
         interpolated linearly.

@@ -118,7 +118,7 @@ class SpectralFit:
 
 
 def skin_model_spectra(skin: SkinParameters = DEFAULT_SKIN) -> SpectralModel:
-    """Return the package's spectral model of skin.
+    """Return the package's spectral model of skin: a function from parameters to reflectance spectra.
 
     skin : parameters that are used where a call of the model omits them
     """

@@ -35,7 +35,7 @@ def unknown_skin_sd(
     The result is the root mean square of this error over the samples with estimates near `melanin` and
     `blood`.
 
-    melanin, blood : volume fractions that were found in a picture [-]
+    melanin, blood : volume fractions that were estimated from a picture [-]
     skin : parameters that are assumed for unmixing
     known_parameters : those of the `FIXED_PARAMETERS` that are known for the person
     is_oxygen_fitted : whether unmixing also estimates oxygen

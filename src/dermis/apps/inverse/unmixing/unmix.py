@@ -149,9 +149,9 @@ class UnmixResult:
     def summary(self) -> dict[str, Any]:
         """Return medians of the pigments, colour differences, skin tone, and the fraction of skin texels.
 
-        They are computed from about 512 evenly spaced texels along the longer side. Black texels do not count
-        as skin. The entry "sd" is the standard deviation due to noise, and "skin_sd" that due to the values
-        assumed for oxygen and epidermal thickness, which vary among people.
+        They are computed from a grid of texels, with about 512 texels along the longer side. Black texels do
+        not count as skin. The entry "sd" is the standard deviation due to noise, and "skin_sd" that due to
+        the values assumed for oxygen and epidermal thickness, which vary among people.
         """
         step = max(1, max(self.melanin.shape) // _SUMMARY_SIDE_TEXELS)
         maps = {name: one[::step, ::step].astype(np.float64) for name, one in self.maps().items()}
