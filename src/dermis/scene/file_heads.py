@@ -88,7 +88,7 @@ class MapOptions:
 def load_file_head(
     sample_or_path: str, mesh_options: dict[str, Any], map_options: MapOptions
 ) -> tuple[Head, EyeLook]:
-    """Return the head of a sample or a mesh file, and its eye look: the look stored in the file, or the default.
+    """Return the head of a sample or a mesh file, and its eye look, from the file or the default look.
 
     sample_or_path : name of the sample, or path of the mesh file
     mesh_options : keyword arguments of `load_rigged`
