@@ -76,7 +76,7 @@ class FrameRequest:
 
     @cached_property
     def split(self) -> ProfileSplit:
-        """Return the split of the profile into Gaussians that are blurred and one that is evaluated per pixel.
+        """Return the profile, split into Gaussians that are blurred and one that is evaluated per pixel.
 
         The result includes the splits of any other profiles that a map blends.
         """

@@ -82,7 +82,7 @@ class ScreenSpace(Technique):
         return replace(layers, kernel=memo.get(make_kernel, device, profile))
 
     def make_subsurface_layers(self, memo: Memo, device: Device, settings: Settings) -> SubsurfaceLayers:
-        """Return textures, without `result` and `kernel`, in which subsurface light is diffused for outputs."""
+        """Return the textures in which subsurface light is diffused for outputs."""
         return memo.get(make_subsurface_layers, device, settings.size, False, caller_name="outputs")
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:

@@ -129,7 +129,7 @@ class Technique(TechniqueTraits):
     def sum_translucency(
         self, graph: Graph, inputs: FrameInputs, atlas_textures: tuple[Texture, ...]
     ) -> Texture:
-        """Declare the passes that fill textures with the light through thin parts of the head, without other light.
+        """Declare the passes that fill textures with only the light through thin parts of the head.
 
         Return the texture that combines all layouts. The textures are for outputs that separate this light
         from the rest of the picture.

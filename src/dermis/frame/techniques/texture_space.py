@@ -1,4 +1,4 @@
-"""Texture-space diffusion by a pyramid of Gaussian blurs, with light carried across the seams of the atlas."""
+"""Texture-space diffusion by a pyramid of Gaussian blurs, which carry light across the seams of the atlas."""
 
 from __future__ import annotations
 
