@@ -70,7 +70,7 @@ def cumulative_gaussian_profile(
     variance_mm2 : (n,) variances of the Gaussians [mm2]
     gaussian_weight : (n, 3) weight of each Gaussian in red, green and blue; only the ratios of the weights
         matter [-]
-    energy : (3,) total energy of the curve: emerging light per incident light [-]
+    energy : (3,) total energy of the profile: emerging light per incident light [-]
     """
     fraction = gaussian_weight / gaussian_weight.sum(axis=0)
 

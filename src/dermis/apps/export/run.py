@@ -1,4 +1,4 @@
-"""Export of a skin or head to another program, with a report of the errors in its skin rendering."""
+"""Export of a skin or head to another program, with a report of how wrongly the program renders the skin."""
 
 from __future__ import annotations
 
@@ -129,11 +129,11 @@ def _parameter_table_lines(parameters: Parameters) -> Sequence[str]:
     return ["  ".join([*map(str.ljust, row[:3], widths), row[3]]) for row in rows]
 
 
-def format_parameter(value: ParameterValue) -> str:
+def format_parameter(parameter_value: ParameterValue) -> str:
     """Return the value of a parameter as text, with four significant digits."""
-    if isinstance(value, tuple):
-        return ", ".join(f"{x:.4g}" for x in value)
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    if isinstance(parameter_value, tuple):
+        return ", ".join(f"{x:.4g}" for x in parameter_value)
+    return f"{parameter_value:.4g}" if isinstance(parameter_value, float) else str(parameter_value)
 
 
 def _format_colour_channels(channel_values: Floats) -> str:

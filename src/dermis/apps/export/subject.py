@@ -136,13 +136,11 @@ class Subject:
         return replace(self, scene=replace(self.scene, head=painted))
 
     def encode_maps(self) -> dict[str, bytes]:
-        """Return a dictionary from role to PNG file for the maps of the head.
+        """Return the maps of the head as PNG files, by role.
 
-        The roles are colour, normal, roughness, specular and height.
-
-        The colour is sRGB, and the green channel of the normal map points up. Roughness, which is Beckmann's
-        m, and specular strength are linear. Heights are stored in 16 bits: 0 is the lowest height of the map,
-        and 65535 the highest.
+        The roles are colour, normal, roughness, specular and height. Colours are sRGB, and the green channel
+        of the normal map points up. Roughness (Beckmann's m) and specular strength are linear. Heights have
+        16 bits: 0 is the lowest height of the map, and 65535 the highest.
         """
         if self.head is None:
             return {}
@@ -151,11 +149,15 @@ class Subject:
 
 
 def load_subject(
-    source: str | Path, *, profile: str | Path | None = None, model: ModelName | None = None, **head: Any
+    name_or_file: str | Path,
+    *,
+    profile: str | Path | None = None,
+    model: ModelName | None = None,
+    **head: Any,
 ) -> Subject:
     """Load a skin or a head, given by name or file, and return it with the reference profile of its skin.
 
-    source : name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv) of a profile, or a head:
+    name_or_file : name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv) of a profile, or a head:
         "human", "human:7", a person's .json file, the name of a sample, or a mesh file (.glb, .obj, .usdz,
         ...)
     profile : name or file of the profile of a head's skin; by default, the skin of a parametric person has
@@ -163,13 +165,13 @@ def load_subject(
     model : model of the reference profile, see `reference_profile`
     head : options of `load_head`
 
-    Raises DermisError for an unknown name, and for options of heads if `source` is a skin.
+    Raises DermisError for an unknown name, and for options of heads if `name_or_file` is a skin.
     """
-    path = checked_path(source, "a skin or a head")
-    name = str(source)
+    path = checked_path(name_or_file, "a skin or a head")
+    name = str(name_or_file)
     if not (is_person_name(name) or name in SAMPLES or find_format(path)):
         return _load_skin(name, model, head if profile is None else ("profile",))
-    loaded = load_head(source, **head)
+    loaded = load_head(name_or_file, **head)
     if profile is not None:
         skin = Skin(profile=str(profile))
     else:

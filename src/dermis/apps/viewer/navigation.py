@@ -73,7 +73,7 @@ def dolly(camera: Camera, distance_factor: float) -> Camera:
 
 
 def focus(camera: Camera, new_target: ArrayLike) -> Camera:
-    """Shift the camera so that a point becomes its target, without changing its direction or distance."""
+    """Shift the camera so that a point becomes its target; direction and distance stay the same."""
     shift = np.subtract(new_target, camera.target)
     return _with_position_and_target(camera, np.array(camera.position) + shift, new_target)
 

@@ -140,8 +140,8 @@ class Session:
     clock : function that returns the time [s]
 
     split : before/after comparison
-    status : text over the picture about the adapter
-    message : text over the picture about the last action
+    status : message about the graphics adapter, shown over the picture
+    message : message about the last action, shown over the picture
     scene_file : file name of the scene, typed in the panel
     picture_file : file name of screenshots, typed in the panel
     picture_size : size of screenshots; (0, 0) for the size of the view [pixel]
@@ -294,9 +294,10 @@ def _shorten_message(message: str) -> str:
 def with_region_table(
     state: ViewerState, table_name: str, known_states: Iterable[ViewerState] = ()
 ) -> ViewerState:
-    """Return the state with the roughness and specular maps of a table of face regions, or without them.
+    """Return the state with roughness and specular maps that a table of face regions defines.
 
-    table_name : name or file of the table, "auto" or "none"
+    table_name : name or file of the table; "auto" for the package's table if the regions of the head are
+        known; "none" for no such maps
     known_states : states whose heads are reused if they already have these maps
 
     Raises DermisError for heads without known regions and for heads created in memory.

@@ -65,8 +65,8 @@ class AtlasView:
         (u, v), reduction = self.centre, self.span - span
         return replace(self, span=span)._with_centre(u + reduction * x, v + reduction * y)
 
-    def _with_centre(self, u: float, v: float) -> AtlasView:
-        return replace(self, centre=(min(1.0, max(0.0, u)), min(1.0, max(0.0, v))))
+    def _with_centre(self, centre_u: float, centre_v: float) -> AtlasView:
+        return replace(self, centre=(min(1.0, max(0.0, centre_u)), min(1.0, max(0.0, centre_v))))
 
 
 P = TypeVar("P", bound=FrozenModel)

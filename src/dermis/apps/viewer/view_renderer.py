@@ -68,7 +68,7 @@ _BEST_QUALITY_LEVEL_ON_CPU = 2
 
 
 class QualityController:
-    """Controller that adapts the quality of frames in motion to the time that the last frames took.
+    """Controller that adapts the quality of a changing picture to the time that the last frames took.
 
     software : whether the adapter renders on the CPU
     """

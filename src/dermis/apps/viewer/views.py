@@ -112,7 +112,7 @@ class IntermediateViews:
         return self._image
 
     def _atlas_layer(
-        self, inputs: FrameInputs, layer_name: str, settings: Settings
+        self, frame_inputs: FrameInputs, layer_name: str, settings: Settings
     ) -> tuple[TextureOrView, float]:
         """Return the texture of an atlas layer, and a scale for displaying it.
 
@@ -120,7 +120,7 @@ class IntermediateViews:
         the layer "stretch", it is the mean number of texels per mm; for other layers, it is 1.
         """
         if layer_name in BLUR_LEVELS_BY_VIEW:
-            level, blur = BLUR_LEVELS_BY_VIEW[layer_name], next(iter(inputs.blurs), None)
+            level, blur = BLUR_LEVELS_BY_VIEW[layer_name], next(iter(frame_inputs.blurs), None)
             count = len(blur.profile_levels) if blur else 0
             if blur is None or level >= count:
                 refuse(
@@ -130,20 +130,22 @@ class IntermediateViews:
                     _MISSING_BLUR_ADVICE,
                 )
             layer = blur.profile_levels[level]
-            texture = inputs.resources.diffusion.levels.layer(layer, blur.halvings[layer])
-            return texture, self._exposure(inputs) / blur.scale
+            texture = frame_inputs.resources.diffusion.levels.layer(layer, blur.halvings[layer])
+            return texture, self._exposure(frame_inputs) / blur.scale
         if layer_name == "stretch":
-            stretch = inputs.layouts[0].atlas.resources["stretch_map"]
+            stretch = frame_inputs.layouts[0].atlas.resources["stretch_map"]
             return stretch, self._mean_texel_density(stretch)
-        return self._thickness_texture(inputs) if layer_name == "thickness" else self._empty_texture, 1.0
+        return self._thickness_texture(
+            frame_inputs
+        ) if layer_name == "thickness" else self._empty_texture, 1.0
 
-    def _exposure(self, inputs: FrameInputs) -> float:
+    def _exposure(self, frame_inputs: FrameInputs) -> float:
         """Return the exposure factor of the last frame, whether metered or fixed [-]."""
-        meter, exposure = inputs.resources.post.meter, inputs.settings.exposure
+        meter, exposure = frame_inputs.resources.post.meter, frame_inputs.settings.exposure
         return read_meter(self._renderer.device, meter) if meter else float(exposure)
 
-    def _thickness_texture(self, inputs: FrameInputs) -> Texture:
-        translucency = inputs.layouts[0].translucency
+    def _thickness_texture(self, frame_inputs: FrameInputs) -> Texture:
+        translucency = frame_inputs.layouts[0].translucency
         if translucency is None:
             refuse("view thickness", "a scene with translucency", "it is off", "Set transmission to thin")
         if translucency.pairs not in self._thickness_maps:

@@ -52,11 +52,11 @@ class Arnold(JsonTarget):
         return curve.with_energy(curve.energy / subject.clipped_albedo(_MIN_ALBEDO) * subject.curve.energy)
 
 
-def _material_parameters(colour: Floats, mean_free_path_mm: Floats) -> Parameters:
+def _material_parameters(base_colour: Floats, mean_free_path_mm: Floats) -> Parameters:
     return (
         Parameter("subsurface", 1.0, "-", "all diffuse light is scattered below the surface"),
         Parameter("subsurface_type", "randomwalk", "-", "not diffusion, whose profile differs"),
-        Parameter(_COLOUR_NAME, flat_tuple(colour), "-", "diffuse reflectance"),
+        Parameter(_COLOUR_NAME, flat_tuple(base_colour), "-", "diffuse reflectance"),
         Parameter(_RADIUS_NAME, flat_tuple(mean_free_path_mm / _MM_PER_CM), "cm", "mean free path"),
         Parameter(_SCALE_NAME, 1.0, "-", "scene units per cm: 0.01 for a scene in metres"),
         Parameter("subsurface_anisotropy", 0.0, "-", "isotropic scattering"),

@@ -1,8 +1,8 @@
 """Export to RenderMan: parameters of PxrSurface, based on published documentation and not tested.
 
-The diffuse mean free path is subsurfaceDmfp times subsurfaceDmfpColor times unitLength, in mm. The
-Burley profile for a diffuse mean free path dmfp has the width d = dmfp / s(A), where A is the albedo and s is
-Burley's factor for diffuse mean free paths.
+The diffuse mean free path is subsurfaceDmfp times subsurfaceDmfpColor times unitLength, in mm. The width d of
+the Burley profile is the diffuse mean free path divided by s(A). Here A is the albedo, and s is Burley's
+factor for diffuse mean free paths.
 
 Source: [ChristensenBurley2015].
 """

@@ -32,7 +32,7 @@ _MAX_DISPLAYED_NAME_CHARACTERS = 80
 
 
 class Uploads:
-    """ASGI middleware that receives files at upload/NAME from the page that has control.
+    """ASGI middleware that receives files at upload/NAME from the page that controls the viewer.
 
     app : application that handles all other requests
     canvas : canvas of the page; it issues the ticket required for an upload, and opens each received file

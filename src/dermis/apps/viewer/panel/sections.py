@@ -454,19 +454,19 @@ def stage_times_by_name(frame_times_ms: Sequence[dict[str, float]]) -> dict[str,
 
 
 def _plot_stacked_areas(
-    times_ms: dict[str, Floats], colours: Sequence[tuple[float, float, float]], total_ms: Floats
+    times_ms: dict[str, Floats], stage_colours: Sequence[tuple[float, float, float]], total_ms: Floats
 ) -> None:
     """Plot the times of stages over the frames as stacked areas, with the last frame at the right edge.
 
     times_ms : (n,) times of each stage, by stage name [ms]
-    colours : colour of each stage
+    stage_colours : colour of each stage
     total_ms : (n,) total times of the frames [ms]
     """
     last = max(1.0, len(total_ms) - 1.0)
     if not begin_plot("stages", ("frames", "ms"), (0.0, last), max(float(total_ms.max()), 1e-3)):
         return
     x, below = np.arange(len(total_ms), dtype=np.float64), np.zeros(len(total_ms))
-    for (name, values), colour in zip(times_ms.items(), colours, strict=True):
+    for (name, values), colour in zip(times_ms.items(), stage_colours, strict=True):
         spec = implot.Spec()
         spec.fill_color = imgui.ImVec4(*colour, 1.0)
         implot.plot_shaded(name, x, below, below + values, spec)

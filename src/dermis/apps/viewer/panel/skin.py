@@ -104,7 +104,7 @@ def draw_surface(session: Session) -> None:
 
 
 def _draw_skin_tone_text(session: Session) -> None:
-    """Draw a text that describes the mean colour of the head's skin."""
+    """Display a description of the mean colour of the head's skin."""
     colour = session.state.scene.head.maps.mean_colour
     if colour is not None:
         imgui.text_disabled(skin_tone(colour).as_text())

@@ -1,8 +1,8 @@
 """Export to a web page with Babylon.js, which diffuses light in screen space.
 
 The formulas follow the shader subSurfaceScattering of babylonjs 9.28.0 and 9.34.0. A diffusion profile is set
-as a colour c. The shader takes samples on a spiral, whose radii are distributed by a Burley profile of width
-max(c), and weights them by a Burley profile that has the width 1/c in each channel. A bug in the shader
+as a colour c. The shader takes samples on a spiral, with radii distributed like a Burley profile of width
+max(c). In each channel, a Burley profile of width 1/c gives the weights of the samples. A bug in the shader
 doubles all widths.
 """
 
@@ -80,7 +80,7 @@ class Babylon(EnginePage):
         """Return the library's script elements, and the URLs or hashes that the page's policy must allow."""
         files = self.library_files[version]
         if self.library_folder is None:
-            return "\n".join(file.element for file in files), [file.url for file in files]
+            return "\n".join(file.html_element for file in files), [file.url for file in files]
         texts = [escape_script(file.read(self.library_folder)) for file in files]
         return "\n".join(f"<script>{text}</script>" for text in texts), [csp_hash(text) for text in texts]
 

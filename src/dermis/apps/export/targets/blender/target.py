@@ -149,8 +149,8 @@ def _interpolate_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Float
 def _load_walk_table() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
     """Return a table of Cycles' random walks for each way in which a walk enters the medium.
 
-    A table is a tuple of n values of sqrt(1 - albedo) [-], m radii [mean free paths], and the fraction of
-    light (n, m) that leaves the medium within each radius [-].
+    A table is a tuple of three arrays: n values of sqrt(1 - albedo) [-], m radii [mean free paths], and
+    fractions (n, m) of the light that leave the medium within each radius [-].
     """
     by_entry: dict[str, list[list[float]]] = {}
     for row in read_rows(__package__, "cycles_walk"):

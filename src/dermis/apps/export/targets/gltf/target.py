@@ -48,16 +48,17 @@ class Gltf(Target):
     part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the parameters of a fitted scattering volume or, in the other variant, of transmission.
+        """Return the parameters of the variant.
 
-        The transmission is that of an ear.
+        In the variant "scatter", a scattering volume is fitted to the skin's profile. In the variant
+        "diffuse-transmission", the skin transmits as much light as an ear.
         """
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_transmission_parameters(subject, *_ear_transmission(subject))
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return parameters with the skin's colour for all colours, and a guess of all other parameters."""
+        """Return the skin's colour as the value of each colour, and guesses of the other parameters."""
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_transmission_parameters(subject, _NAIVE_TRANSMISSION_FACTOR, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())
@@ -65,7 +66,7 @@ class Gltf(Target):
         return _scatter_parameters(Volume(radius_m, colour, colour))
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile of the volume or, in the variant with transmission, a step at radius 0."""
+        """Return the profile of the volume or, in the variant "diffuse-transmission", a step at radius 0."""
         if self.variant == TRANSMISSION_VARIANT:
             reflected = (1.0 - get_numbers(parameters, _TRANSMISSION_FACTOR_NAME)[0]) * subject.curve.energy
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), reflected)

@@ -119,8 +119,8 @@ class Mitsuba(Target):
         """Write the scene with one XML file for each surface model, and with meshes and textures."""
         colours, scene = skin_colours(subject), subject.scene or Scene(subject.head_or_ball)
         media = {each: fit_medium(subject.curve, colours, each) for each in BOUNDARIES}
-        pictured = _picture_roles_by_material(subject)
-        opaque = _opaque_meshes(scene, self.adapter, pictured)
+        pictured = _image_roles_by_material(subject)
+        opaque = _encode_opaque_meshes(scene, self.adapter, pictured)
         pictures = subject.part_pictures.encode(PART_ROLES) if subject.part_pictures else {}
         appearance = SkinAppearance(media, *skin_textures(subject, colours), opaque, pictured, pictures)
         return write_files(
@@ -159,7 +159,7 @@ def _boundary_transmittance(boundary: Boundary) -> float:
     return 1.0 - MATCHED_REFLECTANCE if boundary == "matched" else 1.0
 
 
-def _picture_roles_by_material(subject: Subject) -> dict[int, set[PartRole]]:
+def _image_roles_by_material(subject: Subject) -> dict[int, set[PartRole]]:
     """Return the roles of the texture images of each material, by material index; eyeballs are left out."""
     head, pictures = subject.head_or_ball, subject.part_pictures
     if pictures is None:
@@ -169,24 +169,24 @@ def _picture_roles_by_material(subject: Subject) -> dict[int, set[PartRole]]:
     return {k: part_roles for k, part_roles in roles.items() if part_roles}
 
 
-def _opaque_meshes(scene: Scene, adapter: str, picture_materials: Container[int]) -> dict[int, bytes]:
+def _encode_opaque_meshes(scene: Scene, adapter: str, textured_materials: Container[int]) -> dict[int, bytes]:
     """Return a dictionary from material index to PLY file, for the head's materials except skin.
 
-    picture_materials : indices of the materials with texture images; other meshes get vertex colours
+    textured_materials : indices of the materials with texture images; other meshes get vertex colours
     """
     mesh, centre = scene.head.mesh, scene.head.centre_mm
     opaque = [k for k in np.unique(mesh.material).tolist() if mesh.materials[k].kind != "skin"]
     meshes = {
         k: mesh_ply(mesh, mesh.material == k, centre, is_v_upwards=False)
         for k in opaque
-        if k in picture_materials
+        if k in textured_materials
     }
     if len(meshes) == len(opaque):
         return meshes
     from dermis.apps.export.targets.mitsuba.meshes import coloured_meshes
     from dermis.frame.renderer import Renderer
 
-    coloured = [k for k in opaque if k not in picture_materials]
+    coloured = [k for k in opaque if k not in textured_materials]
     return meshes | coloured_meshes(Renderer(adapter), scene, coloured)
 
 

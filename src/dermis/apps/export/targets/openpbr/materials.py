@@ -121,20 +121,20 @@ def skin_material(
     material_name: str,
     skin: Skin,
     radius_m: tuple[float, float, float],
-    colour: tuple[float, ...],
+    uniform_colour: tuple[float, ...],
     map_roles: Iterable[str],
 ) -> OpenPbrMaterial:
     """Return the OpenPBR material of skin.
 
     radius_m : (3,) mean free paths [m]
-    colour : (3,) uniform colour, used without a colour map; linear Rec. 709 [-]
+    uniform_colour : (3,) uniform colour, used without a colour map; linear Rec. 709 [-]
     map_roles : roles of the maps that replace uniform values
     """
     longest = max(radius_m)
     values: dict[str, InputValue] = {
-        "base_color": colour,
+        "base_color": uniform_colour,
         "subsurface_weight": 1.0,
-        "subsurface_color": colour,
+        "subsurface_color": uniform_colour,
         "subsurface_radius": longest,
         "subsurface_radius_scale": tuple(one / longest for one in radius_m),
         "subsurface_scatter_anisotropy": 0.0,
@@ -148,7 +148,7 @@ def skin_material(
     )
 
 
-def opaque_material(material: Material) -> OpenPbrMaterial:
+def untextured_part_material(material: Material) -> OpenPbrMaterial:
     """Return the OpenPBR material of a part of the head that is not skin, such as teeth, tongue or lashes."""
     name = material.name.casefold()
     roughness = next(
@@ -162,13 +162,13 @@ def opaque_material(material: Material) -> OpenPbrMaterial:
     return OpenPbrMaterial(material.name, values, {})
 
 
-def part_material(material: Material, pictures: PartPictures) -> OpenPbrMaterial:
-    """Return the OpenPBR material of a part of the head, such as hair or clothes, with texture images."""
-    roles = pictures.needed_roles(material)
+def textured_part_material(material: Material, part_pictures: PartPictures) -> OpenPbrMaterial:
+    """Return the OpenPBR material of a part of the head that is not skin and has texture images."""
+    roles = part_pictures.needed_roles(material)
     maps = {name: f"{PART_PREFIX}{role}" for role, name in _PART_INPUTS.items() if role in roles}
-    values = {**opaque_material(material).values, "specular_ior": _PART_IOR}
+    values = {**untextured_part_material(material).values, "specular_ior": _PART_IOR}
     if max(material.emission) > 0.0:
-        values["emission_luminance"], values["emission_color"] = pictures.emission_strength_and_colour(
+        values["emission_luminance"], values["emission_color"] = part_pictures.emission_strength_and_colour(
             material
         )
     return OpenPbrMaterial(
@@ -198,20 +198,20 @@ def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
     return OpenPbrMaterial("hair", values, {})
 
 
-def open_pbr_maps(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
+def open_pbr_maps(head_maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
     """Return a dictionary from role to map of a skin, with the values that OpenPBR expects.
 
-    slopes : (n, n, 2) slopes of the relief, used if `maps` has no normals
+    slopes : (n, n, 2) slopes of the relief, used if `head_maps` has no normals
     """
     arrays: dict[str, Floats] = {}
-    if maps.colour is not None and skin.albedo == "map":
-        arrays["colour"] = maps.colour
-    if maps.roughness is not None:
-        roughness = maps.roughness * np.float32(skin.roughness / DEFAULT_ROUGHNESS * skin.smoothing)
+    if head_maps.colour is not None and skin.albedo == "map":
+        arrays["colour"] = head_maps.colour
+    if head_maps.roughness is not None:
+        roughness = head_maps.roughness * np.float32(skin.roughness / DEFAULT_ROUGHNESS * skin.smoothing)
         arrays["roughness"] = np.sqrt(np.clip(roughness, 0.0, 1.0))
-    if maps.specular is not None and (mean := float(maps.specular.mean())) > 0:
-        arrays["specular"] = np.clip(maps.specular * np.float32(skin.strength / mean), 0.0, 1.0)
-    gradient = slopes if maps.normal is None else maps.normal
+    if head_maps.specular is not None and (mean := float(head_maps.specular.mean())) > 0:
+        arrays["specular"] = np.clip(head_maps.specular * np.float32(skin.strength / mean), 0.0, 1.0)
+    gradient = slopes if head_maps.normal is None else head_maps.normal
     if gradient is not None:
         normal = np.concatenate([-gradient, np.ones_like(gradient[..., :1])], axis=-1)
         arrays["normal"] = 0.5 + 0.5 * normal / np.linalg.norm(normal, axis=-1, keepdims=True)
@@ -233,13 +233,13 @@ def _encode_map_png(map_role: str, texels: Floats) -> bytes:
     return encode_png(levels if levels.ndim == 3 else levels[..., None])
 
 
-def file_prefix(file: Path, subject: Subject) -> str:
+def file_prefix(main_file: Path, subject: Subject) -> str:
     """Return the prefix of the names of map and mesh files beside a target's main file."""
-    identifier = re.sub(r"[^A-Za-z0-9]+", "_", file.stem).strip("_")[:_MAX_MATERIAL_NAME_LENGTH]
+    identifier = re.sub(r"[^A-Za-z0-9]+", "_", main_file.stem).strip("_")[:_MAX_MATERIAL_NAME_LENGTH]
     return f"{identifier or subject.identifier}_"
 
 
-def write_maps(subject: Subject, folder: Path, file_name_prefix: str) -> dict[str, Path]:
+def write_maps(subject: Subject, output_folder: Path, file_name_prefix: str) -> dict[str, Path]:
     """Write the maps of the head's skin as PNG files, and return a dictionary from role to path.
 
     file_name_prefix : prefix of the file names
@@ -247,12 +247,14 @@ def write_maps(subject: Subject, folder: Path, file_name_prefix: str) -> dict[st
     if subject.head is None:
         return {}
     files = encode_map_files(open_pbr_maps(subject.head.maps, subject.skin, relief_slopes(subject.head)))
-    written = write_files(folder, ((f"{file_name_prefix}{role}.png", data) for role, data in files.items()))
+    written = write_files(
+        output_folder, ((f"{file_name_prefix}{role}.png", data) for role, data in files.items())
+    )
     return dict(zip(files, written, strict=True))
 
 
 def write_part_pictures(
-    subject: Subject, folder: Path, file_name_prefix: str, additional_roles: Iterable[PartRole] = ()
+    subject: Subject, output_folder: Path, file_name_prefix: str, additional_roles: Iterable[PartRole] = ()
 ) -> list[Path]:
     """Write the texture images of parts that are not skin as PNG files, and return their paths.
 
@@ -263,7 +265,7 @@ def write_part_pictures(
         return []
     files = subject.part_pictures.encode([*_PART_INPUTS, *additional_roles])
     return write_files(
-        folder, ((f"{file_name_prefix}{PART_PREFIX}{role}.png", data) for role, data in files.items())
+        output_folder, ((f"{file_name_prefix}{PART_PREFIX}{role}.png", data) for role, data in files.items())
     )
 
 
@@ -279,9 +281,9 @@ def mesh_materials(subject: Subject, mfp_mm: Doubles, map_roles: Iterable[str]) 
 
     def material_definition(material: Material) -> OpenPbrMaterial:
         if parts is not None and material.has_maps:
-            return part_material(material, parts)
+            return textured_part_material(material, parts)
         if material.kind != "skin":
-            return opaque_material(material)
+            return untextured_part_material(material)
         return skin_material(material.name, subject.skin, (red, green, blue), colour, known_roles)
 
     return {index: material_definition(mesh.materials[index]) for index in np.unique(mesh.material).tolist()}

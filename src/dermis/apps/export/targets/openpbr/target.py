@@ -179,16 +179,16 @@ def lowest_layer(subject: Subject) -> Layer | None:
     return tissue.medium.layers[-1]
 
 
-def random_walk_profile(colour: Floats, mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
+def random_walk_profile(base_colour: Floats, mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
     """Return the cumulative profile of a random walk whose albedo is derived from the base colour.
 
     The albedo follows from van de Hulst's formula, so the energy of the profile includes the error of this
     formula.
 
-    colour : (3,) base colour
+    base_colour : (3,) base colour
     mfp_mm : (3,) mean free paths [mm]
     """
-    return subject.rescale_energy(half_space("walk", albedo_from_colour(colour), mfp_mm))
+    return subject.rescale_energy(half_space("walk", albedo_from_colour(base_colour), mfp_mm))
 
 
 def materialx_profile(mfp_mm: Floats, subject: Subject) -> CumulativeProfile:

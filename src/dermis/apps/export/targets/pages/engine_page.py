@@ -63,7 +63,7 @@ class LibraryFile:
         return f"sha384-{self.sha384}"
 
     @property
-    def element(self) -> str:
+    def html_element(self) -> str:
         """Return the HTML element that loads and checks the file."""
         return f'<script src="{self.url}" integrity="{self.integrity}" crossorigin="anonymous"></script>'
 
@@ -101,9 +101,9 @@ class EnginePage(Target):
     library_files: ClassVar[Mapping[str, tuple[LibraryFile, ...]]]
     """Files of the library, by version."""
 
-    def with_library(self, folder: str | Path) -> EnginePage:
+    def with_library(self, node_modules_folder: str | Path) -> EnginePage:
         """Return a copy of the target that embeds the library from an npm folder in the page."""
-        return replace(self, library_folder=Path(folder))
+        return replace(self, library_folder=Path(node_modules_folder))
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the page with the head, its parameters, camera and lights."""

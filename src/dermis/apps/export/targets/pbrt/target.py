@@ -1,4 +1,4 @@
-"""Export to pbrt, whose subsurface material is fitted with pbrt's own table of photon beam diffusion."""
+"""Export to pbrt, with parameters of the material `subsurface` that are fitted by pbrt's diffusion model."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class DiffusionTable(NamedTuple):
     albedo : (n,) single-scattering albedos
     radius : (m,) radii [mean free paths]
     reflectance : (n,) diffuse reflectance at each albedo
-    reflectance_within : (n, m) part of `reflectance` that is due to light leaving within each radius
+    reflectance_within : (n, m) diffuse reflectance if only the light that leaves within each radius counts
     """
 
     albedo: Floats
@@ -73,9 +73,10 @@ class DiffusionTable(NamedTuple):
     reflectance_within: Floats
 
     def interpolate(self, radius: ArrayLike, reflectance: float) -> Floats:
-        """Return the part of `reflectance` that is due to light leaving within given radii [-].
+        """Return the diffuse reflectance if only the light that leaves within given radii counts [-].
 
         radius : radii [mean free paths]
+        reflectance : diffuse reflectance if all light counts [-]
         """
         row = np.interp(reflectance, self.reflectance, np.arange(_TABLE_ALBEDO_COUNT))
         low = int(min(row, _TABLE_ALBEDO_COUNT - 2))
@@ -265,7 +266,7 @@ def _scene_lines(
         if material.kind == "skin":
             texts = [_skin_material(parameters, textures.material_textures)]
         else:
-            texts = _opaque_materials(material, roles, f"part_{index}", file_prefix)
+            texts = _part_material_lines(material, roles, f"part_{index}", file_prefix)
         alpha = {"texture alpha": "parts_opacity"} if "opacity" in roles else {}
         shape = format_directive("Shape", "plymesh", {"string filename": name, **alpha})
         lines += ["AttributeBegin", *texts, shape, "AttributeEnd"]
@@ -288,7 +289,7 @@ def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[st
     return format_directive("Material", "subsurface", values)
 
 
-def _opaque_materials(
+def _part_material_lines(
     material: Material, image_roles: set[PartRole], material_name: str, file_prefix: str
 ) -> Lines:
     """Return the material directives for a part of the head that is not skin.

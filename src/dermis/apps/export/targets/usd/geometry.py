@@ -201,7 +201,9 @@ def _bone_transforms(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
 def _bind_joints(mesh_binding: UsdSkel.BindingAPI, deformable_mesh: DeformableMesh) -> None:
     rig, count = deformable_mesh.rig, int(deformable_mesh.head.mesh.point.max()) + 1
     rigid = np.zeros((count, 1), np.int64), np.ones((count, 1))
-    bone, weight = rigid if rig.skeleton is None else point_bone_influences(rig, deformable_mesh.refinement)
+    bone, weight = (
+        rigid if rig.skeleton is None else point_bone_influences(rig, deformable_mesh.subdivision_matrix)
+    )
     indices = Vt.IntArray.FromNumpy(np.ascontiguousarray(bone, np.int32).ravel())
     weights = Vt.FloatArray.FromNumpy(np.ascontiguousarray(weight, np.float32).ravel())
     mesh_binding.CreateJointIndicesPrimvar(False, bone.shape[1]).Set(indices)

@@ -44,8 +44,9 @@ class PageContent:
     byte_runs : compressed data of buffers and textures
     maps : layers of maps, encoded as WebP images
     pictures : WebP files of these images, in the order in which the page stores them
-    picture_entries : how to decode a layer of a map, by role, mip level and layer: index of the file in
-        `pictures`, index of the channels' decoding curves in `byte_runs`, and number of colour channels
+    picture_entries : entry for each image, by role, mip level and layer of the map; an entry consists of the
+        index in `pictures`, the index in `byte_runs` of the curves that decode the channels, and the number
+        of colour channels
     poster : (h, w, 3) sRGB picture that the page shows until it renders
     """
 
@@ -180,10 +181,10 @@ def _frame_changes(
     """
     capture = FrameCapture(renderer.device)
 
-    def slider_frame_json(inputs: FrameInputs | None) -> Json | None:
-        if inputs is None:
+    def slider_frame_json(frame_inputs: FrameInputs | None) -> Json | None:
+        if frame_inputs is None:
             return None
-        node = reduce_hair(capture_frame(capture, inputs), named_frame.merged_hairs)
+        node = reduce_hair(capture_frame(capture, frame_inputs), named_frame.merged_hairs)
         return slider_frame_changes(named_frame.captured, node, byte_runs)
 
     return {
@@ -230,23 +231,23 @@ def _colour_maps(
 
 
 def _colour_map_entry(
-    page_content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, role: str
+    page_content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, map_role: str
 ) -> tuple[int, int, int] | None:
     """Return the entry in `PageContent.picture_entries` of a scene's colour map; None for the default map.
 
     scene : scene at a captured value of a slider; None at the default value
-    role : role under which the map is stored, such as "melanin 0"
+    map_role : role under which the map is stored, such as "melanin 0"
     """
     if scene is None:
         return None
-    if (role, 0, 0) not in page_content.maps.pictures:
+    if (map_role, 0, 0) not in page_content.maps.pictures:
         capture = FrameCapture(renderer.device)
         texture = renderer.prepare(scene, settings).bindings["colour_map"]
         texels = read_texels(capture, capture.index_of_resource(texture), 0)[0]
         if page_content.maps.matches_picture("colour_map", texels):
             return None
-        page_content.maps.pictures[role, 0, 0] = encode_picture(texels, True)
-    return *page_content.add_picture((role, 0, 0))[:2], 3
+        page_content.maps.pictures[map_role, 0, 0] = encode_picture(texels, True)
+    return *page_content.add_picture((map_role, 0, 0))[:2], 3
 
 
 def _interaction_json(scene: Scene, frame_inputs: FrameInputs) -> Json:

@@ -54,7 +54,7 @@ PictureMaps = dict[int, PictureMap]
 
 def frames_json(
     capture: FrameCapture,
-    frames: list[NamedFrame],
+    named_frames: list[NamedFrame],
     picture_maps: PictureMaps,
     quantisation_steps: dict[int, tuple[float, ...]],
     byte_runs: ByteRunCollector,
@@ -70,9 +70,9 @@ def frames_json(
     """
     pictures = [
         [capture.index_of_resource(f.picture.bytes), capture.index_of_resource(f.picture.exposed)]
-        for f in frames
+        for f in named_frames
     ]
-    captured_frames = [frame.captured for frame in frames]
+    captured_frames = [frame.captured for frame in named_frames]
     contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TRIANGLE_TABLE_BINDINGS))
     for index in resources_read_before_write(capture, captured_frames):
         if index in quantisation_steps:
@@ -92,7 +92,7 @@ def frames_json(
         "resources": [_with_camel_case_keys(one) for one in capture.resources],
         "structs": {name: _struct_json(dtype) for name, dtype in capture.structs.items()},
         "contents": contents,
-        "frames": [_frame_json(one, k, byte_runs) for one, k in zip(frames, pictures, strict=True)],
+        "frames": [_frame_json(one, k, byte_runs) for one, k in zip(named_frames, pictures, strict=True)],
         "halved": {k: _passes_json(m.mip_passes, byte_runs) for k, m in picture_maps.items() if m.mip_passes},
     }
 
@@ -181,14 +181,14 @@ def _camel_case(snake_case: str) -> str:
     return first + "".join(word.title() for word in others)
 
 
-def resources_read_before_write(capture: FrameCapture, frames: Frames) -> list[int]:
+def resources_read_before_write(capture: FrameCapture, captured_frames: Frames) -> list[int]:
     """Return the sorted indices of the resources that a frame reads before writing to them.
 
     The page stores the data of these resources. A view of a texture counts as the whole texture, so a texture
     counts as written if any part of the texture is written.
     """
     found: set[int] = set()
-    for frame in frames:
+    for frame in captured_frames:
         written: set[int] = set()
         for one in frame.passes:
             found |= {viewed_resource(capture, k) for k in resources_read_by(capture, one)} - written
@@ -197,11 +197,11 @@ def resources_read_before_write(capture: FrameCapture, frames: Frames) -> list[i
 
 
 def resources_bound_as(
-    capture: FrameCapture, frames: Frames, binding_names: tuple[str, ...]
+    capture: FrameCapture, captured_frames: Frames, binding_names: tuple[str, ...]
 ) -> dict[int, str]:
     """Return a dictionary from resource index to the name in `binding_names` under which shaders bind it."""
     found: dict[int, str] = {}
-    for one in (one for frame in frames for one in frame.passes if one.program is not None):
+    for one in (one for frame in captured_frames for one in frame.passes if one.program is not None):
         bound_names = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]
         found |= {
             k: name

@@ -122,18 +122,20 @@ class MapPictures:
     pictures: dict[PictureKey, Picture] = field(default_factory=dict)
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
-    def matches_picture(self, role: str, texels: NDArray[np.float16]) -> bool:
+    def matches_picture(self, map_role: str, texels: NDArray[np.float16]) -> bool:
         """Return whether texels equal the original texels of the first image encoded for a role."""
-        return bool(np.array_equal(self._encoded_texels[role], texels))
+        return bool(np.array_equal(self._encoded_texels[map_role], texels))
 
-    def replace_textures(self, renderer: Renderer, capture: FrameCapture, frames: Frames) -> PictureMaps:
+    def replace_textures(
+        self, renderer: Renderer, capture: FrameCapture, captured_frames: Frames
+    ) -> PictureMaps:
         """Encode the frames' maps as pictures, and upload the decoded texels to the renderer's textures.
 
         The renderer then draws with the same maps as the page. Returns a dictionary from resource index to
         replaced map.
         """
         maps = {}
-        for index, role in _picture_textures(capture, frames).items():
+        for index, role in _picture_textures(capture, captured_frames).items():
             texture, description = capture.resource_at(index), capture.resources[index]
             side, storable = min(description["size"][:2]), description["usage"] & _STORAGE_BINDING_USAGE
             mips = (
@@ -147,7 +149,7 @@ class MapPictures:
         return maps
 
     def _add_pictures(
-        self, capture: FrameCapture, resource_index: int, role: str, mip_level: int
+        self, capture: FrameCapture, resource_index: int, map_role: str, mip_level: int
     ) -> NDArray[np.float16]:
         """Add the pictures of a mip level, and return the (l, h, w, c) texels decoded from the pictures.
 
@@ -156,10 +158,10 @@ class MapPictures:
         """
         layers = read_texels(capture, resource_index, mip_level)
         for layer, texels in enumerate(layers):
-            if (role, mip_level, layer) not in self.pictures:
-                self.pictures[role, mip_level, layer] = encode_picture(texels, role == _COLOUR_ROLE)
-                self._encoded_texels.setdefault(role, texels)
-        return np.stack([self.pictures[role, mip_level, layer].texels for layer in range(len(layers))])
+            if (map_role, mip_level, layer) not in self.pictures:
+                self.pictures[map_role, mip_level, layer] = encode_picture(texels, map_role == _COLOUR_ROLE)
+                self._encoded_texels.setdefault(map_role, texels)
+        return np.stack([self.pictures[map_role, mip_level, layer].texels for layer in range(len(layers))])
 
 
 def with_reduced_maps(head: Head, max_side: int) -> Head:
@@ -178,12 +180,14 @@ def _reduce_map(texels: NDArray[np.float32], max_side: int) -> NDArray[np.float3
     return np.asarray(mip_chain(texels)[mip], np.float32)
 
 
-def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) -> dict[int, tuple[float, ...]]:
+def quantise_hairs(
+    renderer: Renderer, capture: FrameCapture, captured_frames: Frames
+) -> dict[int, tuple[float, ...]]:
     """Round the knots of hairs in the device's buffers, so that the buffers compress well.
 
     Returns the rounding steps of a knot's x, y, z and radius [mm] for each buffer, by resource index.
     """
-    buffers = resources_bound_as(capture, frames, ("knots",))
+    buffers = resources_bound_as(capture, captured_frames, ("knots",))
     for index in buffers:
         knots = capture.read_content(index)[0].view(np.float32).reshape(-1, len(_KNOT_STEPS_MM))
         data = quantise(knots, _KNOT_STEPS_MM)
@@ -202,7 +206,7 @@ def read_texels(capture: FrameCapture, resource_index: int, mip_level: int) -> N
     return np.stack([one.view(np.float16).reshape(*sides, -1) for one in parts])
 
 
-def _picture_textures(capture: FrameCapture, frames: Frames) -> dict[int, str]:
+def _picture_textures(capture: FrameCapture, captured_frames: Frames) -> dict[int, str]:
     """Return a dictionary from resource index to role, for the map textures that are stored as pictures.
 
     These are the half-float textures whose sides have at least `MIN_PICTURE_SIDE` texels. The role of a
@@ -210,7 +214,7 @@ def _picture_textures(capture: FrameCapture, frames: Frames) -> dict[int, str]:
     """
     return {
         index: role
-        for index, role in resources_bound_as(capture, frames, _MAP_ROLES).items()
+        for index, role in resources_bound_as(capture, captured_frames, _MAP_ROLES).items()
         if capture.resources[index].get("format", "").endswith("16float")
         and min(capture.resources[index]["size"][:2]) >= MIN_PICTURE_SIDE
     }

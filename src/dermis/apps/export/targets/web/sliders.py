@@ -46,21 +46,21 @@ class Slider:
 
 
 def slider_frame_inputs(
-    slider: Slider, prepare_inputs: Callable[[Scene], FrameInputs], default_inputs: FrameInputs
+    slider: Slider, prepare_frame_inputs: Callable[[Scene], FrameInputs], default_inputs: FrameInputs
 ) -> Iterator[FrameInputs | None]:
     """Yield the frame inputs at each captured value of a slider; None at the default value.
 
-    prepare_inputs : function that returns the frame inputs of a scene
+    prepare_frame_inputs : function that returns the frame inputs of a scene
     default_inputs : frame inputs of the default scene
     """
     for scene in slider.scenes:
         if scene is None:
             yield None
         elif slider.changes_pose_only:
-            posed = prepare_inputs(scene)
+            posed = prepare_frame_inputs(scene)
             yield replace(default_inputs, motion=posed.motion, view=posed.view)
         else:
-            yield prepare_inputs(scene)
+            yield prepare_frame_inputs(scene)
 
 
 def slider_frame_changes(
@@ -167,10 +167,10 @@ def _pigment_sliders(scene: Scene) -> list[Slider]:
     return sliders
 
 
-def _with_pigment(scene: Scene, maps: PaintedMaps, pigment_name: str, pigment_value: float) -> Scene:
+def _with_pigment(scene: Scene, painted_maps: PaintedMaps, pigment_name: str, pigment_value: float) -> Scene:
     assert scene.skin.pigments is not None
     pigments = scene.skin.pigments.model_copy(update={pigment_name: pigment_value})
     changed: Any = {pigment_name: pigment_value}
-    painted = replace(maps, look=replace(maps.look, **changed))
+    painted = replace(painted_maps, look=replace(painted_maps.look, **changed))
     skin = scene.skin.model_copy(update={"pigments": pigments})
     return replace(scene, head=replace(scene.head, maps=painted), skin=skin)
