@@ -73,7 +73,9 @@ def zonal_factors(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
 
 
 def synthesise_panoramas(coefficients: list[Complex], degree_factors: Floats, height: int) -> Floats:
-    """Return k panoramas (k, height, 2 height, c) whose harmonic coefficients are multiplied by factors.
+    """Return k panoramas (k, height, 2 height, c) from harmonic coefficients and k sets of factors.
+
+    In each panorama, the coefficients of each degree are multiplied by the factor of this degree.
 
     coefficients : coefficients of the spherical harmonics, see `analyse_panorama`
     degree_factors : (k, degree + 1) factor for each panorama and degree, see `zonal_factors`

@@ -88,7 +88,7 @@ def _table_entries() -> Iterator[TableIndices]:
 
 
 def _active_lobes(view_index: int) -> NDArray[np.bool_]:
-    """Return the mask (5,) of lobes that have weight for a view.
+    """Return the mask (5,) of the lobes whose weight is not 0 for a view.
 
     view_index : index of the view in LOBE_TABLE_COSINES
     """
@@ -96,7 +96,7 @@ def _active_lobes(view_index: int) -> NDArray[np.bool_]:
 
 
 def _parameter_direction(parameter_kind: int, *lobe_amounts: tuple[int, float]) -> Floats:
-    """Return a direction (20,) in the space of all lobe parameters, along which one or two lobes change.
+    """Return a direction (20,) in the space of all lobe parameters: a change of one parameter of some lobes.
 
     parameter_kind : index of the parameter that changes, such as `_IN_PLANE_POSITION`
     lobe_amounts : index of each lobe that changes, and the amount by which its parameter changes
@@ -108,7 +108,7 @@ def _parameter_direction(parameter_kind: int, *lobe_amounts: tuple[int, float]) 
 
 
 def _free_directions(target_lobe: LobeTarget, view_index: int) -> Floats:
-    """Return the k directions (20, k) in the space of lobe parameters along which a fit may vary.
+    """Return the k directions (20, k) in the space of all lobe parameters along which a fit may move.
 
     Directions for the lobes in the plane of incidence come first, then directions for the pair of lobes (see
     `fit_isotropic_lobes`). The two lobes of the pair either both stay in the plane, or remain mirror images

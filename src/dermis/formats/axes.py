@@ -32,7 +32,7 @@ class Axes(NamedTuple):
 
     @property
     def front_or_default(self) -> Axis:
-        """Return the axis along which the face looks, or the assumed axis if `front` is "auto"."""
+        """Return the axis along which the face looks: `front`, or the axis assumed for "auto", see `Axes`."""
         if self.front != "auto":
             return self.front
         return "-y" if self.up in ("z", "-z") else "z"

@@ -1,4 +1,4 @@
-"""Materials of mesh files: pictures with their mapping to the surface, and factors."""
+"""Materials of mesh files: their pictures, the mapping of pictures to the surface, and constant values."""
 
 from __future__ import annotations
 

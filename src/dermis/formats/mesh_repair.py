@@ -63,7 +63,7 @@ class RawMesh:
     triangles : (f, 3) vertex indices
     material : (f,) material index of each triangle
     quads : (q, 2) pairs of triangles that are the halves of a quad
-    vertices : the same vertices in the file's space, with their morph targets and bones
+    vertices : mesh part with the same vertices in the file's space, with their morph targets and bones
     file_vertex : (v,) index of each vertex among the vertices that the file's triangles use
     """
 
@@ -295,7 +295,7 @@ def _pair_continuing_sides(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGL
     )
     table = -np.sort(-table, axis=1)
     inwards = _directions_from_sides(mesh, table)
-    forward, piece = (
+    forward, component = (
         sides.start < sides.end,
         _label_components(len(mesh.triangles), sides.manifold_pairs // 3),
     )
@@ -306,7 +306,7 @@ def _pair_continuing_sides(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGL
             row = np.flatnonzero((table[:, a] >= 0) & (table[:, b] >= 0))
             one, two = table[row, a], table[row, b]
             cost = (inwards[row, a] * inwards[row, b]).sum(axis=1)
-            cost += 0.5 * (piece[one // 3] != piece[two // 3]) + 8 * (
+            cost += 0.5 * (component[one // 3] != component[two // 3]) + 8 * (
                 material[one // 3] != material[two // 3]
             )
             cost += np.where(forward[one] == forward[two], np.inf if turn else 4, 0)
@@ -365,25 +365,25 @@ def _split_points(mesh: RawMesh, side_pairs: Index) -> Index:
 
 def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
     """Return the mesh with consistently wound triangles and outward normals."""
-    piece, reverse = _components_and_reversals(mesh)
+    component, reverse = _components_and_reversals(mesh)
     x = np.ascontiguousarray(mesh.positions.T, np.float64)
     a, b, c = (x.take(one, axis=1) for one in np.ascontiguousarray(mesh.triangles.T))
     area = cross_columns(b - a, c - a) * np.where(reverse, -1.0, 1.0)
-    surface = _ComponentSurface(piece, area, np.stack((a, b, c)))
+    surface = _ComponentSurface(component, area, np.stack((a, b, c)))
     agreement = surface.mean_cosine(_corner_normal_sums(mesh))
     doubtful = (surface.mean_cosine(surface.outward_directions()) < _MIN_MEAN_CONVEXITY_COSINE) | (
         agreement < _MAX_COSINE_OF_OPPOSITE_NORMALS
     )
     if doubtful.any():
         turned = _inside_out_components(surface, doubtful, agreement)
-        reverse ^= turned[piece]
+        reverse ^= turned[component]
         agreement[turned] *= -1
     if reverse.any():
         count = _count_with_noun(int(reverse.sum()), "triangle")
         notes.append(f"reversed {count} of {len(reverse):,} that are wound inside out")
         triangles = np.where(reverse[:, None], mesh.triangles[:, ::-1], mesh.triangles)
         mesh = replace(mesh, triangles=triangles)
-    inwards = np.unique(mesh.triangles[(agreement < _MAX_COSINE_OF_OPPOSITE_NORMALS)[piece]])
+    inwards = np.unique(mesh.triangles[(agreement < _MAX_COSINE_OF_OPPOSITE_NORMALS)[component]])
     if len(inwards):
         notes.append(f"turned {_count_with_noun(len(inwards), 'normal')} outwards")
         normals = mesh.normals.copy()
@@ -409,11 +409,11 @@ def _components_and_reversals(mesh: RawMesh) -> tuple[Index, Mask]:
     first, second = np.concatenate((one, one + count)), np.concatenate((two, two + count))
     second = np.where(np.tile(conflict, 2), (second + count) % (2 * count), second)
     kept, reversed_ = _label_components(2 * count, np.column_stack((first, second))).reshape(2, -1)
-    piece = np.unique(np.minimum(kept, reversed_), return_inverse=True)[1].reshape(-1)
+    component = np.unique(np.minimum(kept, reversed_), return_inverse=True)[1].reshape(-1)
     reverse = kept > reversed_
     size = triangle_areas(mesh.positions[mesh.triangles])
-    balance = np.bincount(piece, np.where(reverse, size, -size))
-    return piece, reverse ^ ((balance > 0)[piece] & (kept != reversed_))
+    balance = np.bincount(component, np.where(reverse, size, -size))
+    return component, reverse ^ ((balance > 0)[component] & (kept != reversed_))
 
 
 def _corner_normal_sums(mesh: RawMesh) -> Doubles:
@@ -424,14 +424,14 @@ def _corner_normal_sums(mesh: RawMesh) -> Doubles:
 
 @dataclass(frozen=True)
 class _ComponentSurface:
-    """Triangles, and the connected component ("piece") of each.
+    """Triangles, and the connected component of each.
 
-    piece : (f,) index of each triangle's component
+    component : (f,) index of each triangle's component
     area_normals : (3, f) normals with twice the triangle's area as their length [mm²]
     corners : (3, 3, f) positions of the corners; axes: corner, coordinate, triangle [mm]
     """
 
-    piece: Index
+    component: Index
     area_normals: Doubles
     corners: Doubles
 
@@ -443,19 +443,19 @@ class _ComponentSurface:
     def outward_directions(self) -> Doubles:
         """Return the vector (3, f) to each triangle from the centroid of its component."""
         centre = self.corners.mean(axis=0)
-        total = np.maximum(np.bincount(self.piece, self.double_area), np.finfo(np.float64).tiny)
+        total = np.maximum(np.bincount(self.component, self.double_area), np.finfo(np.float64).tiny)
         for axis in centre:
-            axis -= (np.bincount(self.piece, axis * self.double_area) / total)[self.piece]
+            axis -= (np.bincount(self.component, axis * self.double_area) / total)[self.component]
         centre[np.abs(centre) < 1e-6 * np.sqrt(self.double_area)] = 0  # rounding errors of single triangles
         return np.asarray(centre)
 
     def mean_cosine(self, direction: Doubles) -> Doubles:
-        """Return the mean cosine between normals and directions for each component.
+        """Return, for each component, the mean cosine of the angle between its normals and given directions.
 
         direction : (3, f) direction for each triangle; a component whose directions are all zero gets 0
         """
-        length = np.bincount(self.piece, self.double_area * np.sqrt(dot_columns(direction, direction)))
-        total = np.bincount(self.piece, dot_columns(self.area_normals, direction))
+        length = np.bincount(self.component, self.double_area * np.sqrt(dot_columns(direction, direction)))
+        total = np.bincount(self.component, dot_columns(self.area_normals, direction))
         return total / np.where(length > 0, length, 1)
 
     def visible_sides(self, doubtful_components: Mask) -> tuple[Doubles, bool]:
@@ -468,12 +468,15 @@ class _ComponentSurface:
 
         doubtful_components : mask of components that may be inside out; they get additional sample points
         """
-        component_area = np.bincount(self.piece, self.double_area)
+        component_area = np.bincount(self.component, self.double_area)
         more = _DOUBTFUL_SAMPLE_FRACTION * doubtful_components / (component_area * doubtful_components.sum())
         triangle, sample = self._draw_samples(
-            self.double_area * ((1 - _DOUBTFUL_SAMPLE_FRACTION) / component_area.sum() + more[self.piece])
+            self.double_area * ((1 - _DOUBTFUL_SAMPLE_FRACTION) / component_area.sum() + more[self.component])
         )
-        normal, piece = self.area_normals[:, triangle] / self.double_area[triangle], self.piece[triangle]
+        normal, component = (
+            self.area_normals[:, triangle] / self.double_area[triangle],
+            self.component[triangle],
+        )
         radius, seen = (
             float(np.sqrt(dot_columns(sample, sample).max())),
             np.zeros((2, len(component_area)), np.int64),
@@ -490,11 +493,11 @@ class _ComponentSurface:
             cosine = view @ normal[:, visible]
             facings = cosine > _MIN_VIEW_COSINE, cosine < -_MIN_VIEW_COSINE
             for side, facing in zip(seen, facings, strict=True):
-                side += np.bincount(piece[visible[facing]], minlength=len(component_area))
+                side += np.bincount(component[visible[facing]], minlength=len(component_area))
         cells = (
             component_area / 8 * (_CELLS_PER_VIEW_SIDE / 2 / radius) ** 2
         )  # that a convex component would cover alone
-        alone = _VIEW_COUNT * np.minimum(cells, np.bincount(piece, minlength=len(component_area)) / 2)
+        alone = _VIEW_COUNT * np.minimum(cells, np.bincount(component, minlength=len(component_area)) / 2)
         front, back = seen
         is_seen = front + back >= np.maximum(_MIN_VISIBLE_FRACTION * alone, _MIN_VISIBLE_SAMPLES)
         balance = np.where(is_seen, (front - back) / np.maximum(front + back, 1), 0)

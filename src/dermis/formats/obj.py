@@ -37,7 +37,7 @@ def read_obj_text(path: Path) -> str:
 
 
 def read_obj(path: Path) -> MeshFile:
-    """Read a .obj file, one mesh part per pair of `usemtl` and `g`.
+    """Read a .obj file; polygons with the same `usemtl` and the same `g` form one mesh part.
 
     The colour of a part is the value Kd of its material in the .mtl file, taken as linear.
     """
@@ -45,7 +45,7 @@ def read_obj(path: Path) -> MeshFile:
 
 
 def parse_obj(path: Path, obj_text: str) -> MeshFile:
-    """Parse the text of a .obj file, one mesh part per pair of `usemtl` and `g`.
+    """Parse the text of a .obj file; polygons with the same `usemtl` and the same `g` form one mesh part.
 
     path : path of the file, for errors and to find the .mtl file
     """

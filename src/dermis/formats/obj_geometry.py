@@ -350,7 +350,7 @@ def _parse_faces(path: Path, rows_of_statement: Mapping[str, _StatementRows]) ->
 def _face_groups(
     path: Path, statements: Sequence[_Statement], face_line: Index
 ) -> tuple[list[tuple[str, str]], Index]:
-    """Return the combinations of `usemtl` and `g` names, and the index of the combination of each face.
+    """Return the combinations of `usemtl` and `g` names, and for each face the index of its combination.
 
     face_line : (n,) line number of each face
 

@@ -1,4 +1,4 @@
-"""PLY files: elements as arrays of columns, and the mesh that they describe."""
+"""Reading of PLY files: the columns of their elements, and the mesh that the elements describe."""
 
 from __future__ import annotations
 
@@ -139,13 +139,13 @@ class _Header(NamedTuple):
 
 
 class _Columns(dict[str, "Numbers | _ListColumn"]):
-    """Columns of an element by property name; `take` and similar methods record which columns are used."""
+    """Columns of an element by property name; methods that return columns record that these are used."""
 
     def __init__(self) -> None:
         super().__init__()
         self.used: set[str] = set()
 
-    def take(self, property_names: Sequence[str]) -> Numbers | None:
+    def take_properties(self, property_names: Sequence[str]) -> Numbers | None:
         """Return k scalar properties as columns of an array (n, k); None unless all of them exist."""
         columns = [column for name in property_names if isinstance(column := self.get(name), np.ndarray)]
         if not columns or len(columns) < len(property_names):
@@ -155,7 +155,9 @@ class _Columns(dict[str, "Numbers | _ListColumn"]):
 
     def take_first_complete_set(self, property_choices: Sequence[Sequence[str]]) -> Numbers | None:
         """Return the first set of properties that exists, as an array (n, k); None if no set exists."""
-        return next((one for names in property_choices if (one := self.take(names)) is not None), None)
+        return next(
+            (one for names in property_choices if (one := self.take_properties(names)) is not None), None
+        )
 
     def take_list(self, list_names: Sequence[str]) -> _ListColumn | None:
         """Return the first list property in `list_names` that exists; None if no such property exists."""
@@ -175,12 +177,12 @@ def read_ply(path: Path) -> MeshFile:
     header = _read_header(path, data)
     tables = _read_elements(path, header, np.frombuffer(data, np.uint8, offset=header.size))
     vertices, faces, strips = (tables.get(name, _Columns()) for name in ("vertex", "face", "tristrips"))
-    positions = vertices.take("xyz")
+    positions = vertices.take_properties("xyz")
     if positions is None:
         refuse(path, "vertices with x, y and z", f"they have {list_names(vertices)}", limits.DAMAGED_ADVICE)
     counts, index = _polygon_corners(path, faces, strips, len(positions))
     uv, uv_index = _corner_uv(path, vertices, faces, counts, index)
-    normals = vertices.take(("nx", "ny", "nz"))
+    normals = vertices.take_properties(("nx", "ny", "nz"))
     colours, notes = _vertex_colours(vertices)
     corners = np.column_stack((index, uv_index, np.full_like(index, -1) if normals is None else index))
     counts, corners, _, faults = without_small_polygons(counts, corners)
@@ -188,7 +190,7 @@ def read_ply(path: Path) -> MeshFile:
         refuse_without_faces(path, len(positions))
     directions = np.empty((0, 3)) if normals is None else to_floats(normals)
     polygons = Polygons(counts, corners, np.asarray(positions, np.float64), uv, directions, colours)
-    picture, unused = _main_picture(header.pictures, faces.take(("texnumber",)))
+    picture, unused = _main_picture(header.pictures, faces.take_properties(("texnumber",)))
     notes += [*faults, *missing_uv_notes(polygons), *unused, *_unread_notes(tables)]
     materials: tuple[FileMaterial, ...] = ()
     if picture is not None and (file := find_referenced_file(path, picture)) is not None:

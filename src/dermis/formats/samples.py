@@ -127,7 +127,7 @@ def _has_expected_hash(path: Path, sample_file: SampleFile) -> bool:
 
 @lru_cache(maxsize=256)
 def _file_sha256(path: Path, byte_count: int, mtime_ns: int) -> str:
-    """Return the SHA-256 of a file, cached while the size and modification time are unchanged."""
+    """Return the SHA-256 of a file, from a cache if its size and modification time are unchanged."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -223,8 +223,8 @@ class _RadianceHeader:
     axes : direction in which scanlines follow each other, and direction of the pixels of a scanline, such as
         "-Y" and "+X"
     lengths : number of scanlines, and number of pixels per scanline
-    values : dictionary from the name of a variable, such as EXPOSURE, to its numbers; the products of the
-        numbers if several lines state the variable
+    values : dictionary from the name of a variable, such as EXPOSURE, to its numbers; if several lines state
+        a variable, their numbers are multiplied
     is_xyz : whether the colours are CIE XYZ
     offset : byte at which the pixels start
     """

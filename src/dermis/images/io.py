@@ -121,9 +121,9 @@ def read_colours(
 
 
 def note_properties(path: str | Path | EmbeddedPicture, read_as_colours: bool) -> None:
-    """Issue the note on a picture's properties that the functions which read pictures issue.
+    """Issue the note on a picture's properties that reading the picture would issue.
 
-    This function serves for pictures that are taken from a cache and thus not read.
+    This function serves for pictures that are taken from a cache instead.
 
     read_as_colours : whether to issue the note of `read_colours` instead of that of `read_image`
     """
@@ -214,9 +214,9 @@ def _apply_format_function(
     radiance_function: Callable[[bytes], T],
     default_function: Callable[[bytes], T],
 ) -> T:
-    """Call one of three functions with the bytes of a picture file, and return its result.
+    """Call the function for the format of a picture file with the bytes of the file; return its result.
 
-    The format of the file, recognised by the first bytes, determines which function is called.
+    The format is recognised by the first bytes of the file.
 
     file_bytes : bytes of the file
     exr_function : function for OpenEXR files

@@ -25,7 +25,7 @@ _SPLINE_TANGENT_IN, _SPLINE_VALUE, _SPLINE_TANGENT_OUT = range(3)
 class AnimationTrack(NamedTuple):
     """Animated property of one or more nodes or morph targets, with the curve of its values.
 
-    path : "translation", "rotation" or "scale" of nodes, or "weights" of morph targets
+    path : name of the property: "translation", "rotation" or "scale" of nodes, or "weights" of morph targets
     names : (m,) names of the nodes or morph targets
     """
 

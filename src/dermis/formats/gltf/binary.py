@@ -68,12 +68,12 @@ class BufferBuilder:
     def add_displacements(
         self, moved_vertex: Numbers, displacements: Sequence[Numbers], vertex_count: int
     ) -> list[int]:
-        """Append arrays (vertex_count, 3) that are mostly 0, and return the indices of their accessors.
+        """Append arrays of displacements (vertex_count, 3), and return the indices of their accessors.
 
         The arrays are stored as sparse accessors, or as dense accessors if these are smaller.
 
-        moved_vertex : (m,) indices of the rows that may differ from 0, increasing, the same for all arrays
-        displacements : for each array, the values (m, 3) of the rows in `moved_vertex`
+        moved_vertex : (m,) increasing indices of the displaced vertices, the same for all arrays
+        displacements : for each array, the displacements (m, 3) of these vertices
         vertex_count : number of vertices
         """
         if not len(moved_vertex):

@@ -190,7 +190,7 @@ def _gltf_nodes(head: Head, buffer_builder: BufferBuilder) -> tuple[list[Tree], 
 
 
 def _bone_nodes(skeleton: Skeleton) -> tuple[list[Tree], Doubles]:
-    """Return the glTF nodes of b bones in metres, and their inverse bind matrices (b, 4, 4)."""
+    """Return the glTF nodes of b bones, and their inverse bind matrices (b, 4, 4); lengths are in metres."""
     to_file = np.diag([_METRES_PER_MM] * 3 + [1.0]) @ skeleton.to_head
     size = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
     scaled_up, scaled_down = (np.diag([factor] * 3 + [1.0]) for factor in (size, 1.0 / size))

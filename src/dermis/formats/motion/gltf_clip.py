@@ -107,7 +107,7 @@ def _rest_transforms(skeleton: Skeleton, bones: list[str]) -> _BoneTransforms:
 
 
 def _bone_matrices(transforms: _BoneTransforms) -> Doubles:
-    """Return the bone matrices (n, 4, 4): scale first, then rotation, then translation."""
+    """Return the bone matrices (n, 4, 4), which apply the scale first, then rotation, then translation."""
     matrices = quaternion_matrix(transforms.rotation)
     matrices[:, :3, :3] *= transforms.scale[:, None, :]
     matrices[:, :3, 3] = transforms.translation

@@ -291,7 +291,7 @@ def _timecode_rate(timecodes: Sequence[_Timecode]) -> float:
 def _bone_angles(
     capture_table: _CaptureTable, bones: RotationBones
 ) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Return the angles (k, 3) of bones by name [degrees], and the angle columns that fit no bone."""
+    """Return the angles (k, 3) of bones by bone name [degrees], and the angle columns without a bone."""
     columns = {plain_key(name): k for k, name in enumerate(capture_table.names)}
     angles: dict[str, Doubles] = {}
     unused: list[str] = []

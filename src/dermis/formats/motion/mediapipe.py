@@ -66,7 +66,7 @@ class _CapturedFrame(NamedTuple):
     number : number of the frame
     time : time of the frame, in the unit `unit`; NaN if the frame has none
     unit : unit of the time [s]; None if it is not stated
-    columns : (n,) column indices of the blend shapes of the frame; empty without a face
+    columns : (n,) indices of the frame's blend shapes among those of all frames; empty without a face
     weights : (n,) weights of these blend shapes
     matrix : (4, 4) facial transformation; None if the frame has none
     faces : number of faces in the frame
@@ -180,9 +180,12 @@ def _frame_list(json_document: object) -> list[object]:
 def _parse_frame(
     culprit: str, frame_index: int, json_record: object, shape_columns: dict[str, int]
 ) -> _CapturedFrame:
-    """Return a frame; it has no faces if its record has neither blend shapes nor a transformation.
+    """Parse the JSON record of a frame.
 
-    shape_columns : dictionary from blend shape name to column index; this function adds missing names
+    If the record has neither blend shapes nor a transformation, the number of faces is 0.
+
+    shape_columns : dictionary from the name of a blend shape to its index among the blend shapes of all
+        frames; this function adds missing names
     """
     if isinstance(json_record, list):
         json_record = {"blendshapes": json_record}
@@ -330,7 +333,7 @@ def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None
 def _head_angles(
     path: Path, frames: Sequence[_CapturedFrame], times: Doubles, bones: RotationBones
 ) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Return the angles (k, 3) of bones by name [degrees], and the rotations that fit no bone."""
+    """Return the angles (k, 3) of bones by bone name [degrees], and a name for rotations without a bone."""
     matrices = [frame.matrix for frame in frames if frame.matrix is not None]
     if not matrices or not bones.head:
         return {}, ("bone for the matrix",) if matrices else ()

@@ -331,10 +331,10 @@ def _obj_fingerprint(path: Path, obj_bytes: bytes) -> _ObjFingerprint:
 
 
 def _parse_positions(obj_bytes: bytes, fingerprint: _ObjFingerprint) -> Doubles | None:
-    """Return the vertex positions (v, 3) of an OBJ file in file units; None if its fingerprint differs.
+    """Return the vertex positions (v, 3) of an OBJ file in file units; None if it has another fingerprint.
 
     obj_bytes : bytes of the file
-    fingerprint : fingerprint of the first file of the sequence
+    fingerprint : fingerprint of the first file of the sequence, which all files should have
     """
     rows, digest = _split_vertex_lines(obj_bytes)
     if len(rows) != fingerprint.line_count or digest != fingerprint.digest:

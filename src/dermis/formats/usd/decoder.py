@@ -209,7 +209,7 @@ class _SceneReader:
         return self.material_index[key]
 
     def _find_uv(self, prim: Usd.Prim, faces: _Faces, material_indices: list[int]) -> _Primvar | None:
-        """Return the uv set that the materials name, else a uv set with a common name; None without uv."""
+        """Return the uv set that the materials use, or else one with a usual name; None if there is none."""
         named = dict.fromkeys(
             one for k in material_indices if k >= 0 and (one := self.materials[k].get("uv"))
         )

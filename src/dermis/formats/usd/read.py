@@ -60,10 +60,10 @@ USD_PROPERTIES = (
 
 
 def read_usd(path: Path) -> MeshFile:
-    """Read the meshes of a USD file at its first time, with their materials.
+    """Read the meshes of a USD file at its first time code, with their materials.
 
-    Raises DermisError without the package usd-core, for damaged files, and for layers outside the folder of
-    the file.
+    Raises DermisError if the package usd-core is missing, for damaged files, and for layers outside the
+    folder of the file.
     """
     data = read_file(path, "a USD file", MAX_FILE_BYTES)
     request = {"file": array_from_text(str(path.resolve())), "path": array_from_text(str(path))}

@@ -165,11 +165,11 @@ class UnmixResult:
             above = {
                 f"above_{limit:g}": float((delta_e > limit).mean()) for limit in _REPORTED_DELTA_E_LIMITS
             }
-            result["delta_e"] = _percentiles(delta_e[skin]) | above
+            result["delta_e"] = _percentile_summary(delta_e[skin]) | above
             result["skin_tone"] = skin_tone(np.median(colours[skin], axis=0)).as_json()
             for name, fraction in fractions.items():
                 sd = {"sd": float(np.median(maps[f"{name}_sd"].ravel()[skin]))} if name != "oxygen" else {}
-                result[name] = _percentiles(fraction[skin]) | sd
+                result[name] = _percentile_summary(fraction[skin]) | sd
             median = {name: result[name]["median"] for name in ("melanin", "blood")}
             found = self.third is not None
             spread = unknown_skin_sd(**median, skin=self.skin, is_oxygen_fitted=found)
@@ -212,7 +212,7 @@ class UnmixResult:
         return float(np.median(fraction_map[skin] if skin.any() else fraction_map))
 
 
-def _percentiles(values: Floats) -> dict[str, float]:
+def _percentile_summary(values: Floats) -> dict[str, float]:
     low, middle, high = np.percentile(values, (5.0, 50.0, 95.0))
     return {"p5": float(low), "median": float(middle), "p95": float(high)}
 
