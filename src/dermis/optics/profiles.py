@@ -1,4 +1,4 @@
-"""Diffusion profiles as sums of Gaussians: the published preset, files, and fits to tissue."""
+"""Diffusion profiles as sums of Gaussians: a published preset, files, and fits to tissue."""
 
 from __future__ import annotations
 

@@ -327,8 +327,8 @@ def anisotropic_response(total_reflectance: ArrayLike, eta: float, g: float) -> 
     eta : index of refraction relative to air, at least 1 [-]
     g : mean cosine of the scattering angle, at least 0 [-]
 
-    The field `single_scattering` is that of `angular_response` plus a correction for anisotropy. For the
-    correction, this factor is fitted to the emerging radiance by least squares, both for g and for isotropic
+    The field `single_scattering` is that of `angular_response` plus a correction for anisotropy. To find the
+    correction, this field is fitted to the emerging radiance by least squares, both for g and for isotropic
     scattering. The correction is the difference of the two fits.
     """
     isotropic = angular_response(total_reflectance, eta)
@@ -371,13 +371,13 @@ def _response_column(eta: float, g: float, total_reflectance: float) -> Floats:
 
 
 def _interpolate_over_cosines(sample_cosine: Floats, sample_values: Floats, cosine: Floats) -> Floats:
-    """Return a function of the cosine, interpolated linearly between samples.
+    """Return values at given cosines, interpolated linearly between samples.
 
-    Beyond the first and the last sample, the function is extrapolated by a polynomial.
+    Beyond the first and the last sample, the values are extrapolated by a polynomial.
 
     sample_cosine : (m,) cosines of the samples
     sample_values : (m,) values of the samples
-    cosine : cosines at which the function is returned
+    cosine : cosines at which the values are returned
     """
     order = np.argsort(sample_cosine)
     x, y = sample_cosine[order], sample_values[order]

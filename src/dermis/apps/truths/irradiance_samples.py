@@ -80,7 +80,7 @@ def sample_irradiance(
     subdivision = _subdivide_to(_skin_triangles(mesh), spacing_mm)
     irradiance = light(_sample_points(subdivision))
     while min_spacing_mm is not None:
-        ends, side, length = _edge_lengths(subdivision)
+        ends, side, length = _edges_with_lengths(subdivision)
         contrast_across = np.abs(irradiance[ends[:, 0]] - irradiance[ends[:, 1]]).max(axis=1)
         high_contrast = (length >= 2 * min_spacing_mm) & (
             contrast_across > contrast_threshold * irradiance.max()
@@ -128,13 +128,13 @@ def _skin_triangles(mesh: Mesh) -> _Subdivision:
 
 def _subdivide_to(subdivision: _Subdivision, spacing_mm: float) -> _Subdivision:
     while True:
-        _, side, length = _edge_lengths(subdivision)
+        _, side, length = _edges_with_lengths(subdivision)
         if not (length > spacing_mm).any():
             return subdivision
         subdivision = _halve_edges(subdivision, side, length > spacing_mm)
 
 
-def _edge_lengths(subdivision: _Subdivision) -> tuple[Index, Index, Floats]:
+def _edges_with_lengths(subdivision: _Subdivision) -> tuple[Index, Index, Floats]:
     return triangle_edges(_sample_points(subdivision).positions, subdivision.corners)
 
 

@@ -32,7 +32,7 @@ from dermis.scene.lights import (
 )
 
 Floats = NDArray[np.float64]
-_DISTANT_LIGHT_MM = 2e5
+_DISTANT_LIGHT_DISTANCE_MM = 2e5
 """Distance of the source of nearly parallel light: irradiance changes by 0.1 % in 100 mm, and a stripe is
 positioned within 0.02 mm in single precision."""
 _SPOT_SLIDE_SIDE = 1024
@@ -114,8 +114,8 @@ def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, light_label: str) 
         return {"type": "directional", "direction": list(light.direction), "irradiance": irradiance}
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
     half = 0.5 * np.radians(light.angle_degrees)
-    to_world = mitsuba_look_at(mi, -_DISTANT_LIGHT_MM * direction, (0.0, 0.0, 0.0)).scale(
-        float(_DISTANT_LIGHT_MM * np.tan(half))
+    to_world = mitsuba_look_at(mi, -_DISTANT_LIGHT_DISTANCE_MM * direction, (0.0, 0.0, 0.0)).scale(
+        float(_DISTANT_LIGHT_DISTANCE_MM * np.tan(half))
     )
     return mitsuba_shape("disk", np.divide(light.irradiance, np.pi * np.sin(half) ** 2), to_world=to_world)
 
@@ -136,11 +136,13 @@ def mitsuba_stripe(mi: Mitsuba, light: StripeLight, light_label: str) -> SceneDi
     with np.errstate(under="ignore"):
         profile = np.exp(-2.0 * across**2)
     falloff = (1.0 - _smoothstep((np.abs(along) - 0.95) / 0.05))[:, None] * profile[None, :]
-    slide = falloff[..., None] * np.multiply(light.irradiance, _DISTANT_LIGHT_MM**2)
+    slide = falloff[..., None] * np.multiply(light.irradiance, _DISTANT_LIGHT_DISTANCE_MM**2)
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
-    to_world = mitsuba_look_at(mi, light.position - _DISTANT_LIGHT_MM * direction, light.position, light.up)
+    to_world = mitsuba_look_at(
+        mi, light.position - _DISTANT_LIGHT_DISTANCE_MM * direction, light.position, light.up
+    )
     return mitsuba_projector(
-        mi, slide, np.ones((rows, columns)), to_world, 0.5 * columns * texel / _DISTANT_LIGHT_MM
+        mi, slide, np.ones((rows, columns)), to_world, 0.5 * columns * texel / _DISTANT_LIGHT_DISTANCE_MM
     )
 
 
@@ -181,15 +183,15 @@ def cycles_directional(light: DirectionalLight) -> SceneDict:
 def cycles_stripe(light: StripeLight) -> SceneDict:
     """Return a distant point light, which cycles_script.py turns into a stripe light by shader nodes."""
     across, along, forward = camera_axes(light.direction, light.up)
-    power = 4.0 * np.pi * (_DISTANT_LIGHT_MM / CYCLES_UNIT_MM) ** 2
-    source = light.position - _DISTANT_LIGHT_MM * forward
+    power = 4.0 * np.pi * (_DISTANT_LIGHT_DISTANCE_MM / CYCLES_UNIT_MM) ** 2
+    source = light.position - _DISTANT_LIGHT_DISTANCE_MM * forward
     distant = cycles_light("POINT", light.irradiance, power, source, light.direction, shadow_soft_size=0.0)
     axes = {
         "forward": (-forward).tolist(),
         "across": (across / (0.5 * light.width_mm)).tolist(),
         "along": (along / (0.5 * light.length_mm)).tolist(),
     }
-    return distant | {"stripe": {**axes, "distance": _DISTANT_LIGHT_MM}}
+    return distant | {"stripe": {**axes, "distance": _DISTANT_LIGHT_DISTANCE_MM}}
 
 
 def _cycles_point_light(

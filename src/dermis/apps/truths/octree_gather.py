@@ -74,7 +74,7 @@ def _node_is_far(
     distance = _distance(
         point, tree.centre[node_index, 0], tree.centre[node_index, 1], tree.centre[node_index, 2]
     )
-    near, far = _table_rows(distance, tree.radius[node_index], profile_table)
+    near, far = _bracketing_rows(distance, tree.radius[node_index], profile_table)
     error = (
         profile_table.curvature[near] * tree.second_moment[node_index]
         + profile_table.slope[near] * tree.centroid_error[node_index]
@@ -141,7 +141,7 @@ def _triangle_is_far(point: Floats, corners: Floats, profile_table: ProfileTable
         distance2 = (corners[k, 0] - x) ** 2 + (corners[k, 1] - y) ** 2 + (corners[k, 2] - z) ** 2
         sum_distance2 += distance2
         max_distance2 = max(max_distance2, distance2)
-    near, far = _table_rows(_distance(point, x, y, z), math.sqrt(max_distance2), profile_table)
+    near, far = _bracketing_rows(_distance(point, x, y, z), math.sqrt(max_distance2), profile_table)
     # Upper bound of the mean square distances of linear light and of the midpoints from the centroid.
     second_moment = (sum_distance2 + 2.0 * max_distance2) / 20.0 + max_distance2 / 4.0
     return bool(
@@ -213,7 +213,7 @@ def _distance(point: Floats, x: float, y: float, z: float) -> float:
 
 
 @compiled
-def _table_rows(distance: float, ball_radius: float, profile_table: ProfileTable) -> tuple[int, int]:
+def _bracketing_rows(distance: float, ball_radius: float, profile_table: ProfileTable) -> tuple[int, int]:
     """Return the rows of the profile's table that bracket the distances of all points of a ball.
 
     distance : distance of the ball's centre from the point at which light is gathered [mm]

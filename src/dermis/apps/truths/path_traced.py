@@ -119,24 +119,26 @@ def render_passes(
     min_pass_count: int,
     picture_size: tuple[int, int],
     cache_key: str | None,
-    build_radiance: Callable[[], tuple[MitsubaObject, tuple[str, ...]]],
-    build_coverage: Callable[[], MitsubaObject],
+    build_radiance_scene: Callable[[], tuple[MitsubaObject, tuple[str, ...]]],
+    build_coverage_scene: Callable[[], MitsubaObject],
     progress: ProgressCallback | None,
 ) -> PathTraced:
     """Return the mean of at least `min_pass_count` passes of Mitsuba, including cached ones.
 
     cache_key : name of the cached passes; None for no cache
-    build_radiance : function that returns the Mitsuba scene for radiance, and notes on changes to the head
-    build_coverage : function that returns the Mitsuba scene whose image is the skin's coverage of each pixel
+    build_radiance_scene : function that returns the Mitsuba scene for radiance, and notes on changes made to
+        the head
+    build_coverage_scene : function that returns the Mitsuba scene whose image is the skin's coverage of each
+        pixel
     """
     passes = load_passes(cache_key, picture_size) if cache_key else None
     if passes is None or passes.count < min_pass_count:
         with mitsuba_variant(mi, variant):
-            built_scene, notes = build_radiance()
+            built_scene, notes = build_radiance_scene()
             if passes is None:
-                mask = np.array(mi.render(build_coverage(), spp=_COVERAGE_SAMPLES_PER_PIXEL), np.float32)[
-                    ..., 0
-                ]
+                mask = np.array(
+                    mi.render(build_coverage_scene(), spp=_COVERAGE_SAMPLES_PER_PIXEL), np.float32
+                )[..., 0]
                 passes = PassStatistics.empty(picture_size, np.clip(mask, 0.0, 1.0), notes)
             add_passes(mi, built_scene, passes, min_pass_count, cache_key, progress)
     return PathTraced(
@@ -179,7 +181,7 @@ def add_passes(
             started = time.perf_counter()
             image = np.array(mi.render(loaded_scene, spp=SAMPLES_PER_PASS, seed=passes.count), np.float64)
             ended = time.perf_counter()
-            passes.add(image, ended - started)
+            passes.add_pass(image, ended - started)
             if progress is not None:
                 progress(passes.count, min_pass_count)
             if cache_key and ended - last_save > _CACHE_SAVE_INTERVAL_S and passes.count < min_pass_count:
@@ -230,7 +232,7 @@ class PassStatistics:
         """Return the variance (h, w, 3) of the mean of all passes."""
         return self.spread / (self.count * (self.count - 1))
 
-    def add(self, image: Doubles, seconds: float) -> None:
+    def add_pass(self, image: Doubles, seconds: float) -> None:
         """Add the image (h, w, 3) of a pass to the mean and to the squared deviations, by [Welford1962]."""
         self.count += 1
         self.seconds += seconds

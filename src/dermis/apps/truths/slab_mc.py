@@ -55,7 +55,7 @@ def trace_slab(
 
     Source: [Wang1995].
     """
-    photons = _checked_photons(layers, photons, seed)
+    photons = _checked_photon_count(layers, photons, seed)
     edges = default_ring_edges() if edges_mm is None else _checked_edges(edges_mm)
     tally = _trace_batches(_layer_stack(layers), photons, seed, edges, progress)
     return _slab_result(tally, photons, edges, layers[0].eta)
@@ -142,7 +142,7 @@ def _scattering_layer(layer: Layer, channel: int, g: float, eta: float) -> Scatt
     return ScatteringLayer(float(layer.sigma_a[channel]), sigma_s, layer.thickness_mm, g, eta)
 
 
-def _checked_photons(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> int:
+def _checked_photon_count(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> int:
     if not layers:
         refuse("slab", "at least one layer", "got none", "Add one")
     if np.isinf([layer.thickness_mm for layer in layers[:-1]]).any():

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from dermis.optics.media import Floats, Layer, Medium
 
-Source = Literal["beam", "point"]
+SourceKind = Literal["beam", "point"]
 _NEAR_ZERO_FREQUENCY = np.array([1e-8])  # so low that a Hankel transform equals the total reflectance [1/mm]
 
 
@@ -64,7 +64,7 @@ class _DownwardTransfer(NamedTuple):
 
 
 def solve_layers(
-    frequency: ArrayLike, medium: Medium, A: float, source_kind: Source = "beam"
+    frequency: ArrayLike, medium: Medium, A: float, source_kind: SourceKind = "beam"
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms (n, c) of R(r) and of T(r) of a layered medium [-].
 
@@ -81,7 +81,9 @@ def solve_layers(
     return _solve_sublayers(frequency, _sublayers(medium, source_kind), medium.channels, A)
 
 
-def solve_reflectance(frequency: ArrayLike, medium: Medium, A: float, source_kind: Source = "beam") -> Floats:
+def solve_reflectance(
+    frequency: ArrayLike, medium: Medium, A: float, source_kind: SourceKind = "beam"
+) -> Floats:
     """Return the Hankel transform (n, c) of R(r) of a layered medium [-].
 
     R(r) is per power that enters. This function is faster than `solve_layers`, which also computes T(r).
@@ -184,7 +186,7 @@ def _propagate_up(
     return face, _DownwardTransfer(E, rho, common, beta, lower)
 
 
-def _sublayers(medium: Medium, source_kind: Source) -> list[_Sublayer]:
+def _sublayers(medium: Medium, source_kind: SourceKind) -> list[_Sublayer]:
     return list(_beam_sublayers(medium) if source_kind == "beam" else _point_sublayers(medium))
 
 

@@ -75,7 +75,7 @@ def diffusion_profile(
         edges_mm=edges,
         ring_energy=ring_energy,
         incident=rgb_weights is not None,
-        warnings=(*_medium_warnings(medium, model, clamp), *_result_warnings(total, ring_energy)),
+        warnings=(*_medium_warnings(medium, model, clamp), *_profile_warnings(total, ring_energy)),
         sources=(*medium.sources, *MODEL_SOURCES[model]),
     )
 
@@ -122,7 +122,7 @@ def hankel_transform(medium: Medium, model: DiffusionModel, clamp: Clamp, freque
     """Return the Hankel transform (n, c) of a model's R(r) at n frequencies above 0 [1/mm]."""
     if model in ("layered", "layered-point"):
         A = boundary_mismatch(medium.eta, "exact")
-        source: layered_diffusion.Source = "beam" if model == "layered" else "point"
+        source: layered_diffusion.SourceKind = "beam" if model == "layered" else "point"
         return layered_diffusion.solve_reflectance(frequency, medium, A, source)
     return multipole.stack_response(frequency, medium, boundary_mismatch(medium.eta), clamp).R_above
 
@@ -174,7 +174,7 @@ def _first_event_albedo(medium: Medium) -> Floats:
     return scattered / depth
 
 
-def _result_warnings(total_reflectance: Floats, ring_energy: Floats) -> Sequence[str]:
+def _profile_warnings(total_reflectance: Floats, ring_energy: Floats) -> Sequence[str]:
     """Return warnings about negative reflectances, and about ring energies that do not sum to the total."""
     warnings = missing_light_warnings(total_reflectance, ring_energy)
     if (total_reflectance < 0.0).any():

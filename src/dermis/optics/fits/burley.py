@@ -142,7 +142,7 @@ def unity_parameters(profile: BurleyProfile) -> UnityParameters:
     According to Unity's source code (DiffusionProfileSettings.cs), the shape s of Burley's profile is
     1 / (colour times multiplier), where the multiplier is in millimetres at scale 1.
     """
-    _check_rgb(profile)
+    _check_three_channels(profile)
     distance = 1.0 / profile.shape
     return UnityParameters(
         scattering_colour=tuple((distance / distance.max()).tolist()),
@@ -177,7 +177,7 @@ def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
     life-size at scale 1. Both facts are from public copies of its source code (SubsurfaceProfile.cpp,
     BurleyNormalizedSSS.cpp).
     """
-    _check_rgb(profile)
+    _check_three_channels(profile)
     mean_free_path = 0.1 * UNREAL_SHAPE_RATIO * shape_factor(profile.albedo) / profile.shape
     distance = max(float(mean_free_path.max()), _UNREAL_MIN_DISTANCE_CM)
     return UnrealParameters(
@@ -187,7 +187,7 @@ def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
     )
 
 
-def _check_rgb(profile: BurleyProfile) -> None:
+def _check_three_channels(profile: BurleyProfile) -> None:
     if profile.shape.shape != (3,):
         actual = f"got {profile.shape.size} channels"
         refuse("engine parameters", "red, green and blue", actual, "Fit three channels")

@@ -110,7 +110,9 @@ def _optimal_weights(design_function: DesignFunction, samples: Floats, log_varia
     weight = np.zeros((k, samples.shape[1]))
     cost, gradient, curvature = 0.0, np.zeros(k), np.zeros((k, k))
     for i, sample in enumerate(reduced.T[2 * k :]):
-        weight[:, i], residual, jacobian = _solve_channel(reduced[:, :k], reduced[:, k : 2 * k], sample)
+        weight[:, i], residual, jacobian = _solve_channel_weights(
+            reduced[:, :k], reduced[:, k : 2 * k], sample
+        )
         cost += float(residual @ residual)
         gradient += jacobian.T @ residual
         curvature += jacobian.T @ jacobian
@@ -128,7 +130,7 @@ def qr_factor(matrix: Floats) -> Floats:
     return factors[0] if len(factors) == 1 else np.asarray(np.linalg.qr(np.vstack(factors), mode="r"))
 
 
-def _solve_channel(columns: Floats, slopes: Floats, sample: Floats) -> tuple[Floats, Floats, Floats]:
+def _solve_channel_weights(columns: Floats, slopes: Floats, sample: Floats) -> tuple[Floats, Floats, Floats]:
     from scipy.optimize import nnls
 
     weight: Floats = nnls(columns, sample)[0]

@@ -26,8 +26,8 @@ PROFILE_GRID_CORNERS = {"profile": (0, 0), "profile_blood": (0, -1), "profile_da
 """File name of each profile, with its indices on the grid of melanin and blood: pale skin without blood, pale
 skin with blood, and dark skin with blood."""
 WEIGHT_MAP_NAME = "profile_map"
-_GRID_NODES_PER_AXIS = 4  # number of grid nodes along the logarithms of melanin and of blood
-_GRID_PERCENTILES = 0.5, 99.5  # percentiles of the pigments of the skin texels, which bound the grid
+_PIGMENT_GRID_NODES_PER_AXIS = 4  # number of grid nodes along the logarithms of melanin and of blood
+_PIGMENT_GRID_PERCENTILES = 0.5, 99.5  # percentiles of the pigments of the skin texels, which bound the grid
 # Smallest volume fraction of a grid axis, and smallest ratio of its ends.
 _MIN_VOLUME_FRACTION, _MIN_AXIS_RATIO = 1e-3, 1.02
 _UNIT_SUM_EQUATION_WEIGHT = 1e4  # weight of the equation by which the mixture weights sum to 1
@@ -66,15 +66,17 @@ def profile_mixture(unmixed: UnmixResult) -> ProfileMixture:
     tissues = [_spectral_tissue(unmixed.skin, m, b) for m, b in product(*axes)]
     nodes = np.array([_ring_fractions(one) for one in tissues])
     corners = [
-        (m % _GRID_NODES_PER_AXIS) * _GRID_NODES_PER_AXIS + b % _GRID_NODES_PER_AXIS
+        (m % _PIGMENT_GRID_NODES_PER_AXIS) * _PIGMENT_GRID_NODES_PER_AXIS + b % _PIGMENT_GRID_NODES_PER_AXIS
         for m, b in PROFILE_GRID_CORNERS.values()
     ]
     weights = _mixture_weights(nodes, nodes[corners])
-    middle = nodes[(_GRID_NODES_PER_AXIS // 2) * _GRID_NODES_PER_AXIS + _GRID_NODES_PER_AXIS // 2]
+    middle = nodes[
+        (_PIGMENT_GRID_NODES_PER_AXIS // 2) * _PIGMENT_GRID_NODES_PER_AXIS + _PIGMENT_GRID_NODES_PER_AXIS // 2
+    ]
     mixed = np.einsum("nk,krc->nrc", weights, nodes[corners])
     profiles = [fit_profile(tissues[k], name) for k, name in zip(corners, PROFILE_GRID_CORNERS, strict=True)]
     weight_map = _interpolate_weight_map(
-        weights[:, 1:].reshape(_GRID_NODES_PER_AXIS, _GRID_NODES_PER_AXIS, 2), axes, unmixed
+        weights[:, 1:].reshape(_PIGMENT_GRID_NODES_PER_AXIS, _PIGMENT_GRID_NODES_PER_AXIS, 2), axes, unmixed
     )
     errors = _rms_error(mixed, nodes), _rms_error(middle[None], nodes)
     return ProfileMixture(shared_gaussians(profiles), weight_map, *errors)
@@ -95,8 +97,8 @@ def save_mixture(folder: Path, mixture: ProfileMixture) -> list[Path]:
 
 
 def _pigment_axis(volume_fractions: Pixels) -> Floats:
-    low, high = np.maximum(np.percentile(volume_fractions, _GRID_PERCENTILES), _MIN_VOLUME_FRACTION)
-    return np.geomspace(low, max(high, _MIN_AXIS_RATIO * low), _GRID_NODES_PER_AXIS)
+    low, high = np.maximum(np.percentile(volume_fractions, _PIGMENT_GRID_PERCENTILES), _MIN_VOLUME_FRACTION)
+    return np.geomspace(low, max(high, _MIN_AXIS_RATIO * low), _PIGMENT_GRID_NODES_PER_AXIS)
 
 
 def _spectral_tissue(skin: SkinParameters, melanin: float, blood: float) -> Tissue:

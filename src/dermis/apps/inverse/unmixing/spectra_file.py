@@ -62,7 +62,7 @@ def read_spectra(path: str | Path) -> SpectraTable:
 
     Raises DermisError when the file is not such a table, or when its wavelengths do not cover this range.
     """
-    rows = _read_cells(path)
+    rows = _read_table_cells(path)
     columns = {k: nm for k, cell in enumerate(rows[0]) if (nm := _parse_wavelength_nm(cell)) is not None}
     if len(columns) < _MIN_BAND_COUNT:
         rows = [list(column) for column in zip(*rows, strict=True)]
@@ -87,7 +87,7 @@ def read_spectra(path: str | Path) -> SpectraTable:
     return SpectraTable([{name: row[k] for k, name in heads.items()} for row in body], spectra)
 
 
-def _read_cells(path: str | Path) -> list[list[str]]:
+def _read_table_cells(path: str | Path) -> list[list[str]]:
     """Return the cells of a table whose rows all have the same length.
 
     Raises DermisError for other files.
