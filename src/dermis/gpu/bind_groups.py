@@ -111,12 +111,12 @@ class ResourceCache(Generic[T]):
             def on_release(_: object) -> None:
                 cache = this()
                 if cache is not None:
-                    cache._drop_entries(identity)
+                    cache._drop_objects_with(identity)
 
             self._keys[identity] = weakref.ref(resource, on_release), set()
         return self._keys[identity][1]
 
-    def _drop_entries(self, resource_id: int) -> None:
+    def _drop_objects_with(self, resource_id: int) -> None:
         _, keys = self._keys.pop(resource_id)
         for key in keys:
             self._entries.pop(key, None)

@@ -210,7 +210,7 @@ class Device:
         )
 
     def _allocate_buffer(
-        self, buffer_name: str, byte_count: int, usage: str, create: Callable[..., Buffer]
+        self, buffer_name: str, byte_count: int, usage: str, create_buffer: Callable[..., Buffer]
     ) -> Buffer:
         import wgpu
 
@@ -218,7 +218,7 @@ class Device:
         flags |= 0 if usage == "MAP_READ" else wgpu.BufferUsage.COPY_SRC
         limit = self.max_storage_bytes if usage == "STORAGE" else self.max_buffer_bytes
         with checked_allocation(self.adapter.name, buffer_name, byte_count, limit):
-            return create(usage=flags)
+            return create_buffer(usage=flags)
 
     def sampler(self, **options: str) -> Sampler:
         """Return a sampler with options of wgpu, such as its filters; samplers are cached."""

@@ -255,15 +255,15 @@ def accepted_values(model: type[BaseModel], field: str) -> str:
     return ", ".join(words)
 
 
-def format_default(default: Any) -> str:
+def format_default(default_value: Any) -> str:
     """Return a default value as a user types it on the command line; "" for None, booleans and no default."""
-    if isinstance(default, tuple):
-        return ("x" if all(isinstance(one, int) for one in default) else ",").join(
-            map(format_default, default)
+    if isinstance(default_value, tuple):
+        return ("x" if all(isinstance(one, int) for one in default_value) else ",").join(
+            map(format_default, default_value)
         )
-    if default is None or isinstance(default, bool) or default is PydanticUndefined:
+    if default_value is None or isinstance(default_value, bool) or default_value is PydanticUndefined:
         return ""
-    return f"{default:g}" if isinstance(default, float) else str(default)
+    return f"{default_value:g}" if isinstance(default_value, float) else str(default_value)
 
 
 def _registry_names(field_info: FieldInfo) -> list[RegisteredName]:

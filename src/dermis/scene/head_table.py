@@ -114,8 +114,8 @@ class HeadTable(FrozenModel):
 
     @field_validator("front")
     @classmethod
-    def _check_axes(cls, front: Front, info: ValidationInfo) -> Front:
-        up = info.data.get("up") or ""
+    def _check_axes(cls, front: Front, validation_info: ValidationInfo) -> Front:
+        up = validation_info.data.get("up") or ""
         if front[-1] == up[-1:]:
             raise ValueError(f"an axis across up, which is {up}")
         return front
@@ -138,14 +138,14 @@ def head_name(head: object) -> str:
     return str(head)
 
 
-def check_files_and_lengths(files: Mapping[str, object], **lengths: object) -> None:
+def check_files_and_lengths(map_files: Mapping[str, object], **lengths: object) -> None:
     """Raise DermisError for lengths that are text, such as "cm", and for maps that are not file names."""
     for name, value in lengths.items():
         if isinstance(value, str):
             known = value in _UNIT_LENGTHS_MM
             advice = f"Write {name}={_UNIT_LENGTHS_MM[value]:g}" if known else "Write 10 for cm, 1000 for m"
             refuse(name, "a length in mm, as a number", f"got {value!r}", advice)
-    for role, file in files.items():
+    for role, file in map_files.items():
         if file is not None and not isinstance(file, str | os.PathLike):
             advice = f"For an array write dataclasses.replace(head, maps=replace(head.maps, {role}=...))"
             refuse(role, "the name of an image file", f"got a {type(file).__name__}", advice)

@@ -114,7 +114,7 @@ class Settings(FrozenModel):
     reflection."""
 
     @model_validator(mode="after")
-    def _fits_in_memory(self) -> Settings:
+    def _check_fits_in_memory(self) -> Settings:
         if self.size[0] * self.size[1] * self.samples > MAX_SAMPLE_COUNT:
             limit = MAX_SAMPLE_COUNT // 10**6
             raise ValueError(f"width times height times samples of at most {limit} million")

@@ -48,7 +48,7 @@ def find_chart_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
     neighbour = surface.uv_neighbour
     chart = connected_pieces(np.zeros(len(mirrored), np.int64), neighbour)
     piece = connected_pieces(2 * chart + mirrored, neighbour)
-    piece = _merge_specks(surface, chart, piece)
+    piece = _merge_small_pieces(surface, chart, piece)
     piece = np.where(surface.valid, piece, -1)
     density, mean = _uv_density(surface, piece)
     piece[density < _MIN_RELATIVE_UV_DENSITY * mean] = -1
@@ -65,7 +65,7 @@ def renumber_pieces(triangle_piece: Index) -> Index:
     return np.asarray(index.reshape(-1) - np.count_nonzero(numbers < 0), dtype=np.int64)
 
 
-def _merge_specks(surface: FlatSurface, triangle_chart: Index, triangle_piece: Index) -> Index:
+def _merge_small_pieces(surface: FlatSurface, triangle_chart: Index, triangle_piece: Index) -> Index:
     """Merge pieces (parts of charts) of less than 1 mm2 into the largest piece of their chart."""
     area = np.bincount(triangle_piece, surface.area_mm2 * surface.valid)
     order = np.argsort(area[triangle_piece], kind="stable")

@@ -173,7 +173,7 @@ def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> 
 def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -> NDArray[np.uint16]:
     """Return how far each texel's piece and gutter extend left, right, up and down, (h, w, 4) [texel].
 
-    A piece also ends at a gap: between adjacent texels whose surface points are far apart, see `_has_gap`.
+    A piece also ends at a gap: between adjacent texels whose surface points are far apart.
     """
     anchor = coverage.anchor_triangle
     owner = np.where(anchor >= 0, np.where(coverage.distance_mm > 0, -1, anchor), -2)
@@ -184,13 +184,15 @@ def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -
         here[:] = (before[1:] >= 0) & (before[1:] == before[:-1])
         first, second = unconnected_pairs(surface, owner, axis)
         same = joined.ravel()[second]
-        joined.ravel()[second[same]] = ~_has_gap(surface, packing, coverage, first[same], second[same], axis)
+        joined.ravel()[second[same]] = ~_pairs_with_gap(
+            surface, packing, coverage, first[same], second[same], axis
+        )
         runs = connected_run_lengths(np.moveaxis(joined, 1 - axis, 1))
         distance[..., 2 * axis], distance[..., 2 * axis + 1] = (np.moveaxis(one, 1, 1 - axis) for one in runs)
     return distance
 
 
-def _has_gap(
+def _pairs_with_gap(
     surface: FlatSurface,
     packing: Packing,
     coverage: Coverage,

@@ -265,12 +265,12 @@ def _conflict_clusters(conflicts: Conflicts, gutter_width_texels: float) -> list
     return [np.flatnonzero(label == k) for k in range(label.max(initial=-1) + 1)]
 
 
-def _within_reach(points: Doubles, target_points: Doubles, reach: float) -> Mask:
-    """Return the mask (...) of points (..., 2) within about `reach` of any target point.
+def _near_any_target(points: Doubles, target_points: Doubles, max_distance: float) -> Mask:
+    """Return the mask (...) of points (..., 2) within about `max_distance` of any target point.
 
     target_points : (n, 2) points to which the distances are measured
     """
-    cell = reach / _CELLS_PER_GUTTER
+    cell = max_distance / _CELLS_PER_GUTTER
     low = np.floor(target_points.min(axis=0) / cell) - _CELLS_PER_GUTTER - 1
     disc = np.argwhere(
         np.hypot(*(np.indices((2 * _CELLS_PER_GUTTER + 1,) * 2) - _CELLS_PER_GUTTER)) <= _CELLS_PER_GUTTER
@@ -300,9 +300,9 @@ def _conflict_strip(
     corners = surface.uv[member_triangles] * conflicts.texels_per_uv
     points = np.concatenate((corners, corners.mean(axis=1, keepdims=True)), axis=1)
     near = np.asarray(
-        _within_reach(points, np.concatenate((conflicts.first, conflicts.second)), gutter_width_texels).any(
-            axis=1
-        )
+        _near_any_target(
+            points, np.concatenate((conflicts.first, conflicts.second)), gutter_width_texels
+        ).any(axis=1)
     )
     area = surface.area_mm2[member_triangles]
     return near & (
@@ -319,7 +319,7 @@ def _best_cut_line(conflicts: Conflicts, gutter_width_texels: float) -> tuple[Do
     line's normal and offset, and the number of separated conflicts.
     """
     close = conflicts.inside[
-        _within_reach(
+        _near_any_target(
             conflicts.inside, np.concatenate((conflicts.first, conflicts.second)), gutter_width_texels
         )
     ]

@@ -218,7 +218,8 @@ def _find_largest_scale(masks: list[_PieceMask], cells_per_side: int, max_scale:
     for order in range(_PACKING_ORDER_COUNT):
         lower = coarse.scale if coarse else 0.0
         if order == 0 or (
-            coarse and _try_scale(masks, lower * _MIN_SCALE_GAIN, cells_per_side // _COARSE_CELL_SIDE, order)
+            coarse
+            and _layout_at_scale(masks, lower * _MIN_SCALE_GAIN, cells_per_side // _COARSE_CELL_SIDE, order)
         ):
             found = _bisect_scale(
                 masks,
@@ -253,13 +254,13 @@ def _bisect_scale(
     """Return the layout with the largest scale that bisection finds, or None if no trial fits.
 
     scale_bounds : lowest and highest scale
-    order_index : index of the packing order, see `_try_scale`
+    order_index : index of the packing order, see `_layout_at_scale`
     bisection_count : number of trials
     """
     (low, high), best = scale_bounds, None
     for _ in range(bisection_count):
         middle = (low + high) / 2
-        found = _try_scale(masks, middle, cells_per_side, order_index)
+        found = _layout_at_scale(masks, middle, cells_per_side, order_index)
         if found is None:
             high = middle
         else:
@@ -267,7 +268,7 @@ def _bisect_scale(
     return best
 
 
-def _try_scale(
+def _layout_at_scale(
     masks: list[_PieceMask], scale: float, cells_per_side: int, order_index: int
 ) -> PieceLayout | None:
     """Return the layout of the pieces at one scale, or None if they do not fit.
