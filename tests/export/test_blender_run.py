@@ -20,7 +20,7 @@ from dermis.apps.validation.engines import blender
 from dermis.base.errors import DermisError
 
 PYTHON = os.environ.get(PYTHON_VARIABLE, "")
-MEASURING_SCRIPT = blender.SCRIPT
+MEASURING_SCRIPT = blender.BLENDER_SCRIPT
 QUERY = """
 import json, sys
 import bpy

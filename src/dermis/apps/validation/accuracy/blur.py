@@ -82,9 +82,9 @@ def blurred_levels(device: Device, mesh: Mesh, irradiance: Array, stretch_mode: 
 
 
 def lit_texel_row(device: Device, texels_per_mm: float) -> str:
-    """Return a Markdown row with the shape and energy errors of a lit texel, blurred on a flat surface.
+    """Return a Markdown row with errors in shape and energy after the light of one texel is blurred.
 
-    The reference is the analytic sum of Gaussians.
+    The surface is flat. The reference is the analytic sum of Gaussians.
 
     texels_per_mm : resolution of the atlas on the surface
     """
@@ -105,10 +105,10 @@ def lit_texel_row(device: Device, texels_per_mm: float) -> str:
 
 
 def sheared_uv_row(device: Device, shear_degrees: float) -> str:
-    """Return a Markdown row with the widths of a lit texel, blurred on a flat surface with a sheared uv map.
+    """Return a Markdown row with the widths to which the light of one texel is blurred on a sheared uv map.
 
-    The widths are divided by the exact width. The cells are the smallest and the largest width with the
-    stretch map "axes", then the same with "full".
+    The surface is flat. The widths are divided by the exact width. The cells are the smallest and the largest
+    width with the stretch map "axes", then the same with "full".
 
     shear_degrees : angle between the uv axes on the flat surface [degrees]
     """
@@ -132,7 +132,7 @@ def sheared_uv_row(device: Device, shear_degrees: float) -> str:
 
 
 def constant_light_error(device: Device) -> float:
-    """Return the largest error of blurred constant light on the atlas of a sphere, over all levels [-]."""
+    """Return the largest error after constant light is blurred on the atlas of a sphere [-]."""
     atlas = build_atlas(uv_sphere(100.0), FLAT_PATCH_SIDE)
     levels = blurred_levels(device, uv_sphere(100.0), atlas.coverage.astype(np.float32))
     return max(float(np.abs(level[atlas.coverage] - 1).max()) for level in levels)
@@ -181,7 +181,7 @@ def blur_light(
     stretch_mode : stretch map that the blur uses: "full", or "axes", which ignores the angle between u and v
     """
     textures, variance = upload_atlas(device, atlas, stretch_mode), BLUR_PROFILE.variance_mm2[1:]
-    max_halvings = len(textures.mips_for("repeated")) - 1
+    max_halvings = len(textures.mips_for_blurs("repeated")) - 1
     halvings = choose_halvings(variance, textures.median_texels_per_mm, max_halvings)
     blur = Blur(variance, BLUR_PROFILE.weight[1:], halvings)
     levels = make_levels(device, len(irradiance), (halvings,), level_format(device))
@@ -263,7 +263,7 @@ def hidden_seams_mask(positions: Array) -> Mask:
 def seam_row(
     renderer: Renderer, row_title: str, head: Head, atlas_side: int, point_filter: PointFilter
 ) -> str:
-    """Return a Markdown row with the discontinuity of light across seams, in one cell for each seam method.
+    """Return a Markdown row with the discontinuity of light across seams, with one cell per seam method.
 
     atlas_side : side of the atlas [texel]
     point_filter : function that returns the mask of the seam points to use, given their positions

@@ -52,8 +52,8 @@ def direction_table(head: Head, adapter: str) -> str:
     oblique, errors = "light from 81° over light from above", "relative RMSE over all pairs of directions"
     photons = f"photons of mean cosine {FORWARD_G:g}"
     rows: dict[str, Sequence[float]] = {
-        f"{oblique}, index-matched": [_oblique_ratio(one, 1.0) for one in albedo],
-        f"{oblique}, index {SKIN_IOR:g}": [_oblique_ratio(one, SKIN_IOR) for one in albedo],
+        f"{oblique}, index-matched": [_oblique_to_normal_ratio(one, 1.0) for one in albedo],
+        f"{oblique}, index {SKIN_IOR:g}": [_oblique_to_normal_ratio(one, SKIN_IOR) for one in albedo],
         "the same, photons": [_monte_carlo_oblique_ratio(one, 0.0, SKIN_IOR) for one in albedo],
         f"the same, {photons}": [_monte_carlo_oblique_ratio(one, FORWARD_G, SKIN_IOR) for one in forward],
         f"index-matched, {photons}": [_monte_carlo_oblique_ratio(one, FORWARD_G, 1.0) for one in forward],
@@ -68,7 +68,7 @@ def direction_table(head: Head, adapter: str) -> str:
     return "\n".join(lines)
 
 
-def _oblique_ratio(albedo: float, eta: float) -> float:
+def _oblique_to_normal_ratio(albedo: float, eta: float) -> float:
     oblique, above = directional_reflectance([OBLIQUE_COSINE, 1.0], albedo, eta)
     return float(oblique / above)
 
@@ -108,7 +108,7 @@ def _direction_errors(albedo: float) -> tuple[float, float]:
 
 
 def _monte_carlo_oblique_ratio(albedo: float, mean_cosine: float, eta: float) -> float:
-    """Return the ratio of the reflectance at 81 degrees to that at normal incidence, by Monte Carlo [-].
+    """Return the ratio of reflectance at 81 degrees of incidence to that at 0 degrees, by Monte Carlo [-].
 
     mean_cosine : mean cosine of the scattering angle [-]
     """
@@ -141,27 +141,31 @@ def _reflected_fraction(cosine: float, albedo: float, mean_cosine: float, eta: f
     return reflected / PHOTON_COUNT
 
 
-def _scattered_cosines(downward_cosines: Floats, g: float, rng: np.random.Generator) -> Floats:
+def _scattered_cosines(downward_cosines: Floats, mean_cosine: float, rng: np.random.Generator) -> Floats:
     """Return cosines (n,) of the angles between photon directions and the downward axis, after scattering.
 
     Scattering angles are distributed according to [HenyeyGreenstein1941].
 
     downward_cosines : (n,) cosines before scattering
-    g : mean cosine of the scattering angle [-]
+    mean_cosine : mean cosine of the scattering angle [-]
     """
     uniform = rng.random(len(downward_cosines))
-    if g == 0.0:
+    if mean_cosine == 0.0:
         return 2.0 * uniform - 1.0
-    cosine = (1.0 + g**2 - ((1.0 - g**2) / (1.0 - g + 2.0 * g * uniform)) ** 2) / (2.0 * g)
+    cosine = (
+        1.0
+        + mean_cosine**2
+        - ((1.0 - mean_cosine**2) / (1.0 - mean_cosine + 2.0 * mean_cosine * uniform)) ** 2
+    ) / (2.0 * mean_cosine)
     sines = np.sqrt(np.maximum((1.0 - cosine**2) * (1.0 - downward_cosines**2), 0.0))
     deflected = downward_cosines * cosine + sines * np.cos(2.0 * np.pi * rng.random(len(downward_cosines)))
     return np.asarray(np.clip(deflected, -1.0, 1.0))
 
 
 def _studio_brightness_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
-    """Return ratios of a picture with skin direction "half-space" to one with "lambertian", in studio light.
+    """Return ratios of the radiance of skin with `direction` "half-space" to that with "lambertian".
 
-    The ratios are the median and the 99th percentile over the pixels of the head, each by channel.
+    The ratios are the median and the 99th percentile over the pixels of a head in studio light, by channel.
     """
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
 

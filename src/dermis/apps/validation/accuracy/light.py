@@ -47,7 +47,7 @@ UP_AXIS = np.array([0.0, 1.0, 0.0])
 
 def light(adapter: str = "auto") -> None:
     """Print tables with errors of environments, area lights, ambient occlusion and white furnace tests."""
-    print_tables(tables(adapter))
+    print_tables(light_error_tables(adapter))
 
 
 def sample_panorama(panorama_image: Array, directions: Array) -> Array:
@@ -89,7 +89,7 @@ def prefiltered_panorama(panorama_name: str, row_count: int = 256) -> tuple[Arra
 
 
 def irradiance_error(panorama_name: str, normal_count: int = 200) -> float:
-    """Return the largest relative error of the irradiance of a panorama, over random normals.
+    """Return the largest relative error of the irradiance from a prefiltered panorama, over random normals.
 
     normal_count : number of normals
     """
@@ -279,7 +279,7 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
     return float(np.sqrt(np.nanmean((ours - reference) ** 2)))
 
 
-def tables(adapter: str = "auto") -> dict[str, str]:
+def light_error_tables(adapter: str = "auto") -> dict[str, str]:
     """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     renderer = dermis.Renderer(adapter)
     shadows = [(rig, *soft_shadow_error(renderer, rig)) for rig in ("window", "top", "rim")]

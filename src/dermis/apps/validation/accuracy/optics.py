@@ -41,7 +41,7 @@ THICKNESSES_MM = (0.5, 1.0, 2.0, 4.0)
 
 def optics() -> None:
     """Print tables with errors of diffusion models, of fitted profiles and of the transmittance of slabs."""
-    print_tables(tables())
+    print_tables(optics_error_tables())
 
 
 def tissue_by_name(tissue_name: str) -> Tissue:
@@ -117,8 +117,7 @@ def fitted_profiles_table() -> str:
 def gaussian_point_fits_table() -> str:
     """Return Markdown rows with errors of six Gaussians fitted to the radial values of diffusion profiles.
 
-    Each profile is fitted twice: without a constraint, and with its total energy conserved. The first fit has
-    an error in shape and one in energy.
+    Each profile is fitted twice: without a constraint, and with its total energy conserved.
     """
     rows = []
     for name, model, clamp in (
@@ -184,7 +183,7 @@ def published_profile_errors_text() -> str:
     return ", ".join(cells)
 
 
-def tables() -> dict[str, str]:
+def optics_error_tables() -> dict[str, str]:
     """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     return {
         "models": diffusion_models_table(),

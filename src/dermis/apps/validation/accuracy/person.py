@@ -24,7 +24,7 @@ from dermis.apps.gallery.script import encode_webp
 from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse, signed_difference
 from dermis.apps.truths.path_traced import MitsubaVariant, path_trace
 from dermis.apps.validation.comparisons.person import (
-    CAUSES,
+    ERROR_CAUSES,
     TRUTHS,
     Cause,
     PersonComparison,
@@ -60,7 +60,7 @@ from dermis.scene.heads import load_head
 from dermis.scene.settings import Settings
 
 PAGE = DOCS / "path_traced.md"
-PICTURE = DOCS / "images" / "path_traced.webp"
+PICTURE_FILE = DOCS / "images" / "path_traced.webp"
 RESULTS_FILE = RESULTS / "path_traced.json"
 PICTURE_SIDE, PATHS_PER_PIXEL = 160, 48
 SHEET_COLUMNS = 6
@@ -115,7 +115,9 @@ def list_measurements() -> list[Measurement]:
     found += [Measurement("human", view, "layered") for view in VIEWS]
     people: tuple[PersonName, ...] = "dark", "old"
     found += [Measurement(one, view, "matched") for one in people for view in _PEOPLE_VIEWS]
-    found += [Measurement("human", view, "matched", cause) for view in _ABLATED_VIEWS for cause in CAUSES]
+    found += [
+        Measurement("human", view, "matched", cause) for view in _ABLATED_VIEWS for cause in ERROR_CAUSES
+    ]
     found += [Measurement("human", view, "refracting") for view in VIEWS]
     return found
 
@@ -316,7 +318,7 @@ def person(
     seconds:
         Time after which no further comparison starts; 0 for no limit [s].
     """
-    require_in_checkout(PICTURE.parent)
+    require_in_checkout(PICTURE_FILE.parent)
     started, renderer = time.perf_counter(), Renderer(adapter)
     chosen: Any = fastest_variant() if variant == "auto" else variant
     device = f"{renderer.device.adapter.name}, {renderer.device.adapter.backend}"
@@ -333,7 +335,7 @@ def person(
             figures[group][key] = measure()
             write_results(RESULTS_FILE, figures, digits=5)
             print_lines(f"{key}: {figures[group][key]['error']} {figures[group][key]['energy']}")
-    PICTURE.write_bytes(picture_sheet(list(ALL_VIEWS)))
+    PICTURE_FILE.write_bytes(picture_sheet(list(ALL_VIEWS)))
     person_page()
 
 
@@ -448,7 +450,7 @@ def cause_table(people_figures: Figures) -> str:
         f"| left out on both sides | {' | '.join(f'{view} | energy' for view in _ABLATED_VIEWS)} |",
         "|---" * (2 * len(_ABLATED_VIEWS) + 1) + "|",
     ]
-    for cause in (None, *CAUSES):
+    for cause in (None, *ERROR_CAUSES):
         rows = (
             people_figures.get(Measurement("human", view, "matched", cause).key) for view in _ABLATED_VIEWS
         )

@@ -40,7 +40,7 @@ SLAB_MEDIA = (("skin1", 1.0), ("skin2", 1.0), ("skin1", 1.4), ("skin2", 1.4))
 
 def slabs(adapter: str = "auto") -> None:
     """Print tables with errors of the reflectance and transmittance of rendered slabs."""
-    print_tables(tables(adapter))
+    print_tables(slab_error_tables(adapter))
 
 
 def exact_slab_response(medium: Medium, thickness_mm: float, mean_cosine: float = 0.0) -> Array:
@@ -96,7 +96,7 @@ def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
 
 
 def slab_error_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows with errors of reflectance and transmittance, by slab and skin direction."""
+    """Return Markdown rows with errors of rendered slabs, by medium, skin `direction` and thickness."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, eta in SLAB_MEDIA:
@@ -110,10 +110,10 @@ def slab_error_rows(renderer: dermis.Renderer) -> str:
 
 
 def forward_scattering_error_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows with errors of rendered slabs against references that scatter light forwards.
+    """Return Markdown rows with errors of rendered slabs against references with forward scattering.
 
-    The slabs are rendered with the skin direction "half-space". Half of the rows ignore forward scattering;
-    the others account for it by the skin's `anisotropy`.
+    The `direction` of the rendered skin is "half-space". Half of the rows ignore forward scattering; the
+    others account for it by the skin's `anisotropy`.
     """
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -130,7 +130,7 @@ def forward_scattering_error_rows(renderer: dermis.Renderer) -> str:
 
 
 def forward_scattering_direction_rows() -> str:
-    """Return Markdown rows with errors of the skin direction "half-space", over light and view directions.
+    """Return Markdown rows with errors of skin with `direction` "half-space", over light and view directions.
 
     The medium is "skin1" with forward scattering. A row is for one value of the skin's `anisotropy`. A cell
     is for one index of refraction and has the errors in red, green and blue.
@@ -162,7 +162,7 @@ def _direction_pairs_error(albedo: float, eta: float, skin_anisotropy: float) ->
 def _error_cells(response: Array, reference: Array) -> str:
     """Return two table cells with errors of transmittance, then two with errors of reflectance.
 
-    Of the two cells, the first has the relative RMS error. The second has the ratio of red light to the
+    The first cell of each pair has the relative RMS error. The second has the ratio of red light to the
     reference for each angle of incidence.
     """
     flux, cells = np.sqrt(np.cos(np.radians(INCIDENT_DEGREES)))[:, None], []
@@ -194,7 +194,7 @@ def forward_scattering_rows() -> str:
     return "\n".join(rows)
 
 
-def tables(adapter: str = "auto") -> dict[str, str]:
+def slab_error_tables(adapter: str = "auto") -> dict[str, str]:
     """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     renderer = dermis.Renderer(adapter)
     return {

@@ -29,7 +29,7 @@ REFERENCE_QUADRATURE_NODE_COUNTS = (96, 96)
 
 def specular() -> None:
     """Print tables with errors of directional albedos, and with results of white furnace tests."""
-    print_tables(tables())
+    print_tables(specular_error_tables())
 
 
 def read_albedo(lobe_model: str, cosine: Floats, roughness_m: Floats) -> Floats:
@@ -92,7 +92,7 @@ def furnace_rows() -> str:
     )
 
 
-def tables() -> dict[str, str]:
+def specular_error_tables() -> dict[str, str]:
     """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     below = (np.arange(4000) + 0.5) / 4000
     kelemen = float((directional_albedo(below, 0.3) * below).sum() / below.sum())

@@ -37,7 +37,7 @@ DIRECTION_HEADER = (
     "|---|---|---|---|---|---|---|---|"
 )
 BALL = Head("ball", uv_sphere(100.0, 512, 256), Maps())
-BALL_SAMPLES = {"front": 64, "back": 64}  # paths per pixel
+BALL_SAMPLES_BY_LIGHT = {"front": 64, "back": 64}  # paths per pixel
 
 
 def techniques(adapter: str = "auto") -> None:
@@ -61,7 +61,7 @@ def techniques(adapter: str = "auto") -> None:
     parts["integral"], _ = technique_rows(head, "surface-integral", "skin1", adapter, "layered")
     parts["heat"], _ = technique_rows(head, "heat", "skin1", adapter, "layered")
     parts["heat"] += "\n" + fine_atlas_row(head, adapter)
-    parts |= texture_space.tables(head, SETTINGS, adapter) | blur.surface_tables(adapter)
+    parts |= texture_space.texture_space_error_tables(head, SETTINGS, adapter) | blur.surface_tables(adapter)
     fill_page(PAGE, adapter=comparison["front"].adapter, **parts)
 
 
@@ -183,16 +183,16 @@ def lambertian_limit_text(head: Head, medium: str, path_traced_comparison: Compa
 
 
 def direction_rows(head: Head, samples_by_light: dict[str, int], settings: Settings, adapter: str) -> str:
-    """Return Markdown rows with errors of the skin directions "lambertian" and "half-space".
+    """Return Markdown rows with errors of skin with `direction` "lambertian" and "half-space".
 
-    The reference is path tracing. The rows are for the head under each of `samples_by_light`, and for a ball.
+    The reference is path tracing. The rows are for the head under each light, and for a ball.
 
     samples_by_light : dictionary from the name of a light to the number of paths per pixel
     """
     lines = [DIRECTION_HEADER]
     for light, samples in samples_by_light.items():
         lines += _direction_rows_under_light(head, light, default_region(light), samples, settings, adapter)
-    for light, samples in BALL_SAMPLES.items():
+    for light, samples in BALL_SAMPLES_BY_LIGHT.items():
         small = settings.model_copy(update={"size": (96, 96)})
         lines += _direction_rows_under_light(BALL, light, "ear", samples, small, adapter)
     return "\n".join(lines)

@@ -45,7 +45,7 @@ LANDMARKS_BY_REGION: dict[str, dict[str, tuple[str, ...]]] = {
 """Landmarks of the regions that are visible under each light; their mean is the centre of the region."""
 
 
-def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
+def texture_space_error_tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
     """Return Markdown rows for docs/templates/techniques.md, keyed by placeholder."""
     rows: dict[str, list[str]] = {"by_atlas": [], "zero_width": [], "places": [], "even": []}
     for light in COMPARED_LIGHTS:

@@ -28,8 +28,10 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 PointFilter = Callable[[Array, Array], Mask]  # mask of points from their positions and normals
 MATTE_SKIN = Skin(albedo="profile", rho_s=0.0)
-PROFILE = load_profile("gpu-gems-3")
-BLURRED_PROFILE = GaussianSum("blurred levels", PROFILE.variance_mm2[1:], PROFILE.weight[1:])
+GPU_GEMS_3_PROFILE = load_profile("gpu-gems-3")
+BLURRED_PROFILE = GaussianSum(
+    "blurred levels", GPU_GEMS_3_PROFILE.variance_mm2[1:], GPU_GEMS_3_PROFILE.weight[1:]
+)
 THICKNESSES_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0)
 WEDGE_DEGREES = (5.0, 10.0, 20.0, 30.0, 45.0)
 ATLAS_SIDE = 1024
@@ -38,7 +40,7 @@ EAR_DISTANCE_MM = 66.0  # distance from the scan's middle beyond which a point i
 
 def thin(adapter: str = "auto") -> None:
     """Print tables with errors of light transmitted through slabs, wedges and ears."""
-    print_tables(tables(adapter))
+    print_tables(thin_body_error_tables(adapter))
 
 
 def scattered_light(
@@ -73,7 +75,7 @@ def scattered_light(
 
 
 def integrated_light(mesh: Mesh, light_direction: Array, points: Array, spacing_mm: float) -> Array:
-    """Return the scattered light (n, 3) at points, as an integral of irradiance and profile over the surface.
+    """Return the scattered light (n, 3) at points, by integrating irradiance times profile over the surface.
 
     The profile is a function of Euclidean distance.
 
@@ -224,7 +226,7 @@ def ear_rows(renderer: dermis.Renderer) -> str:
     return "\n".join(rows)
 
 
-def tables(adapter: str = "auto") -> dict[str, str]:
+def thin_body_error_tables(adapter: str = "auto") -> dict[str, str]:
     """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     renderer = dermis.Renderer(adapter)
     rows = {"thin_slabs": slab_rows, "thin_wedges": wedge_rows, "thin_ears": ear_rows}

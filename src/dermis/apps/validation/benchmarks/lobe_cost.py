@@ -28,7 +28,7 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     """Return the device time per evaluation of each lobe model with each Fresnel term [ns].
 
     The time is the inverse throughput of the whole device, minus the time of a loop that evaluates no lobe.
-    Each key of the result is a key of MODELS and a key of FRESNEL.
+    A key of the result is a pair: a key of MODELS and a key of FRESNEL.
     """
     on_cpu = device.adapter.kind == "CPU"
     side, lights = (

@@ -92,7 +92,7 @@ Cause = Literal["pigments", "relief", "reflection", "hair", "scattering", "bounc
 lobe of the skin. "hair": hair, brows and lashes. "scattering": subsurface scattering, so that skin is
 Lambertian. "bounces": all light but direct light on Lambertian skin, so that eyes are black; and hair.
 """
-CAUSES: tuple[Cause, ...] = get_args(Cause)
+ERROR_CAUSES: tuple[Cause, ...] = get_args(Cause)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-ZONES: dict[str, tuple[str, ...]] = {
+ZONES_BY_REGION: dict[str, tuple[str, ...]] = {
     "forehead": ("forehead", "side of the forehead", "glabella", "temple"),
     "cheek": ("apple of the cheek", "cheek", "cheekbone", "jaw", "beside the mouth"),
     "nose side": ("wing of the nose", "inner cheek", "nasolabial"),
@@ -78,7 +78,7 @@ def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regi
     lips = placed[:, _LIPS_COLUMN] > 0.0
     lids = (placed[:, _LIDS_COLUMN] > _LID_RANGE_MM[0]) & (placed[:, _LIDS_COLUMN] < _LID_RANGE_MM[1])
     zone = _nearest_zone(placed[:, _POSITION_COLUMNS])
-    found = {name: on_skin & (zone == k) & ~lips & ~lids for k, name in enumerate(ZONES)}
+    found = {name: on_skin & (zone == k) & ~lips & ~lids for k, name in enumerate(ZONES_BY_REGION)}
     found |= {"lips": on_skin & lips, "lids": on_skin & lids, "eyes and mouth": ~on_skin}
     centre = np.array(head.centre_mm)
     facing = _cosines_to_normals(normals, np.array(scene.camera.position) + centre - positions)
@@ -93,7 +93,7 @@ def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regi
 
 
 def _nearest_zone(positions_mm: Floats) -> NDArray[np.int64]:
-    """Return the index (n,) of the region in `ZONES` to which each point belongs.
+    """Return the index (n,) of the region in `ZONES_BY_REGION` to which each point belongs.
 
     A region consists of ellipsoidal zones. A point belongs to the region of the zone whose centre is nearest;
     distances are divided by the radii of the zone.
@@ -104,7 +104,7 @@ def _nearest_zone(positions_mm: Floats) -> NDArray[np.int64]:
     mirrored = np.abs(positions_mm[:, :1])
     points = np.concatenate([mirrored, positions_mm[:, 1:]], axis=1)
     distances = []
-    for names in ZONES.values():
+    for names in ZONES_BY_REGION.values():
         zones = [rows[name] for name in names]
         centres, radii = float_columns(zones, "x y z"), float_columns(zones, "rx ry rz")
         distances.append((((points[:, None] - centres) / radii) ** 2).sum(axis=-1).min(axis=1))

@@ -57,11 +57,11 @@ def babylon_library() -> Path:
 
 
 @contextmanager
-def babylon_page(library: Path) -> Iterator[Page]:
+def babylon_page(library_folder: Path) -> Iterator[Page]:
     """Open the measurement page with Babylon.js in Chromium for the duration of a context."""
     with chromium_page(CANVAS_SIDE) as page:
         page.goto(PAGE_FILE.as_uri())
-        page.add_script_tag(path=str(library / "babylonjs" / "babylon.js"))
+        page.add_script_tag(path=str(library_folder / "babylonjs" / "babylon.js"))
         yield page
 
 

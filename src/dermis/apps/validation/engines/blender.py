@@ -29,8 +29,8 @@ from dermis.images.colour import encode_srgb
 from dermis.optics.cumulative_profile import CumulativeProfile
 
 RESULTS_FILE = RESULTS / "engines_blender.json"
-PICTURE = DOCS / "images" / "engines_blender.webp"
-SCRIPT = Path(__file__).with_name("blender_script.py")
+PICTURE_FILE = DOCS / "images" / "engines_blender.webp"
+BLENDER_SCRIPT = Path(__file__).with_name("blender_script.py")
 Measurement = Literal["edges", "heads", "picture"]
 COMPARED_SKINS = "skin1", "skin2", "dj3"
 SUBSURFACE_METHODS = "random-walk-skin", "random-walk", "burley"
@@ -110,7 +110,7 @@ def measure_edge_response(python: Path, version: str, subsurface_method: str, sk
         folder = Path(folder_name)
         target.write(subject, rows, folder, version)
         (folder / "passes.json").write_text(json.dumps(passes), encoding="utf-8")
-        run_blender(python, SCRIPT, [str(folder)], 3600.0, HALF_LIT_PLANE_TASK)
+        run_blender(python, BLENDER_SCRIPT, [str(folder)], 3600.0, HALF_LIT_PLANE_TASK)
         output = json.loads((folder / "done.json").read_text(encoding="utf-8"))
     columns = np.array([[output["columns"][3 * k + c] for c in range(3)] for k in range(SEED_COUNT)])[..., 0]
     means = columns.reshape(SEED_COUNT, 3, EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=-1)
@@ -173,4 +173,4 @@ def write_hair_picture(python_by_version: dict[str, Path]) -> None:
         columns += render_cycles(subject, method, version, python, PICTURE_SIDE, PICTURE_SAMPLES, 1)
     composite_over_grey = [one[..., :3] + 0.4 * (1.0 - one[..., 3:]) for one in columns]
     levels = encode_srgb(np.clip(np.concatenate(composite_over_grey, axis=1), 0.0, 1.0))
-    Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=88)
+    Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE_FILE, quality=88)

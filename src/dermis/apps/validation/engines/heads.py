@@ -1,4 +1,4 @@
-"""Pictures of one exported head, with the same camera and lights, by dermis, Cycles, Babylon.js and Mitsuba.
+"""Pictures of one exported head, rendered by dermis, Cycles, Babylon.js and Mitsuba with the same lights.
 
 Hair is omitted, because each program draws it differently. Lights are directional, as on the page that is
 exported for Babylon.js.
@@ -39,7 +39,7 @@ from dermis.images.io import read_image
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.settings import Settings
 
-RESULTS_FILE, PICTURE = RESULTS / "engines_heads.json", DOCS / "images" / "engines_heads.webp"
+RESULTS_FILE, PICTURE_FILE = RESULTS / "engines_heads.json", DOCS / "images" / "engines_heads.webp"
 EXPORTED_MAP_SIDE, HEAD_PICTURE_SIDE = 1024, 256
 CYCLES_SAMPLES, MITSUBA_SAMPLES, SEED_COUNT = 64, 256, 2
 HEAD_LIGHTS = (
@@ -59,7 +59,7 @@ def heads() -> None:
     programs are found by environment variables: DERMIS_BLENDER_PYTHONS names Python programs that have bpy
     4.5 and 5.2, separated by a comma; DERMIS_BABYLON names a folder into which npm installed babylonjs.
     """
-    require_in_checkout(PICTURE.parent)
+    require_in_checkout(PICTURE_FILE.parent)
     subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
     assert subject.head is not None and subject.scene is not None
     hairless = replace(subject.head, hair=None, strands=None)
@@ -76,7 +76,7 @@ def heads() -> None:
     levels = encode_srgb(
         np.clip(np.concatenate([composite_over_grey(one) for one in columns], axis=1), 0.0, 1.0)
     )
-    Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=90)
+    Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE_FILE, quality=90)
 
 
 def available_renderers(subject: Subject, dermis_picture: Floats) -> dict[str, Callable[[], list[Floats]]]:
@@ -99,14 +99,14 @@ def available_renderers(subject: Subject, dermis_picture: Floats) -> dict[str, C
     return result
 
 
-def render_babylon(subject: Subject, library: Path, dermis_picture: Floats) -> Floats:
+def render_babylon(subject: Subject, library_folder: Path, dermis_picture: Floats) -> Floats:
     """Return the linear picture (h, w, 4) that Babylon.js renders in the exported page, in Chromium.
 
     dermis_picture : (h, w, 4) picture rendered by dermis; its alpha is used
     """
     with TemporaryDirectory() as folder_name, chromium_page(HEAD_PICTURE_SIDE) as page:
         file = Path(folder_name) / "head.html"
-        export_skin(subject, "babylon", file, library=library)
+        export_skin(subject, "babylon", file, library=library_folder)
         page.goto(file.as_uri())
         page.wait_for_selector("html[data-state]", state="attached", timeout=240_000)
         page.evaluate("document.querySelectorAll('body > :not(canvas)').forEach((one) => one.remove())")

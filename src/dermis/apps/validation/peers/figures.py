@@ -29,7 +29,7 @@ class RendererRow:
     setting : technique of dermis, or paths per pixel of a path tracer
     seconds : elapsed time of one image [s]; None if the image is an average of other images
     core_seconds : CPU time of one image [s]; None if the image is an average of other images
-    noise : relative RMSE of the image's own noise [-]
+    noise : relative RMS of the noise in the image [-]
     relrmse : relative RMSE against the reference [-]; None for the reference itself
     relrmse_se : standard error of `relrmse`
     energy_ratio : ratio of the total light to that of the reference [-]; None for the reference itself

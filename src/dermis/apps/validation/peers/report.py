@@ -76,8 +76,9 @@ def peers(
 def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) -> JsonObject:
     """Render and compare all scenes, and return the report as a JSON object.
 
-    Rows of Cycles are missing if Cycles cannot run. Raises DermisError for unknown lights, and without
-    Mitsuba, which renders the reference.
+    If Cycles cannot run, its rows are missing.
+
+    Raises DermisError for unknown lights, or if Mitsuba, which renders the reference, is not installed.
     """
     for light in lights:
         if light not in SCENES:
@@ -131,7 +132,7 @@ def cpu_model() -> str:
 
 
 def scenes_text(report: JsonObject) -> str:
-    """Return a Markdown section for the scene with each light."""
+    """Return Markdown sections, one for the scene under each light."""
     sections = (f"## {one['light'].capitalize()}\n\n{scene_text(one)}" for one in report["scenes"])
     return "\n\n".join(sections)
 
@@ -196,13 +197,13 @@ def _random_walk_sentence(setting: str, cycles_times: dict[str, dict[str, float]
 
 
 def _cost_text(cycles_times: dict[str, float]) -> str:
-    """Return text with the time and paths of Cycles, and with its time relative to a frame of dermis."""
-    elapsed, cpu = (_ratio_text(cycles_times[name]) for name in ("ratio", "core_ratio"))
+    """Return text with the number of paths and the time of Cycles, and the ratio to the time of dermis."""
+    elapsed, cpu = (_time_ratio_text(cycles_times[name]) for name in ("ratio", "core_ratio"))
     cost = f"{cycles_times['seconds']:.3g} s ({cycles_times['samples']:.0f} paths per pixel)"
     return f"{cost}: {elapsed} times our frame, {cpu} in CPU time"
 
 
-def _ratio_text(ratio: float) -> str:
+def _time_ratio_text(ratio: float) -> str:
     return f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.1f}"
 
 

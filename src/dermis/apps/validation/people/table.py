@@ -94,26 +94,30 @@ def build_measured_table(archive: Archive, skin_variables: Doubles) -> dict[str,
     table_document: dict[str, Any] = {
         "source": _ARCHIVE_SOURCE,
         "probabilities": list(_QUANTILE_PROBABILITIES),
-        "sex": _rounded(sex),
-        "age": _rounded(age),
+        "sex": _rounded_lists(sex),
+        "age": _rounded_lists(age),
         "mean_age_term": round(float(age_term(ages).mean()), 4),
     }
-    adjusted = y - _centred_terms(cheek, sex, age)
+    adjusted = y - _centred_sex_age_effects(cheek, sex, age)
     scores = {
         code: _normal_scores(adjusted[rows], cheek.select_rows(rows)) for code, rows in _group_masks(cheek)
     }
     pooled = np.corrcoef(np.concatenate(list(scores.values())).T)
     shifts, slope, spread = _site_differences(archive, skin_variables)
-    table_document |= {"site_slope": _rounded(slope), "site_spread": _rounded(spread), "groups": {}}
+    table_document |= {
+        "site_slope": _rounded_lists(slope),
+        "site_spread": _rounded_lists(spread),
+        "groups": {},
+    }
     for code, rows in _group_masks(cheek):
         n, own = int(rows.sum()), np.corrcoef(scores[code].T)
         mixed = (n * own + _POOLED_CORRELATION_WEIGHT * pooled) / (n + _POOLED_CORRELATION_WEIGHT)
         ita = ita_degrees(cheek.select_rows(rows).cielab)
         table_document["groups"][GROUP_OF_CODE[code]] = {
-            "quantiles": _rounded(np.quantile(adjusted[rows], _QUANTILE_PROBABILITIES, axis=0).T),
-            "ita": _rounded(np.quantile(ita, _QUANTILE_PROBABILITIES), 2),
-            "correlation": _rounded(mixed, 3),
-            "sites": _rounded(shifts[list(GROUP_OF_CODE).index(code)]),
+            "quantiles": _rounded_lists(np.quantile(adjusted[rows], _QUANTILE_PROBABILITIES, axis=0).T),
+            "ita": _rounded_lists(np.quantile(ita, _QUANTILE_PROBABILITIES), 2),
+            "correlation": _rounded_lists(mixed, 3),
+            "sites": _rounded_lists(shifts[list(GROUP_OF_CODE).index(code)]),
         }
     _calibrate_median_colours(table_document, archive, ages, sexes)
     return table_document
@@ -150,7 +154,7 @@ def _sex_age_effects(cheek: Archive, skin_variables: Doubles) -> tuple[Doubles, 
     return found[-2], found[-1]
 
 
-def _centred_terms(cheek: Archive, sex_effect: Doubles, age_effect: Doubles) -> Doubles:
+def _centred_sex_age_effects(cheek: Archive, sex_effect: Doubles, age_effect: Doubles) -> Doubles:
     """Return the deviations (n, 4) from group means that sex and age explain, for each skin variable.
 
     sex_effect, age_effect : (4,) effects of sex and of `age_term` on the variables
@@ -269,7 +273,7 @@ def _calibrate_group(
         _drawn_cheek_variables(table_document, group_name, people)[1], target, 3
     )
     loss += float(error @ error)
-    group["quantiles"] = _rounded(np.array(group["quantiles"]) + shift[:, None])
+    group["quantiles"] = _rounded_lists(np.array(group["quantiles"]) + shift[:, None])
     found, y = _drawn_cheek_variables(table_document, group_name, people)
     differences = found.site_differences({group_name: 1.0}, y, people.site_normals)
     sites = np.array(group["sites"])
@@ -281,7 +285,7 @@ def _calibrate_group(
             shift, error = _colour_matching_shift(z, np.median(group_archive.cielab[measured], axis=0), 3)
             sites[site] += shift[:3]
             loss += float(error @ error) * (SITES[site].replace(" ", "_") in FACE_SITES)
-    group["sites"] = _rounded(sites)
+    group["sites"] = _rounded_lists(sites)
     return loss
 
 
@@ -295,7 +299,7 @@ def _drawn_cheek_variables(
 
 
 def _colour_matching_shift(
-    skin_variables: Doubles, target_colour: Doubles, free_count: int
+    skin_variables: Doubles, target_colour: Doubles, shifted_variable_count: int
 ) -> tuple[Doubles, Doubles]:
     """Return a shift (4,) of skin variables after which the median colour is near a target.
 
@@ -303,9 +307,9 @@ def _colour_matching_shift(
 
     skin_variables : (n, 4) variables of people
     target_colour : (3,) median colour to reach [CIELAB]
-    free_count : number of variables that may be shifted, counted from the first
+    shifted_variable_count : number of variables that may be shifted, counted from the first
     """
-    shift, used = np.zeros(4), np.arange(4) < free_count
+    shift, used = np.zeros(4), np.arange(4) < shifted_variable_count
 
     def median_colour(variable_shift: Doubles) -> Doubles:
         return np.asarray(np.median(model_lab(skin_variables + variable_shift), axis=0))
@@ -416,5 +420,5 @@ def _lower_triangle_text(samples: Doubles, digits: int) -> str:
     return " ".join(f"{one:.{digits}f}" for one in covariance[np.triu_indices(len(covariance))])
 
 
-def _rounded(numbers: Doubles, digits: int = 4) -> Any:
+def _rounded_lists(numbers: Doubles, digits: int = 4) -> Any:
     return (np.round(np.asarray(numbers, np.float64), digits) + 0.0).tolist()

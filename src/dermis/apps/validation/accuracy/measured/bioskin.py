@@ -56,7 +56,7 @@ class _TensorReader(pickle.Unpickler):
     """Unpickler that loads a dictionary of tensors and refuses to construct any other object."""
 
     def find_class(self, module_name: str, name: str) -> object:
-        """Return a class or function that files of weights need; raise UnpicklingError for any other name."""
+        """Return a class or function that weight files need; raise UnpicklingError for any other name."""
         if (module_name, name) == ("torch._utils", "_rebuild_tensor_v2"):
             return lambda storage, offset, size, *rest: (storage, offset, size)
         if (module_name, name) == ("collections", "OrderedDict"):

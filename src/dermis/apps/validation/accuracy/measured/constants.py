@@ -1,4 +1,4 @@
-"""Fits of the skin model's constants to measured spectra, and a skin model with more constants."""
+"""Fits of the skin model's constants to measured spectra, and a skin model with additional constants."""
 
 from __future__ import annotations
 

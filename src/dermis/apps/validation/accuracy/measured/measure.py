@@ -79,7 +79,9 @@ _CONSTANTS_BY_ADDITION: dict[str, tuple[str, ...]] = {
 
 
 def measured(bioskin: Path | None = None, only: str | None = None) -> None:
-    """Fit the spectral model of skin to all measured spectra, and write docs/measured.md; takes ten minutes.
+    """Fit the spectral model of skin to all measured spectra, and write docs/measured.md.
+
+    Takes ten minutes.
 
     Parameters
     ----------
@@ -119,10 +121,10 @@ def measured_page() -> None:
 
 
 def _default_skin_errors(archive: Archive) -> JsonObject:
-    """Return errors of fits in which all other parameters have the values of one of four skins.
+    """Return errors of fits of two, three and five unknowns, for four skins that set the other parameters.
 
-    The skins are the former default skin, the present one, and the former default with less absorption by
-    bloodless tissue.
+    The skins are the former default skin, the present one, and two that are the former default with less
+    absorption by bloodless tissue.
     """
     skins = {
         "former": FORMER_SKIN,
