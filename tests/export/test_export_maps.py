@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import load_subject
-from dermis.apps.export.targets.maps import check_map_side, orient_green, resample_map
+from dermis.apps.export.targets.maps import check_map_side, orient_normal_map, resample_map
 from dermis.base.errors import DermisError
 from dermis.frame.baking import BakedMaps, bake
 from dermis.frame.renderer import Renderer
@@ -138,8 +138,8 @@ def _decode_png(levels: NDArray[Any], info: dict[str, Any]) -> NDArray[Any]:
 
 def test_green_channel_is_inverted_for_directx() -> None:
     normal = np.array([[[0.1, 0.2, 0.97]]], np.float32)
-    np.testing.assert_array_equal(orient_green(normal, "up"), normal)
-    np.testing.assert_allclose(orient_green(normal, "down"), [[[0.1, -0.2, 0.97]]])
+    np.testing.assert_array_equal(orient_normal_map(normal, "up"), normal)
+    np.testing.assert_allclose(orient_normal_map(normal, "down"), [[[0.1, -0.2, 0.97]]])
 
 
 def test_resampling_keeps_ramps() -> None:

@@ -21,7 +21,7 @@ from dermis.apps.export.run import evaluate_export, export_skin
 from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.target import get_numbers
 from dermis.apps.export.targets.babylon.target import spiral_profile
-from dermis.apps.export.targets.pages.engine_page import page_camera
+from dermis.apps.export.targets.pages.engine_page import page_camera_json
 from dermis.apps.export.targets.pages.html import csp_hash, escape_script
 from dermis.base.errors import DermisError
 
@@ -178,7 +178,7 @@ def test_camera_is_that_of_the_scene() -> None:
     """Cameras are placed relative to the centre of the head, which is not the origin of the file."""
     human = load_subject("human")
     assert human.scene is not None
-    exported = page_camera(human.scene, human.scene.head.centre_mm)
+    exported = page_camera_json(human.scene, human.scene.head.centre_mm)
     centre = 1e-3 * np.array(human.scene.head.centre_mm)
     assert np.linalg.norm(centre) > 0.03
     np.testing.assert_allclose(

@@ -53,7 +53,7 @@ class HeadLoader:
         self._name = ""
 
     @property
-    def note(self) -> str:
+    def loading_message(self) -> str:
         """Return a message that names the head being loaded; empty if no head is being loaded."""
         return f"opening {self.display_name(self._name)} ..." if self._future else ""
 
@@ -129,8 +129,8 @@ def built_in_heads() -> tuple[str, ...]:
     return (HUMAN, *samples)
 
 
-_MAX_REASON_CHARACTERS = 160
-_log = logging.getLogger(__name__)
+_MAX_ERROR_CHARACTERS = 160
+_LOGGER = logging.getLogger(__name__)
 
 
 class Session:
@@ -206,7 +206,7 @@ class Session:
         if message not in self._reported_errors:
             self._reported_errors.add(message)
             self.message = message
-            _log.error(message, exc_info=error)
+            _LOGGER.error(message, exc_info=error)
 
     def save(self, path: Path) -> None:
         """Write the displayed state to a scene file, or offer the file as a download.
@@ -288,7 +288,7 @@ class Session:
 
 def _shorten_message(message: str) -> str:
     line = " ".join(message.split())
-    return line if len(line) <= _MAX_REASON_CHARACTERS else f"{line[:_MAX_REASON_CHARACTERS]} ..."
+    return line if len(line) <= _MAX_ERROR_CHARACTERS else f"{line[:_MAX_ERROR_CHARACTERS]} ..."
 
 
 def with_region_table(

@@ -246,7 +246,7 @@ class ViewRenderer:
         )
 
     @property
-    def is_current(self) -> bool:
+    def has_full_quality(self) -> bool:
         """Return whether the last image has the full quality of a still image."""
         if not self._image_inputs:
             return False
@@ -266,14 +266,14 @@ class ViewRenderer:
         self._image_inputs = None
         is_linear, rendered = picture_path.suffix.lower() == ".exr", self.rendered
         if not rendered or state.view not in (PICTURE_VIEW_NAME, *PART_VIEWS):
-            write_png(picture_path, self.read(image))
+            write_png(picture_path, self.download_image(image))
         elif state.settings.background == "none":
             write_image(picture_path, rendered.linear_rgba()) if is_linear else write_png(
                 picture_path, rendered.rgba8()
             )
         else:
             write_image(picture_path, rendered.linear()) if is_linear else write_png(
-                picture_path, self.read(image)
+                picture_path, self.download_image(image)
             )
 
     @property
@@ -281,7 +281,7 @@ class ViewRenderer:
         """Return the exposure factor of the last frame, whether metered or fixed [-]."""
         return self.rendered.exposure if self.rendered else 1.0
 
-    def read(self, image: Texture) -> NDArray[np.uint8]:
+    def download_image(self, image: Texture) -> NDArray[np.uint8]:
         """Download an image from the device, and return it as sRGB bytes (h, w, 3)."""
         return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
 

@@ -159,7 +159,7 @@ class Viewer:
         """Return whether the picture on screen is final, so no frame is needed until something changes."""
         state, view_renderer = self.session.displayed_state, self.session.view_renderer
         is_settled = self._last_state is state and self._easing.camera == state.scene.camera
-        is_final = view_renderer.is_current or self._rejected_state is state
+        is_final = view_renderer.has_full_quality or self._rejected_state is state
         is_ready = not self._preparation.is_running
         return is_ready and is_settled and is_final and not self._is_moving(self._clock())
 
@@ -256,7 +256,7 @@ class Viewer:
             return ""
         width, height = settings.size
         text = f"software adapter, no GPU: {width} x {height}"
-        if view_renderer.is_current and settings.size == picture_size:
+        if view_renderer.has_full_quality and settings.size == picture_size:
             return text
         return f"{text}, atlas {settings.atlas} while moving, refined when still"
 

@@ -82,7 +82,7 @@ class IntermediateViews:
             "visibility_buffer": inputs.resources.visibility.texture,
             "layer": layer,
         }
-        return self._render(shader, bindings, settings.size)
+        return self._run_image_shader(shader, bindings, settings.size)
 
     def draw_atlas(
         self, scene: Scene, settings: Settings, atlas_view: AtlasView, divider_side: str = ""
@@ -98,9 +98,13 @@ class IntermediateViews:
         values = {"centre": atlas_view.centre, "span": atlas_view.span, "scale": scale}
         quantity = _SHADER_QUANTITY_NUMBERS.get(atlas_view.layer, 0)
         record = self._atlas_shader.record("AtlasView", quantity=quantity, **values)
-        return self._render(self._atlas_shader, {"atlas_view": record, "layer": layer}, settings.size)
+        return self._run_image_shader(
+            self._atlas_shader, {"atlas_view": record, "layer": layer}, settings.size
+        )
 
-    def _render(self, shader: ComputeProgram, bindings: Bindings, image_size: tuple[int, int]) -> Texture:
+    def _run_image_shader(
+        self, shader: ComputeProgram, bindings: Bindings, image_size: tuple[int, int]
+    ) -> Texture:
         """Run a shader that writes an image to its binding `bytes`, and return the image's texture."""
         device = self._renderer.device
         if self._image is None or self._image.size[:2] != image_size:

@@ -161,7 +161,7 @@ def quantise_map(texels: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint
     return _to_uint16((texels - low) / span), {"png": formula, "black": low, "white": low + span}
 
 
-def orient_green(normals: Floats, normal_y: NormalY) -> Floats:
+def orient_normal_map(normals: Floats, normal_y: NormalY) -> Floats:
     """Return normals whose y, the green channel, points towards row 0 of the map or away from row 0.
 
     normal_y : "up" if y is to point towards row 0, as in OpenGL; "down" if away from row 0, as in DirectX
@@ -215,7 +215,9 @@ def map_files(baked_maps: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterato
     for name, info in MAP_INFOS.items():
         if name not in baked_maps.maps:
             continue
-        values = orient_green(baked_maps.maps[name], normal_y) if name == "normal" else baked_maps.maps[name]
+        values = (
+            orient_normal_map(baked_maps.maps[name], normal_y) if name == "normal" else baked_maps.maps[name]
+        )
         _LOGGER.info("writing %s", name)
         yield f"{name}.exr", encode_map_exr(name, values)
         inside = values[baked_maps.covered]

@@ -38,7 +38,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         self._startup_message: dict[str, object] | None = None  # shown by pages before the first frame
         super().__init__(**kwargs)
 
-    def send_stage(self, stage_name: str, stage_number: int, stage_count: int) -> None:
+    def send_progress(self, stage_name: str, stage_number: int, stage_count: int) -> None:
         """Send the progress of the preparation to all pages; they display it until the first picture.
 
         stage_name : name of the stage, such as "compiling shaders"

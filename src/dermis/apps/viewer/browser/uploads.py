@@ -92,10 +92,10 @@ class Uploads:
         if self._count >= MAX_FILES:
             refuse(file_name, f"at most {MAX_FILES} files", "this is one more", "Restart the viewer")
         length = headers.get(b"content-length", b"0")
-        self._check_size(file_name, int(length) if length.isdigit() and len(length) < 16 else 0)
+        self._check_upload_size(file_name, int(length) if length.isdigit() and len(length) < 16 else 0)
         return suffix, on_file
 
-    def _check_size(self, file_name: str, byte_count: int) -> None:
+    def _check_upload_size(self, file_name: str, byte_count: int) -> None:
         if byte_count > MAX_FILE_BYTES:
             refuse(file_name, f"at most {MAX_FILE_BYTES >> 20} MB", "it is larger", "Make it smaller")
         if self._bytes + byte_count > MAX_TOTAL_BYTES:
@@ -150,7 +150,7 @@ class Uploads:
             if message["type"] != "http.request":
                 refuse(file_name, "a complete file", "the connection was closed", "Send it again")
             size += len(message.get("body", b""))
-            self._check_size(file_name, size)
+            self._check_upload_size(file_name, size)
             file.write(message.get("body", b""))
             more = message.get("more_body", False)
 

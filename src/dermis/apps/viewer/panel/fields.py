@@ -105,7 +105,7 @@ def _draw_field(
         if isinstance(value, str):
             return
     if isinstance(value, bool):
-        edit_value(session, label, imgui.checkbox(label, value), state_with_value)
+        apply_edited_value(session, label, imgui.checkbox(label, value), state_with_value)
     elif style.options:
         draw_combo(
             session, label, str(value), map(str, style.options), lambda text: state_with_value(int(text))
@@ -120,12 +120,14 @@ def _draw_field(
         )
     elif kind.model_fields[field_name].annotation == _COLOUR_TYPE:
         result = imgui.color_edit3(label, list(value), _HDR_COLOUR_FLAGS)
-        edit_value(session, label, result, lambda new: state_with_value(tuple(max(0.0, c) for c in new)))
+        apply_edited_value(
+            session, label, result, lambda new: state_with_value(tuple(max(0.0, c) for c in new))
+        )
     elif isinstance(value, tuple) and value_range.logarithmic:
         result = imgui.slider_float3(
             label, list(value), value_range.low, value_range.high, "%.3g", _LOG_SLIDER_FLAG
         )
-        edit_value(
+        apply_edited_value(
             session,
             label,
             result,
@@ -219,7 +221,7 @@ def draw_slider(
     """
     flags = _LOG_SLIDER_FLAG if value_range.logarithmic else 0
     result = imgui.slider_float(label, current_value, value_range.low, value_range.high, number_format, flags)
-    edit_value(session, label, result, lambda new: state_with_value(clamp_to_range(new, value_range)))
+    apply_edited_value(session, label, result, lambda new: state_with_value(clamp_to_range(new, value_range)))
 
 
 def clamp_to_range(unclamped_value: float, value_range: SliderRange) -> float:
@@ -227,7 +229,7 @@ def clamp_to_range(unclamped_value: float, value_range: SliderRange) -> float:
     return min(value_range.high, max(value_range.low, unclamped_value))
 
 
-def edit_value(
+def apply_edited_value(
     session: Session, label: str, change_and_value: tuple[bool, Any], state_with_value: ToState
 ) -> None:
     """Apply the new value of a control to the state; all changes of one drag are undone together.

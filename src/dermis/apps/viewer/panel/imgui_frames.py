@@ -70,13 +70,13 @@ class ImguiFrames:
         # A context holds its font texture, which belongs to one device.
         self._context = imgui.create_context()
         self._plot_context = implot.create_context()
-        self.enter()
+        self.make_context_current()
         set_style()
         self._is_new = True
         self._device, self._target = device, target_format
         self._imgui_backend = ImguiWgpuBackend(device.handle, target_format)
 
-    def enter(self) -> None:
+    def make_context_current(self) -> None:
         """Make the context of this object the current context of Dear ImGui."""
         imgui.set_current_context(self._context)
         implot.set_current_context(self._plot_context)

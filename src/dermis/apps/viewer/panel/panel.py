@@ -189,7 +189,7 @@ class Panel:
 
         window_size : width and height of the window [logical pixel]
         """
-        self._frames.enter()
+        self._frames.make_context_current()
         self._size = window_size
         io, kind = imgui.get_io(), event["event_type"]
         if kind == "key_down" and not io.want_text_input and self._run_shortcut(event):
@@ -213,7 +213,7 @@ class Panel:
 
         window_size : width and height of the window [logical pixel]
         """
-        self._frames.enter()
+        self._frames.make_context_current()
         imgui.get_io().display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
         self._lay_out_frame(window_size)
         self._frames.render(target_view)
@@ -283,7 +283,9 @@ class Panel:
         draw_divider(session.split, left, window_size)
         status = "" if self._covered_width(window_size) > left else session.status
         draw_messages(
-            [line for line in (session.message, session.heads.note, status) if line], left, window_size
+            [line for line in (session.message, session.heads.loading_message, status) if line],
+            left,
+            window_size,
         )
 
     def _draw_panel_button(self) -> None:

@@ -22,6 +22,7 @@ from dermis.apps.viewer.panel.fields import (
     SURFACE_STYLES,
     TECHNIQUE_STYLES,
     FieldStyle,
+    apply_edited_value,
     begin_plot,
     choose_name,
     clamp_to_range,
@@ -31,7 +32,6 @@ from dermis.apps.viewer.panel.fields import (
     draw_rows,
     draw_slider,
     draw_tooltip,
-    edit_value,
     record_position,
     run_action,
 )
@@ -274,7 +274,7 @@ def _draw_bone_angles(session: Session, bone_name: str, animated_names: frozense
         f"{bone_name}##bone", [*angles], _BONE_ANGLE_RANGE.low, _BONE_ANGLE_RANGE.high, "%.0f"
     )
     imgui.end_disabled()
-    edit_value(session, f"{bone_name}##bone", result, state_with_value)
+    apply_edited_value(session, f"{bone_name}##bone", result, state_with_value)
     if len(bone_name) > _MAX_STAGE_LABEL_LENGTH:
         draw_tooltip(bone_name)
 

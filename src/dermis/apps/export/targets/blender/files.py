@@ -122,7 +122,7 @@ def _write_script_files(
     if panorama is not None:
         files.append(script_path.with_name(PANORAMA_FILE))
         np.save(files[-1], panorama)
-    script_path.write_text(script_text(skin_description | scene_dict), encoding="utf-8")
+    script_path.write_text(blender_script_text(skin_description | scene_dict), encoding="utf-8")
     return files
 
 
@@ -143,7 +143,7 @@ def skin_material_indices(head: Head) -> list[int]:
     return [slot for slot, kind in enumerate(used) if head.mesh.materials[kind].kind == "skin"]
 
 
-def script_text(export_data: Mapping[str, object]) -> str:
+def blender_script_text(export_data: Mapping[str, object]) -> str:
     """Return the text of the Blender script with the exported parameters and scene as Python literals.
 
     Text is written as a Python literal, so that a name cannot inject code.

@@ -113,7 +113,7 @@ def _dipole_reflectance(albedo: Floats, internal_reflection_factor: float) -> Fl
     )
 
 
-def walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> Floats:
+def random_walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> Floats:
     """Return the fraction of the incident light that Cycles' random walk returns within given radii [-].
 
     radius : radii [mean free paths]
@@ -122,7 +122,7 @@ def walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> Floats:
         RANDOM_WALK_SKIN
     """
     walk_albedo = max(albedo, MIN_ALBEDO)
-    radii, fraction_within = _interpolate_walk_table(round(walk_albedo, 7), walk_entry)
+    radii, fraction_within = _interpolate_random_walk_table(round(walk_albedo, 7), walk_entry)
     r = np.asarray(radius, np.float64)
     fraction = np.interp(np.log(np.maximum(r, 1e-12)), np.log(radii), fraction_within)
     near = np.minimum(r / radii[0], 1.0)  # linear in the radius below the first tabulated one
@@ -130,14 +130,14 @@ def walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> Floats:
 
 
 @cache
-def _interpolate_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Floats, Floats]:
+def _interpolate_random_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Floats, Floats]:
     """Return radii [mean free paths] and the fraction of light within each radius [-], for one albedo.
 
     The fractions are interpolated in a table. There are eight times as many radii as in the table.
     """
     from scipy.interpolate import PchipInterpolator
 
-    roots, radii, fraction_within = _load_walk_table()[walk_entry]
+    roots, radii, fraction_within = _load_random_walk_tables()[walk_entry]
     fraction = PchipInterpolator(roots, fraction_within, axis=0)(
         np.clip(np.sqrt(1.0 - albedo), roots[0], roots[-1])
     )
@@ -146,7 +146,7 @@ def _interpolate_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Float
 
 
 @cache
-def _load_walk_table() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
+def _load_random_walk_tables() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
     """Return a table of Cycles' random walks for each way in which a walk enters the medium.
 
     A table is a tuple of three arrays: n values of sqrt(1 - albedo) [-], m radii [mean free paths], and
@@ -179,12 +179,12 @@ class RandomWalk(NamedTuple):
 
         radius : radii [mean free paths]
         """
-        return walk_cdf(radius, self.albedo, self.entry) / self.emerging_fraction
+        return random_walk_cdf(radius, self.albedo, self.entry) / self.emerging_fraction
 
     @property
     def emerging_fraction(self) -> float:
         """Return the light that leaves the skin along its normal, as a fraction of the incident light [-]."""
-        return float(walk_cdf(np.array([_EFFECTIVELY_INFINITE_RADIUS]), self.albedo, self.entry)[0])
+        return float(random_walk_cdf(np.array([_EFFECTIVELY_INFINITE_RADIUS]), self.albedo, self.entry)[0])
 
 
 class Blender(Target):
@@ -205,7 +205,7 @@ class Blender(Target):
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return parameters with the subsurface radius whose profile is closest to the reference profile."""
-        units = self._unit_cdfs(subject, version)
+        units = self._unit_cdf_by_channel(subject, version)
         fitted = np.array([fit_length_scale(subject.curve, k, unit) for k, unit in enumerate(units)])
         radius = fitted / self._lengths_per_unit_radius(subject, version)
         return self._parameters(tuple(round(float(x), 5) for x in radius), version)
@@ -218,7 +218,7 @@ class Blender(Target):
         """Return the cumulative profile, predicted by the formulas of Cycles' kernel and EEVEE's shader."""
         metres = np.array(get_numbers(parameters, _RADIUS_NAME)) * get_numbers(parameters, _SCALE_NAME)[0]
         lengths = np.maximum(metres / _METRES_PER_MM * self._lengths_per_unit_radius(subject, version), 1e-9)
-        units = self._unit_cdfs(subject, version)
+        units = self._unit_cdf_by_channel(subject, version)
 
         def fraction_within(radius_mm: Floats) -> Floats:
             return np.stack(
@@ -288,7 +288,7 @@ class Blender(Target):
         albedos = albedo(subject.clipped_albedo())
         return [RandomWalk(float(one), "straight" if plain else "skin") for one in albedos]
 
-    def _unit_cdfs(self, subject: Subject, version: str) -> list[Cdf]:
+    def _unit_cdf_by_channel(self, subject: Subject, version: str) -> list[Cdf]:
         """Return each channel's cumulative profile as a function of radius / `_lengths_per_unit_radius`."""
         if self.variant in ("burley", "eevee"):
             return [burley_cdf] * 3

@@ -150,14 +150,14 @@ def surface_bsdf(
     return {"type": "roughdielectric", "id": "skin_surface", **facets, **refraction}
 
 
-def _lower_surface_bsdf(has_dimming: bool) -> SceneDict:
+def _lower_surface_bsdf(has_dimming_texture: bool) -> SceneDict:
     """Return Mitsuba's description of the inner layer of an index-matched surface.
 
     Where the skin is darker than its medium, this layer absorbs part of the light that leaves the skin.
 
-    has_dimming : whether the skin has a texture of the absorbed fraction
+    has_dimming_texture : whether the skin has a texture of the absorbed fraction
     """
-    if not has_dimming:
+    if not has_dimming_texture:
         return {"type": "null", "id": "skin_below"}
     black = {"type": "diffuse", "reflectance": mitsuba_rgb((0.0, 0.0, 0.0))}
     return {"type": "mask", "opacity": _exr_texture("held_back"), "bsdf": black, "id": "skin_below"}
@@ -168,15 +168,15 @@ def _scene_elements(
     scene: Scene,
     appearance: SkinAppearance,
     boundary: Boundary,
-    size_and_samples: tuple[int, int, int],
+    picture_size_and_samples: tuple[int, int, int],
 ) -> list[ET.Element]:
     """Return the XML elements of the scene except the skin, which is included from its own XML file.
 
     boundary : surface model of the skin that is included by default
-    size_and_samples : width and height of the picture [pixel], and samples per pixel
+    picture_size_and_samples : width and height of the picture [pixel], and samples per pixel
     """
-    sizes = zip(("width", "height", "samples"), map(str, size_and_samples), strict=True)
-    sensor = mitsuba_sensor(backend, scene.camera, size_and_samples[:2])
+    sizes = zip(("width", "height", "samples"), map(str, picture_size_and_samples), strict=True)
+    sensor = mitsuba_sensor(backend, scene.camera, picture_size_and_samples[:2])
     sensor["film"] |= {"width": xml.Override("integer", "width"), "height": xml.Override("integer", "height")}
     sensor["sampler"]["sample_count"] = xml.Override("integer", "samples")
     # Spectral multiple importance sampling, as extinction differs between channels.

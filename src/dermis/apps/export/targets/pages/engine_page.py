@@ -134,8 +134,8 @@ class EnginePage(Target):
         scene = subject.scene or Scene(subject.head_or_ball)
         centre_mm = scene.head.centre_mm if subject.scene else (0.0, 0.0, 0.0)  # of the ball
         return {
-            "camera": page_camera(scene, centre_mm),
-            "lights": [page_light(light) for light in scene.lights],
+            "camera": page_camera_json(scene, centre_mm),
+            "lights": [page_light_json(light) for light in scene.lights],
             "skin": {one.name.rpartition(".")[2]: one.value for one in parameters},
             "shadow_side": _SHADOW_MAP_SIDE,
             "warm_frames": _WARM_UP_FRAMES,
@@ -169,7 +169,7 @@ def material_parameters(subject: Subject) -> Parameters:
     )
 
 
-def page_camera(scene: Scene, centre_mm: Sequence[float]) -> Json:
+def page_camera_json(scene: Scene, centre_mm: Sequence[float]) -> Json:
     """Return the scene's camera as JSON, with positions in the page's scene [m] and angle of view [rad].
 
     centre_mm : (3,) point of the scene that is the origin of the page's scene [mm]
@@ -185,7 +185,7 @@ def page_camera(scene: Scene, centre_mm: Sequence[float]) -> Json:
     }
 
 
-def page_light(light: Light) -> Json:
+def page_light_json(light: Light) -> Json:
     """Return the JSON of a directional light that replaces a light, with the same irradiance at the head."""
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction, np.float64)

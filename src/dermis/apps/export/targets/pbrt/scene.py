@@ -55,7 +55,7 @@ def _format_value(parameter_value: ArrayLike | Sequence[str]) -> str:
     return " ".join(f"{number:.7g}" for number in np.ravel(np.asarray(parameter_value)).tolist())
 
 
-def camera_lines(camera: Camera, picture_name: str) -> Lines:
+def camera_directives(camera: Camera, picture_name: str) -> Lines:
     """Return the directives of camera, film and integrator, to be written before the directive WorldBegin.
 
     picture_name : name of the picture file that pbrt writes
@@ -78,7 +78,7 @@ def camera_lines(camera: Camera, picture_name: str) -> Lines:
     ]
 
 
-def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lines:
+def light_directives(lights: Iterable[Light], environment: Environment | None) -> Lines:
     """Return the directives of lights and environment, and warn if pbrt does not support one of them.
 
     Unsupported lights are replaced or omitted. A panorama is omitted.

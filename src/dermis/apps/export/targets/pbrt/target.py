@@ -21,7 +21,7 @@ from dermis.apps.export.targets.openpbr.materials import (
     open_pbr_maps,
 )
 from dermis.apps.export.targets.openpbr.target import published_mean_free_path_mm
-from dermis.apps.export.targets.pbrt.scene import Lines, camera_lines, format_directive, light_lines
+from dermis.apps.export.targets.pbrt.scene import Lines, camera_directives, format_directive, light_directives
 from dermis.formats.part_pictures import PartRole
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
@@ -72,7 +72,7 @@ class DiffusionTable(NamedTuple):
     reflectance: Floats
     reflectance_within: Floats
 
-    def interpolate(self, radius: ArrayLike, reflectance: float) -> Floats:
+    def interpolate_reflectance_within(self, radius: ArrayLike, reflectance: float) -> Floats:
         """Return the diffuse reflectance if only the light that leaves within given radii counts [-].
 
         radius : radii [mean free paths]
@@ -203,7 +203,7 @@ class Pbrt(Target):
         file = self.main_file(output, subject)
         prefix = file_prefix(file, subject)
         scene = subject.scene or _ball_scene(subject.head_or_ball)
-        lines, files = _scene_lines(subject, parameters, scene, prefix)
+        lines, files = _scene_directives(subject, parameters, scene, prefix)
         file.write_text("\n".join([*lines, ""]), encoding="ascii")
         return [file, *write_files(file.parent, files.items())]
 
@@ -211,10 +211,13 @@ class Pbrt(Target):
 def _unit_profile(reflectance: Floats) -> CumulativeProfile:
     """Return pbrt's cumulative profile for reflectances (3,), with radii in mean free paths."""
     table = diffusion_table(SKIN_ETA)
-    total = np.array([table.interpolate(table.radius[-1], float(one)) for one in reflectance], np.float64)
+    total = np.array(
+        [table.interpolate_reflectance_within(table.radius[-1], float(one)) for one in reflectance],
+        np.float64,
+    )
 
     def fraction_within(radius: Floats) -> Floats:
-        columns = [table.interpolate(radius, float(one)) for one in reflectance]
+        columns = [table.interpolate_reflectance_within(radius, float(one)) for one in reflectance]
         return np.asarray(np.clip(np.stack(columns, axis=-1) / np.maximum(total, 1e-9), 0.0, 1.0))
 
     return CumulativeProfile.from_function(fraction_within, total)
@@ -245,7 +248,7 @@ def _ball_scene(ball: Head) -> Scene:
     return Scene(ball, camera=camera)
 
 
-def _scene_lines(
+def _scene_directives(
     subject: Subject, parameters: Parameters, scene: Scene, file_prefix: str
 ) -> tuple[Lines, dict[str, bytes]]:
     """Return the directives of the scene, and a dictionary from name to content of mesh and image files.
@@ -255,25 +258,25 @@ def _scene_lines(
     head = scene.head
     textures = skin_textures(subject, file_prefix)
     lines = ["# Written by dermis; lengths in mm relative to the head's centre"]
-    lines += [*camera_lines(scene.camera, f"{file_prefix}picture.exr"), "WorldBegin"]
+    lines += [*camera_directives(scene.camera, f"{file_prefix}picture.exr"), "WorldBegin"]
     part_lines, part_files = _part_textures(subject, file_prefix)
-    lines += [*light_lines(scene.lights, scene.environment), *textures.lines, *part_lines]
+    lines += [*light_directives(scene.lights, scene.environment), *textures.lines, *part_lines]
     files = textures.files | part_files
     for index in np.unique(head.mesh.material).tolist():
         material, name = head.mesh.materials[index], f"{file_prefix}part_{index}.ply"
         files[name] = mesh_ply(head.mesh, head.mesh.material == index, head.centre_mm, is_v_upwards=True)
         roles = subject.part_pictures.needed_roles(material) if subject.part_pictures else set()
         if material.kind == "skin":
-            texts = [_skin_material(parameters, textures.material_textures)]
+            texts = [_skin_material_directive(parameters, textures.material_textures)]
         else:
-            texts = _part_material_lines(material, roles, f"part_{index}", file_prefix)
+            texts = _part_material_directives(material, roles, f"part_{index}", file_prefix)
         alpha = {"texture alpha": "parts_opacity"} if "opacity" in roles else {}
         shape = format_directive("Shape", "plymesh", {"string filename": name, **alpha})
         lines += ["AttributeBegin", *texts, shape, "AttributeEnd"]
     return lines, files
 
 
-def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[str, str]]) -> str:
+def _skin_material_directive(parameters: Parameters, material_textures: dict[str, tuple[str, str]]) -> str:
     """Return the directive of the skin's material, in which maps replace the values of some parameters.
 
     material_textures : for each parameter that a map sets, pbrt's type of the parameter, and the name of the
@@ -289,7 +292,7 @@ def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[st
     return format_directive("Material", "subsurface", values)
 
 
-def _part_material_lines(
+def _part_material_directives(
     material: Material, image_roles: set[PartRole], material_name: str, file_prefix: str
 ) -> Lines:
     """Return the material directives for a part of the head that is not skin.

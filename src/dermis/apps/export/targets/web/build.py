@@ -93,7 +93,7 @@ class PageRequest:
     adapter: str = "auto"
     interactive: dict[str, tuple[int, int, int]] = field(default_factory=dict)
 
-    def frames(self, adapter_kind: str) -> Iterator[tuple[Settings, int]]:
+    def frame_settings(self, adapter_kind: str) -> Iterator[tuple[Settings, int]]:
         """Yield the settings of each frame, and the number of hairs drawn as one hair (0 at full quality).
 
         adapter_kind : kind of adapter, "gpu" or "software"
@@ -144,7 +144,7 @@ def _capture_frames(
     """
     capture, frames, slider_changes = FrameCapture(renderer.device), list[NamedFrame](), list[Json]()
     base: FrameInputs | None = None
-    for settings, merged_hairs in request.frames(adapter_kind):
+    for settings, merged_hairs in request.frame_settings(adapter_kind):
         inputs = renderer.prepare(request.scene, settings)
         base, picture = base or inputs, inputs.resources.post.picture
         captured = reduce_hair(capture_frame(capture, inputs), merged_hairs)
