@@ -110,8 +110,10 @@ def tabulated_albedo(half_space_kind: HalfSpaceKind, total_reflectance: ArrayLik
     return np.asarray(1.0 - root**2)
 
 
-def _table_position(table: _PhotonTable, albedo: ArrayLike) -> Floats:
-    return np.clip(_root_absorption(albedo), table.root_absorption[0], table.root_absorption[-1])
+def _table_position(photon_table: _PhotonTable, albedo: ArrayLike) -> Floats:
+    return np.clip(
+        _root_absorption(albedo), photon_table.root_absorption[0], photon_table.root_absorption[-1]
+    )
 
 
 def _root_absorption(albedo: ArrayLike) -> Floats:

@@ -149,21 +149,21 @@ def write_profile(path: Path, profile: GaussianSum, metadata: Mapping[str, Any])
         temporary.write_text("\n".join([*lines, "]", ""]), encoding="utf-8")
 
 
-def _format_toml_value(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, np.ndarray):
-        return _format_toml_value(value.tolist())
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return f"[{', '.join(map(_format_toml_value, value))}]"
-    if isinstance(value, float):
-        return repr(float(value))  # the repr of NumPy scalars contains their type
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+def _format_toml_value(entry_value: Any) -> str:
+    if isinstance(entry_value, bool):
+        return str(entry_value).lower()
+    if isinstance(entry_value, np.ndarray):
+        return _format_toml_value(entry_value.tolist())
+    if isinstance(entry_value, Sequence) and not isinstance(entry_value, str):
+        return f"[{', '.join(map(_format_toml_value, entry_value))}]"
+    if isinstance(entry_value, float):
+        return repr(float(entry_value))  # the repr of NumPy scalars contains their type
+    return json.dumps(entry_value, ensure_ascii=False) if isinstance(entry_value, str) else repr(entry_value)
 
 
 @cache
-def _fit_preset(name: str) -> GaussianSum:
-    return fit_profile(load_tissue(name), name)
+def _fit_preset(preset_name: str) -> GaussianSum:
+    return fit_profile(load_tissue(preset_name), preset_name)
 
 
 def fit_profile(

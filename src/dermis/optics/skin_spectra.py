@@ -71,6 +71,6 @@ def two_layer_reflectance(
     return (1.0 - normal_reflectance(SKIN_ETA)) * solve_two_layers(upper, epidermis_mm, lower, A)
 
 
-def _as_column(value: ArrayLike) -> Floats:
-    """Return a value as an array with one more axis at the end: (n,) becomes (n, 1)."""
-    return np.asarray(value, np.float64)[..., None]
+def _as_column(number_or_array: ArrayLike) -> Floats:
+    """Return a number or an array as an array with one more axis at the end: (n,) becomes (n, 1)."""
+    return np.asarray(number_or_array, np.float64)[..., None]

@@ -78,10 +78,10 @@ def minimise(
     return fit
 
 
-def _marquardt_step(fit: WeightedFit, damping: float) -> Floats:
-    scale = fit.curvature.diagonal()
-    damped = fit.curvature + np.diag(damping * (scale + 1e-12 * scale.max()))
-    step = -np.linalg.lstsq(damped, fit.gradient, rcond=None)[0]
+def _marquardt_step(weighted_fit: WeightedFit, damping: float) -> Floats:
+    scale = weighted_fit.curvature.diagonal()
+    damped = weighted_fit.curvature + np.diag(damping * (scale + 1e-12 * scale.max()))
+    step = -np.linalg.lstsq(damped, weighted_fit.gradient, rcond=None)[0]
     return np.asarray(np.clip(step, -_MAX_LOG_VARIANCE_STEP, _MAX_LOG_VARIANCE_STEP))
 
 

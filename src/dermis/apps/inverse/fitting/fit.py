@@ -90,16 +90,16 @@ class InitialGuess:
     rendering.
 
     face_renderer : renderer of the face
-    point : pigments and candidate suns for which the frames are rendered
+    fit_point : pigments and candidate suns for which the frames are rendered
     photo_radiance : (p, 3) radiance of the photograph's pixels in the mask
     pixel_weight : (p, 3) inverse standard deviations of these pixels
     """
 
     def __init__(
-        self, face_renderer: FaceRenderer, point: FitPoint, photo_radiance: Floats, pixel_weight: Floats
+        self, face_renderer: FaceRenderer, fit_point: FitPoint, photo_radiance: Floats, pixel_weight: Floats
     ) -> None:
-        self.point = point
-        diffuse, specular = face_renderer.diffuse_and_specular_radiance(point)
+        self.point = fit_point
+        diffuse, specular = face_renderer.diffuse_and_specular_radiance(fit_point)
         weighted = np.concatenate([diffuse, specular]) * pixel_weight
         weighted_target = photo_radiance * pixel_weight
         self._grams = np.einsum("apc,bpc->cab", weighted, weighted, optimize=True)

@@ -207,9 +207,9 @@ def _is_number(cell: str) -> bool:
         return False
 
 
-def _are_consecutive_numbers(cells: Sequence[str]) -> bool:
+def _are_consecutive_numbers(text_cells: Sequence[str]) -> bool:
     """Return whether the cells are 0, 1, 2 and so on, or 1, 2, 3 and so on."""
-    return any(list(cells) == [str(k + start) for k in range(len(cells))] for start in (0, 1))
+    return any(list(text_cells) == [str(k + start) for k in range(len(text_cells))] for start in (0, 1))
 
 
 def _parse_number(cell: str) -> float:

@@ -184,7 +184,7 @@ def _landmark_positions(
 
 
 def _fit_camera_and_identity(
-    model: _LandmarkModel, pixels: Floats, photo_size: tuple[int, int], start: Floats
+    model: _LandmarkModel, pixels: Floats, photo_size: tuple[int, int], start_unknowns: Floats
 ) -> Floats:
     """Fit camera and identity to landmarks; return the unknowns (7 + u,).
 
@@ -193,7 +193,7 @@ def _fit_camera_and_identity(
 
     pixels : (n, 2) landmarks in the photograph
     photo_size : width and height of the photograph [pixel]
-    start : (7 + u,) unknowns to start from, in the order of the result
+    start_unknowns : (7 + u,) unknowns to start from, in the order of the result
     """
     from scipy.optimize import least_squares
 
@@ -207,7 +207,7 @@ def _fit_camera_and_identity(
         return np.concatenate([error.ravel(), [(unknowns[6] - prior_median) / _LOG_FOCAL_SD], unknowns[7:]])
 
     scale = np.concatenate([np.full(3, 0.1), (10.0, 10.0, 100.0), [0.1], np.ones(model.unknown_count)])
-    return np.asarray(least_squares(residuals, start, x_scale=scale, loss="soft_l1").x, np.float64)
+    return np.asarray(least_squares(residuals, start_unknowns, x_scale=scale, loss="soft_l1").x, np.float64)
 
 
 def _project_landmarks(camera_unknowns: Floats, positions: Floats, photo_size: tuple[int, int]) -> Floats:

@@ -86,10 +86,10 @@ class FitProblem:
         """Return the inverse standard deviations (p, 3) of pixels from their brightness in the photograph."""
         return self.pixel_weights(self.target.mean(axis=1, keepdims=True) * np.ones(3))
 
-    def render_state(self, point: FitPoint, pixel_weight: Floats) -> FitState:
-        """Render the face for the unknowns of `point`; return the state with the best light strengths."""
+    def render_state(self, fit_point: FitPoint, pixel_weight: Floats) -> FitState:
+        """Render the face for the unknowns of `fit_point`; return the state with the best light strengths."""
         return self._best_light_state(
-            point, self.frames.single_light_radiance(point) * light_tint(point), pixel_weight
+            fit_point, self.frames.single_light_radiance(fit_point) * light_tint(fit_point), pixel_weight
         )
 
     def reweighted_state(self, fit_state: FitState) -> FitState:
@@ -100,13 +100,13 @@ class FitProblem:
         weights *= np.sqrt(limit / np.maximum(scaled, limit))
         return self._best_light_state(fit_state.point, fit_state.basis, weights)
 
-    def _best_light_state(self, point: FitPoint, basis: Floats, pixel_weight: Floats) -> FitState:
+    def _best_light_state(self, fit_point: FitPoint, basis: Floats, pixel_weight: Floats) -> FitState:
         A = (basis * pixel_weight).reshape(len(basis), -1).T
         x = solve_light_strengths(A, (self.target * pixel_weight).ravel())
         residual = self.target - np.einsum("a,apc->pc", x, basis)
-        prior = (self.prior_offsets(point) / self.prior_sd(2 * len(point.suns))) ** 2
+        prior = (self.prior_offsets(fit_point) / self.prior_sd(2 * len(fit_point.suns))) ** 2
         cost = float(((residual * pixel_weight) ** 2).sum()) + float(prior.sum())
-        return FitState(point, x, basis, residual, pixel_weight, cost)
+        return FitState(fit_point, x, basis, residual, pixel_weight, cost)
 
     def derivatives(self, fit_state: FitState, frame_name: str) -> Floats:
         """Return the derivatives (p, 3, u) of the radiance with respect to the u unknowns.
@@ -146,19 +146,19 @@ class FitProblem:
             [one.prior_sd for one in SKIN_UNKNOWNS] + [SUN_PRIOR_SD] * sun_angle_count + [white] * 2
         )
 
-    def prior_offsets(self, point: FitPoint) -> Floats:
+    def prior_offsets(self, fit_point: FitPoint) -> Floats:
         """Return the difference (u,) of each unknown from the mean of its prior, 0 for suns."""
-        skin = point.logs - np.log([one.prior_median for one in SKIN_UNKNOWNS])
-        return np.concatenate([skin, np.zeros(2 * len(point.suns)), point.white])
+        skin = fit_point.logs - np.log([one.prior_median for one in SKIN_UNKNOWNS])
+        return np.concatenate([skin, np.zeros(2 * len(fit_point.suns)), fit_point.white])
 
 
-def light_tint(point: FitPoint) -> Floats:
+def light_tint(fit_point: FitPoint) -> Floats:
     """Return the ratio (3,) of the fitted light colour to the light colour given by the user; green is 1."""
-    return np.array([np.exp(point.white[0]), 1.0, np.exp(point.white[1])])
+    return np.array([np.exp(fit_point.white[0]), 1.0, np.exp(fit_point.white[1])])
 
 
 def solve_fit(
-    problem: FitProblem, start: FitPoint, progress: Callable[[int, int], None] = lambda done, of: None
+    problem: FitProblem, start_point: FitPoint, progress: Callable[[int, int], None] = lambda done, of: None
 ) -> tuple[FitState, Floats]:
     """Minimise the cost from a start point; return the best state and derivatives of the radiance.
 
@@ -168,7 +168,7 @@ def solve_fit(
 
     progress : function called with the number of finished steps and the largest number of steps
     """
-    state = problem.reweighted_state(problem.render_state(start, problem.initial_weights()))
+    state = problem.reweighted_state(problem.render_state(start_point, problem.initial_weights()))
     damping = _INITIAL_DAMPING
     for iteration in range(_MAX_ITERATIONS):
         progress(iteration, _MAX_ITERATIONS)

@@ -190,13 +190,13 @@ class UnmixResult:
         lazy_device = self.devices.setdefault(adapter, LazyDevice(adapter))
         return lazy_device.run(lambda device: self._recolour_on_device(device, change))
 
-    def _recolour_on_device(self, device: Device, change: PigmentChange) -> Pixels:
-        fixed = self.third is None or change.oxygen is not None
-        target = skin_model(change.applied_to(self.skin), "none") if fixed else self.model
+    def _recolour_on_device(self, device: Device, pigment_change: PigmentChange) -> Pixels:
+        fixed = self.third is None or pigment_change.oxygen is not None
+        target = skin_model(pigment_change.applied_to(self.skin), "none") if fixed else self.model
         prior_mean = np.broadcast_to(np.float32(target.prior_mean), self.melanin.shape)
         third = prior_mean if fixed or self.third is None else self.third
         estimate = np.stack([self.melanin, self.blood, third], axis=-1)
-        factors, added = change.scales_and_offsets(
+        factors, added = pigment_change.scales_and_offsets(
             self._skin_median(self.melanin), self._skin_median(self.blood)
         )
         return recolour(device, target, estimate, self.residual, factors, added)
@@ -212,8 +212,8 @@ class UnmixResult:
         return float(np.median(fraction_map[skin] if skin.any() else fraction_map))
 
 
-def _percentile_summary(values: Floats) -> dict[str, float]:
-    low, middle, high = np.percentile(values, (5.0, 50.0, 95.0))
+def _percentile_summary(texel_values: Floats) -> dict[str, float]:
+    low, middle, high = np.percentile(texel_values, (5.0, 50.0, 95.0))
     return {"p5": float(low), "median": float(middle), "p95": float(high)}
 
 
