@@ -132,7 +132,7 @@ def resource_key(resources: Sequence[object]) -> ResourceKey:
 def _view_handle(device: Device, texture_or_view: TextureOrView, texture_layout: LayoutEntry) -> object:
     """Return the native handle of a view; for a texture, the handle of its default view, which is cached.
 
-    texture_layout : layout entry of the binding, which contains the view dimension
+    texture_layout : bind group layout entry of the texture; it contains the view dimension
     """
     if is_texture(texture_or_view):
         return _default_view(device, texture_or_view, texture_layout["view_dimension"])

@@ -135,7 +135,7 @@ class _WeakFields:
 
 
 def _weak_copy(argument: object) -> object:
-    """Return a copy of an argument, for later comparison, that keeps no resource alive.
+    """Return a copy of an argument for later comparison; the copy keeps no resource alive.
 
     Arrays are copied; objects that compare by identity, such as textures, become weak references.
     """
