@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dermis.human import lids, teeth
 from dermis.human.hair.root_finder import RootFinder, eye_centres
 from dermis.human.lids import fit_lid_targets
-from dermis.human.makehuman import Points, group_points, mesh_point_count, model_data, morphed_points_mm
+from dermis.human.makehuman import Points, group_points, makehuman_arrays, mesh_point_count, morphed_points_mm
 from dermis.human.movement import build_skeleton, expression_targets, gaze_rotations
 from dermis.mesh import eyeball
 from dermis.mesh.eye_look import EyeLook
@@ -133,7 +133,7 @@ def _combined_quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
 
     The arrays are uv (u, 2), control point indices (q, 4), uv indices (q, 4) and material indices (q,).
     """
-    arrays = model_data()
+    arrays = makehuman_arrays()
     if layout == "own":
         uv, corner = arrays["uv"].astype(np.float64), arrays["quads_uv"].astype(np.int64)
     else:  # without the cut surface of the neck
@@ -178,7 +178,7 @@ class Template:
         rig = replace(control_head.control, stencils=self.head.control.stencils, template=self.head.control)
         mesh = control_head.mesh
         if self.refinement is not None:
-            mesh = self.refinement.mesh(mesh)
+            mesh = self.refinement.subdivided_mesh(mesh)
         return replace(control_head, mesh=mesh, rig=rig, levels=self.head.levels, template=self.head)
 
 
@@ -189,7 +189,7 @@ def template(layout: Layout, levels: int) -> Template:
     refined = refinement(control_head.mesh, levels) if levels else None
     if refined is not None:
         rig = replace(control_head.control, stencils=refined.stencils)
-        head = replace(control_head, mesh=refined.mesh(control_head.mesh), rig=rig, levels=levels)
+        head = replace(control_head, mesh=refined.subdivided_mesh(control_head.mesh), rig=rig, levels=levels)
     mean_mm = control_head.control.positions_mm.astype(np.float64)
     root_finder = RootFinder(control_head.mesh, mean_mm, eye_centres(control_head.mesh), head.mesh)
     return Template(head, root_finder, refined)

@@ -79,7 +79,7 @@ def radial_distances_mm(points: Doubles, eye_axis: Doubles) -> tuple[Doubles, Do
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LidContact(ShortRepr):
-    """Collision of eyelids with eyeballs, which keeps control points of the lids outside the eyeballs.
+    """Collision response that keeps control points of the eyelids outside the eyeballs.
 
     point : (n,) control points of the lids
     ball : (n,) index of the eyeball over which each lid point slides

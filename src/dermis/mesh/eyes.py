@@ -22,7 +22,7 @@ class Eyes(ShortRepr):
     material : (k,) index of the material of each eyeball
     look : appearance of both eyes
     radius_mm : (k,) radius of the ball when the eye is scaled to a cornea of adult size [mm]
-    centre_offset_mm : (k,) shift of the ball's centre along the axis, relative to an adult eye [mm]
+    centre_offset_mm : (k,) shift of the ball's centre along the axis, from its position in an adult eye [mm]
     gaze : (k, 3) unit direction of gaze in eye coordinates: the axis of the eye, or a direction inferred from
         the lids
     """

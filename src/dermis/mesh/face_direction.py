@@ -39,8 +39,8 @@ def face_direction(positions: Doubles, triangles: Index, eyes: Doubles) -> Direc
     triangles : (f, 3) vertex indices
     eyes : (n, 3) vertices of eyeballs, or joints of the eyes; empty if unknown
 
-    Eyes lie in front of the middle of the head. If no eyes are known, the head must be symmetric about a
-    vertical plane, and its front is the side with more relief and with a ridge in the middle, the nose.
+    Known eyes show the front, because they lie in front of the middle of the head. Without them, the head
+    must be symmetric about a vertical plane. The front is then the side with more relief and with a nose.
     """
     if not len(triangles):
         return None

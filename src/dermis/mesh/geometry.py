@@ -96,10 +96,10 @@ def triangle_keys(corners: NDArray[np.integer], point_count: int) -> Index:
 
 
 def unique_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
-    """Return edges, each once, with the triangle sides that lie on them.
+    """Return edges (e, 2), each once, with the triangle sides that lie on them.
 
-    The arrays are the two points (e, 2) of each edge, the index (n,) of the edge on which each side lies, and
-    the number (e,) of sides on each edge.
+    The second array (n,) has the index of the edge on which each side lies. The third array (e,) has the
+    number of sides on each edge.
 
     sides : (n, 2) point indices at the two ends of each triangle side, in either order
     """
@@ -138,7 +138,7 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
 
 
 def sum_by_index(row_index: NDArray[np.integer], row_values: Doubles, sum_count: int) -> Doubles:
-    """Return the sums (sum_count, k) of rows that have the same index.
+    """Return the sums (sum_count, k) of all rows with the same index.
 
     row_index : (n,) index of the sum to which each row is added
     row_values : (n, k) rows
@@ -164,7 +164,7 @@ def cross_2d(a: Doubles, b: Doubles) -> Doubles:
 
 
 def uv_cross(corners: NDArray[np.floating]) -> Doubles:
-    """Return twice the signed area of each triangle in uv space, (f,).
+    """Return twice the signed area (f,) of each triangle in uv space.
 
     corners : (f, 3, 2) uv of the corners
     """
@@ -242,7 +242,7 @@ def cross_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
 def label_components(
     node_count: int, link_start: NDArray[np.integer], link_end: NDArray[np.integer]
 ) -> Index:
-    """Return for each node of a graph the index of its connected component, (n,).
+    """Return the index (n,) of the connected component to which each node of a graph belongs.
 
     Components are numbered in the order in which they first appear.
 

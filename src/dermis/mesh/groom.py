@@ -74,8 +74,8 @@ class Groom(ShortRepr):
 
     guides, roots : guides and strand roots of the style
     parameters : (p,) structured array with one row of parameters for scalp hair and one for the beard
-    strands : number of roots to use, from the start of `roots`; if some are unused, the strands are widened
-        to keep coverage
+    strands : number of roots to use, from the start of `roots`; if it is less than all, the strands are
+        widened to keep coverage
     knots : number of knots per strand
     hairline_mm : (91,) heights of the hairline at angles of 0 to 180 degrees from the front [mm]
     centre_mm : (3,) centre of the roots on the mean person [mm]

@@ -17,7 +17,7 @@ _MEAN_SAMPLES_PER_SIDE, _MAX_SAMPLE_DISTANCE_TEXELS = 64, 16
 
 @dataclass(frozen=True, repr=False)
 class PartMaps(ShortRepr):
-    """Texture maps, in one common uv layout, of all groups of triangles except skin.
+    """Texture maps of everything except the skin, in one common uv layout.
 
     colour : (H, W, 4) base colour, linear Rec. 709, and opacity; surfaces are cut out where opacity is below
         0.5 [-]
@@ -42,7 +42,7 @@ class Maps(ShortRepr):
     specular : (H, W) specular strength, 0 to 1; the renderer divides it by its mean over the skin [-]
     roughness : (H, W) roughness, 0 to 1 [-]
     region : (H, W) uint8 index of the facial region
-    parts : maps of the groups of triangles that are not skin
+    parts : maps of everything that is not skin
     """
 
     colour: Floats | None = None

@@ -13,11 +13,11 @@ from dermis.base.summary import ShortRepr
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MorphTargets(ShortRepr):
-    """Sparse displacements of points by t morph targets, stored target after target.
+    """Displacements of points by t morph targets, without zeros, stored target after target.
 
     names : (t,) names of the targets
-    first : (t + 1,) index of the first displacement of each target, then the number n of displacements
-    point : (n,) point of each displacement
+    first : (t + 1,) index of the first displacement of each target; the last element is n
+    point : (n,) index of the point of each displacement
     delta_mm : (n, 3) displacement at weight 1
     rest : (t,) weights in the rest pose; None if all are 0
     """

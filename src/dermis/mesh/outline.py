@@ -75,10 +75,10 @@ def hull_vertices(positions: NDArray[np.floating]) -> Intp:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RigOutline(ShortRepr):
-    """The s outline points of a rig, stored as columns, with dense morph targets and skin weights.
+    """Outline points of a rig, with the morph targets and bones that move them.
 
-    rest_mm : (4, s) homogeneous points at rest
-    delta_mm : (t, 3 s) displacements by each target at weight 1
+    rest_mm : (4, s) s points at rest as homogeneous columns
+    delta_mm : (t, 3 s) displacements by each target at weight 1: all x, then all y, then all z
     weight : (m, s) weights of the m bones that move any of the points; None without bones
     bones : (m,) indices of these bones in the skeleton
     """
@@ -89,7 +89,7 @@ class RigOutline(ShortRepr):
     bones: Intp
 
     def pose(self, weights: Floats, matrices: Floats) -> Floats:
-        """Return the outline points in a pose, (s, 3) [mm].
+        """Return the outline points (s, 3) in a pose [mm].
 
         weights : (t,) weights of the targets, relative to the rest pose
         matrices : (b, 3, 4) matrices of all bones of the rig
@@ -109,7 +109,7 @@ class RigOutline(ShortRepr):
 def rig_outline(
     positions: Floats, targets: MorphTargets, skeleton: Skeleton | None, outline_points: Intp
 ) -> RigOutline:
-    """Return the outline formed by some points of a rig, with their morph targets and bone weights.
+    """Return a `RigOutline` of selected points of a rig.
 
     positions : (p, 3) positions of all control points at rest [mm]
     outline_points : (s,) indices of the outline points
@@ -218,7 +218,7 @@ def _outline_candidates(positions: Floats, targets: MorphTargets, skeleton: Skel
 def _random_bone_matrices(skeleton: Skeleton, rng: np.random.Generator) -> Floats:
     """Return bone matrices (b, 3, 4) for random rotations of a few bones.
 
-    Bones are chosen with a probability proportional to the number of points that follow them.
+    The more points follow a bone or its descendants, the more likely the bone is chosen.
     """
     probability = skeleton.subtree_weight_sums / skeleton.subtree_weight_sums.sum()
     count = min(int(rng.integers(1, _MAX_ROTATED_BONES + 1)), int((probability > 0).sum()))

@@ -39,8 +39,8 @@ class Pose(ShortRepr):
         nod, y: turn, z: tilt) relative to the rest pose, applied about z first, then x, then y; or a (4, 4)
         matrix from the bone's space to its parent's space, in the units of the file, as in animations.
     positions_mm : (n, 3) array, optional
-        Rest positions of all points of the control mesh, in the order of `Head.positions_mm` [mm], such as
-        those of another person with the same topology, or of a motion from another program.
+        Rest positions of all points of the control mesh, in the order of `Head.positions_mm` [mm]. They may
+        be those of another person with the same topology, or a frame of a motion from another program.
 
     Raises
     ------

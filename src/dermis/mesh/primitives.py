@@ -82,7 +82,7 @@ def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
 
 
 def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells: int = 4) -> Mesh:
-    """Return a closed slab of linearly varying thickness about the origin, with one uv chart per face.
+    """Return a closed slab, centred at the origin, that gets thicker along +X, with one uv chart per face.
 
     side_mm : length along X and Y [mm]
     thin_mm, thick_mm : thickness along Z at -X and at +X [mm]

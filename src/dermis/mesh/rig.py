@@ -49,9 +49,9 @@ class Motion(NamedTuple):
 class Stencils(ShortRepr):
     """Points of a subdivided mesh as weighted means of control points, in compressed rows.
 
-    first : (q + 1,) index in `point` and `weight` at which each mesh point starts
-    point : (n,) control points
-    weight : (n,) weights, which sum to 1 for each mesh point
+    first : (q + 1,) index at which the control points of each mesh point start in `point` and `weight`
+    point : (n,) indices of control points
+    weight : (n,) weights of these control points, which sum to 1 for each mesh point
     """
 
     first: Ints
@@ -183,13 +183,13 @@ class Rig(ShortRepr):
         ).astype(np.intp)
 
     def points_mm(self, motion: Motion) -> Doubles:
-        """Return the points of the mesh in a pose, after any subdivision, (q, 3) [mm]."""
+        """Return the points (q, 3) of the mesh in a pose, after any subdivision [mm]."""
         rig = replace(self, positions_mm=motion.positions_mm)
         control = rig.pose(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
         return control if self.stencils is None else self.stencils.points(control)
 
     def lid_edges_mm(self, motion: Motion) -> Doubles:
-        """Return points along the lid edges in a pose, on the subdivided surface, (k, r, 3) [mm].
+        """Return points (k, r, 3) along the lid edges in a pose, on the subdivided surface [mm].
 
         There are k eyes with r points around each opening, see `LidContact.edge`.
         """
@@ -201,10 +201,10 @@ class Rig(ShortRepr):
 
     @cached_property
     def _posable_lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
-        """Return the precomputed data for `lid_edges_mm`.
+        """Return arrays for `lid_edges_mm` that do not depend on the pose.
 
-        The data are the indices (n,) of the control points around the lid edges, the weights (e, n) of these
-        control points in each of the e returned points, and a `RigOutline` that poses the control points.
+        They are the indices (n,) of the control points around the lid edges, and the weights (e, n) of these
+        control points in the e points along the edges. The `RigOutline` poses the control points.
         """
         assert self.contact is not None
         edge = self.contact.edge.ravel().astype(np.intp)
@@ -218,7 +218,7 @@ class Rig(ShortRepr):
         return points, weights, rig_outline(self.positions_mm, self.targets, self.skeleton, points)
 
     def pose_points(self, points: Ints, motion: Motion) -> Doubles:
-        """Return selected control points in a pose, (n, 3) [mm].
+        """Return selected control points (n, 3) in a pose [mm].
 
         points : (n,) indices of the control points
         """

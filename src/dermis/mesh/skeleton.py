@@ -54,12 +54,12 @@ class Skeleton(ShortRepr):
 
     @cached_property
     def rest_matrices(self) -> Floats:
-        """Return the bone matrices in the rest pose, (b, 3, 4)."""
+        """Return the bone matrices (b, 3, 4) in the rest pose."""
         return self.matrices().astype(np.float32)
 
     @cached_property
     def origin_mm(self) -> list[list[float]]:
-        """Return the positions of the joints at rest, (b, 3), in head space [mm]."""
+        """Return the positions (b, 3) of the joints at rest, in head space [mm]."""
         origins: list[list[float]] = (self.to_head @ self._bone_to_file(self.local))[:, :3, 3].tolist()
         return origins
 

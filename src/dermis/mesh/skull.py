@@ -17,7 +17,7 @@ _MIN_BODY_HEIGHT_MM = 300.0
 MAX_ELONGATION = 2.4
 """Largest ratio of length to width of a head with neck or shoulders; forearms have 3 and more [-]."""
 _MAX_RELATIVE_WIDTH = 3.0  # largest width of a bust relative to its depth
-_MAX_EYES_TO_HAIR_MM = 250.0  # largest horizontal distance between the eyes and other parts of the head
+_HEAD_RADIUS_ABOUT_EYES_MM = 250.0  # largest horizontal distance between the eyes and other parts of the head
 _MAX_FLAT_THICKNESS_RATIO = 0.5  # thickness relative to width below which a mesh is flat
 _MIN_MEAN_NORMAL_LENGTH = 0.2  # length of the mean normal of an open surface; 0 for closed meshes
 _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
@@ -25,7 +25,7 @@ _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _HEAD_SECTION_HEIGHT = 0.95
 _NECK_SECTION_HEIGHTS = 0.82, 0.85, 0.88
 _SHOULDER_SECTION_HEIGHTS = 0.74, 0.77, 0.8
-_MIN_FIGURE_TO_DEPTH = 2.5
+_MIN_FIGURE_HEIGHT_TO_DEPTH = 2.5
 _MAX_HEAD_WIDTH, _MAX_NECK_WIDTH, _MIN_SHOULDERS_TO_NECK = 0.25, 0.16, 1.6
 
 
@@ -52,7 +52,7 @@ def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
     triangles : (f, 3) vertex indices
     """
     width, height, depth = (float(one) for one in np.ptp(positions, axis=0))
-    if height <= _MIN_FIGURE_TO_DEPTH * min(width, depth):
+    if height <= _MIN_FIGURE_HEIGHT_TO_DEPTH * min(width, depth):
         return False
     points, ends = positions.astype(np.float64), positions[:, 1][triangles]
     low, high = ends.min(axis=1), ends.max(axis=1)
@@ -96,7 +96,7 @@ def body_skull_centre(positions: Floats, triangles: Ints, eyes: Floats) -> Point
         return None
     if len(eyes):
         x, y, z = 0.5 * (eyes.min(axis=0) + eyes.max(axis=0))
-        near = np.hypot(positions[:, 0] - x, positions[:, 2] - z) < _MAX_EYES_TO_HAIR_MM
+        near = np.hypot(positions[:, 0] - x, positions[:, 2] - z) < _HEAD_RADIUS_ABOUT_EYES_MM
         return skull_centre_below(positions[near], float(y) + _CROWN_TO_CENTRE_MM)
     if is_standing_figure(positions, triangles):
         return skull_centre_below(positions, float(positions[:, 1].max()))

@@ -90,7 +90,7 @@ def offsets_in_frames(root_axes: Doubles, offsets_mm: Doubles) -> Floats:
 
 
 def quad_corners(mesh: Mesh, quad_index: NDArray[np.integer]) -> Ints:
-    """Return the point indices at the four corners of quads, (n, 4).
+    """Return the point indices (n, 4) at the four corners of quads.
 
     quad_index : (n,) rows of `Mesh.quads`
     """
@@ -110,7 +110,7 @@ def quad_weights(bilinear_position: NDArray[np.floating]) -> Doubles:
 
 
 def hair_cover_of_points(mesh: Mesh, roots: Roots, area_mm2: Doubles) -> Doubles:
-    """Return the projected area of the strands rooted around each point of a mesh, per area of skin (p,) [-].
+    """Return the projected area of the strands rooted around each mesh point (p,), per area of skin [-].
 
     Because hair is inclined, half the area of a strand seen from the side counts as its projected area. The
     whole projected area counts as cover of the skin at the root.

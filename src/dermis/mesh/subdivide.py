@@ -41,7 +41,7 @@ class Refinement:
     """Subdivision that applies to all meshes with the same triangles, whatever their positions.
 
     weights : (q, p) weights of the p control points in each of the q points of the finer mesh
-    stencils : the same weights in the format of a rig
+    stencils : the same weights, as the stencils of a rig
     uv, point : (v, 2) uv and (v,) point index of each vertex of the finer mesh
     triangles, material, quads : arrays of the finer mesh, see `Mesh`
     """
@@ -54,7 +54,7 @@ class Refinement:
     material: Ints
     quads: Ints
 
-    def mesh(self, coarse_mesh: Mesh) -> Mesh:
+    def subdivided_mesh(self, coarse_mesh: Mesh) -> Mesh:
         """Return a subdivided mesh.
 
         coarse_mesh : mesh before subdivision, with the triangles for which this refinement was computed
@@ -110,11 +110,11 @@ def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
     if _check_levels(levels) == 0:
         return SubdividedMesh(mesh, None)
     refined = refinement(mesh, levels)
-    return SubdividedMesh(refined.mesh(mesh), refined.stencils)
+    return SubdividedMesh(refined.subdivided_mesh(mesh), refined.stencils)
 
 
 def refinement(mesh: Mesh, levels: int) -> Refinement:
-    """Return the subdivision of all meshes with this mesh's topology; see `subdivide` for its rules.
+    """Return the subdivision of meshes with the triangles and uv of this mesh; see `subdivide` for the rules.
 
     levels : 1 to 3
     """

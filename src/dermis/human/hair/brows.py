@@ -20,11 +20,11 @@ _MAX_HAIRS = 760  # number of hairs of the bushiest brow
 # Artist's values along the brow, from its inner to its outer end, in a view from the front [mm]: position,
 # half height, angle of the hairs from outwards to upwards, density and length.
 _POSITIONS_ALONG_BROW = np.array([0.0, 0.1, 0.25, 0.45, 0.65, 0.85, 1.0])
-_CENTRELINE_X = np.array([10.5, 14.5, 21.0, 30.0, 39.5, 48.5, 54.5])
-_CENTRELINE_Y = np.array([12.6, 13.2, 14.7, 17.0, 18.4, 16.4, 12.8])
-_BROW_HALF_HEIGHT = np.array([2.8, 3.4, 3.7, 3.5, 2.9, 2.0, 1.0])
-_HAIR_ANGLES = np.radians([82, 66, 43, 21, 3, -20, -32])
-_HAIR_DENSITY = np.array([0.3, 0.75, 1.0, 1.0, 1.0, 0.9, 0.55])
+_CENTRELINE_X_MM = np.array([10.5, 14.5, 21.0, 30.0, 39.5, 48.5, 54.5])
+_CENTRELINE_Y_MM = np.array([12.6, 13.2, 14.7, 17.0, 18.4, 16.4, 12.8])
+_BROW_HALF_HEIGHT_MM = np.array([2.8, 3.4, 3.7, 3.5, 2.9, 2.0, 1.0])
+_HAIR_ANGLES_RADIANS = np.radians([82, 66, 43, 21, 3, -20, -32])
+_RELATIVE_HAIR_DENSITY = np.array([0.3, 0.75, 1.0, 1.0, 1.0, 0.9, 0.55])
 _HAIR_LENGTH_MM = np.array([4.5, 6.3, 8.0, 9.0, 9.0, 7.5, 5.5])
 
 
@@ -74,8 +74,8 @@ def _grid_axes() -> tuple[Doubles, Doubles]:
 class BrowSurface:
     """Skin around the brows of a person, sampled on a grid; brow hairs follow this surface as they grow.
 
-    node_mm : (2 n, 3) skin points in front of the n nodes of `brow_grid_points`, and then in front of the
-        mirrored nodes of the right brow [mm]
+    node_mm : (2 n, 3) the n nodes of `brow_grid_points` on the left brow, then the mirrored nodes on the
+        right brow, all projected onto the skin [mm]
     normal : (2 n, 3) unit normals of the skin at these points
     """
 
@@ -116,7 +116,7 @@ def sample_positions(rng: np.random.Generator) -> tuple[Doubles, Doubles, Double
     """
     u = rng.random(4 * _MAX_HAIRS)
     accepted = rng.random(len(u)) < np.interp(
-        u, _POSITIONS_ALONG_BROW, _HAIR_DENSITY * _BROW_HALF_HEIGHT / _BROW_HALF_HEIGHT.max()
+        u, _POSITIONS_ALONG_BROW, _RELATIVE_HAIR_DENSITY * _BROW_HALF_HEIGHT_MM / _BROW_HALF_HEIGHT_MM.max()
     )
     u = u[accepted][:_MAX_HAIRS]
     v = np.clip(rng.normal(0.0, 0.52, len(u)), -1.5, 1.5)
@@ -124,13 +124,13 @@ def sample_positions(rng: np.random.Generator) -> tuple[Doubles, Doubles, Double
     along = np.stack(
         [
             np.interp(ahead, _POSITIONS_ALONG_BROW, c) - np.interp(behind, _POSITIONS_ALONG_BROW, c)
-            for c in (_CENTRELINE_X, _CENTRELINE_Y)
+            for c in (_CENTRELINE_X_MM, _CENTRELINE_Y_MM)
         ]
     )
     along /= np.linalg.norm(along, axis=0)
-    offset = v * np.interp(u, _POSITIONS_ALONG_BROW, _BROW_HALF_HEIGHT)
-    x = np.interp(u, _POSITIONS_ALONG_BROW, _CENTRELINE_X) - along[1] * offset + rng.normal(0, 0.4, len(u))
-    y = np.interp(u, _POSITIONS_ALONG_BROW, _CENTRELINE_Y) + along[0] * offset + rng.normal(0, 0.3, len(u))
+    offset = v * np.interp(u, _POSITIONS_ALONG_BROW, _BROW_HALF_HEIGHT_MM)
+    x = np.interp(u, _POSITIONS_ALONG_BROW, _CENTRELINE_X_MM) - along[1] * offset + rng.normal(0, 0.4, len(u))
+    y = np.interp(u, _POSITIONS_ALONG_BROW, _CENTRELINE_Y_MM) + along[0] * offset + rng.normal(0, 0.3, len(u))
     return u, v, x, y
 
 
@@ -139,11 +139,11 @@ def brow_outline(position_across: float) -> Doubles:
 
     position_across : -1 for the lower edge of the brow, 0 for its centreline, 1 for the upper edge
     """
-    along = np.gradient(np.stack([_CENTRELINE_X, _CENTRELINE_Y], axis=-1), axis=0)
+    along = np.gradient(np.stack([_CENTRELINE_X_MM, _CENTRELINE_Y_MM], axis=-1), axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     x, y = (
-        _CENTRELINE_X - position_across * _BROW_HALF_HEIGHT * along[:, 1],
-        _CENTRELINE_Y + position_across * _BROW_HALF_HEIGHT * along[:, 0],
+        _CENTRELINE_X_MM - position_across * _BROW_HALF_HEIGHT_MM * along[:, 1],
+        _CENTRELINE_Y_MM + position_across * _BROW_HALF_HEIGHT_MM * along[:, 0],
     )
     return np.stack([x, y], axis=-1)
 
@@ -165,12 +165,15 @@ def sample_shapes(u: Doubles, v: Doubles, rng: np.random.Generator, look: HairLo
     n = len(u)
     # hairs of the upper and the lower half lean towards each other
     angle = (
-        np.interp(u, _POSITIONS_ALONG_BROW, _HAIR_ANGLES)
+        np.interp(u, _POSITIONS_ALONG_BROW, _HAIR_ANGLES_RADIANS)
         - 0.6 * v * np.minimum(2.5 * u, 1.0)
         + rng.normal(0, 0.13, n)
     )
     bend = (
-        -0.5 * np.clip(angle - np.interp(np.minimum(u + 0.2, 1), _POSITIONS_ALONG_BROW, _HAIR_ANGLES), 0, 1)
+        -0.5
+        * np.clip(
+            angle - np.interp(np.minimum(u + 0.2, 1), _POSITIONS_ALONG_BROW, _HAIR_ANGLES_RADIANS), 0, 1
+        )
         - 0.25 * v * u
     )
     bend += rng.normal(0, 0.14, n)

@@ -20,7 +20,9 @@ from dermis.mesh.strands import Roots, interpolate_quads, quad_corners
 
 HEAD_AXIS_Z = -72.0
 """Position of the vertical axis around which the hairline is defined [mm]."""
-_SEQUENCE_STEPS = np.array([0.7548776662, 0.5698402909])  # of a low-discrepancy sequence in the unit square
+_R2_SEQUENCE_STEPS = np.array(
+    [0.7548776662, 0.5698402909]
+)  # of a low-discrepancy sequence in the unit square
 _SCALP_BOTTOM_Y = -80.0  # lower end of the hair of the head [mm]
 _HAIRLINE_FADE_MM = (-3.0, 11.0)  # heights above the hairline between which density rises from 0 to 1
 _LIP_FADE_MM = (1.5, 4.5)  # distances from the lips between which the density of the beard rises
@@ -62,7 +64,7 @@ def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.rando
     ends = np.cumsum(counts)[near]
     threshold_index = np.arange(len(quad_index)) + np.repeat(ends - np.cumsum(counts[near]), counts[near])
     step = threshold_index - (np.cumsum(counts) - counts)[quad_index]
-    position = starts.take(quad_index, axis=0) + step[:, None] * _SEQUENCE_STEPS
+    position = starts.take(quad_index, axis=0) + step[:, None] * _R2_SEQUENCE_STEPS
     position -= np.floor(position)
     values = average_points().T.take(corner_points.T.take(quad_index, axis=1), axis=1)
     relative = density.relative(interpolate_quads(position, values).T)
@@ -93,7 +95,7 @@ def hairline_waves(points: Doubles) -> Doubles:
 
 
 def recession_effect(amount_name: str, recession: float, points: Doubles) -> Doubles:
-    """Return the change (n,) of an amount, such as hair density, at points by a receding hairline.
+    """Return by how much (n,) a receding hairline changes an amount, such as hair density, at given points.
 
     amount_name : one of `ZONE_AMOUNTS`, such as "hair"
     recession : recession of the hairline, 0 to 1, see `SkinLook`
@@ -151,12 +153,12 @@ def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
-def quad_areas_cm2(control_mesh: Mesh, quad: Index) -> Doubles:
+def quad_areas_cm2(control_mesh: Mesh, quad_index: Index) -> Doubles:
     """Return the areas (n,) of quads of a control mesh [cm2].
 
-    quad : (n,) indices of the quads
+    quad_index : (n,) indices of the quads
     """
-    corner_points = control_mesh.points_mm.T.take(quad_corners(control_mesh, quad).T, axis=1)
+    corner_points = control_mesh.points_mm.T.take(quad_corners(control_mesh, quad_index).T, axis=1)
     a, b, c, d = corner_points.swapaxes(0, 1)
     across = cross_columns(c - a, d - b)
     return np.asarray(np.sqrt(dot_columns(across, across)) / 200.0)
@@ -198,7 +200,7 @@ def _amount_column(amount_name: str) -> int:
 def average_points() -> Doubles:
     """Return the control points (p, 4) of the average person.
 
-    The columns are the position and the distance inside the border of the lips [mm].
+    The columns are x, y, z and the signed distance to the border of the lips, positive on the lips [mm].
     """
     points_mm, distances = average_surface()
     lips = distances[:, BORDER_FIELDS.index("lips")]

@@ -133,7 +133,7 @@ def _concatenate_roots(root_groups: Iterable[Roots]) -> Roots:
 
 
 def _repeat_per_hair(groups: list[HairGroup], field_name: str) -> Doubles:
-    """Return the values of a scalar field of `HairGroup`, such as "cover", repeated for each hair, (n,)."""
+    """Return the value (n,) of a scalar field of `HairGroup`, such as "cover", for each hair of groups."""
     return np.concatenate([np.full(len(group.radius), getattr(group, field_name)) for group in groups])
 
 

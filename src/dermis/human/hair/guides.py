@@ -23,7 +23,7 @@ _MIN_HEIGHT_MM = 0.5  # least height of guides above the skin, away from their r
 _LAYER_LENGTH_MM = 35.0  # length along which hair rises to the outermost layer
 _WHORL_MM = np.array([9.0, 86.0, -131.0])
 _SKULL_CENTRE_MM = np.array([0.0, 12.0, -66.0])
-_ROUND_RADII_MM = np.array([75.0, 96.0, 92.0])  # semi-axes of the skull
+_ROUND_CUT_RADII_MM = np.array([75.0, 96.0, 92.0])  # semi-axes of the skull
 # Elliptic cylinder around the face that combed hair avoids: centre (z), semi-axes along x and z, and the
 # heights between which it begins [mm].
 _FACE_CENTRE_Z, _FACE_RADII_MM, _FACE_TOP_MM = -60.0, (74.0, 118.0), (78.0, 40.0)
@@ -66,7 +66,7 @@ def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
-def unit(vectors: Doubles) -> Doubles:
+def unit_vectors(vectors: Doubles) -> Doubles:
     """Return vectors (n, 3) scaled to length 1; a vector of length 0 stays 0."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9))
 
@@ -185,7 +185,7 @@ def body_surface(root_finder: RootFinder, has_ears: bool = True) -> SkinSurface:
     filled[:, 0] = _quadratic_terms(filled) @ fit
     dy, dz = filled[:, 1:].T - _EAR_CENTRE_MM[1:, None]
     slopes = fit[1] + 2 * fit[3] * dy + fit[5] * dz, fit[2] + 2 * fit[4] * dz + fit[5] * dy
-    facing = unit(np.stack([np.ones(len(filled)), -slopes[0], -slopes[1]], axis=1))
+    facing = unit_vectors(np.stack([np.ones(len(filled)), -slopes[0], -slopes[1]], axis=1))
     sides = [1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]
     return SkinSurface(
         np.concatenate([points[~ear], *(filled * side for side in sides)]),
@@ -228,11 +228,11 @@ def grow_guides(root_finder: RootFinder, roots_mm: Doubles, style: Style) -> tup
 
 
 def _root_directions(points: Doubles, normals: Doubles, style: Style) -> Doubles:
-    combed = unit(tangent_component(COMBS[style.comb](points, style), normals))
+    combed = unit_vectors(tangent_component(COMBS[style.comb](points, style), normals))
     if style.comb == "up":
-        return unit(normals + style.tilt * combed)
+        return unit_vectors(normals + style.tilt * combed)
     lift = style.lift * (smoothstep(10.0, 70.0, points[:, 1]) if style.comb == "fall" else 1.0)
-    return unit(np.reshape(lift, (-1, 1)) * normals + combed)
+    return unit_vectors(np.reshape(lift, (-1, 1)) * normals + combed)
 
 
 def _grow_one_step(surface: SkinSurface, state: Growth, step_mm: float, style: Style) -> Growth:
@@ -264,7 +264,7 @@ def _grow_one_step(surface: SkinSurface, state: Growth, step_mm: float, style: S
     # hair that is held out slides along the obstacle: it loses its inward motion, but gains no outward motion
     inward = np.minimum((direction * normal).sum(axis=1, keepdims=True), 0.0)
     direction = np.where(
-        (pushed > 0) & ~np.isfinite(tied)[:, None], unit(direction - inward * normal), direction
+        (pushed > 0) & ~np.isfinite(tied)[:, None], unit_vectors(direction - inward * normal), direction
     )
     base, normal = surface.project(moved)
     height = ((moved - base) * normal).sum(axis=1)
@@ -277,16 +277,20 @@ def _next_directions(state: Growth, style: Style) -> Doubles:
     free = np.minimum(state.length_mm / 60.0, 1.0)[:, None] + 0.15
     pull = 4.0 * style.gravity * free * np.array([0.0, -1.0, 0.0])
     if style.comb in ("gather", "rows", "back"):
-        combed = unit(tangent_component(COMBS[style.comb](state.position_mm, style), state.skin_normal))
+        combed = unit_vectors(
+            tangent_component(COMBS[style.comb](state.position_mm, style), state.skin_normal)
+        )
         close = np.exp(-np.maximum(state.height_mm - style.volume_mm, 0.0) / 8.0)[:, None]
         if style.comb == "gather":
             to_tie = np.array(style.tie_mm) + _tie_offsets(state, style) - state.position_mm
             distance = np.linalg.norm(to_tie, axis=1, keepdims=True)
-            combed = unit(np.where(distance < 35.0, to_tie, combed))
+            combed = unit_vectors(np.where(distance < 35.0, to_tie, combed))
             tail = _tail_directions(state, style, pull)
-            return np.where(np.isfinite(state.tied_mm)[:, None], tail, unit(0.5 * state.direction + combed))
-        return unit(0.6 * state.direction + 0.8 * close * combed + 0.3 * (1.0 - close) * pull)
-    return unit(style.stiffness * state.direction + (1.0 - style.stiffness) * pull)
+            return np.where(
+                np.isfinite(state.tied_mm)[:, None], tail, unit_vectors(0.5 * state.direction + combed)
+            )
+        return unit_vectors(0.6 * state.direction + 0.8 * close * combed + 0.3 * (1.0 - close) * pull)
+    return unit_vectors(style.stiffness * state.direction + (1.0 - style.stiffness) * pull)
 
 
 def _tie_offsets(state: Growth, style: Style) -> Doubles:
@@ -294,12 +298,12 @@ def _tie_offsets(state: Growth, style: Style) -> Doubles:
 
     A guide passes through the side of the tie that is nearest to the root of the guide.
     """
-    outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
+    outward = unit_vectors(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
     away = tangent_component(
         state.root_mm - np.array(style.tie_mm), np.broadcast_to(outward, state.root_mm.shape)
     )
     reach = np.linalg.norm(away, axis=1, keepdims=True)
-    return np.asarray(_TIE_RADIUS_MM * np.minimum(reach / 60.0, 1.0) * unit(away))
+    return np.asarray(_TIE_RADIUS_MM * np.minimum(reach / 60.0, 1.0) * unit_vectors(away))
 
 
 def _tail_directions(state: Growth, style: Style, gravity_pull: Doubles) -> Doubles:
@@ -307,13 +311,13 @@ def _tail_directions(state: Growth, style: Style, gravity_pull: Doubles) -> Doub
 
     gravity_pull : (g, 3) pull of gravity, as vectors
     """
-    outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)[None]
+    outward = unit_vectors(np.array(style.tie_mm) - _SKULL_CENTRE_MM)[None]
     since = np.maximum(state.length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, 0.0), 0.0)[
         :, None
     ]
     apart = _tie_offsets(state, style) / _TIE_RADIUS_MM
     spread = 0.12 * np.exp(-since / 60.0) - 0.03 * smoothstep(150.0, 400.0, since)
-    return unit(
+    return unit_vectors(
         0.85 * state.direction + 0.15 * gravity_pull + 0.3 * np.exp(-since / 25.0) * outward + spread * apart
     )
 
@@ -331,8 +335,8 @@ def _bun_points(state: Growth, length_mm: Doubles, style: Style) -> Doubles:
 
     length_mm : (g,) lengths from the roots to the points [mm]
     """
-    outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
-    side = unit(np.cross(outward, [0.0, 1.0, 0.0]))
+    outward = unit_vectors(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
+    side = unit_vectors(np.cross(outward, [0.0, 1.0, 0.0]))
     up = np.cross(side, outward)
     offset = _tie_offsets(state, style)
     turn = np.arctan2(offset @ up, offset @ side)
@@ -369,7 +373,7 @@ def cut_fractions(knots: Doubles, style: Style) -> Doubles:
         fringe = fringe_weight(root, style) > 0.5
         cut = np.where(fringe, _first_crossing_fractions(knots, np.full(len(knots), style.fringe_y_mm)), cut)
     if style.round:
-        radius = np.linalg.norm((knots - _SKULL_CENTRE_MM) / _ROUND_RADII_MM, axis=2)
+        radius = np.linalg.norm((knots - _SKULL_CENTRE_MM) / _ROUND_CUT_RADII_MM, axis=2)
         limit = 1.0 + style.round * style.max_length_mm / 90.0
         outside = radius > limit
         first = np.where(outside.any(axis=1), outside.argmax(axis=1), GUIDE_KNOTS - 1)
@@ -431,7 +435,7 @@ def quad_frames(corners_mm: Doubles) -> tuple[Doubles, Doubles]:
     corners_mm : (q, 4, 3) corners of the quads [mm]
     """
     a, b, c, d = corners_mm.swapaxes(0, 1)
-    along = unit((b - a) + (c - d))
+    along = unit_vectors((b - a) + (c - d))
     normal = np.cross(c - a, d - b)
-    normal = unit(normal - (normal * along).sum(axis=1, keepdims=True) * along)
+    normal = unit_vectors(normal - (normal * along).sum(axis=1, keepdims=True) * along)
     return corners_mm.mean(axis=1), np.stack([along, np.cross(normal, along), normal], axis=1)

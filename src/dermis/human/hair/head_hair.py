@@ -74,7 +74,7 @@ def make_groom(
 def _scalp_parameters(style: Style, look: HairLook, recession: float) -> tuple[object, ...]:
     length, fade = min(look.length_mm, style.max_length_mm), look.fade if style.fade else 0.0
     densities = STRANDS_PER_CM2, MAX_HAIRS_PER_CM2, look.density
-    return _part_parameters(
+    return _parameter_row(
         style, look, length, densities, _HAIR_RADIUS_MM, fade, max(recession, style.crown), 1.0
     )
 
@@ -84,10 +84,10 @@ def _beard_parameters(look: HairLook) -> tuple[object, ...]:
         min(look.beard_mm, BEARD.max_length_mm),
         (BEARD_STRANDS_PER_CM2, BEARD_HAIRS_PER_CM2, 1.0),
     )
-    return _part_parameters(BEARD, look, length, densities, _BEARD_RADIUS_MM)
+    return _parameter_row(BEARD, look, length, densities, _BEARD_RADIUS_MM)
 
 
-def _part_parameters(
+def _parameter_row(
     style: Style,
     look: HairLook,
     length_mm: float,

@@ -60,8 +60,7 @@ LOWER_LASHES = LashRow(
 def sample_positions(row: LashRow, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
     """Return random root positions of lashes on a lid, as two arrays (n,) of coordinates from 0 to 1.
 
-    The coordinates are `u` (along the edge of the lid) and `across` (distance from the edge) of
-    `RootFinder.lid_edge_roots`.
+    The coordinates are `edge_position` and `edge_distance` of `RootFinder.lid_edge_roots`.
     """
     u = (np.arange(row.hairs) + rng.uniform(-0.3, 1.3, row.hairs)) / row.hairs
     across = 0.04 + 0.12 * rng.integers(0, 3, row.hairs)

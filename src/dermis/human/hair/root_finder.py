@@ -118,35 +118,41 @@ class RootFinder:
 
     @cached_property
     def brow_grid_roots(self) -> Roots:
-        """Return roots at the nodes of `brow_grid_points`, on the left brow, then at the mirrored nodes."""
+        """Return roots at the nodes of `brow_grid_points` (left brow), then at the mirrored nodes (right)."""
         x, y = brow_grid_points()
         return self.front_roots(
             np.concatenate([side * x for side in SIDE_SIGNS]), np.tile(y, len(SIDE_SIGNS))
         )[0]
 
-    def lid_edge_roots(self, lid: lashes.LashRow, side: float, u: Doubles, across: Doubles) -> Roots:
+    def lid_edge_roots(
+        self, lid: lashes.LashRow, side_sign: float, edge_position: Doubles, edge_distance: Doubles
+    ) -> Roots:
         """Return lash roots near the edge of a lid, on the quads that adjoin the edge on the outside.
 
         lid : row of lashes on the lid
-        side : 1 for the left eye, -1 for the right eye
-        u : (n,) positions along the edge, as fractions of its arc length
-        across : (n,) distances from the edge: 0 on the edge, 1 on the opposite side of the adjacent quad
+        side_sign : 1 for the left eye, -1 for the right eye
+        edge_position : (n,) positions along the edge, as fractions of its arc length
+        edge_distance : (n,) distances from the edge: 0 on the edge, 1 on the opposite side of the quad
         """
-        key = lid.edge_points, side
+        key = lid.edge_points, side_sign
         if key not in self._lid_edges:
-            self._lid_edges[key] = self._lid_edge(np.array(lid.edge_points), side)
+            self._lid_edges[key] = self._lid_edge(np.array(lid.edge_points), side_sign)
         lengths_mm, quad, frame = self._lid_edges[key]
-        segment = np.clip(np.searchsorted(lengths_mm, u * lengths_mm[-1], "right") - 1, 0, len(quad) - 1)
-        t = (u * lengths_mm[-1] - lengths_mm[segment]) / (lengths_mm[segment + 1] - lengths_mm[segment])
+        segment = np.clip(
+            np.searchsorted(lengths_mm, edge_position * lengths_mm[-1], "right") - 1, 0, len(quad) - 1
+        )
+        t = (edge_position * lengths_mm[-1] - lengths_mm[segment]) / (
+            lengths_mm[segment + 1] - lengths_mm[segment]
+        )
         frame = frame[segment]
         low = (1 - t)[:, None] * frame[:, 0] + t[:, None] * frame[:, 1]
         high = (1 - t)[:, None] * frame[:, 2] + t[:, None] * frame[:, 3]
-        position = (1 - across)[:, None] * low + across[:, None] * high
+        position = (1 - edge_distance)[:, None] * low + edge_distance[:, None] * high
         return Roots(quad[segment].astype(np.int32), position.astype(np.float32))
 
-    def _lid_edge(self, edge_points: Index, side: float) -> _LidEdge:
-        points, around, eye = self.points_mm, self._quad_points, self._eyes_mm[0 if side > 0 else 1]
-        edge_points = edge_points if side > 0 else _mirrored_points(points, edge_points)
+    def _lid_edge(self, edge_points: Index, side_sign: float) -> _LidEdge:
+        points, around, eye = self.points_mm, self._quad_points, self._eyes_mm[0 if side_sign > 0 else 1]
+        edge_points = edge_points if side_sign > 0 else _mirrored_points(points, edge_points)
         distances = np.linalg.norm(points[around].mean(axis=1) - eye, axis=1)
         segments_mm = np.linalg.norm(np.diff(points[edge_points], axis=0), axis=1)
         lengths_mm = np.concatenate([[0], np.cumsum(segments_mm)])
@@ -196,15 +202,15 @@ def _bounding_box(corner: Doubles) -> tuple[Doubles, Doubles]:
     return corner[..., :2].min(axis=1), corner[..., :2].max(axis=1)
 
 
-def _mirrored_points(points_mm: Doubles, index: Index) -> Index:
+def _mirrored_points(points_mm: Doubles, point_index: Index) -> Index:
     """Return for points of a symmetric head the indices of their mirror images in x.
 
     points_mm : (p, 3) all points of the head [mm]
-    index : indices of the points to mirror
+    point_index : indices of the points to mirror
     """
     from scipy.spatial import cKDTree
 
-    return np.asarray(cKDTree(points_mm).query(points_mm[index] * [-1, 1, 1])[1], np.int64)
+    return np.asarray(cKDTree(points_mm).query(points_mm[point_index] * [-1, 1, 1])[1], np.int64)
 
 
 def eye_centres(mesh: Mesh) -> Doubles:

@@ -100,7 +100,7 @@ class HairGroup(NamedTuple):
     radius : (n, k) radii of the hairs at the knots [mm]
     pigment_factor : pigment concentrations relative to those of the person's look [-]
     hairs_per_strand : number of real hairs that each strand represents
-    cover : area of skin that the hairs cover around their roots, per area of skin, see `Strands` [-]
+    cover : projected area of the hairs around their roots, per area of skin, see `Strands` [-]
     """
 
     roots: Roots

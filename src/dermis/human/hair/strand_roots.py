@@ -125,29 +125,29 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
     return found | {name: getattr(guides, name) for name in _GUIDE_FIELDS}
 
 
-def _near_guide_weights(weight: Doubles, guide: NDArray[np.int64], knots: Doubles) -> Doubles:
+def _near_guide_weights(guide_weight: Doubles, guide: NDArray[np.int64], knots: Doubles) -> Doubles:
     """Return weights (n, 4) in which guides far from a strand's main guide count less.
 
-    The main guide of a strand is the guide with the largest weight. The reduction prevents that a strand
-    between guides on opposite sides of the head passes through the head.
+    The main guide of a strand is the guide with the largest weight. The reduction keeps a strand between
+    guides on opposite sides of the head from passing through the head.
 
-    weight, guide : (n, 4) original weights of the guides, and their indices
+    guide_weight, guide : (n, 4) original weights of the guides, and their indices
     knots : (g, k, 3) knots of all guides [mm]
     """
-    main = np.take_along_axis(guide, weight.argmax(axis=1)[:, None], axis=1)
+    main = np.take_along_axis(guide, guide_weight.argmax(axis=1)[:, None], axis=1)
     some = knots[:, :: GUIDE_KNOTS // 8]
     apart = np.linalg.norm(some[guide] - some[main], axis=-1).max(axis=2)
-    agreeing = weight * smoothstep(_GUIDE_SEPARATION_MM[1], _GUIDE_SEPARATION_MM[0], apart)
+    agreeing = guide_weight * smoothstep(_GUIDE_SEPARATION_MM[1], _GUIDE_SEPARATION_MM[0], apart)
     return np.asarray(agreeing / agreeing.sum(axis=1, keepdims=True))
 
 
-def _root_locations(weight: Doubles, corner_points: Doubles) -> Doubles:
+def _root_locations(corner_weight: Doubles, corner_points: Doubles) -> Doubles:
     """Return `StrandRoots.place` (n, 4): the angle, height, thinning and nape-to-top position of each root.
 
-    weight : (n, 4) weights of the corners of the quad on which each strand is rooted
+    corner_weight : (n, 4) weights of the corners of the quad on which each strand is rooted
     corner_points : (n, 4, 4) rows of `average_points` at these corners
     """
-    points = np.einsum("nk,nkc->nc", weight, corner_points)
+    points = np.einsum("nk,nkc->nc", corner_weight, corner_points)
     angle = density.hairline_angle(points)
     height = points[:, 1] + density.hairline_waves(points)
     thinning = -recession_effect("hair", 1.0, points)
@@ -160,9 +160,9 @@ def _clump_centre_strands(
 ) -> NDArray[np.int64]:
     """Return for each strand the index (n,) of the strand at the centre of its clump.
 
-    In cornrows, the root of each strand is moved sideways to the centreline of its row, and the strand
-    nearest to there is the centre. In other styles, random strands are centres, and each strand joins the
-    clump of the nearest centre.
+    In cornrows, the centre is the strand nearest to the strand's root after this root was moved sideways onto
+    the centreline of its row. In other styles, random strands are centres, and each strand joins the clump of
+    the nearest centre.
 
     root_mm : (n, 3) roots on the mean person [mm]
     half_length_mm : (n, 3) points of the strands at half the length of their guides [mm]

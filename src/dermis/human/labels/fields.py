@@ -48,7 +48,7 @@ _MIN_BROW_Z_MM = -30.0  # minimum z of brows
 _HAIRLINE_MARGIN_MM = -8.0  # height relative to the hairline below which hair belongs to the beard
 _DENSE_SUBDIVISION_LEVELS = 2
 SIDE_NAMES = "right", "left"
-_PART_CLASSES = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "torso"}
+_CLASS_OF_MATERIAL = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "torso"}
 _MAX_CACHED_TOPOLOGIES = 3
 _LABEL_CACHE_LOCK = Lock()
 
@@ -82,7 +82,7 @@ def label_fields() -> Doubles:
 def dense_label_fields() -> tuple[Doubles, Doubles]:
     """Return points (n, 3) on the average human's outer skin, and their label fields (k, n) [mm].
 
-    Points and fields are those of a subdivided mesh, with the signed distances of `label_fields`.
+    The fields are the signed distances of `label_fields` at the points of a subdivided mesh.
     """
     head = AVERAGE_HUMAN.head(subdivide=_DENSE_SUBDIVISION_LEVELS)
     assert head.control.stencils is not None
@@ -202,7 +202,7 @@ def _build_mesh_labels(head: Head) -> MeshLabels:
 
 def _material_class(material: Material) -> str:
     """Return the name of the label class of a material; eyeballs are labelled separately."""
-    known = _PART_CLASSES.get(material.part or material.name)
+    known = _CLASS_OF_MATERIAL.get(material.part or material.name)
     return known or ("skin" if material.kind == "skin" else "other")
 
 

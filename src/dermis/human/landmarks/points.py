@@ -42,8 +42,8 @@ class LandmarkPoints:
 def landmark_points(head: Head, set_or_table: str) -> LandmarkPoints:
     """Return the landmarks of a head, from a published set or from a table of vertices.
 
-    set_or_table : one of `LANDMARK_SETS`, or a CSV file with columns name,vertex, where vertex is an index
-        into `Head.positions_mm`
+    set_or_table : one of `LANDMARK_SETS`, or a CSV file with the columns name and vertex; a vertex is an
+        index into `Head.positions_mm`
 
     Raises DermisError for a published set if the head is not a parametric human, and for tables that cannot
     be read.

@@ -96,11 +96,11 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE_NAM
 def _region_map(
     atlas: Atlas, points: NDArray[np.float64], region_values: NDArray[np.float64], existing_map: Floats | None
 ) -> Floats:
-    """Return a map (h, w) of a regional quantity, multiplied by the fine detail of an existing map.
+    """Return a map (h, w) of roughness or specular strength, with the fine detail of an existing map.
 
     points : (n, 3) positions of the covered texels of the atlas [mm]
-    region_values : (n,) quantity at these texels, smoothed across region borders
-    existing_map : (h, w) existing map of the quantity, or None
+    region_values : (n,) roughness or specular strength at these texels, smoothed across region borders
+    existing_map : (h, w) existing map of the same quantity, or None
     """
     if existing_map is None:
         return _texel_image(atlas, region_values)
@@ -178,12 +178,14 @@ def with_default_regions(head: Head) -> Head:
     missing = ["roughness"] if head.maps.specular is not None else ["roughness", "specular"]
     sources: list[Array] = [head.mesh.positions, head.mesh.uv, head.mesh.triangles, table.values]
 
-    def make() -> Arrays:
+    def make_region_maps() -> Arrays:
         maps = with_regions(replace(head, maps=Maps()), table)[0].maps
         return {name: np.asarray(getattr(maps, name), np.float32) for name in missing}
 
     try:
-        arrays = cached_arrays(sources, f"regions {_CACHE_VERSION} {MIN_MAP_SIDE} {head.name}", missing, make)
+        arrays = cached_arrays(
+            sources, f"regions {_CACHE_VERSION} {MIN_MAP_SIDE} {head.name}", missing, make_region_maps
+        )
     except DermisError:  # a different head with the name of a known one
         return head
     changed: dict[str, Any] = dict(arrays)

@@ -12,7 +12,7 @@ _COLOUR_TABLE_LOCK = Lock()  # two threads may request the same table
 
 
 def skin_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
-    """Return a table of skin colours as a function of melanin and blood, for given other parameters."""
+    """Return a table of skin colours over melanin and blood, for fixed values of the other parameters."""
     with _COLOUR_TABLE_LOCK:
         return _cached_colour_table(eumelanin, oxygen, epidermis_mm)
 

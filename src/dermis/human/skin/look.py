@@ -148,11 +148,11 @@ class Demographics(NamedTuple):
     ita: float | None = None
 
     def shape_weighted_mean(self, value_of_ancestry: dict[str, float]) -> float:
-        """Return the mean of one value per ancestry, weighted by the ancestry fractions of the shape."""
+        """Return the mean of one value per ancestry, weighted by the fractions that determine the shape."""
         return _weighted_mean((self.african, self.asian, self.caucasian), value_of_ancestry)
 
     def skin_weighted_mean(self, value_of_ancestry: dict[str, float]) -> float:
-        """Return the mean of one value per ancestry, weighted by the ancestry fractions of the skin."""
+        """Return the mean of one value per ancestry, weighted by the fractions that determine the skin."""
         return _weighted_mean(pigment_ancestry(self.skin_groups), value_of_ancestry)
 
 
@@ -166,10 +166,12 @@ def typical_skin(demographics: Demographics) -> SkinLook:
 
     Source: [Lu2025] for the pigments.
     """
-    return _typical_look(demographics, *typical_pigments(*_pigment_arguments(demographics)))
+    return _typical_skin_look(demographics, *typical_pigments(*_typical_pigment_arguments(demographics)))
 
 
-def _typical_look(demographics: Demographics, pigments: MeasuredPigments, sites: SiteDifferences) -> SkinLook:
+def _typical_skin_look(
+    demographics: Demographics, pigments: MeasuredPigments, sites: SiteDifferences
+) -> SkinLook:
     """Return the typical look of a person with measured pigments."""
     old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
     spot_progress = max(demographics.age - _AGE_SPOTS_FROM_YEARS, 0.0) / (OLD_AGE - _AGE_SPOTS_FROM_YEARS)
@@ -186,7 +188,9 @@ def _typical_look(demographics: Demographics, pigments: MeasuredPigments, sites:
     )
 
 
-def _pigment_arguments(demographics: Demographics) -> tuple[Mapping[str, float], float, float, float | None]:
+def _typical_pigment_arguments(
+    demographics: Demographics,
+) -> tuple[Mapping[str, float], float, float, float | None]:
     return demographics.skin_groups, demographics.sex, demographics.age, demographics.ita
 
 
@@ -212,8 +216,8 @@ def sample_skin(
 
     Source: [Lu2025] for the pigments.
     """
-    pigments, sites = sample_pigments(pigment_rng, *_pigment_arguments(demographics))
-    typical = _typical_look(demographics, pigments, sites)
+    pigments, sites = sample_pigments(pigment_rng, *_typical_pigment_arguments(demographics))
+    typical = _typical_skin_look(demographics, pigments, sites)
     n = rng.normal(size=8)
     freckled = float(rng.beta(0.4, 3.0)) * (1.0 - min(typical.melanin / 0.1, 1.0))
     seed = int(rng.integers(2**31))

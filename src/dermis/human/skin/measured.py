@@ -68,8 +68,8 @@ _ITA_HALF_WIDTH_DEGREES = 1.0
 _MAX_NORMAL_SCORE = 2.9  # largest absolute normal score of an ITA
 # Numbers of melanin fractions, of bisections between two of them, and of changes of the other pigments:
 _MELANIN_NODE_COUNT, _BISECTION_COUNT, _MAX_ITA_STEPS = 257, 40, 15
-Weights = Mapping[str, float]
-"""Weights of groups, with a sum of 1."""
+GroupWeights = Mapping[str, float]
+"""Weights of groups of people, with a sum of 1."""
 
 
 class MeasuredPigments(NamedTuple):
@@ -94,7 +94,7 @@ class SiteDifferences:
     Parameters
     ----------
     cheekbone, forehead, chin, nose_tip, ear_lobe, neck : tuple of float
-        Three differences, site minus cheek: melanin [doublings], blood [doublings], oxygen saturation [-].
+        Three differences, site minus cheek, of log2 of melanin, log2 of blood, and oxygen saturation [-].
 
     Examples
     --------
@@ -135,8 +135,8 @@ class _Group(NamedTuple):
     quantiles : (4, k) quantiles of the four variables of the cheek that `MeasuredTable` lists
     ita : (k,) quantiles of the individual typology angle (ITA) [degrees]
     correlation : (5, 5) correlation of the normal scores of these four variables and of the ITA
-    sites : (12, 3) differences between each site and the cheek: melanin [doublings], blood [doublings] and
-        oxygen [-]
+    sites : (12, 3) differences between each site and the cheek in log2 of melanin, log2 of blood, and oxygen
+        [-]
     """
 
     quantiles: Doubles
@@ -155,10 +155,10 @@ class MeasuredTable(NamedTuple):
     groups : mapping from group name to distribution
     sex, age : (4,) changes of the variables from female to male, and from young to old
     mean_age_term : mean of `age_term` over the ages that `Human.drawn` samples
-    site_slope : (12, 2) change of each site's difference in melanin per doubling of the cheek's melanin, and
-        the same for blood [-]
-    site_spread : (12, 2) standard deviations of the differences in melanin and in blood between people
-        [doublings]
+    site_slope : (12, 2) change of each site's difference in log2 of melanin per change of the cheek's log2 of
+        melanin, and the same for blood [-]
+    site_spread : (12, 2) standard deviations between people of each site's differences in log2 of melanin and
+        in log2 of blood [-]
     """
 
     probabilities: Doubles
@@ -169,7 +169,7 @@ class MeasuredTable(NamedTuple):
     site_slope: Doubles
     site_spread: Doubles
 
-    def group_mean(self, field_name: str, weights: Weights) -> Doubles:
+    def group_mean(self, field_name: str, weights: GroupWeights) -> Doubles:
         """Return a field of `_Group`, averaged over a mixture of groups.
 
         field_name : name of the field
@@ -181,7 +181,7 @@ class MeasuredTable(NamedTuple):
         return np.asarray(np.sum(parts, axis=0))
 
     def cheek_variables(
-        self, weights: Weights, sex: ArrayLike, age: ArrayLike, normal_scores: Doubles
+        self, weights: GroupWeights, sex: ArrayLike, age: ArrayLike, normal_scores: Doubles
     ) -> Doubles:
         """Return the variables (n, 4) that describe the cheeks of n people, in the order of `MeasuredTable`.
 
@@ -197,11 +197,11 @@ class MeasuredTable(NamedTuple):
         return np.asarray(values + sexes[..., None] * self.sex + terms[..., None] * self.age)
 
     def site_differences(
-        self, weights: Weights, cheek_variables: Doubles, normal_samples: Doubles
+        self, weights: GroupWeights, cheek_variables: Doubles, normal_samples: Doubles
     ) -> Doubles:
         """Return the differences (n, 12, 3) between all sites and the cheek.
 
-        The differences are in melanin [doublings], blood [doublings] and oxygen [-].
+        The differences are in log2 of melanin, log2 of blood, and oxygen [-].
 
         weights : weight of each group in the mixture
         cheek_variables : (n, 4) result of the method `cheek_variables`
@@ -274,7 +274,7 @@ def _split_union_weight(union_name: str, weight: float) -> dict[str, float]:
     return {one: weight / len(members) for one in members}
 
 
-def pigment_ancestry(weights: Weights) -> tuple[float, float, float]:
+def pigment_ancestry(weights: GroupWeights) -> tuple[float, float, float]:
     """Return the African, Asian and European fractions that determine pigments of hair and eyes."""
     african = weights.get("african", 0.0)
     european = sum(weight * _EUROPEAN_FRACTION_OF_GROUP.get(name, 0.0) for name, weight in weights.items())
@@ -300,7 +300,7 @@ def group_probabilities(ita: float) -> dict[str, float]:
 
 
 def typical_pigments(
-    weights: Weights, sex: float, age: float, ita: float | None = None
+    weights: GroupWeights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
     """Return the median pigments and site differences for a sex, an age and, optionally, an ITA.
 
@@ -310,7 +310,7 @@ def typical_pigments(
 
 
 def sample_pigments(
-    rng: np.random.Generator, weights: Weights, sex: float, age: float, ita: float | None = None
+    rng: np.random.Generator, weights: GroupWeights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
     """Return random pigments and site differences of a person; pigments are correlated as measured.
 
@@ -322,7 +322,7 @@ def sample_pigments(
 
 
 def _pigments_and_sites(
-    weights: Weights,
+    weights: GroupWeights,
     sex: float,
     age: float,
     ita: float | None,
@@ -350,7 +350,9 @@ def _pigments_and_sites(
     samples_or_zeros = (
         np.zeros((1, len(SITES), 2)) if site_normal_samples is None else site_normal_samples[None]
     )
-    middle = variables if not typical or ita is not None else np.tile(_median_variables(weights), (1, 1))
+    middle = (
+        variables if not typical or ita is not None else np.tile(_median_cheek_variables(weights), (1, 1))
+    )
     sites = table.site_differences(weights, middle, samples_or_zeros)[0]
     oxygen = variables[0, 2] + sites[:, 2]  # may exceed 1, where skin is redder than the model allows
     sites[:, 2] = np.clip(oxygen, 0.0, 1.0) - pigments.oxygen
@@ -359,7 +361,7 @@ def _pigments_and_sites(
     return pigments, SiteDifferences(**rows)
 
 
-def _median_variables(weights: Weights) -> Doubles:
+def _median_cheek_variables(weights: GroupWeights) -> Doubles:
     table = measured_table()
     return table.group_mean("quantiles", weights)[:, len(table.probabilities) // 2]
 
@@ -407,7 +409,7 @@ def with_ita(
     return pigments._replace(melanin=float(np.exp(0.5 * (low + high))))
 
 
-def _ita_score(ita: float, weights: Weights) -> float:
+def _ita_score(ita: float, weights: GroupWeights) -> float:
     """Return the standard normal score of an ITA in a mixture of groups, limited to the range -2.9 to 2.9."""
     quantiles = measured_table().group_mean("ita", weights)
     return float(np.clip(_ita_scores(np.array([ita]), quantiles)[0], -_MAX_NORMAL_SCORE, _MAX_NORMAL_SCORE))

@@ -11,7 +11,7 @@ from dermis.base.arrays import Doubles, Index
 from dermis.mesh.geometry import label_components, triangle_areas
 from dermis.mesh.mesh import Mesh
 
-RADIUS_RANGE_MM = 8.0, 20.0
+EYEBALL_RADIUS_RANGE_MM = 8.0, 20.0
 """Range of the radius of an eyeball, which is 12 mm in reality but varies between artists [mm]."""
 MAX_SPHERE_DEVIATION = 0.06
 """Largest deviation of most of an eyeball from a sphere, as a fraction of its radius."""
@@ -57,7 +57,7 @@ class _EyePiece:
     @property
     def rejection_reason(self) -> str:
         """Return the reason why this component is not an eyeball; an empty string if it is one."""
-        (low, high), (_, radius, deviation) = RADIUS_RANGE_MM, self.sphere
+        (low, high), (_, radius, deviation) = EYEBALL_RADIUS_RANGE_MM, self.sphere
         if len(self.points) < _MIN_EYEBALL_POINTS:
             return f"has only {len(self.points)} points"
         if deviation > MAX_SPHERE_DEVIATION:

@@ -120,7 +120,7 @@ def _eye_shapes(corners_mm: Doubles, balls: tuple[DetectedEyeball, DetectedEyeba
     for ball, lid, side in zip(balls, lids, (1.0, -1.0), strict=True):
         scale, sunk, axis = min(1.0, ball.sphere.radius / SCLERA_MM), 0.0, ball.gaze
         if not ball.cornea:
-            axis = lid.direction(side * outwards, up)
+            axis = lid.turned_direction(side * outwards, up)
             sunk = lid.cornea_recess_mm(axis, scale) / scale
         radius = ball.sphere.radius / scale
         offset = limbus_plane_mm(SCLERA_MM) - limbus_plane_mm(radius) + sunk

@@ -114,7 +114,7 @@ class Lids:
             )
         return angles[0], angles[1]
 
-    def direction(self, angle_across: float, angle_up: float) -> Doubles:
+    def turned_direction(self, angle_across: float, angle_up: float) -> Doubles:
         """Return the unit vector (3,) in head space that is turned sideways and upwards from straight ahead.
 
         angle_across, angle_up : angles by which the vector is turned sideways and upwards [rad]

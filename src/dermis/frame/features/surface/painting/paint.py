@@ -68,7 +68,7 @@ _FOLDING_VALUE_COUNT = FOLD_MOVEMENT_COUNT + 1  # numbers in `folding` of the sh
 
 def painting_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
     """Return the lists over which `//#each` lines in painting shaders loop, such as the list of noises."""
-    return {name: _as_members(names) for name, names in _PAINTING_LISTS.items()}
+    return {name: _as_shader_list(names) for name, names in _PAINTING_LISTS.items()}
 
 
 def painting_constants() -> dict[str, float]:
@@ -79,7 +79,7 @@ def painting_constants() -> dict[str, float]:
     return sizes | counts | rows | {"folding": FOLD_MOVEMENT_COUNT, "wander_rows": ZONE_BORDER_NOISE_COUNT}
 
 
-def _as_members(member_names: Sequence[str]) -> Callable[[], Sequence[ShaderListMember]]:
+def _as_shader_list(member_names: Sequence[str]) -> Callable[[], Sequence[ShaderListMember]]:
     return lambda: [ShaderListMember(name, Path()) for name in member_names]
 
 
@@ -106,8 +106,8 @@ def paint_inputs(surface: PaintedSurface, look: SkinLook, map_side: int) -> Pain
 
     Raises DermisError for a mesh with too many triangles.
     """
-    if surface.count >= _MAX_PAINTED_TRIANGLES:
-        actual = f"got {surface.count:,}"
+    if surface.triangle_count >= _MAX_PAINTED_TRIANGLES:
+        actual = f"got {surface.triangle_count:,}"
         refuse("painted skin", f"fewer than {_MAX_PAINTED_TRIANGLES:,} triangles", actual, "Subdivide less")
     text = _shader_text(_SKIN_SHADER)
     names = set(struct_dtype(text, "Paint").names or ()) & set(vars(look))
@@ -118,7 +118,7 @@ def paint_inputs(surface: PaintedSurface, look: SkinLook, map_side: int) -> Pain
     return PaintInputs(paint, tables, painted_colour_tables(look), surface)
 
 
-def cache_key(inputs: PaintInputs, driver_name: str) -> str:
+def painted_maps_cache_key(inputs: PaintInputs, driver_name: str) -> str:
     """Return the disk cache key of painted maps: a hash of inputs, shaders and driver name."""
     source = "\n".join((driver_name, _shader_text(_SKIN_SHADER), _shader_text(_TEXEL_TRIANGLE_SHADER)))
     records = (np.frombuffer(record.tobytes(), np.uint8) for record in (inputs.paint, inputs.tables))
@@ -126,8 +126,8 @@ def cache_key(inputs: PaintInputs, driver_name: str) -> str:
 
 
 @cache
-def _shader_text(shader: str) -> str:
-    return shader_source(FEATURES_FOLDER / shader, shader_folders()).text
+def _shader_text(shader_path: str) -> str:
+    return shader_source(FEATURES_FOLDER / shader_path, shader_folders()).text
 
 
 def _face_tables(hairline_recession: float, site_differences: SiteDifferences) -> bytes:
@@ -178,13 +178,13 @@ def cached_rest_maps(
     if device.adapter.kind != "CPU":
         return paint_rest_maps(device, inputs, map_side)
     key, names = (
-        cache_key(inputs, f"{device.adapter.name} {device.adapter.driver}"),
+        painted_maps_cache_key(inputs, f"{device.adapter.name} {device.adapter.driver}"),
         [*_PAINTED_MAP_NAMES, "heights"],
     )
     names += ["deltas"] if with_expressions else []
     arrays = load_arrays(_PAINTED_CACHE_FOLDER, key, names)
     if arrays is not None:
-        return _upload_arrays(device, arrays, map_side)
+        return _upload_cached_maps(device, arrays, map_side)
     maps = paint_rest_maps(device, inputs, map_side)
     if device.cached("first painted", lambda: key) == key:
         load_or_make(
@@ -235,7 +235,9 @@ def _surface_buffers(device: Device, inputs: PaintInputs, map_side: int) -> dict
         }
         frame = CommandList(device, timed=False)
         bound: Bindings = {"paint": inputs.paint, **buffers}
-        frame.dispatch("maps", program(device, _TEXEL_TRIANGLE_SHADER), bound, workgroup_grid(surface.count))
+        frame.dispatch(
+            "maps", program(device, _TEXEL_TRIANGLE_SHADER), bound, workgroup_grid(surface.triangle_count)
+        )
         frame.submit()
         sides[map_side] = buffers
     return sides[map_side]
@@ -259,16 +261,16 @@ def _download_maps(device: Device, maps: RestMaps, with_expressions: bool) -> Ar
     return arrays
 
 
-def _upload_arrays(device: Device, arrays: Arrays, map_side: int) -> RestMaps:
+def _upload_cached_maps(device: Device, map_arrays: Arrays, map_side: int) -> RestMaps:
     maps = {name: map_mips.empty_map(device, (map_side, map_side)) for name in _PAINTED_MAP_NAMES}
     for name, one in maps.items():
-        upload(device, one.texture, arrays[name])
+        upload(device, one.texture, map_arrays[name])
     deltas = None
-    if "deltas" in arrays:
+    if "deltas" in map_arrays:
         deltas = make_texture(device, (map_side, map_side), HALF_TEXEL_FORMAT, layer_count=2)
-        for layer, texels in enumerate(arrays["deltas"]):
+        for layer, texels in enumerate(map_arrays["deltas"]):
             upload(device, deltas, texels, layer=layer)
-    return RestMaps(**maps, heights=device.buffer(arrays["heights"], "STORAGE"), deltas=deltas)
+    return RestMaps(**maps, heights=device.buffer(map_arrays["heights"], "STORAGE"), deltas=deltas)
 
 
 @dataclass(frozen=True, eq=False)
