@@ -33,7 +33,7 @@ from dermis.frame.features.translucency import passes as translucency_weights
 from dermis.frame.features.translucency.build import (
     make_pair_buffers,
     make_translucency_buffers,
-    with_profile,
+    with_profile_weights,
 )
 from dermis.frame.features.translucency.pair_search.search import search_pairs
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
@@ -114,7 +114,7 @@ def thin(device: Device) -> Thin:
 
 def weighed(device: Device, pairs: PairBuffers, surface: dict[str, Any]) -> Translucency:
     """Return pairs on a surface with the weights of a profile."""
-    made = with_profile(
+    made = with_profile_weights(
         device, make_translucency_buffers(device, surface, pairs), BLURRED.variance_mm2, BLURRED.weight
     )
     frame = CommandList(device)

@@ -114,9 +114,9 @@ class FrameLandmarks:
         self.names: tuple[str, ...] = ()
         self.path = image_path.with_name(f"{image_path.stem}.landmarks.json")
         if option_value is not None:
-            from dermis.frame.features.outputs.landmarks import checked_landmarks
+            from dermis.frame.features.outputs.landmarks import checked_landmark_sets
 
-            self.names = checked_landmarks(_split_names(option_value))
+            self.names = checked_landmark_sets(_split_names(option_value))
             check_output(self.path, (self.path.suffix,))
 
     def check(self, head: Head) -> None:

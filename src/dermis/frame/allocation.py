@@ -18,7 +18,7 @@ from dermis.frame.features.interreflection.interreflection import (
 from dermis.frame.features.occlusion.baked import cached_occlusion_map, placeholder_occlusion
 from dermis.frame.features.occlusion.moving import (
     VertexSkyVisibility,
-    make_moving_map,
+    make_moving_occlusion_map,
     make_vertex_sky_visibility,
 )
 from dermis.frame.features.shading.shade import shade_program
@@ -27,7 +27,7 @@ from dermis.frame.features.shadows.shadows import ShadowMaps, make_shadow_maps
 from dermis.frame.features.shape.curvature import placeholder_curvature
 from dermis.frame.features.shape.mesh import HeadGeometry, rest_geometry, upload_geometry
 from dermis.frame.features.shape.shape import Shape
-from dermis.frame.features.surface.maps import detail_bindings, has_parts, upload_maps
+from dermis.frame.features.surface.maps import detail_bindings, has_part_materials, upload_maps
 from dermis.frame.features.surface.record import skin_record, surface_constants
 from dermis.frame.features.surface.texels import make_surface_texture
 from dermis.frame.features.translucency.build import make_translucency, thin_part_tables
@@ -109,7 +109,7 @@ def _shade_constants(request: FrameRequest) -> Constants:
     """
     eyes = request.head.eyes is not None
     used = {"DETAIL": request.has_fine_relief, "EYES": eyes, "MIXED": request.mixes_profiles}
-    used["PARTS"] = has_parts(request.head)
+    used["PARTS"] = has_part_materials(request.head)
     return tuple((name, 1) for name, value in used.items() if value)
 
 
@@ -229,7 +229,9 @@ def _make_layout(
         occlusion = placeholder_occlusion(device)
     moving_occlusion = translucency = None
     if request.occlusion_follows_shape:
-        occlusion, moving_occlusion = cached(make_moving_map, device, occlusion, caller_name=layout_key)
+        occlusion, moving_occlusion = cached(
+            make_moving_occlusion_map, device, occlusion, caller_name=layout_key
+        )
     bindings["occlusion_map"] = occlusion
     if request.blur_count and settings.transmission == "thin" and request.technique.supports_translucency:
         searched = at_rest(pair_positions_mm(memo, request), layout_index)

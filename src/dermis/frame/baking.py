@@ -72,27 +72,30 @@ def bake(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) ->
         for names in _ABSENCE_REASONS_OF_OUTPUTS
         for name in _available_outputs(renderer, scene, settings, names, absent)
     )
-    texel, points = layout_points(scene.head.mesh, map_side)
+    texel, points = texel_surface_points(scene.head.mesh, map_side)
     job = partial(_bake_points, renderer, scene, settings, outputs, points, map_side)
     return _arrange_as_maps(map_side, texel, renderer.reopening_device.run(job), absent)
 
 
 def bake_albedo(
-    renderer: Renderer, scene: Scene, triangle: NDArray[np.integer], weights: NDArray[np.floating]
+    renderer: Renderer,
+    scene: Scene,
+    triangle_index: NDArray[np.integer],
+    barycentric_weights: NDArray[np.floating],
 ) -> Floats:
     """Return the (n, 3) linear Rec. 709 albedo at surface points of skin, eyes or mouth [-].
 
-    triangle : (n,) indices of the triangles on which the points lie
-    weights : (n, 2) barycentric weights of the second and third corner
+    triangle_index : (n,) indices of the triangles on which the points lie
+    barycentric_weights : (n, 2) barycentric weights of the second and third corner
     """
     settings = Settings(size=_DISCARDED_PICTURE_SIZE, samples=1, atlas=_ALBEDO_ATLAS_SIDE, strands=False)
-    points = baking_pass.point_words(triangle, weights)
+    points = baking_pass.bake_point_words(triangle_index, barycentric_weights)
     job = partial(_bake_points, renderer, scene, settings, (), points, _ALBEDO_MAP_SIDE)
     values = renderer.reopening_device.run(job)
     return np.ascontiguousarray(values[:, : BAKED_CHANNELS["albedo"]])
 
 
-def layout_points(mesh: Mesh, map_side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
+def texel_surface_points(mesh: Mesh, map_side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
     """Return the indices of texels whose centres are on skin, and these surface points packed for bake.wgsl.
 
     Where triangles overlap in uv, a triangle that is not mirrored takes precedence over a mirrored triangle,
@@ -104,7 +107,7 @@ def layout_points(mesh: Mesh, map_side: int) -> tuple[NDArray[np.int64], NDArray
     owner = np.full(map_side * map_side, -1, np.int64)
     owner[texel[order]] = triangle[order]
     covered = np.flatnonzero(owner >= 0)
-    return covered, baking_pass.point_words(
+    return covered, baking_pass.bake_point_words(
         owner[covered], _texel_weights(mesh, map_side, covered, owner[covered])
     )
 
@@ -160,7 +163,7 @@ def _bake_points(
     A frame is rendered first, because it computes the light in the atlas.
 
     output_names : names of outputs whose resources bake.wgsl needs
-    packed_points : (n, 4) surface points, packed by `features.shading.bake.point_words`
+    packed_points : (n, 4) surface points, packed by `features.shading.bake.bake_point_words`
     map_side : side of the maps, which sets the width of filters [texels]
     """
     renderer.draw(scene, settings, timed=False, outputs=output_names)

@@ -60,7 +60,9 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
     outputs.draw(graph, resources.outputs, stage_inputs)
 
 
-def _stage_inputs(graph: Graph, inputs: FrameInputs, technique: Technique, scattered: Texture) -> StageInputs:
+def _stage_inputs(
+    graph: Graph, inputs: FrameInputs, technique: Technique, scattered_light: Texture
+) -> StageInputs:
     """Collect the inputs of the shader stages that compute outputs."""
     resources, diffused = inputs.resources, None
     layers = technique.subsurface_layers(resources.output_layers)
@@ -71,7 +73,7 @@ def _stage_inputs(graph: Graph, inputs: FrameInputs, technique: Technique, scatt
         view=inputs.view,
         centre_mm=inputs.centre_mm,
         constants=inputs.constants,
-        scattered=scattered,
+        scattered=scattered_light,
         camera=inputs.camera_views,
         head=resources.head,
         visibility=resources.visibility,

@@ -97,11 +97,11 @@ def observation_jobs(
 def _read_observation(scene: Scene, settings: Settings, readback: Readback) -> Observation:
     picture, outputs, landmark_sets = readback.image_and_outputs()
     camera = scene.camera.to_opencv(settings.size)
-    landmarks = {name: _landmarks(camera, *rows) for name, rows in landmark_sets.items()}
+    landmarks = {name: _project_landmarks(camera, *rows) for name, rows in landmark_sets.items()}
     return Observation(picture, outputs, camera, landmarks, head_pose(scene), gaze_directions(scene))
 
 
-def _landmarks(
+def _project_landmarks(
     camera: OpenCvCamera, landmark_names: tuple[str, ...], landmark_rows: NDArray[np.float32]
 ) -> Landmarks:
     projected = (landmark_rows[:, :3].astype(np.float64) @ camera.R.T + camera.t) @ camera.K.T

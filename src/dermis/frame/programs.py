@@ -89,9 +89,9 @@ def program(
     device: Device,
     path: str | Path,
     constants: Constants = (),
-    source: str = FLOAT_TEXEL_FORMAT,
-    store: str = FLOAT_TEXEL_FORMAT,
-    labels: bool = False,
+    source_format: str = FLOAT_TEXEL_FORMAT,
+    store_format: str = FLOAT_TEXEL_FORMAT,
+    with_labels: bool = False,
 ) -> ComputeProgram:
     """Return the compiled program of a shader; programs are cached per device.
 
@@ -99,11 +99,11 @@ def program(
 
     path : "FEATURE/NAME.wgsl", or the path of any other file
     constants : pipeline constants
-    source : format of the texture from which the shader reads light
-    store : format of the texture to which the shader writes light
-    labels : whether the shader, a hair pass, stores labels besides the picture
+    source_format : format of the texture from which the shader reads light
+    store_format : format of the texture to which the shader writes light
+    with_labels : whether the shader, a hair pass, stores labels besides the picture
     """
-    active = shader_options(source, store, labels, constants)
+    active = shader_options(source_format, store_format, with_labels, constants)
 
     def compile_program() -> ComputeProgram:
         file, folders = FEATURES_FOLDER / path, shader_folders(*active)
@@ -112,12 +112,14 @@ def program(
     return cached_program(device, (path, active, registry_version()), constants, compile_program)
 
 
-def shader_options(source: str, store: str, labels: bool, constants: Constants = ()) -> tuple[str, ...]:
+def shader_options(
+    source_format: str, store_format: str, with_labels: bool, constants: Constants = ()
+) -> tuple[str, ...]:
     """Return the names of the `//#if` conditions that hold for the options of `program`."""
     values = {
-        "FILTERED_SOURCE": source == HALF_TEXEL_FORMAT,
-        "STORED_HALVES": store == HALF_TEXEL_FORMAT,
-        "HAIR_LABELS": labels,
+        "FILTERED_SOURCE": source_format == HALF_TEXEL_FORMAT,
+        "STORED_HALVES": store_format == HALF_TEXEL_FORMAT,
+        "HAIR_LABELS": with_labels,
     }
     options = [name for name, value in values.items() if value]
     return (*options, *(name for name, value in constants if name in OPTIONAL_BINDING_CONSTANTS and value))
@@ -180,7 +182,7 @@ def warm_up(device: Device) -> None:
     for name in _COMMON_SHADERS:
         program(device, name)
     texel = level_format(device)
-    program(device, "atlas/stitch_gather.wgsl", source=texel)
-    program(device, "diffusion/diffuse_halve.wgsl", source=texel, store=texel)
+    program(device, "atlas/stitch_gather.wgsl", source_format=texel)
+    program(device, "diffusion/diffuse_halve.wgsl", source_format=texel, store_format=texel)
     for name in ("atlas/stitch_place.wgsl", "irradiance/irradiance.wgsl"):
-        program(device, name, store=texel)
+        program(device, name, store_format=texel)

@@ -136,30 +136,33 @@ def view_rows(eye: Triple, axes: Axes) -> Rows:
     return (*right, -_dot(right, eye)), (*up, -_dot(up, eye)), (*forward, -_dot(forward, eye))
 
 
-def perspective_rows(rows: Rows, window: Window, near: float, far: float) -> list[Sequence[float]]:
+def perspective_rows(
+    view_matrix_rows: Rows, window: Window, near: float, far: float
+) -> list[Sequence[float]]:
     """Return the rows of the matrix from world to clip space for a window on the image plane.
 
     Depth is reversed, which gives a similar precision at all distances, because floats are densest near 0.
 
-    rows : upper three rows of the view matrix
+    view_matrix_rows : upper three rows of the view matrix
     near, far : distances at which depth is 1 and 0 [mm]
     """
     scale = -near / (far - near)
-    depth = [scale * c for c in rows[2]]
+    depth = [scale * c for c in view_matrix_rows[2]]
     depth[3] -= far * scale
-    lateral = zip(rows, window.half, window.shift, strict=False)
+    lateral = zip(view_matrix_rows, window.half, window.shift, strict=False)
     across = [
-        [c / half - shift * w for c, w in zip(row, rows[2], strict=True)] for row, half, shift in lateral
+        [c / half - shift * w for c, w in zip(row, view_matrix_rows[2], strict=True)]
+        for row, half, shift in lateral
     ]
-    return [*across, depth, rows[2]]
+    return [*across, depth, view_matrix_rows[2]]
 
 
-def depth_range(outline: Outline, rows: Rows) -> tuple[float, float]:
+def depth_range(outline: Outline, view_matrix_rows: Rows) -> tuple[float, float]:
     """Return the nearest and farthest depth of a shape in view space, with a small margin [mm].
 
-    rows : upper three rows of the view matrix
+    view_matrix_rows : upper three rows of the view matrix
     """
-    z = np.array(rows[2], np.float32) @ outline.homogeneous_points
+    z = np.array(view_matrix_rows[2], np.float32) @ outline.homogeneous_points
     near, far = float(z.min()) - outline.margin_mm, float(z.max()) + outline.margin_mm
     return max(near - 1.0, 0.5, 1e-3 * far), max(far + 1.0, 2.0)
 

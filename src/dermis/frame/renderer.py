@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_integer
 from dermis.base.renamed import renamed_keywords
-from dermis.frame.features.outputs.landmarks import checked_landmarks
+from dermis.frame.features.outputs.landmarks import checked_landmark_sets
 from dermis.frame.features.outputs.readback import Readback, start_readback
 from dermis.frame.features.post.picture import Picture
 from dermis.frame.frame import draw_frame
@@ -427,7 +427,7 @@ class Renderer:
         """
         if settings is None or isinstance(settings, Settings | Mapping):
             settings = repeat(as_model(Settings, settings or {}, "settings", "size=(512, 512)"))
-        names, sets = check_outputs(outputs), checked_landmarks(landmarks)
+        names, sets = check_outputs(outputs), checked_landmark_sets(landmarks)
         submit = partial(self._submit_readback, linear=linear, alpha=alpha, outputs=names, landmarks=sets)
         jobs = observation_jobs(submit, scenes, previous, settings)
         return pipeline_frames(self.reopening_device, lambda: self.device, jobs)

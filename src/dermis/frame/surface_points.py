@@ -64,11 +64,11 @@ def _find_surface_points(renderer: Renderer, scene: Scene, settings: Settings) -
 
 
 def _barycentric_weights(
-    scene: Scene, view: NDArray[np.void], triangle_index: Index, head_mask: NDArray[np.bool_]
+    scene: Scene, shade_record: NDArray[np.void], triangle_index: Index, head_mask: NDArray[np.bool_]
 ) -> Floats:
     """Return (n, 3) barycentric weights of the points where camera rays meet the triangles, see shade.wgsl.
 
-    view : uniform record of the shading pass
+    shade_record : uniform record of the shading pass
     triangle_index : (n,) indices of the triangles in the pixels of the mask
     head_mask : (h, w) mask of the pixels that show the head
     """
@@ -76,7 +76,7 @@ def _barycentric_weights(
     rows, columns = np.nonzero(head_mask)
     x, y = 2.0 * (columns + 0.5) / width - 1.0, 1.0 - 2.0 * (rows + 0.5) / height
     names = ("forward", "right", "up", "eye", "shift")
-    forward, right, up, eye, shift = (view[name].astype(np.float64) for name in names)
+    forward, right, up, eye, shift = (shade_record[name].astype(np.float64) for name in names)
     x, y = x + shift[0], y + shift[1]
     ray = forward + x[:, None] * right + y[:, None] * up
     mesh, motion = scene.head.mesh, scene.motion
@@ -90,7 +90,7 @@ def _barycentric_weights(
 
 
 def irradiance_at(
-    renderer: Renderer, scene: Scene, settings: Settings, triangle: Index, barycentric: Floats
+    renderer: Renderer, scene: Scene, settings: Settings, triangle_index: Index, barycentric_weights: Floats
 ) -> Floats:
     """Return the (n, 3) irradiance at surface points, times the skin colour [-].
 
@@ -98,19 +98,19 @@ def irradiance_at(
 
     scene : scene without maps and environment, because the positions of the points in the atlas are unknown;
         interreflection is ignored
-    triangle : (n,) indices of the triangles on which the points lie
-    barycentric : (n, 3) barycentric weights of the points
+    triangle_index : (n,) indices of the triangles on which the points lie
+    barycentric_weights : (n, 3) barycentric weights of the points
     """
-    side = max(1, int(np.ceil(np.sqrt(len(triangle)))))
+    side = max(1, int(np.ceil(np.sqrt(len(triangle_index)))))
     triangles = np.full(side * side, -1, np.int64)
-    triangles[: len(triangle)] = triangle
+    triangles[: len(triangle_index)] = triangle_index
     weights = np.zeros((side * side, 2))
-    weights[: len(triangle)] = barycentric[:, 1:]
+    weights[: len(triangle_index)] = barycentric_weights[:, 1:]
     records = pack_surface_points(
         triangles.reshape(side, side), np.rint(65535 * weights).reshape(side, side, 2)
     )
     return renderer.reopening_device.run(partial(_compute_irradiance, renderer, scene, settings, records))[
-        : len(triangle)
+        : len(triangle_index)
     ]
 
 

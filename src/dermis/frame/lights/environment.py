@@ -47,7 +47,9 @@ def load_environment_map(device: Device, environment_name: str | None) -> Enviro
         )
     prefiltered = prefilter(environment_name)
     return EnvironmentMap(
-        _upload_layers(device, prefiltered.layers), prefiltered.suns, float(prefiltered.layers[0].max())
+        _upload_panorama_layers(device, prefiltered.layers),
+        prefiltered.suns,
+        float(prefiltered.layers[0].max()),
     )
 
 
@@ -57,14 +59,18 @@ def unfiltered_panorama(device: Device, environment_name: str) -> Texture:
     The texture has a second layer, which is black.
     """
     radiance = load_panorama(environment_name, max_rows=_MAX_BACKGROUND_ROWS).astype(np.float32)
-    return _upload_layers(device, [radiance, np.zeros_like(radiance)])
+    return _upload_panorama_layers(device, [radiance, np.zeros_like(radiance)])
 
 
-def _upload_layers(device: Device, layers: Sequence[NDArray[np.float32]] | NDArray[np.float32]) -> Texture:
-    height, width = layers[0].shape[:2]
+def _upload_panorama_layers(
+    device: Device, panorama_layers: Sequence[NDArray[np.float32]] | NDArray[np.float32]
+) -> Texture:
+    height, width = panorama_layers[0].shape[:2]
     size = width + 2, height + 2
-    texture = make_texture(device, size, "rgba16float", layer_count=len(layers), content_source="map")
-    for index, layer in enumerate(layers):
+    texture = make_texture(
+        device, size, "rgba16float", layer_count=len(panorama_layers), content_source="map"
+    )
+    for index, layer in enumerate(panorama_layers):
         texels = np.dstack([_with_border(layer), np.ones(size[::-1])])
         upload(device, texture, np.minimum(texels, _MAX_HALF_FLOAT), layer=index)
     return texture

@@ -147,7 +147,7 @@ def area_light_members(
     }
 
 
-def override_name(kind_name: str) -> str:
+def kind_constant_name(kind_name: str) -> str:
     """Return the name of the pipeline constant that enables a kind of light in shaders.
 
     kind_name : name of the kind in scene files
@@ -159,7 +159,7 @@ def light_shaders() -> list[ShaderListMember]:
     """Return the shaders of all kinds of lights, in the order of their numbers in lights.wgsl."""
     return [
         ShaderListMember(
-            name, kind.shader, (("override", override_name(name)), ("always", str(kind.always).lower()))
+            name, kind.shader, (("override", kind_constant_name(name)), ("always", str(kind.always).lower()))
         )
         for name, kind in KINDS.items()
     ]

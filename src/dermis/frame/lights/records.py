@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.environment.panorama import Sun
-from dermis.frame.lights.kind import KINDS, Members, override_name
+from dermis.frame.lights.kind import KINDS, Members, kind_constant_name
 from dermis.frame.projection import (
     ShadowView,
     Triple,
@@ -67,14 +67,14 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
     used_kinds = sorted({light.kind for kind, light in each if not kind.always})
     flags = {
         "SHAPES": any(kind.has_size(light) for kind, light in each),
-        **dict.fromkeys(map(override_name, used_kinds), True),
+        **dict.fromkeys(map(kind_constant_name, used_kinds), True),
         "ENVIRONMENT": scene.environment,
         "HALF_SPACE": scene.skin.direction != "lambertian",
     }
     return tuple((name, 1) for name, value in flags.items() if value)
 
 
-def oblique_constants(constants: Constants) -> Constants:
+def with_oblique_constant(constants: Constants) -> Constants:
     """Return `constants`, and add the constant for oblique incidence if they contain HALF_SPACE.
 
     Use the result only for passes that know the shape of the surface around a point.

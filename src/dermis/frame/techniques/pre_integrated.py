@@ -34,8 +34,8 @@ _MAX_PENUMBRA_MM = 8.0
 class PreIntegratedTables(TechniqueResources):
     """Tables of scattered light for a profile, which the shading pass reads.
 
-    table : texture with the rows of `sphere_table`, followed by one row of `shadow_edge_row` for each of
-        several widths of the shadow filter
+    table : texture with the rows of `sphere_irradiance_table`, followed by one row of `shadow_edge_row` for
+        each of several widths of the shadow filter
     penumbra_width_mm : distance over which light scatters across the edge of a shadow [mm]
     relief_mm : (3,) standard deviations of the Gaussians that smooth the relief for red, green and blue [mm]
     """
@@ -87,14 +87,14 @@ def make_pre_integrated_tables(device: Device, profile: GaussianSum) -> PreInteg
     edges = [
         shadow_edge_row(profile, penumbra, width) for width in np.linspace(0.0, penumbra, _SHADOW_EDGE_ROWS)
     ]
-    rows = np.concatenate([sphere_table(profile), np.stack(edges)])
+    rows = np.concatenate([sphere_irradiance_table(profile), np.stack(edges)])
     table = np.concatenate([rows, np.zeros((*rows.shape[:2], 1))], axis=-1)
     return PreIntegratedTables(
         texture_from_array(device, table, "rgba32float"), penumbra, half_light_sigma_mm(profile)
     )
 
 
-def sphere_table(profile: GaussianSum) -> Floats:
+def sphere_irradiance_table(profile: GaussianSum) -> Floats:
     """Return the irradiance max(N.L, 0) after scattering on spheres, (n, m, c) [-].
 
     N is the normal and L the direction to the light. The n rows are for curvatures from 0 to

@@ -59,7 +59,7 @@ class SubsurfaceLayers(TechniqueResources):
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """Diffusion kernel as a texture of its integrals from 0 to increasing distances, see `kernel_table`.
+    """Texture of a diffusion kernel, stored as integrals from 0 to increasing distances.
 
     reach_mm : distance of the last entry [mm]
     """
@@ -129,7 +129,7 @@ def make_subsurface_layers(
 
 def make_kernel(device: Device, profile: GaussianSum) -> Kernel:
     """Compute the diffusion kernel of a profile, and upload it."""
-    table, reach_mm = kernel_table(preintegrated_kernel(profile))
+    table, reach_mm = kernel_integral_table(preintegrated_kernel(profile))
     return Kernel(texture_from_array(device, table, "rgba32float"), reach_mm)
 
 
@@ -178,7 +178,7 @@ def draw_blur(graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window:
         graph.compute("screen space", shader, bound, size)
 
 
-def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
+def kernel_integral_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
     """Return (1, n, 4) integrals of the kernel from 0 to each of n distances, and the largest distance [mm].
 
     The square roots of the distances are evenly spaced.

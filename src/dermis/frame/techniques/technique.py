@@ -182,7 +182,7 @@ class AtlasTechnique(Technique):
 
         edge_mode : filter mode at the edges of charts
         """
-        max_halvings = len(atlas.mips_for(edge_mode)) - 1
+        max_halvings = len(atlas.mips_for_blurs(edge_mode)) - 1
         return choose_halvings(split.blurred_mm2, atlas.median_texels_per_mm, max_halvings)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:

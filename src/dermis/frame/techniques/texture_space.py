@@ -43,7 +43,7 @@ class TextureSpace(AtlasTechnique):
 
         edge_mode : filter mode at the edges of charts
         """
-        max_halvings = len(atlas.mips_for(edge_mode)) - 1
+        max_halvings = len(atlas.mips_for_blurs(edge_mode)) - 1
         variances, steps = add_intermediate_levels(
             split.blurred_mm2, atlas.median_texels_per_mm, max_halvings
         )

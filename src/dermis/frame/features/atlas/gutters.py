@@ -90,16 +90,18 @@ def _neighbour_words(mesh: Mesh) -> Words:
     return np.where((neighbour >= 0) & skin[neighbour], word, _NO_NEIGHBOUR_WORD).astype(np.uint32)
 
 
-def _halving_buffers(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> Bindings:
+def _halving_buffers(
+    device: Device, finer_textures: AtlasTextures, coarser_textures: AtlasTextures
+) -> Bindings:
     """Upload, for each gutter texel of the coarser atlas, the list of finer gutter texels to average."""
-    width = int(finer.gutter_texels.max()) + 1
+    width = int(finer_textures.gutter_texels.max()) + 1
 
     def texel_index(texels: NDArray[np.integer]) -> NDArray[np.int64]:
         return texels[:, 1].astype(np.int64) * width + texels[:, 0]
 
-    fine, coarse = texel_index(finer.gutter_texels // 2), texel_index(coarser.gutter_texels)
+    fine, coarse = texel_index(finer_textures.gutter_texels // 2), texel_index(coarser_textures.gutter_texels)
     order = np.argsort(fine, kind="stable")
-    x, y = coarser.gutter_texels.T.astype(np.uint32)
+    x, y = coarser_textures.gutter_texels.T.astype(np.uint32)
     squares = np.column_stack([x | (y << 16), run_bounds(fine[order], coarse)])
     return {
         "squares": device.buffer(squares, "STORAGE"),

@@ -56,8 +56,8 @@ def draw_gutters(
     if atlas.gutter is None or atlas.gutter_light is None:
         return
     device = graph.device
-    gather = program(device, "atlas/stitch_gather.wgsl", source=texel_format)
-    place = program(device, "atlas/stitch_place.wgsl", store=texel_format)
+    gather = program(device, "atlas/stitch_gather.wgsl", source_format=texel_format)
+    place = program(device, "atlas/stitch_place.wgsl", store_format=texel_format)
     linear = device.sampler(mag_filter="linear", min_filter="linear")
     size = (_GUTTER_ENTRIES_PER_ROW, -(-atlas.gutter.size // (GUTTER_ENTRY_BYTES * _GUTTER_ENTRIES_PER_ROW)))
     lists = {"gutter": atlas.gutter, "gathered": atlas.gutter_light}

@@ -70,7 +70,7 @@ class AtlasTextures:
     coarser: tuple[AtlasTextures, ...] = ()
     median_texels_per_mm: float = 0.0
 
-    def mips_for(self, edge_mode: str) -> tuple[AtlasTextures, ...]:
+    def mips_for_blurs(self, edge_mode: str) -> tuple[AtlasTextures, ...]:
         """Return the atlas at all resolutions that blurs may use, the finest first.
 
         edge_mode : filter mode at the edges of charts; only "repeated" permits coarser resolutions
@@ -250,28 +250,28 @@ def halve_mip(atlas_mip: AtlasMip) -> AtlasMip:
     )
 
 
-def _split_squares(texel_values: NDArray[np.generic]) -> NDArray[np.generic]:
+def _split_squares(image: NDArray[np.generic]) -> NDArray[np.generic]:
     """Rearrange an (n, n) image as (4, n/2, n/2); the first axis counts the texels of a 2 x 2 square."""
-    return np.stack([texel_values[y::2, x::2] for y in (0, 1) for x in (0, 1)])
+    return np.stack([image[y::2, x::2] for y in (0, 1) for x in (0, 1)])
 
 
-def _halved_reach(reach: NDArray[np.uint16], measured_texels: NDArray[np.bool_]) -> NDArray[np.uint16]:
+def _halved_reach(reach: NDArray[np.uint16], counted_texels: NDArray[np.bool_]) -> NDArray[np.uint16]:
     """Return the reach of each 2 x 2 square of texels, (n/2, n/2, 4) [squares].
 
-    The reach of a square is the smallest reach of its texels; texels outside `measured_texels` do not count.
+    The reach of a square is the smallest reach of its texels; texels outside `counted_texels` do not count.
 
     reach : (n, n, 4) reach of each texel, see `AtlasMip` [texels]
-    measured_texels : (4, n/2, n/2) mask of texels, as split by `_split_squares`
+    counted_texels : (4, n/2, n/2) mask of texels, as split by `_split_squares`
     """
-    squares = np.zeros((*measured_texels.shape[1:], 4), np.uint16)
+    squares = np.zeros((*counted_texels.shape[1:], 4), np.uint16)
     within = np.array([[0, 1, 0, 1], [1, 0, 1, 0], [0, 0, 1, 1], [1, 1, 0, 0]])  # steps inside the square
     for side in range(4):
         steps = (
             _split_squares(reach[..., side]).astype(np.int16) - within[side].astype(np.int16)[:, None, None]
         )
-        steps[~measured_texels] = np.iinfo(np.int16).max
+        steps[~counted_texels] = np.iinfo(np.int16).max
         squares[..., side] = np.maximum(steps.min(axis=0), 0) // 2
-    squares[~measured_texels.any(axis=0)] = 0
+    squares[~counted_texels.any(axis=0)] = 0
     return squares
 
 

@@ -95,28 +95,28 @@ def add_intermediate_levels(
 
 @cache
 def _add_intermediate_levels(
-    profile_mm2: tuple[float, ...], texels_per_mm: float, max_halvings: int
+    profile_variances_mm2: tuple[float, ...], texels_per_mm: float, max_halvings: int
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    chain = list(profile_mm2)
-    min_cost = chain_cost(chain, texels_per_mm, max_halvings)
+    chain = list(profile_variances_mm2)
+    min_cost = blur_chain_cost(chain, texels_per_mm, max_halvings)
     for side in (2.0**times / texels_per_mm for times in range(max_halvings)):  # side of a texel
         level_mm2 = (
             _HALVING_VARIANCE_MARGIN
             * max(MIN_SMOOTHNESS * (2.0 * side) ** 2, _MIN_LEVEL_SIGMA_TEXELS * side) ** 2
         )
-        if level_mm2 >= profile_mm2[-1]:
+        if level_mm2 >= profile_variances_mm2[-1]:
             continue
         if any(level_mm2 < _MIN_VARIANCE_RATIO * v and v < _MIN_VARIANCE_RATIO * level_mm2 for v in chain):
             continue
         candidate = sorted({*chain, level_mm2})
-        cost = chain_cost(candidate, texels_per_mm, max_halvings)
+        cost = blur_chain_cost(candidate, texels_per_mm, max_halvings)
         if cost < (1.0 - _MIN_SAVED_COST_FRACTION) * min_cost:
             chain, min_cost = candidate, cost
-    intermediate_levels = tuple(k for k, v in enumerate(chain, start=1) if v not in profile_mm2)
+    intermediate_levels = tuple(k for k, v in enumerate(chain, start=1) if v not in profile_variances_mm2)
     return np.array(chain), intermediate_levels
 
 
-def chain_cost(variance_mm2: list[float], texels_per_mm: float, max_halvings: int) -> float:
+def blur_chain_cost(variance_mm2: list[float], texels_per_mm: float, max_halvings: int) -> float:
     """Estimate the number of texel reads of a chain of blurs, per texel of the full resolution.
 
     variance_mm2 : increasing variances of the levels [mm^2]

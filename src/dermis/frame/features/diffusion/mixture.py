@@ -50,24 +50,24 @@ class Mixture:
 
 
 def make_mixture(
-    device: Device, uv_weights: Texture, entering_light: tuple[PyramidLevels, ...], layout_count: int
+    device: Device, uv_weights: Texture, entering_pyramids: tuple[PyramidLevels, ...], layout_count: int
 ) -> Mixture:
     """Allocate the textures of a mixture of profiles.
 
     uv_weights : texture over uv of the blend weights
-    entering_light : for each profile but the first, the blur pyramid of entering light times blend weight
+    entering_pyramids : for each profile but the first, the blur pyramid of entering light times blend weight
     layout_count : number of atlas layouts
     """
-    side, texel = entering_light[0].size, entering_light[0].texel
+    side, texel = entering_pyramids[0].size, entering_pyramids[0].texel
     atlas_weights = tuple(
         make_texture(device, (side, side), texel, texture_name="shares of profiles")
         for _ in range(layout_count)
     )
-    layers = sum_layer_count(len(entering_light))
+    layers = sum_layer_count(len(entering_pyramids))
     sums = make_texture(
         device, (side, side), FLOAT_TEXEL_FORMAT, layer_count=layers, texture_name="light of mixed profiles"
     )
-    return Mixture(uv_weights, entering_light, atlas_weights, sums)
+    return Mixture(uv_weights, entering_pyramids, atlas_weights, sums)
 
 
 def sum_layer_count(other_profile_count: int) -> int:
@@ -123,7 +123,7 @@ def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, layo
         "weight_map": mixture.uv_weights,
         "stored": into,
     }
-    shader = program(graph.device, "diffusion/profile_blend_weights.wgsl", store=texel)
+    shader = program(graph.device, "diffusion/profile_blend_weights.wgsl", store_format=texel)
     graph.compute("profiles", shader, bindings, into.size[:2])
     draw_gutters(graph, "profiles", layout.atlas, into, texel)
 

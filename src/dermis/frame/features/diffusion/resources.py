@@ -108,6 +108,9 @@ def _make_levels(
 
 
 def _cached_mixture(
-    device: Device, blend_weights: NDArray[np.float32], entering: tuple[PyramidLevels, ...], layout_count: int
+    device: Device,
+    blend_weights: NDArray[np.float32],
+    entering_pyramids: tuple[PyramidLevels, ...],
+    layout_count: int,
 ) -> Mixture:
-    return make_mixture(device, upload_blend_weights(device, blend_weights), entering, layout_count)
+    return make_mixture(device, upload_blend_weights(device, blend_weights), entering_pyramids, layout_count)

@@ -6,11 +6,11 @@ import numpy as np
 
 from dermis.frame.features.hair.resources import (
     KNOTS_PER_WINDOW,
-    TILE_PIXELS,
+    TILE_SIDE_PIXELS,
     Resources,
     StrandCounts,
     StrandTables,
-    drawn_counts,
+    drawn_strand_counts,
 )
 from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.frame.features.shape.shape import Shape
@@ -55,31 +55,35 @@ def pose_guides(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
     style = tables.groom.style
     guides: Bindings = {"guide_rest": style.guide_rest, "bound_guides": style.bound_guides}
     knots, points = style.guide_rest.size // 16, shape.surface["points"]
-    _dispatch(graph, "hair/guides_pose.wgsl", {**guides, "points": points, "anchors": style.anchors}, knots)
-    _dispatch(graph, "hair/guides_smooth.wgsl", {**guides, "guides": style.guides}, knots)
+    _dispatch_hair(
+        graph, "hair/guides_pose.wgsl", {**guides, "points": points, "anchors": style.anchors}, knots
+    )
+    _dispatch_hair(graph, "hair/guides_smooth.wgsl", {**guides, "guides": style.guides}, knots)
 
 
 def pose_strands(
-    graph: Recorder, tables: StrandTables, shape: Shape, posed_strands: Buffer, coarse: StrandCounts
+    graph: Recorder, tables: StrandTables, shape: Shape, posed_strands: Buffer, coarse_counts: StrandCounts
 ) -> None:
     """Declare the passes that move brows and lashes with the skin, and interpolate other strands from guides.
 
     posed_strands : buffer to which the posed strands are written
-    coarse : number of interpolated strands (scalp hair and beard), and number of knots of each
+    coarse_counts : number of interpolated strands (scalp hair and beard), and number of knots of each
     """
     shared: Bindings = {
         "points": shape.surface["points"],
-        "hairs": tables.record(coarse),
+        "hairs": tables.record(coarse_counts),
         "posed": posed_strands,
     }
     if tables.fine.hairs:
         fine: Bindings = {"strands": tables.strands, "knots": tables.knots}
-        _dispatch(graph, "hair/strands_pose.wgsl", {**shared, **fine}, tables.fine.all_knots())
+        _dispatch_hair(graph, "hair/strands_pose.wgsl", {**shared, **fine}, tables.fine.all_knots())
     if tables.groom is not None:
         groom, style = tables.groom, tables.groom.style
         person: Bindings = {"roots": groom.roots, "parts": groom.parts, "hairline": groom.hairline}
         guides: Bindings = {"guides": style.guides, "guide_cuts": style.guide_cuts}
-        _dispatch(graph, "hair/strands_grow.wgsl", {**shared, **person, **guides}, coarse.all_knots())
+        _dispatch_hair(
+            graph, "hair/strands_grow.wgsl", {**shared, **person, **guides}, coarse_counts.all_knots()
+        )
 
 
 def _draw_deep_opacity(graph: Recorder, strands: Resources, shape: Shape, lighting: Bindings) -> None:
@@ -95,7 +99,7 @@ def _draw_deep_opacity(graph: Recorder, strands: Resources, shape: Shape, lighti
     windows = program(graph.device, "hair/strands_window.wgsl")
     graph.dispatch("strands", windows, bindings, (max(1, -(-knots // KNOTS_PER_WINDOW)), 1, 1))
     for adds_cover in (0, 1):
-        _dispatch(graph, "hair/strands_shadow.wgsl", bindings, segments, (("ADDS_COVER", adds_cover),))
+        _dispatch_hair(graph, "hair/strands_shadow.wgsl", bindings, segments, (("ADDS_COVER", adds_cover),))
 
 
 def draw(
@@ -103,7 +107,7 @@ def draw(
     strands: Resources,
     geometry: tuple[Shape, HeadGeometry],
     shading: ShadingInputs,
-    visibility: Texture,
+    visibility_buffer: Texture,
     radiance: Texture,
     labels: Bindings | None = None,
 ) -> Texture:
@@ -111,63 +115,65 @@ def draw(
 
     geometry : current shape of the head, and its vertices and triangles
     shading : resources of the lighting, uniform record of the shading pass, and constants of the lights
-    visibility : texture with the index of the triangle that is visible at each sample
+    visibility_buffer : texture with the index of the triangle that is visible at each sample
     radiance : texture of the picture without hair
     labels : resources with which the pass labels pixels of hair, None if no labels are requested
     """
     tables, picture, (lighting, view, light_constants) = strands.tables, strands.picture, shading
     shape, head = geometry
     width, height = picture.result.size[:2]
-    pixel_mm = _pixel_mm(view, tables, height)
-    coarse, posed = drawn_counts(tables, pixel_mm), tables.buffers.drawn
+    pixel_mm = _pixel_footprint_mm(view, tables, height)
+    coarse, posed = drawn_strand_counts(tables, pixel_mm), tables.buffers.drawn
     pose_strands(graph, tables, shape, posed, coarse)
     segments = tables.fine.all_segments() + coarse.all_segments()
     knots = tables.fine.all_knots() + coarse.all_knots()
     light_constants = (*light_constants, ("RAY_STRIDE", _SHADOW_RAY_STRIDE))
     light = program(graph.device, "hair/strands_light.wgsl", light_constants)
-    record = _view_record(light, strands, view, coarse.hairs)
+    record = _strand_view_record(light, strands, view, coarse.hairs)
     hairs = tables.record(coarse)
     shared: Bindings = {"strand_view": record, "projected": tables.buffers.projected, "hairs": hairs}
     graph.dispatch("strands", light, {**lighting, **shared, "posed": posed}, workgroup_grid(knots))
     lists: Bindings = {"chains": picture.chains, "links": picture.links}
-    _dispatch(graph, "hair/strands_empty.wgsl", lists, picture.chains.size // 4)
+    _dispatch_hair(graph, "hair/strands_empty.wgsl", lists, picture.chains.size // 4)
     chains = (("CHAINS", picture.chains_per_tile),)
-    _dispatch(graph, "hair/strands_bin.wgsl", {**shared, **lists}, segments, chains)
-    images: Bindings = {"visibility_buffer": visibility, "behind": radiance, "image": picture.result}
+    _dispatch_hair(graph, "hair/strands_bin.wgsl", {**shared, **lists}, segments, chains)
+    images: Bindings = {"visibility_buffer": visibility_buffer, "behind": radiance, "image": picture.result}
     bindings = {**head.resources, **shared, **lists, **images, **(labels or {})}
     if picture.chains_per_tile > 1:
-        shader = program(graph.device, "hair/strands_draw_tiles.wgsl", chains, labels=labels is not None)
+        shader = program(graph.device, "hair/strands_draw_tiles.wgsl", chains, with_labels=labels is not None)
         graph.compute("strands", shader, bindings, (width, height))
         return picture.result
     rows = rows_per_invocation(graph.device, _max_segments_in_tile(tables, segments, pixel_mm))
-    shader = program(graph.device, "hair/strands_draw.wgsl", (("ROWS", rows),), labels=labels is not None)
+    shader = program(
+        graph.device, "hair/strands_draw.wgsl", (("ROWS", rows),), with_labels=labels is not None
+    )
     graph.compute("strands", shader, bindings, (width, -(-height // rows)))
     return picture.result
 
 
-def _view_record(
-    shader: ComputeProgram, strands: Resources, view: UniformRecord, coarse_count: int
+def _strand_view_record(
+    shader: ComputeProgram, strands: Resources, shade_record: UniformRecord, coarse_count: int
 ) -> UniformRecord:
     """Return a record of the shader's struct StrandView: camera, samples and number of coarse strands.
 
-    view : uniform record of the shading pass
+    shade_record : uniform record of the shading pass
     coarse_count : number of coarse strands to draw
     """
     members = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "light_factors")
-    record = shader.record("StrandView", **{name: view[name] for name in members})
+    record = shader.record("StrandView", **{name: shade_record[name] for name in members})
     record["coarse"], record["size"] = coarse_count, strands.picture.result.size[:2]
     record["skin"] = strands.skin_albedo
     return record
 
 
-def _pixel_mm(view: UniformRecord, tables: StrandTables, picture_height: int) -> float:
+def _pixel_footprint_mm(shade_record: UniformRecord, tables: StrandTables, picture_height: int) -> float:
     """Return the side of the square that a pixel covers at the depth of the coarse strands [mm].
 
-    view : uniform record of the shading pass
+    shade_record : uniform record of the shading pass
     picture_height : height of the picture [pixels]
     """
-    depth = float(np.dot(tables.centre_mm - view["eye"], view["forward"]))
-    return 2.0 * float(np.linalg.norm(view["up"])) * max(depth, 1.0) / picture_height
+    depth = float(np.dot(tables.centre_mm - shade_record["eye"], shade_record["forward"]))
+    return 2.0 * float(np.linalg.norm(shade_record["up"])) * max(depth, 1.0) / picture_height
 
 
 def _max_segments_in_tile(tables: StrandTables, segment_count: int, pixel_mm: float) -> int:
@@ -179,7 +185,7 @@ def _max_segments_in_tile(tables: StrandTables, segment_count: int, pixel_mm: fl
     segment_count : number of segments of all strands that are drawn
     pixel_mm : side of the square that a pixel covers at the depth of the strands [mm]
     """
-    tiles = max(1.0, (_HAIR_EXTENT_MM / (TILE_PIXELS * pixel_mm)) ** 2)
+    tiles = max(1.0, (_HAIR_EXTENT_MM / (TILE_SIDE_PIXELS * pixel_mm)) ** 2)
     fine = tables.fine.all_segments()
     return int(fine + min(1.0, _CROWDING_FACTOR / tiles) * (segment_count - fine))
 
@@ -198,7 +204,7 @@ def rows_per_invocation(device: Device, segment_count: int) -> int:
     return 1 << rows.bit_length() - 1
 
 
-def _dispatch(
+def _dispatch_hair(
     graph: Recorder, shader_path: str, bindings: Bindings, invocation_count: int, constants: Constants = ()
 ) -> None:
     """Declare a hair pass with one shader invocation for each of `invocation_count` elements."""

@@ -19,7 +19,7 @@ from dermis.mesh.strands import Strands, quad_corners, quad_weights
 from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_constants
 
-TILE_PIXELS = 8
+TILE_SIDE_PIXELS = 8
 """Side of a tile of the picture, for which strand segments are listed [pixels]."""
 _GPU_CHAINS_PER_TILE = 64  # linked lists of a tile on GPUs: one for each invocation of the tile's workgroup
 DEEP_OPACITY_WIDTH = 256
@@ -29,7 +29,7 @@ DEEP_OPACITY_LAYERS = 6
 DEEP_OPACITY_HEADER_WORDS = 8
 """Number of words that precede the texels of each light's deep opacity map."""
 _LINKS_PER_KNOT = 4
-_MAX_LINKS = 1 << 22
+_MAX_SEGMENT_LINKS = 1 << 22
 # Steps to which capacities for fine strands and for knots are rounded up, so that most heads share them.
 _FINE_CAPACITY_STEP, _KNOT_CAPACITY_STEP = 1 << 12, 1 << 19
 _PROJECTED_KNOT_BYTES = 32
@@ -53,7 +53,7 @@ _HAIR_COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_
 _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _HAIR_COUNT_MEMBERS), ("width_scale", "f4")])
 
 
-class Detail(NamedTuple):
+class StrandDetail(NamedTuple):
     """Limits of the detail of coarse strands (scalp hair and beard) on one kind of adapter.
 
     drawn_knots : largest total number of knots of the drawn strands
@@ -70,7 +70,10 @@ class Detail(NamedTuple):
     segment_px: float
 
 
-_GPU_DETAIL, _SOFTWARE_DETAIL = Detail(1 << 23, 10_000, 24, 0.6, 2.0), Detail(1 << 20, 5_000, 10, 0.9, 4.0)
+_GPU_DETAIL, _SOFTWARE_DETAIL = (
+    StrandDetail(1 << 23, 10_000, 24, 0.6, 2.0),
+    StrandDetail(1 << 20, 5_000, 10, 0.9, 4.0),
+)
 
 
 class StrandCounts(NamedTuple):
@@ -129,7 +132,7 @@ def strand_counts(strands: Strands | None) -> StrandCounts:
     return StrandCounts(0, 2) if strands is None else StrandCounts(*strands.radius_mm.shape)
 
 
-def coarse_counts(device: Device, head: Head) -> StrandCounts:
+def max_coarse_counts(device: Device, head: Head) -> StrandCounts:
     """Return the largest number of coarse strands to draw, and the largest number of knots of each.
 
     Coarse strands are scalp hair and beard. The limits depend on the device.
@@ -137,54 +140,59 @@ def coarse_counts(device: Device, head: Head) -> StrandCounts:
     if head.hair is None:
         return StrandCounts(0, 2)
     fitting = device.max_storage_bytes // _PROJECTED_KNOT_BYTES - _KNOT_CAPACITY_STEP
-    limit = min(fitting, adapter_detail(device).drawn_knots) // head.hair.knots
+    limit = min(fitting, adapter_strand_detail(device).drawn_knots) // head.hair.knots
     return StrandCounts(min(len(head.hair), limit), head.hair.knots)
 
 
-def caster_counts(device: Device, coarse: StrandCounts) -> StrandCounts:
+def caster_strand_counts(device: Device, coarse_counts: StrandCounts) -> StrandCounts:
     """Return how many strands represent all coarse strands in shadow maps, and how many knots each has.
 
-    coarse : result of `coarse_counts`
+    coarse_counts : result of `max_coarse_counts`
     """
-    detail = adapter_detail(device)
-    return StrandCounts(min(coarse.hairs, detail.casters), min(coarse.knots, detail.caster_knots))
+    detail = adapter_strand_detail(device)
+    return StrandCounts(
+        min(coarse_counts.hairs, detail.casters), min(coarse_counts.knots, detail.caster_knots)
+    )
 
 
-def adapter_detail(device: Device) -> Detail:
+def adapter_strand_detail(device: Device) -> StrandDetail:
     """Return the level of detail of hair on a device."""
     return _SOFTWARE_DETAIL if device.adapter.kind == "CPU" else _GPU_DETAIL
 
 
-def strand_capacity(fine: StrandCounts, coarse: StrandCounts) -> StrandCapacity:
+def strand_capacity(fine_counts: StrandCounts, coarse_counts: StrandCounts) -> StrandCapacity:
     """Return the capacity that buffers of strands need, rounded up so that most heads can share buffers."""
-    knots = fine.all_knots() + coarse.all_knots()
-    step = _KNOT_CAPACITY_STEP if coarse.hairs else _FINE_CAPACITY_STEP
-    return StrandCapacity(_round_up(fine.hairs, _FINE_CAPACITY_STEP), _round_up(knots, step))
+    knots = fine_counts.all_knots() + coarse_counts.all_knots()
+    step = _KNOT_CAPACITY_STEP if coarse_counts.hairs else _FINE_CAPACITY_STEP
+    return StrandCapacity(_round_up(fine_counts.hairs, _FINE_CAPACITY_STEP), _round_up(knots, step))
 
 
 def _round_up(count: int, step: int) -> int:
     return -(-count // step) * step
 
 
-def make_strand_buffers(device: Device, capacity: StrandCapacity, casters: StrandCapacity) -> StrandBuffers:
+def make_strand_buffers(
+    device: Device, capacity: StrandCapacity, caster_capacity: StrandCapacity
+) -> StrandBuffers:
     """Allocate the buffers of posed strands and of projected knots."""
     first, second = (
-        _make_buffer(device, 4 * (one.knots + 2 * (one.knots // 2))) for one in (casters, capacity)
+        _make_word_buffer(device, 4 * (one.knots + 2 * (one.knots // 2)))
+        for one in (caster_capacity, capacity)
     )
-    return StrandBuffers(first, second, _make_buffer(device, 8 * capacity.knots))
+    return StrandBuffers(first, second, _make_word_buffer(device, 8 * capacity.knots))
 
 
 def make_strand_picture(
     device: Device, capacity: StrandCapacity, picture_size: tuple[int, int]
 ) -> StrandPicture:
     """Allocate the segment lists and the texture with hair for a picture of size (width, height)."""
-    across, down = (-(-side // TILE_PIXELS) for side in picture_size)
+    across, down = (-(-side // TILE_SIDE_PIXELS) for side in picture_size)
     links = _LINKS_PER_KNOT * capacity.knots + capacity.fine * (across + down)
-    links = min(links, _MAX_LINKS, device.max_storage_bytes // 8)
+    links = min(links, _MAX_SEGMENT_LINKS, device.max_storage_bytes // 8)
     per_tile = chains_per_tile(device, across * down)
-    chains = _make_buffer(device, 1 + per_tile * across * down)
+    chains = _make_word_buffer(device, 1 + per_tile * across * down)
     result = make_texture(device, picture_size, "rgba32float")
-    return StrandPicture(chains, _make_buffer(device, 2 * links), result, per_tile)
+    return StrandPicture(chains, _make_word_buffer(device, 2 * links), result, per_tile)
 
 
 def chains_per_tile(device: Device, tile_count: int) -> int:
@@ -198,18 +206,18 @@ def chains_per_tile(device: Device, tile_count: int) -> int:
     return _GPU_CHAINS_PER_TILE if fits and device.adapter.kind != "CPU" else 1
 
 
-def make_deep_opacity(device: Device, light_count: int) -> Buffer:
+def make_deep_opacity_maps(device: Device, light_count: int) -> Buffer:
     """Allocate a buffer for the deep opacity maps of strands, one map for each of `light_count` lights."""
     texels = (1 + DEEP_OPACITY_LAYERS) * DEEP_OPACITY_WIDTH**2 // 2
-    return _make_buffer(device, (DEEP_OPACITY_HEADER_WORDS + texels) * max(1, light_count))
+    return _make_word_buffer(device, (DEEP_OPACITY_HEADER_WORDS + texels) * max(1, light_count))
 
 
 def placeholder_strand_shadows(device: Device) -> Buffer:
     """Return the buffer that heads without hair bind in place of the deep opacity maps."""
-    return device.cached("no strand shadows", lambda: _make_buffer(device, DEEP_OPACITY_HEADER_WORDS))
+    return device.cached("no strand shadows", lambda: _make_word_buffer(device, DEEP_OPACITY_HEADER_WORDS))
 
 
-def _make_buffer(device: Device, word_count: int) -> Buffer:
+def _make_word_buffer(device: Device, word_count: int) -> Buffer:
     return device.storage_buffer(4 * word_count)
 
 
@@ -261,7 +269,7 @@ class StrandTables:
     fine: StrandCounts
     coarse: StrandCounts
     casters: StrandCounts
-    detail: Detail
+    detail: StrandDetail
     groom: GroomTables | None
     possible: int
     centre_mm: NDArray[np.float64]
@@ -269,13 +277,20 @@ class StrandTables:
     width_mm: float
     cover: float
 
-    def record(self, coarse: StrandCounts) -> UniformRecord:
+    def record(self, coarse_counts: StrandCounts) -> UniformRecord:
         """Return the numbers of strands as a uniform record of the struct Hairs in strand_knots.wgsl.
 
-        coarse : number of coarse strands to draw, and number of knots of each
+        coarse_counts : number of coarse strands to draw, and number of knots of each
         """
-        width_scale = self.possible / max(1, coarse.hairs)
-        values = self.fine.hairs, coarse.hairs, coarse.hairs, self.fine.knots, coarse.knots, width_scale
+        width_scale = self.possible / max(1, coarse_counts.hairs)
+        values = (
+            self.fine.hairs,
+            coarse_counts.hairs,
+            coarse_counts.hairs,
+            self.fine.knots,
+            coarse_counts.knots,
+            width_scale,
+        )
         return np.array(values, _HAIRS_DTYPE)
 
 
@@ -300,7 +315,7 @@ def shader_constants() -> dict[str, float]:
     opacity = {"strand_window": DEEP_OPACITY_WIDTH, "strand_layers": DEEP_OPACITY_LAYERS}
     words = {"strand_window_words": DEEP_OPACITY_HEADER_WORDS, "strand_window_knots": KNOTS_PER_WINDOW}
     guides = {"guide_anchors": GUIDE_ANCHORS, "guide_knots": GUIDE_KNOTS}
-    return {"strand_tile": TILE_PIXELS, **opacity, **words, **guides, **hair_constants()}
+    return {"strand_tile": TILE_SIDE_PIXELS, **opacity, **words, **guides, **hair_constants()}
 
 
 def has_strands(head: Head, settings: Settings) -> bool:
@@ -313,7 +328,7 @@ def strand_constants(head: Head, settings: Settings) -> Constants:
     return (("STRANDS", 1),) if has_strands(head, settings) else ()
 
 
-def drawn_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
+def drawn_strand_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
     """Return the number of coarse strands to draw, and the number of knots of each.
 
     Where strands are thinner than a pixel, fewer strands are drawn. They are wider, so that they cover the
@@ -331,11 +346,11 @@ def drawn_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
 
 
 def make_strand_tables(
-    device: Device, head: Head, coarse: StrandCounts, buffers: StrandBuffers, groom: GroomTables | None
+    device: Device, head: Head, coarse_counts: StrandCounts, buffers: StrandBuffers, groom: GroomTables | None
 ) -> StrandTables:
     """Upload the fine strands of a head, and collect the buffers of its coarse strands.
 
-    coarse : result of `coarse_counts`
+    coarse_counts : result of `max_coarse_counts`
     buffers : buffers that each frame fills
     groom : buffers from which coarse strands are interpolated, None if there are no coarse strands
 
@@ -352,9 +367,9 @@ def make_strand_tables(
         knots=device.buffer(knots, "STORAGE"),
         buffers=buffers,
         fine=strand_counts(fine),
-        coarse=coarse,
-        casters=caster_counts(device, coarse),
-        detail=adapter_detail(device),
+        coarse=coarse_counts,
+        casters=caster_strand_counts(device, coarse_counts),
+        detail=adapter_strand_detail(device),
         groom=groom,
         possible=0 if hair is None else len(hair.roots),
         centre_mm=np.zeros(3) if hair is None else hair.centre_mm,
@@ -369,7 +384,7 @@ def make_guide_tables(device: Device, guides: Guides) -> GuideTables:
     anchors = np.empty(guides.weight.shape, _ANCHOR_DTYPE)
     anchors["corner"] = guides.corner
     anchors["local"][..., :3], anchors["local"][..., 3] = guides.local_mm, guides.weight
-    bound, smooth = (_make_buffer(device, 2 * guides.rest_mm.size) for _ in range(2))
+    bound, smooth = (_make_word_buffer(device, 2 * guides.rest_mm.size) for _ in range(2))
     rest, cuts = (device.buffer(array, "STORAGE") for array in (guides.rest_mm, guides.cut))
     return GuideTables(device.buffer(anchors.view(np.uint32), "STORAGE"), rest, cuts, bound, smooth)
 
@@ -428,8 +443,8 @@ def make(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
     head, cached, layers = request.head, memo.get, request.shadow_layers
     if not has_strands(head, request.settings):
         return None
-    fine, coarse = strand_counts(head.strands), coarse_counts(device, head)
-    capacity, casters = (strand_capacity(fine, one) for one in (coarse, caster_counts(device, coarse)))
+    fine, coarse = strand_counts(head.strands), max_coarse_counts(device, head)
+    capacity, casters = (strand_capacity(fine, one) for one in (coarse, caster_strand_counts(device, coarse)))
     groom = None
     if head.hair is not None:
         style = cached(make_guide_tables, device, head.hair.guides)
@@ -438,5 +453,5 @@ def make(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
     buffers = cached(make_strand_buffers, device, capacity, casters)
     tables = cached(make_strand_tables, device, head.bare, coarse, buffers, groom)
     picture = cached(make_strand_picture, device, capacity, request.settings.size)
-    shadows = cached(make_deep_opacity, device, layers, caller_name=f"{layers} {request.view_name}")
+    shadows = cached(make_deep_opacity_maps, device, layers, caller_name=f"{layers} {request.view_name}")
     return Resources(tables, picture, shadows, cached(mean_skin_albedo, head))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
-from dermis.frame.lights.records import oblique_constants
+from dermis.frame.lights.records import with_oblique_constant
 from dermis.frame.programs import FLOAT_TEXEL_FORMAT, program
 from dermis.gpu import Constants, Recorder, TextureOrView
 
@@ -65,8 +65,8 @@ def draw(
         samples light only at texel centres. Use 0 where adjacent texels may not be adjacent on the surface
     """
     if filter_sigma_texels:  # neighbouring texels are neighbours on the surface
-        constants = oblique_constants(constants)
-    shader = program(graph.device, "irradiance/irradiance.wgsl", constants, store=texel_format)
+        constants = with_oblique_constant(constants)
+    shader = program(graph.device, "irradiance/irradiance.wgsl", constants, store_format=texel_format)
     entering = shader.record("Entering", scale=irradiance_scale, area=filter_sigma_texels)
     bound = {
         **layout.bindings,

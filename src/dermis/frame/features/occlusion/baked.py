@@ -84,7 +84,11 @@ def bake_occlusion(
         ]
         draw_layers(commands, "occlusion", layers, shadow_map_views(views), geometry)
         sky = shader.record("Sky", directions=len(views), side=result_side, vertices=len(mesh.positions))
-        lights: Bindings = {"lights": _light_record(shader, views), "shadow_maps": layers.texture, "sky": sky}
+        lights: Bindings = {
+            "lights": _depth_views_as_lights(shader, views),
+            "shadow_maps": layers.texture,
+            "sky": sky,
+        }
         resources: Bindings = {
             **bindings,
             **geometry.resources,
@@ -99,7 +103,7 @@ def bake_occlusion(
         return np.asarray(raw[..., 0] / raw[..., 1])
 
 
-def _light_record(shader: ComputeProgram, shadow_views: list[ShadowView]) -> UniformRecord:
+def _depth_views_as_lights(shader: ComputeProgram, shadow_views: list[ShadowView]) -> UniformRecord:
     record = shader.record("Lights")
     for layer, view in enumerate(shadow_views):
         light = record["light"][layer]
@@ -109,7 +113,7 @@ def _light_record(shader: ComputeProgram, shadow_views: list[ShadowView]) -> Uni
     return record
 
 
-def fill_gaps(baked_occlusion: NDArray[np.float32], result_side: int) -> NDArray[np.float32]:
+def fill_occlusion_gaps(baked_occlusion: NDArray[np.float32], result_side: int) -> NDArray[np.float32]:
     """Return a baked occlusion map whose empty texels have the value of the nearest texel on the surface.
 
     The last row of the atlas is repeated, so that filters at the edge of the atlas do not read vertices.
@@ -146,7 +150,7 @@ def cached_occlusion_map(
     @logged_step("computing the ambient occlusion")
     def bake() -> NDArray[np.uint16]:
         baked = bake_occlusion(device, head, atlas, bindings, surface_texels, side)
-        integers: NDArray[np.uint16] = np.rint(65535.0 * fill_gaps(baked, side)).astype(np.uint16)
+        integers: NDArray[np.uint16] = np.rint(65535.0 * fill_occlusion_gaps(baked, side)).astype(np.uint16)
         return integers
 
     integers = cached_occlusion(head.mesh, atlas, f"{OCCLUSION_CACHE_VERSION} {side}", bake)
@@ -162,8 +166,8 @@ def _hair_transmittance(
     """Return the fraction of the sky's light that passes through the hair to each point of the skin [-].
 
     Scalp hair and beard are modelled as a plane layer over the roots, which absorbs some of the diffuse
-    light and scatters the rest towards the skin. The points are ordered as in the result of `fill_gaps`: rows
-    of texels, then vertices.
+    light and scatters the rest towards the skin. The points are ordered as in the result of
+    `fill_occlusion_gaps`: rows of texels, then vertices.
 
     packed_texels : (s, s, 2) words of the atlas texels: triangle index plus 1, and packed barycentric weights
     result_side : side of the atlas in the result [texels]

@@ -101,7 +101,7 @@ def _sky_view_axes() -> Floats:
     return np.array([view_axes_array(-to_sky, up) for to_sky in fibonacci_sphere(SKY_VIEW_COUNT)])
 
 
-def make_anchors(head: Head) -> RotationAnchors:
+def make_rotation_anchors(head: Head) -> RotationAnchors:
     """Choose control points from whose motion the rotation of a head is estimated.
 
     Their weights decrease with the distance from the centre of the head, so that moving shoulders have little
@@ -173,20 +173,20 @@ def make_vertex_sky_visibility(
     )
     views = sky_views(Outline(rig.outline_mm(rig.rest)), np.eye(3))
     _draw_vertex_visibility(
-        commands, sky, views, sky_record(device, views, count), rest_geometry, is_at_rest=True
+        commands, sky, views, sky_views_record(device, views, count), rest_geometry, is_at_rest=True
     )
     commands.submit()
     return sky
 
 
-def make_moving_map(device: Device, rest_map: Texture) -> tuple[Texture, MovingOcclusion]:
+def make_moving_occlusion_map(device: Device, rest_occlusion_map: Texture) -> tuple[Texture, MovingOcclusion]:
     """Return an empty occlusion map for a moving head, and the resources that update it.
 
-    rest_map : texture of the occlusion map that was baked at rest
+    rest_occlusion_map : texture of the occlusion map that was baked at rest
     """
-    side, rows = rest_map.size[:2]
+    side, rows = rest_occlusion_map.size[:2]
     corners = make_texture(device, (side, side), "rgba32uint")
-    return make_texture(device, (side, rows), "r32float"), MovingOcclusion(rest_map, corners)
+    return make_texture(device, (side, rows), "r32float"), MovingOcclusion(rest_occlusion_map, corners)
 
 
 def draw(
@@ -198,7 +198,7 @@ def draw(
 ) -> None:
     """Declare the passes that update the occlusion maps of all atlas layouts for the current shape.
 
-    views_record : uniform record of `views`, from `sky_record`
+    views_record : uniform record of `views`, from `sky_views_record`
     occlusion_maps : each atlas layout with the resources that update its occlusion map, None if the layout
         has no map to update
     """
@@ -232,7 +232,7 @@ def _draw_occlusion_map(
     graph.compute("occlusion", fill, {**bindings, **maps}, moving_map.size[:2], TILE_SIDE)
 
 
-def sky_record(device: Device, views: SkyViews, vertex_count: int) -> UniformRecord:
+def sky_views_record(device: Device, views: SkyViews, vertex_count: int) -> UniformRecord:
     """Return the uniform record of the sky views for moving_occlusion_vertices.wgsl.
 
     vertex_count : number of vertices of the mesh
@@ -255,7 +255,7 @@ def _draw_vertex_visibility(
 ) -> None:
     """Declare the passes that compute the visible fraction of the sky at the vertices of a shape.
 
-    views_record : uniform record of `views`, from `sky_record`
+    views_record : uniform record of `views`, from `sky_views_record`
     is_at_rest : whether to store the fractions as those of the head at rest
     """
     draw_layers(

@@ -51,7 +51,7 @@ class LandmarkBuffers:
         return positions
 
 
-def checked_landmarks(set_names: Iterable[str]) -> tuple[str, ...]:
+def checked_landmark_sets(set_names: Iterable[str]) -> tuple[str, ...]:
     """Check names of landmark sets and paths of landmark files, and return them without duplicates.
 
     Raises DermisError for a name that is neither a set nor a file.

@@ -105,10 +105,10 @@ def start_readback(
         count = -(-pixels // _PIXELS_PER_INVOCATION)
         shader, words = program(device, "outputs/pack.wgsl"), _WORDS_PER_INVOCATION * count
         bindings["bytes"] = picture.bytes
-    _check_size(device, _WORD_BYTES * words, device.max_storage_bytes, pixels)
+    _check_readback_size(device, _WORD_BYTES * words, device.max_storage_bytes, pixels)
     packed = _packed_buffer(device, picture, words)
     buffers = [packed, *(outputs.buffers if outputs else ())]
-    _check_size(
+    _check_readback_size(
         device, sum(buffer.size for buffer in buffers), device.max_buffer_bytes, pixels, "outputs of "
     )
     grid = _PACKING_INVOCATIONS_PER_ROW, -(-count // _PACKING_INVOCATIONS_PER_ROW)
@@ -117,7 +117,7 @@ def start_readback(
     return Readback(graph.read_back(*buffers), picture.size, kind, channels, words, outputs)
 
 
-def _check_size(
+def _check_readback_size(
     device: Device, needed_bytes: int, max_bytes: int, pixel_count: int, contents_name: str = ""
 ) -> None:
     if needed_bytes > max_bytes:

@@ -51,23 +51,23 @@ def draw(
     settings: Settings,
     radiance: Texture,
     lighting: Bindings,
-    view: UniformRecord,
+    shade_record: UniformRecord,
     light_constants: Constants,
-    visibility: Texture,
+    visibility_buffer: Texture,
 ) -> None:
     """Declare the passes from radiance to the picture: meter, background, bloom, tone curve and encoding.
 
     lighting : resources of the lighting
-    view : uniform record of the shading pass
+    shade_record : uniform record of the shading pass
     light_constants : pipeline constants of the lights
-    visibility : texture with the index of the triangle that covers each sample
+    visibility_buffer : texture with the index of the triangle that covers each sample
     """
     if resources.meter:
-        shading = lighting, view, light_constants
-        meter.draw(graph, resources.meter, shading, visibility, radiance)
+        shading = lighting, shade_record, light_constants
+        meter.draw(graph, resources.meter, shading, visibility_buffer, radiance)
     if resources.backdrop:
         backdrop, exposure = resources.backdrop, resources.meter
-        radiance = background.draw(graph, backdrop, (lighting, view), radiance, exposure, settings)
+        radiance = background.draw(graph, backdrop, (lighting, shade_record), radiance, exposure, settings)
     if resources.bloom:
         radiance = bloom.draw(graph, resources.bloom, radiance, settings.bloom)
     picture.draw(graph, radiance, resources.picture, settings, resources.meter)

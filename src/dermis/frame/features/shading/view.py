@@ -80,7 +80,9 @@ def camera_views(pinhole: Pinhole, outline: Outline, sample_count: int) -> Views
     return Views(np.array([clip]), pixel_samples(sample_count))
 
 
-def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: ProfileSplit) -> UniformRecord:
+def view_record(
+    shading_program: ComputeProgram, head: Head, settings: Settings, profile_split: ProfileSplit
+) -> UniformRecord:
     """Return the uniform record of the struct Shade; `with_camera` adds the camera and the eye poses.
 
     Raises DermisError for a head with too many materials.
@@ -95,12 +97,14 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
     for index, material in enumerate(materials):
         colours[index, :3] = material.colour
         colours[index, 3] = 1 + MOUTH_PARTS.index(material.part) if material.part else 0
-    record = shade.record(
+    record = shading_program.record(
         "Shade",
         samples=settings.samples,
-        relit=split.relit,
-        relit_changes=np.pad(split.relit_changes, ((0, MAX_OTHER_PROFILES - len(split.others)), (0, 1))),
-        total=split.total,
+        relit=profile_split.relit,
+        relit_changes=np.pad(
+            profile_split.relit_changes, ((0, MAX_OTHER_PROFILES - len(profile_split.others)), (0, 1))
+        ),
+        total=profile_split.total,
         light_factors=_LIGHT_FACTORS[settings.parts],
         material_colour=colours,
         jitter=jitter,
@@ -110,7 +114,7 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
         part["emission"], part["metalness"] = material.emission, material.metalness
         part["roughness"] = _WET_MATERIAL_ROUGHNESS if material.roughness is None else material.roughness
         part["has_maps"] = material.has_maps
-    for name, value in split.fine.items():
+    for name, value in profile_split.fine.items():
         record["fine"][name] = value
     if head.eyes is not None:
         fill_eye(record["eyes"], head.eyes.look)
@@ -119,15 +123,15 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
     return record
 
 
-def with_camera(view: UniformRecord, pinhole: Pinhole, eyes: EyePoses | None) -> UniformRecord:
+def with_camera(shade_record: UniformRecord, pinhole: Pinhole, eyes: EyePoses | None) -> UniformRecord:
     """Return a copy of a Shade record with camera rays and the poses of the eyes.
 
-    view : result of `view_record`
+    shade_record : result of `view_record`
     eyes : poses of modelled eyes, None for a head without such eyes
     """
     eye, (right, up, forward), (half, shift) = pinhole
     # A copy of the bytes: NumPy copies structs member by member and leaves the padding undefined.
-    record: UniformRecord = np.ndarray((), view.dtype, bytearray(view.tobytes()))
+    record: UniformRecord = np.ndarray((), shade_record.dtype, bytearray(shade_record.tobytes()))
     record["eye"], record["forward"] = eye, forward
     record["right"], record["up"] = tuple(half[0] * c for c in right), tuple(half[1] * c for c in up)
     record["shift"] = shift
@@ -143,6 +147,6 @@ def with_camera(view: UniformRecord, pinhole: Pinhole, eyes: EyePoses | None) ->
     return record
 
 
-def ray_record(shader: ComputeProgram, view: UniformRecord) -> UniformRecord:
+def ray_record(shader: ComputeProgram, shade_record: UniformRecord) -> UniformRecord:
     """Return a record of the struct Rays, for shaders that need only the camera rays of a Shade record."""
-    return shader.record("Rays", **{name: view[name] for name in _CAMERA_RAY_MEMBERS})
+    return shader.record("Rays", **{name: shade_record[name] for name in _CAMERA_RAY_MEMBERS})

@@ -325,14 +325,14 @@ def _evaluate_surface(graph: Recorder, shape: Shape) -> None:
     tables = shape.tables
     if shape.morphs:
         constants = ("HAS_BONES", tables.bones > 0), ("HAS_CONTACTS", tables.has_contacts)
-        _dispatch(graph, "shape/shape_pose.wgsl", shape.morphs, tables.control, constants)
+        _dispatch_shape(graph, "shape/shape_pose.wgsl", shape.morphs, tables.control, constants)
     if shape.stencils:
-        _dispatch(graph, "shape/shape_refine.wgsl", shape.stencils, tables.points)
+        _dispatch_shape(graph, "shape/shape_refine.wgsl", shape.stencils, tables.points)
     limits = (("MIN_UV_CROSS", MIN_UV_CROSS), ("MIN_TANGENT", MIN_RELATIVE_TANGENT))
-    _dispatch(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, limits)
+    _dispatch_shape(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, limits)
 
 
-def _dispatch(
+def _dispatch_shape(
     graph: Recorder,
     shader_name: str,
     bound_resources: Bindings,

@@ -77,7 +77,7 @@ def detail_bindings(device: Device, has_fine_relief: bool) -> MutableBindings:
     slopes = detail_slopes() if has_fine_relief else np.zeros((1, 1, 4), np.float32)
     repeat = {f"address_mode_{axis}": "repeat" for axis in "uv"}
     sampler = device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear", **repeat)
-    return {"detail_map": map_mips.upload_detail(device, slopes), "detail_sampler": sampler}
+    return {"detail_map": map_mips.upload_detail_slopes(device, slopes), "detail_sampler": sampler}
 
 
 def _paint_maps(
@@ -118,7 +118,7 @@ def _upload_file_maps(device: Device, head: Head, use_colour: bool, decode_srgb:
         "relief_map": map_mips.make_relief(device, maps.height),
         "slope_map": map_mips.upload_slopes(device, maps.normal),
         "colour_map": map_mips.upload_colours(device, colour),
-        "specular_map": _upload_grey(device, _relative_to_mean(maps.specular, head.mesh)),
+        "specular_map": _upload_grey(device, _divided_by_surface_mean(maps.specular, head.mesh)),
         **_part_bindings(device, maps.parts),
         "roughness_map": _upload_grey(device, _factor_channel(maps.roughness)),
         "beckmann_table": device.cached(
@@ -127,7 +127,7 @@ def _upload_file_maps(device: Device, head: Head, use_colour: bool, decode_srgb:
     }
 
 
-def has_parts(head: Head) -> bool:
+def has_part_materials(head: Head) -> bool:
     """Return whether a head has parts with maps or a metallic-roughness surface, see parts.wgsl."""
     return head.maps.parts is not None or any(one.roughness is not None for one in head.mesh.materials)
 
@@ -147,7 +147,7 @@ def _factor_channel(factor_map: NDArray[np.float32] | None) -> NDArray[np.float3
     return np.ones((1, 1, 1), np.float32) if factor_map is None else factor_map[..., None]
 
 
-def _relative_to_mean(factor_map: NDArray[np.float32] | None, mesh: Mesh) -> NDArray[np.float32]:
+def _divided_by_surface_mean(factor_map: NDArray[np.float32] | None, mesh: Mesh) -> NDArray[np.float32]:
     """Return a map divided by its mean over the surface, as a factor of the skin's specular strength [-]."""
     if factor_map is None:
         return _factor_channel(None)

@@ -91,8 +91,8 @@ def _thin_part_weights(
 def make_translucency(
     memo: Memo,
     device: Device,
-    surface: Bindings,
-    rest_surface: Bindings,
+    surface_bindings: Bindings,
+    rest_surface_bindings: Bindings,
     atlas: Atlas,
     variance_mm2: Floats,
     weight: Floats,
@@ -104,8 +104,8 @@ def make_translucency(
 
     A pair consists of a cell of the atlas where light enters a thin part, and a cell where this light leaves.
 
-    surface : resources of geometry.wgsl and of the atlas, for the current shape
-    rest_surface : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
+    surface_bindings : resources of geometry.wgsl and of the atlas, for the current shape
+    rest_surface_bindings : the same resources for the shape in which pairs are searched
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     weight : (k, 3) weights of the blurred levels [-]
     thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
@@ -117,10 +117,10 @@ def make_translucency(
     widest_mm = float(np.sqrt(variance_mm2[-1]))
     widest_mm = rounded_sigma_mm(widest_mm) if shares_pairs else widest_mm
     cells = memo.get(_cached_cell_division, atlas, caller_name=layout_key)(widest_mm)
-    pairs = memo.get(PairCache, device, rest_surface, atlas, caller_name=layout_key).find(cells)
-    buffers = memo.get(make_translucency_buffers, device, surface, pairs, caller_name=layout_key)
+    pairs = memo.get(PairCache, device, rest_surface_bindings, atlas, caller_name=layout_key).find(cells)
+    buffers = memo.get(make_translucency_buffers, device, surface_bindings, pairs, caller_name=layout_key)
     return memo.get(
-        with_profile, device, buffers, variance_mm2, weight, thickness_tables, caller_name=layout_key
+        with_profile_weights, device, buffers, variance_mm2, weight, thickness_tables, caller_name=layout_key
     )
 
 
@@ -140,8 +140,8 @@ class PairCache:
     surface : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
     """
 
-    def __init__(self, device: Device, surface: Bindings, atlas: Atlas) -> None:
-        self._device, self._surface, self._atlas = device, surface, atlas
+    def __init__(self, device: Device, surface_bindings: Bindings, atlas: Atlas) -> None:
+        self._device, self._surface, self._atlas = device, surface_bindings, atlas
         self._cache: dict[Cells, PairBuffers] = {}
 
     def find(self, cells: Cells) -> PairBuffers:
@@ -167,12 +167,12 @@ def rounded_sigma_mm(widest_sigma_mm: float) -> float:
 
 
 @logged_step("finding the thin parts")
-def find_pairs(device: Device, surface: Bindings, atlas: Atlas, cells: Cells) -> PairBuffers:
+def find_pairs(device: Device, surface_bindings: Bindings, atlas: Atlas, cells: Cells) -> PairBuffers:
     """Find the translucent pairs of cells; if a buffer cannot hold all pairs, use coarser cells."""
-    table, times = search_pairs(device, surface, cells), count(1)
+    table, times = search_pairs(device, surface_bindings, cells), count(1)
     while table is None:
         cells = divide_into_cells(atlas, cells.max_sigma_mm, _CELL_COARSENING_FACTOR ** next(times))
-        table = search_pairs(device, surface, cells)
+        table = search_pairs(device, surface_bindings, cells)
     return make_pair_buffers(device, cells, table)
 
 
@@ -188,8 +188,8 @@ def make_pair_buffers(device: Device, cells: Cells, pair_table: PairTable) -> Pa
         pairs=pair_table.pairs,
         count=int(pair_table.first[-1]),
         receiver_ranges=device.buffer(_receiver_ranges(cells, pair_table), "STORAGE"),
-        transmitted=mark_scratch(device, _zero_light(device, cells.receiver_mask)),
-        lost=_zero_light(device, cells.receiver_mask),
+        transmitted=mark_scratch(device, _black_light_texture(device, cells.receiver_mask)),
+        lost=_black_light_texture(device, cells.receiver_mask),
     )
 
 
@@ -205,7 +205,7 @@ def _receiver_ranges(cells: Cells, pair_table: PairTable) -> NDArray[np.uint32]:
     return rows if len(rows) else np.zeros((1, 3), np.uint32)
 
 
-def _zero_light(device: Device, surface_mask: NDArray[np.bool_]) -> Texture:
+def _black_light_texture(device: Device, surface_mask: NDArray[np.bool_]) -> Texture:
     """Return a black texture over the coarse atlas; its alpha is 1 where `surface_mask` is set."""
     light = np.zeros((*surface_mask.shape, 4), np.float32)
     light[..., 3] = surface_mask
@@ -214,7 +214,7 @@ def _zero_light(device: Device, surface_mask: NDArray[np.bool_]) -> Texture:
     return texture
 
 
-def with_profile(
+def with_profile_weights(
     device: Device,
     translucency: Translucency,
     variance_mm2: Floats,
@@ -245,15 +245,15 @@ def with_profile(
     )
 
 
-def make_translucency_buffers(device: Device, surface: Bindings, pairs: PairBuffers) -> Translucency:
-    """Allocate the buffers of translucency; `with_profile` adds the weights of a profile.
+def make_translucency_buffers(device: Device, surface_bindings: Bindings, pairs: PairBuffers) -> Translucency:
+    """Allocate the buffers of translucency; `with_profile_weights` adds the weights of a profile.
 
-    surface : resources of geometry.wgsl and of the atlas, for the current shape
+    surface_bindings : resources of geometry.wgsl and of the atlas, for the current shape
     """
     receivers, sources = pairs.receivers[1], pairs.sources[1]
     return Translucency(
         pairs=pairs,
-        surface=surface,
+        surface=surface_bindings,
         receiver_points=mark_scratch(device, make_element_buffer(device, receivers, RECEIVER_BYTES)),
         source_points=make_element_buffer(device, sources, SOURCE_BYTES),
         weights=make_element_buffer(device, pairs.count, 8),

@@ -89,7 +89,7 @@ def make_layers(
     """
     use_compute_pass = device.adapter.kind != "CPU" if use_compute_pass is None else use_compute_pass
     fits = 4 * layer_size[0] * layer_size[1] * layer_count <= device.max_storage_bytes
-    make = _compute_layers if use_compute_pass and fits else _raster_layers
+    make = _make_compute_layers if use_compute_pass and fits else _make_raster_layers
     return make(device, layer_size, max(1, layer_count), store_triangles)
 
 
@@ -101,17 +101,17 @@ def draw_layers(
     stage_name : name of the stage in timings
     """
     if layers.nearness is not None:
-        _draw_compute(graph, stage_name, layers, views, head)
+        _draw_with_compute_pass(graph, stage_name, layers, views, head)
     else:
-        _draw_raster(graph, stage_name, layers, views.matrices(layers.size), head)
+        _draw_with_rasteriser(graph, stage_name, layers, views.matrices(layers.size), head)
 
 
-def draw(graph: Recorder, visibility: ViewLayers, views: Views, head: HeadGeometry) -> None:
+def draw(graph: Recorder, visibility_layers: ViewLayers, views: Views, head: HeadGeometry) -> None:
     """Declare the passes that find the triangle that covers each sample of the picture [Burns2013]."""
-    draw_layers(graph, "visibility", visibility, views, head)
+    draw_layers(graph, "visibility", visibility_layers, views, head)
 
 
-def _compute_layers(
+def _make_compute_layers(
     device: Device, layer_size: tuple[int, int], layer_count: int, store_triangles: bool
 ) -> ViewLayers:
     texel, name = ("r32uint", "visibility buffer") if store_triangles else ("r32float", "shadow maps")
@@ -133,7 +133,7 @@ def _word_buffer(device: Device, word_count: int) -> Buffer:
     return device.buffer(np.zeros(word_count, np.uint32), "STORAGE")
 
 
-def _raster_layers(
+def _make_raster_layers(
     device: Device, layer_size: tuple[int, int], view_count: int, store_triangles: bool
 ) -> ViewLayers:
     name = "visibility buffer" if store_triangles else "shadow maps"
@@ -157,7 +157,7 @@ def _raster_layers(
     return ViewLayers(texture, layer_size, view_count, store_triangles, depth * view_count, targets)
 
 
-def _draw_compute(
+def _draw_with_compute_pass(
     graph: Recorder, stage_name: str, layers: ViewLayers, views: Views, head: HeadGeometry
 ) -> None:
     device, triangles, (clips, positions) = graph.device, head.triangles, views
@@ -179,7 +179,7 @@ def _draw_compute(
         "tiles": layers.tiles,
         "layers": layers.texture,
     }
-    work, count = _split_work(triangles, len(clips), len(positions))
+    work, count = _divide_triangles_into_workgroups(triangles, len(clips), len(positions))
     groups = (min(count, _WORKGROUPS_PER_ROW), -(-count // _WORKGROUPS_PER_ROW), len(clips))
     for recorded in passes:
         constants = (("RECORDED", recorded), ("SAMPLES", len(positions)), *work, *head.constants)
@@ -200,11 +200,11 @@ def _pass_modes(layers: ViewLayers, triangle_count: int, clip_matrices: Matrix) 
     if not layers.triangles:
         return (_RECORD_DEPTH,)
     steps = 2.0 ** (32 - triangle_count.bit_length())
-    precise = max(map(_depth_range_mm, clip_matrices)) <= _MAX_DEPTH_STEP_MM * steps
+    precise = max(map(_max_distance_per_depth_mm, clip_matrices)) <= _MAX_DEPTH_STEP_MM * steps
     return (_RECORD_BOTH,) if precise else (_RECORD_DEPTH, _RECORD_TRIANGLE)
 
 
-def _draw_raster(
+def _draw_with_rasteriser(
     graph: Recorder, stage_name: str, layers: ViewLayers, clip_matrices: Matrix, head: HeadGeometry
 ) -> None:
     shader = _raster_program(graph.device, layers.triangles, head.has_cutouts)
@@ -256,7 +256,7 @@ def _views_record(
     return record
 
 
-def _depth_range_mm(clip_matrix: Matrix) -> float:
+def _max_distance_per_depth_mm(clip_matrix: Matrix) -> float:
     """Return the largest change of distance per unit of z-buffer depth, as an upper bound [mm].
 
     If depth is stored as an integer, the error of the distance is at most this bound divided by the number of
@@ -277,7 +277,9 @@ def _depth_range_mm(clip_matrix: Matrix) -> float:
 
 
 @cache
-def _split_work(triangle_count: int, view_count: int, sample_count: int) -> tuple[Constants, int]:
+def _divide_triangles_into_workgroups(
+    triangle_count: int, view_count: int, sample_count: int
+) -> tuple[Constants, int]:
     """Divide the triangles among the workgroups of the compute pass; the numbers were tuned on an H200.
 
     Return pipeline constants, and the number of workgroups.

@@ -107,14 +107,14 @@ class TilePairs:
     partners: Buffer
 
 
-def find_tile_pairs(passes: SearchPasses, surface: Bindings, cells: Cells) -> TilePairs:
+def find_tile_pairs(passes: SearchPasses, surface_bindings: Bindings, cells: Cells) -> TilePairs:
     """Find the pairs of tiles that may contain translucent pairs of cells.
 
-    surface : resources of geometry.wgsl
+    surface_bindings : resources of geometry.wgsl
     """
     device, count = passes.device, cells.tiles_per_side**2
     tiles, counts = make_element_buffer(device, count, _TILE_BOUNDS_BYTES), make_element_buffer(device, count)
-    bindings = {"tiles": tiles, "block_pairs": _find_block_pairs(passes, surface, cells, tiles)}
+    bindings = {"tiles": tiles, "block_pairs": _find_block_pairs(passes, surface_bindings, cells, tiles)}
     every_tile = passes.upload(np.arange(count), np.zeros(count, np.int64))
     passes.add("tile_pairs", count, {**bindings, "queries": every_tile, "partners": counts})
     partner_count = passes.read(counts, count)
@@ -126,7 +126,9 @@ def find_tile_pairs(passes: SearchPasses, surface: Bindings, cells: Cells) -> Ti
     return TilePairs(tiles, tile, first, partners)
 
 
-def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, tile_bounds: Buffer) -> Buffer:
+def _find_block_pairs(
+    passes: SearchPasses, surface_bindings: Bindings, cells: Cells, tile_bounds: Buffer
+) -> Buffer:
     """Return a buffer with one bit for each pair of blocks, set if the blocks may contain translucent pairs.
 
     A block is a square of tiles.
@@ -141,7 +143,7 @@ def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, til
         "triangle_first": passes.upload(cells.triangle_first),
         "triangles": passes.upload(cells.triangles),
     }
-    passes.add("tiles", cells.tiles_per_side**2, {**surface, **triangles, "tiles": tile_bounds})
+    passes.add("tiles", cells.tiles_per_side**2, {**surface_bindings, **triangles, "tiles": tile_bounds})
     passes.add("blocks", blocks, {"tiles": tile_bounds, "blocks": bounds})
     passes.add("block_pairs", words, {"blocks": bounds, "block_pairs": block_pairs})
     return block_pairs
@@ -194,23 +196,28 @@ def _expand_ranges(range_starts: Index, chosen_ranges: Index) -> tuple[Index, In
 
 
 def compute_positions(
-    passes: SearchPasses, surface: Bindings, cells: Cells, candidates: CandidateCells
+    passes: SearchPasses, surface_bindings: Bindings, cells: Cells, candidates: CandidateCells
 ) -> Bindings:
     """Compute the positions and normals of the candidate cells.
 
     Return a dictionary from names in shaders to the buffers of the results.
 
-    surface : resources of geometry.wgsl and of the atlas
+    surface_bindings : resources of geometry.wgsl and of the atlas
     """
     device, commands = passes.device, passes.commands
     receiver_points = make_element_buffer(device, len(candidates.receiver), RECEIVER_BYTES)
     source_points = make_element_buffer(device, len(candidates.source), SOURCE_BYTES)
     receivers = upload_receivers(device, cells, candidates.receiver)
     draw_cell_points(
-        commands, "receiver", surface, cells, receivers, receiver_points, metric_from_triangles=True
+        commands, "receiver", surface_bindings, cells, receivers, receiver_points, metric_from_triangles=True
     )
     draw_cell_points(
-        commands, "source", surface, cells, upload_sources(device, cells, candidates.source), source_points
+        commands,
+        "source",
+        surface_bindings,
+        cells,
+        upload_sources(device, cells, candidates.source),
+        source_points,
     )
     return {"receiver_points": receiver_points, "source_points": source_points}
 
@@ -231,7 +238,7 @@ def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple
     return bindings, int(word[-1])
 
 
-def draw_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, bindings: Bindings) -> Buffer:
+def list_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, bindings: Bindings) -> Buffer:
     """Add the pass that lists the gutter texels with copies of source cells; return its result buffer.
 
     source_cells : (n,) indices of cells that emit light
@@ -290,19 +297,19 @@ class PairTable:
     pairs: Buffer
 
 
-def search_pairs(device: Device, surface: Bindings, cells: Cells) -> PairTable | None:
+def search_pairs(device: Device, surface_bindings: Bindings, cells: Cells) -> PairTable | None:
     """Return all pairs of cells between which enough light crosses the head, None if a buffer is too small.
 
-    surface : resources of geometry.wgsl for the shape to search in, and of the atlas
+    surface_bindings : resources of geometry.wgsl for the shape to search in, and of the atlas
     """
     passes = SearchPasses(device, cells)
-    tile_pairs = find_tile_pairs(passes, surface, cells)
+    tile_pairs = find_tile_pairs(passes, surface_bindings, cells)
     candidates = candidate_cells(cells, tile_pairs)
     ranges, words = upload_hit_ranges(passes, candidates)
     count = len(candidates.receiver)
     if max(4 * words, RECEIVER_BYTES * count) > device.max_storage_bytes:
         return None
-    points = compute_positions(passes, surface, cells, candidates)
+    points = compute_positions(passes, surface_bindings, cells, candidates)
     hits, counts = make_element_buffer(device, words), make_element_buffer(device, count)
     hit_bindings = {**ranges, "partners": tile_pairs.partners, "hits": hits}
     passes.add("hits", count, {**hit_bindings, **points, "tiles": tile_pairs.bounds, "counts": counts})
@@ -310,11 +317,11 @@ def search_pairs(device: Device, surface: Bindings, cells: Cells) -> PairTable |
     if _PAIR_BYTES * pair_count.sum() > device.max_storage_bytes:
         return None
     gutters = passes.upload(*cells.gutter_copies.T)
-    map_bindings = {**points, "reach_map": surface["reach_map"], "gutters": gutters}
-    return _list_pairs(passes, cells, candidates, pair_count, hit_bindings, map_bindings)
+    map_bindings = {**points, "reach_map": surface_bindings["reach_map"], "gutters": gutters}
+    return _make_pair_table(passes, cells, candidates, pair_count, hit_bindings, map_bindings)
 
 
-def _list_pairs(
+def _make_pair_table(
     passes: SearchPasses,
     cells: Cells,
     candidates: CandidateCells,
@@ -339,7 +346,7 @@ def _list_pairs(
         **map_bindings,
         "receiver_index": passes.upload(np.cumsum(is_receiver) - is_receiver),
         "source_index": passes.upload(np.cumsum(is_source) - is_source),
-        "copies": draw_gutter_copies(passes, cells, candidates.source[chosen], copy_bindings),
+        "copies": list_gutter_copies(passes, cells, candidates.source[chosen], copy_bindings),
         "pairs": pairs,
     }
     passes.add("offsets", count, bindings)
