@@ -23,7 +23,7 @@ MAX_PHOTON_EVENTS = 100_000
 
 
 class LayerStack(NamedTuple):
-    """Optical properties of each layer and of the air on both sides, and the depths of the faces.
+    """Optical properties of each layer and of the air on both sides, and the depths of the layers' faces.
 
     The properties are arrays of the shape (layers + 2,), and the depths have the shape (layers + 1,).
     """

@@ -81,7 +81,7 @@ def solve_light_strengths(A: Floats, b: Floats) -> Floats:
 
 
 def solve_normal_equations(gram: Floats, right_side: Floats) -> Floats:
-    """Return the light strengths (9 + k,) of `solve_light_strengths` from its normal equations.
+    """Return the result (9 + k,) of `solve_light_strengths`, computed from the normal equations of A and b.
 
     gram : (9 + k, 9 + k) product A' A
     right_side : (9 + k,) product A' b

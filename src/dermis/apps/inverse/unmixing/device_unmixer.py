@@ -41,7 +41,7 @@ class Unmixer:
 
     device : device on which pictures are unmixed
     model : table of skin colours that is inverted
-    noise : relative standard deviation of a channel [-]
+    relative_noise : relative standard deviation of a channel [-]
     """
 
     def __init__(self, device: Device, model: SkinModel, relative_noise: float) -> None:

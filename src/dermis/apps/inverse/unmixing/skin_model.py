@@ -101,7 +101,7 @@ def _lerp(node_values: Floats, fraction: Floats) -> Floats:
 
 
 def skin_model(skin: SkinParameters = DEFAULT_SKIN, third_unknown: ThirdUnknown = "none") -> SkinModel:
-    """Return the model of skins with all fractions of melanin and blood, computed by layered diffusion.
+    """Return the skin model for all fractions of melanin and blood, computed by layered diffusion.
 
     skin : parameters that do not vary; its melanin and blood are ignored
     third_unknown : unknown besides melanin and blood; "none" keeps the oxygenation of `skin`
