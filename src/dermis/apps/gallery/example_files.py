@@ -69,7 +69,7 @@ class _Glb:
         views, accessors = self._tree["bufferViews"], self._tree["accessors"]
         self._buffer = BufferBuilder(bytearray(encoded_glb[28 + length :]), views, accessors)
 
-    def add(self, mesh_name: str, surface: _Surface, picture: Bytes, roughness: float) -> None:
+    def add_mesh(self, mesh_name: str, surface: _Surface, picture: Bytes, roughness: float) -> None:
         """Add a mesh textured with a picture (h, w, 4); where alpha is low, the mesh is invisible."""
         add_rows = self._buffer.add_accessor
         attributes = {
@@ -116,10 +116,10 @@ def write_avatar(studio: Studio, folder: Path) -> Path:
     painted, eyes = paint_head(studio.renderer.device, plain, 1024)
     file = _Glb(encode_head(replace(painted, strands=None, hair=None), roughness=0.3, eyes=eyes))
     hair = _hair_card_picture((0.045, 0.022, 0.012), 26, (512, 1024), seed=1)
-    file.add("hair", _hair_cards(*_scalp_hair_paths(plain), width_mm=7.0), hair, roughness=0.9)
+    file.add_mesh("hair", _hair_cards(*_scalp_hair_paths(plain), width_mm=7.0), hair, roughness=0.9)
     fringe = _hair_card_picture((0.02, 0.01, 0.006), 4, (128, 256), seed=2, taper_fraction=0.7)
-    file.add("lashes", _hair_cards(*_brow_and_lash_paths(plain), width_mm=0.5), fringe, roughness=0.6)
-    file.add("sweater", _sweater_surface(plain), _sweater_picture(), roughness=0.9)
+    file.add_mesh("lashes", _hair_cards(*_brow_and_lash_paths(plain), width_mm=0.5), fringe, roughness=0.6)
+    file.add_mesh("sweater", _sweater_surface(plain), _sweater_picture(), roughness=0.9)
     return file.write(folder / "avatar.glb")
 
 
@@ -142,7 +142,7 @@ def write_three_meshes(head: Head, folder: Path) -> Path:
         surface = _Surface(mesh.positions[used], mesh.normals[used], uv, triangles.reshape(-1, 3))
         picture = colour[low[1] : high[1], low[0] : high[0]]
         opaque = np.full((*picture.shape[:2], 1), 255, np.uint8)
-        file.add(name, surface, np.concatenate([picture, opaque], axis=2), roughness=0.5)
+        file.add_mesh(name, surface, np.concatenate([picture, opaque], axis=2), roughness=0.5)
     return file.write(folder / "three.glb")
 
 

@@ -134,17 +134,22 @@ def _with_centre_of(head: Head, shaped_head: Head) -> Head:
     return head
 
 
-def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
+def expression_rows(
+    renderer: Renderer, head: Head, person_points_by_name: Mapping[str, Points]
+) -> Iterator[str]:
     """Yield Markdown rows, one per expression, with the largest picture error over all people.
 
     Heads are seen from the front and from the back.
 
-    persons : dictionary from the name of a person to positions in the rest pose [mm]
+    person_points_by_name : dictionary from the name of a person to positions in the rest pose [mm]
     """
     worst = dict.fromkeys(LIGHT_AND_CAMERA, 0.0)
     for name, weights in EXPRESSIONS.items():
         errors = {
-            view: max(picture_error(renderer, head, person, weights, view) for person in persons.values())
+            view: max(
+                picture_error(renderer, head, person, weights, view)
+                for person in person_points_by_name.values()
+            )
             for view in LIGHT_AND_CAMERA
         }
         worst = {view: max(worst[view], errors[view]) for view in LIGHT_AND_CAMERA}
@@ -170,19 +175,19 @@ def _with_thinner_ears(point_positions: Points, thickness_fraction: float) -> Po
     return (point_positions * (1.0 - ear * [0.0, 0.0, thickness_fraction])).astype(np.float32)
 
 
-def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
+def seam_rows(renderer: Renderer, head: Head, person_points_by_name: Mapping[str, Points]) -> Iterator[str]:
     """Yield Markdown rows with the discontinuity of scattered light across the seams of a head.
 
     The rows are for the rest pose, for expressions, and for the shapes of other people.
 
-    persons : dictionary from the name of a person to positions in the rest pose [mm]
+    person_points_by_name : dictionary from the name of a person to positions in the rest pose [mm]
     """
     rest_points = head.positions_mm
     yield _seam_row(renderer, "at rest", head, head, None)
     for name in ("open jaw", "smile", "puffed cheeks"):
         shape = rebuilt_head(head, posed_points(head, rest_points, EXPRESSIONS[name]))
         yield _seam_row(renderer, name, head, shape, Pose(EXPRESSIONS[name]))
-    for name, person in persons.items():
+    for name, person in person_points_by_name.items():
         shape = rebuilt_head(head, person)
         yield _seam_row(renderer, f"{name}, by positions", head, shape, Pose(positions_mm=person))
         yield _seam_row(renderer, f"{name}, rebuilt", shape, shape, None)

@@ -176,12 +176,12 @@ class ComparisonRunner:
             self._people[person_name] = head, textures
         return self._people[person_name]
 
-    def _shared_skin(self, person_name: PersonName, head: Head, truth_name: TruthName) -> SharedSkin:
-        key = person_name, truth_name
+    def _shared_skin(self, person_name: PersonName, head: Head, reference_kind: TruthName) -> SharedSkin:
+        key = person_name, reference_kind
         if key not in self._skins:
             folder = self.folder / person_name
             folder.mkdir(exist_ok=True)
-            self._skins[key] = shared_skin(self.renderer, head, truth_name, folder)
+            self._skins[key] = shared_skin(self.renderer, head, reference_kind, folder)
         return self._skins[key]
 
     def measure_head(self, head_name: str, light_name: str, medium: Medium) -> Figures:
@@ -389,10 +389,12 @@ def estimate_text(estimate: Sequence[float] | Estimate | None, digits: int = 3) 
     return f"{value:.{digits}f} ± {error:.{digits}f}"
 
 
-def _error_cells(figures: Figures | None) -> str:
+def _error_cells(comparison_errors: Figures | None) -> str:
     """Return table cells with the relative RMSE and the energy ratio of a comparison."""
     return (
-        f"{estimate_text(figures['error'])} | {figures['energy'][0]:.3f}" if figures else f"{NOT_MEASURED} | "
+        f"{estimate_text(comparison_errors['error'])} | {comparison_errors['energy'][0]:.3f}"
+        if comparison_errors
+        else f"{NOT_MEASURED} | "
     )
 
 

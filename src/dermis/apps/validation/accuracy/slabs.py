@@ -159,7 +159,7 @@ def _direction_pairs_error(albedo: float, eta: float, skin_anisotropy: float) ->
     return float(np.sqrt((weight * (response - exact) ** 2).sum() / (weight * exact**2).sum()))
 
 
-def _error_cells(response: Array, reference: Array) -> str:
+def _error_cells(slab_response: Array, reference: Array) -> str:
     """Return two table cells with errors of transmittance, then two with errors of reflectance.
 
     The first cell of each pair has the relative RMS error. The second has the ratio of red light to the
@@ -167,7 +167,7 @@ def _error_cells(response: Array, reference: Array) -> str:
     """
     flux, cells = np.sqrt(np.cos(np.radians(INCIDENT_DEGREES)))[:, None], []
     for side in (1, 0):
-        ours, exact = response[side], reference[side]
+        ours, exact = slab_response[side], reference[side]
         error = np.linalg.norm(flux * (ours - exact)) / np.linalg.norm(flux * exact)
         red = ours[:, 0] / exact[:, 0]
         cells.append(f"{error:.3f} | {' '.join(f'{one:.2f}' for one in red)}")

@@ -14,7 +14,7 @@ from dermis.apps.validation.comparisons.references import (
     REFERENCES,
     ComparisonSubject,
     ReferenceImage,
-    check_visible,
+    require_visible_pixels,
 )
 from dermis.apps.validation.comparisons.scenes import LIGHTS, REGIONS, ModelName, medium_scene
 from dermis.base.errors import refuse
@@ -111,9 +111,9 @@ def compare(
     check_names(against, light, region, medium)
     settings = settings or Settings(size=(256, 256), atlas=1024)
     with comparison_subject(head, light, region, medium, settings, adapter, model) as subject:
-        check_visible(surface_points(subject.renderer, subject.scene, settings).mask)
+        require_visible_pixels(surface_points(subject.renderer, subject.scene, settings).mask)
         reference = REFERENCES[against](subject, samples)
-        check_visible(reference.mask)
+        require_visible_pixels(reference.mask)
         skin = Skin(**(subject.scene.skin.model_dump() | {"direction": direction or reference.direction}))
         compared = replace(subject, scene=replace(subject.scene, skin=skin))
         images, ms = {}, {}

@@ -17,7 +17,7 @@ from dermis.apps.truths.path_traced import MitsubaVariant, PathTraced
 from dermis.apps.truths.person.medium import pigmented_skin, uniform_skin
 from dermis.apps.truths.person.path_traced import path_trace_person
 from dermis.apps.truths.person.person import SkinTextures
-from dermis.apps.validation.comparisons.references import check_visible
+from dermis.apps.validation.comparisons.references import require_visible_pixels
 from dermis.apps.validation.comparisons.scenes import medium_gaussians
 from dermis.frame.renderer import Renderer
 from dermis.human.skin.painted import PaintedMaps, mean_colour
@@ -107,24 +107,24 @@ class SharedSkin:
     profile: Path
 
 
-def shared_skin(renderer: Renderer, head: Head, truth_name: TruthName, folder: Path) -> SharedSkin:
+def shared_skin(renderer: Renderer, head: Head, reference_kind: TruthName, folder: Path) -> SharedSkin:
     """Return the skin of a person for a kind of path-traced reference, and write its diffusion profile.
 
     Homogeneous skin has the mean scattering distance of the default skin.
 
-    truth_name : kind of path-traced reference, one of `TRUTHS`
+    reference_kind : kind of path-traced reference, one of `TRUTHS`
     folder : existing folder in which the file of the profile is written
     """
-    maps, eta = head.maps, SKIN_ETA if truth_name == "refracting" else 1.0
+    maps, eta = head.maps, SKIN_ETA if reference_kind == "refracting" else 1.0
     assert isinstance(maps, PaintedMaps)
     colour = mean_colour(maps.look)
-    if truth_name == "layered":
+    if reference_kind == "layered":
         look = maps.look
         parameters = SkinParameters(look.melanin, look.eumelanin, look.blood, look.oxygen, look.epidermis_mm)
         medium = pigmented_skin(parameters, colour, eta)
     else:
         medium = uniform_skin(colour, mean_distance_mm(renderer.skin_profile(Skin())), eta)
-    file = folder / f"{truth_name}.toml"
+    file = folder / f"{reference_kind}.toml"
     write_profile(file, medium_gaussians(medium, "montecarlo"), {"model": "montecarlo"})
     return SharedSkin(medium, file)
 
@@ -225,7 +225,7 @@ def compare_person(
     settings = Settings(size=(picture_side, picture_side), atlas=atlas, samples=4)
     reference = path_trace_subject(subject, skin, settings.size, samples, use_cache, variant, progress)
     mask = reference.mask > _FULL_COVERAGE
-    check_visible(mask)
+    require_visible_pixels(mask)
     return person_comparison(
         comparison_name, render_subject_frame(renderer, subject, skin, settings), reference, mask
     )

@@ -182,10 +182,13 @@ REFERENCES: dict[str, Callable[[ComparisonSubject, int], ReferenceImage]] = {
 }
 
 
-def _reference_image(path_traced: PathTraced, *notes: str) -> ReferenceImage:
-    image, variance = path_traced.image.astype(np.float64), path_traced.variance.astype(np.float64)
-    mask, notes = path_traced.mask > _FULL_COVERAGE, (*notes, *path_traced.notes)
-    return ReferenceImage(image, variance, mask, SAMPLES_PER_PIXEL, path_traced.seconds, notes)
+def _reference_image(path_traced_picture: PathTraced, *notes: str) -> ReferenceImage:
+    image, variance = (
+        path_traced_picture.image.astype(np.float64),
+        path_traced_picture.variance.astype(np.float64),
+    )
+    mask, notes = path_traced_picture.mask > _FULL_COVERAGE, (*notes, *path_traced_picture.notes)
+    return ReferenceImage(image, variance, mask, SAMPLES_PER_PIXEL, path_traced_picture.seconds, notes)
 
 
 def _irradiance_at_points(
@@ -212,26 +215,28 @@ def _integrate_gaussians(
     return integrate_exitance(points, irradiance, Profile(gaussian_weight, variance_mm2))
 
 
-def hit_positions(subject: ComparisonSubject, visible: SurfacePoints) -> Floats:
+def hit_positions(subject: ComparisonSubject, visible_points: SurfacePoints) -> Floats:
     """Return the positions (n, 3) where rays through pixel centres meet the head [mm].
 
-    visible : triangle and barycentric weights of each position
+    visible_points : triangle and barycentric weights of each position
     """
     mesh = subject.scene.head.mesh
-    corners = mesh.positions[mesh.triangles[visible.triangle]].astype(np.float64)
-    return np.asarray(np.einsum("nk,nkc->nc", visible.barycentric, corners))
+    corners = mesh.positions[mesh.triangles[visible_points.triangle]].astype(np.float64)
+    return np.asarray(np.einsum("nk,nkc->nc", visible_points.barycentric, corners))
 
 
 def _image_of_points(
-    visible: SurfacePoints, exitance: Floats, start_time_s: float, assumption: str
+    visible_points: SurfacePoints, exitance: Floats, start_time_s: float, assumption: str
 ) -> ReferenceImage:
-    image = np.zeros((*visible.mask.shape, 3))
-    image[visible.mask] = exitance / np.pi
+    image = np.zeros((*visible_points.mask.shape, 3))
+    image[visible_points.mask] = exitance / np.pi
     seconds, noise = time.perf_counter() - start_time_s, np.zeros_like(image)
-    return ReferenceImage(image, noise, visible.mask, 1, seconds, (assumption,), has_interreflection=False)
+    return ReferenceImage(
+        image, noise, visible_points.mask, 1, seconds, (assumption,), has_interreflection=False
+    )
 
 
-def check_visible(mask: NDArray[np.bool_]) -> None:
+def require_visible_pixels(mask: NDArray[np.bool_]) -> None:
     """Raise DermisError when no pixel can be compared.
 
     mask : (h, w) pixels that show nothing but the head

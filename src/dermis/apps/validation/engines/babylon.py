@@ -112,28 +112,32 @@ def predicted_radiance(
 
 
 def edge_profile(
-    picture: Floats, pixel_mm: float, azimuth: float, x_mm: Floats, half_width_mm: float
+    picture: Floats, pixel_mm: float, azimuth: float, edge_distance_mm: Floats, half_width_mm: float
 ) -> Floats:
     """Return the mean radiance (n, 3) at distances from the edge of the light, in a strip across the edge.
 
     picture : (side, side, 3) radiance
     pixel_mm : size of a pixel [mm]
     azimuth : direction across the edge [rad]
-    x_mm : (n,) evenly spaced distances from the edge, positive on the lit side [mm]
+    edge_distance_mm : (n,) evenly spaced distances from the edge, positive on the lit side [mm]
     half_width_mm : half the width of the strip [mm]
     """
     middle = (np.arange(CANVAS_SIDE) + 0.5 - 0.5 * CANVAS_SIDE) * pixel_mm
     x, y = middle[None, :], middle[:, None]
     across = x * np.cos(azimuth) + y * np.sin(azimuth)
     strip = np.abs(y * np.cos(azimuth) - x * np.sin(azimuth)) < half_width_mm
-    bins = np.round((across[strip] - x_mm[0]) / (x_mm[1] - x_mm[0])).astype(int)
-    inside = (bins >= 0) & (bins < len(x_mm))
-    count = np.bincount(bins[inside], minlength=len(x_mm))
-    sums = [np.bincount(bins[inside], picture[strip][inside, c], len(x_mm)) for c in range(3)]
+    bins = np.round(
+        (across[strip] - edge_distance_mm[0]) / (edge_distance_mm[1] - edge_distance_mm[0])
+    ).astype(int)
+    inside = (bins >= 0) & (bins < len(edge_distance_mm))
+    count = np.bincount(bins[inside], minlength=len(edge_distance_mm))
+    sums = [np.bincount(bins[inside], picture[strip][inside, c], len(edge_distance_mm)) for c in range(3)]
     return np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None]
 
 
-def edge_responses(page: Page, profile_colour: Floats, meters_per_unit: float, d_mm: Floats) -> JsonObject:
+def edge_responses(
+    page: Page, profile_colour: Floats, meters_per_unit: float, burley_width_mm: Floats
+) -> JsonObject:
     """Measure the edge response of a diffusion profile in Babylon.js, and compare it with predictions.
 
     An edge response is the radiance of a half-lit plane by distance from the edge of the light. Here it is
@@ -142,9 +146,9 @@ def edge_responses(page: Page, profile_colour: Floats, meters_per_unit: float, d
 
     profile_colour : diffusion profile, which Babylon.js expresses as a colour
     meters_per_unit : setting metersPerUnit of Babylon.js; the unit of the scene is a millimetre
-    d_mm : (3,) widths of the Burley profiles, by channel [mm]
+    burley_width_mm : (3,) widths of the Burley profiles, by channel [mm]
     """
-    widest = float(d_mm.max())
+    widest = float(burley_width_mm.max())
     pixel = widest / PIXELS_PER_BURLEY_WIDTH
     x = np.arange(-84, 85) * pixel  # to 6 d
     profiles = []
@@ -154,13 +158,13 @@ def edge_responses(page: Page, profile_colour: Floats, meters_per_unit: float, d
         profiles.append([edge_profile(one, pixel, azimuth, x, 3.0 * widest) for one in pictures])
     largest = max(float(np.abs(one - other).max()) for one, other in profiles)
     measured, predicted = np.mean(profiles, axis=0)
-    true = cumulative_burley_profile(d_mm, np.ones(3)).edge_response(x)
-    near = np.abs(x)[:, None] <= 6.0 * d_mm
+    true = cumulative_burley_profile(burley_width_mm, np.ones(3)).edge_response(x)
+    near = np.abs(x)[:, None] <= 6.0 * burley_width_mm
     step = slice(0, None, 7)
     return {
         "colour": np.round(profile_colour, 5).tolist(),
         "metersPerUnit_mm": round(1e3 * meters_per_unit, 5),
-        "expected_d_mm": np.round(d_mm, 5).tolist(),
+        "expected_d_mm": np.round(burley_width_mm, 5).tolist(),
         "fitted_d_mm": fitted_widths(x, measured),
         "x_mm": np.round(x[step], 4).tolist(),
         "edge": np.round(measured[step], 4).tolist(),
@@ -175,14 +179,17 @@ def _max_by_channel(difference: Floats, is_near_edge: NDArray[np.bool_]) -> list
     return [round(float(x), 4) for x in np.abs(difference * is_near_edge).max(axis=0)]
 
 
-def fitted_widths(x_mm: Floats, edge_response: Floats) -> list[float]:
+def fitted_widths(edge_distance_mm: Floats, edge_response: Floats) -> list[float]:
     """Return the width of the Burley profile that fits the measured edge response best, by channel [mm].
 
-    x_mm : (n,) distances from the edge
+    edge_distance_mm : (n,) distances from the edge
     edge_response : (n, 3) measured edge responses
     """
-    widths = np.geomspace(x_mm[-1] / 600.0, x_mm[-1], 241)
-    curves = [cumulative_burley_profile(np.full(3, d), np.ones(3)).edge_response(x_mm)[:, 0] for d in widths]
+    widths = np.geomspace(edge_distance_mm[-1] / 600.0, edge_distance_mm[-1], 241)
+    curves = [
+        cumulative_burley_profile(np.full(3, d), np.ones(3)).edge_response(edge_distance_mm)[:, 0]
+        for d in widths
+    ]
     error = ((np.stack(curves)[:, :, None] - edge_response) ** 2).sum(axis=1)
     return [round(float(d), 4) for d in widths[error.argmin(axis=0)]]
 

@@ -65,7 +65,9 @@ def blender(python_45: Path, python_52: Path, *parts: Measurement) -> None:
     python_by_version = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
     parts = parts or get_args(Measurement)
     results: JsonObject = read_results(RESULTS_FILE) if RESULTS_FILE.exists() else {}
-    results["columns_in_d"] = column_positions().reshape(EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=1).tolist()
+    results["columns_in_d"] = (
+        column_edge_distances().reshape(EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=1).tolist()
+    )
     if "edges" in parts:
         results["edges"] = list(measure_edges(python_by_version))
         write_results(RESULTS_FILE, results)
@@ -85,36 +87,40 @@ def measure_edges(python_by_version: dict[str, Path]) -> Iterator[JsonObject]:
                 print_lines(f"{version} {method} {name}")
 
 
-def column_positions() -> Floats:
+def column_edge_distances() -> Floats:
     """Return the distances of the pixel columns from the edge of the light, in units of the Burley width."""
     return 12.0 * (np.arange(EDGE_BIN_COUNT * PIXELS_PER_BIN) + 0.5) / (EDGE_BIN_COUNT * PIXELS_PER_BIN) - 6.0
 
 
-def measure_edge_response(python: Path, version: str, subsurface_method: str, skin_name: str) -> JsonObject:
+def measure_edge_response(
+    python_program: Path, blender_version: str, subsurface_method: str, skin_name: str
+) -> JsonObject:
     """Return the measured and the predicted edge response of an exported skin, and its errors.
 
     An edge response is the radiance of a half-lit plane by distance from the edge of the light.
 
-    python : Python program that has Blender's module bpy
+    python_program : Python program that has Blender's module bpy
     skin_name : name of the skin
     """
     subject, target = load_subject(skin_name), TARGET.with_variant(subsurface_method)
-    rows, d = target.parameters(subject, version), fit_burley_width(subject.curve)
-    predicted_profile = target.predicted_profile(rows, subject, version)
-    naive = target.predicted_profile(target.naive_parameters(subject, version), subject, version)
+    rows, d = target.parameters(subject, blender_version), fit_burley_width(subject.curve)
+    predicted_profile = target.predicted_profile(rows, subject, blender_version)
+    naive = target.predicted_profile(
+        target.naive_parameters(subject, blender_version), subject, blender_version
+    )
     samples = SAMPLES_BY_METHOD.get(subsurface_method, DEFAULT_SAMPLES)
     shared = {"size": [EDGE_BIN_COUNT * PIXELS_PER_BIN, PIXEL_ROWS], "samples": samples}
     channels = [(k, c) for k in range(SEED_COUNT) for c in range(3)]
     passes = [{"channel": c, "width_m": 12e-3 * d[c], "seed": k, **shared} for k, c in channels]
     with TemporaryDirectory() as folder_name:
         folder = Path(folder_name)
-        target.write(subject, rows, folder, version)
+        target.write(subject, rows, folder, blender_version)
         (folder / "passes.json").write_text(json.dumps(passes), encoding="utf-8")
-        run_blender(python, BLENDER_SCRIPT, [str(folder)], 3600.0, HALF_LIT_PLANE_TASK)
+        run_blender(python_program, BLENDER_SCRIPT, [str(folder)], 3600.0, HALF_LIT_PLANE_TASK)
         output = json.loads((folder / "done.json").read_text(encoding="utf-8"))
     columns = np.array([[output["columns"][3 * k + c] for c in range(3)] for k in range(SEED_COUNT)])[..., 0]
     means = columns.reshape(SEED_COUNT, 3, EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=-1)
-    predicted, true = (binned_response(curve, d) for curve in (predicted_profile, subject.curve))
+    predicted, true = (binned_edge_response(curve, d) for curve in (predicted_profile, subject.curve))
     radiance = (means.mean(axis=0) * predicted).sum(axis=1) / (predicted**2).sum(axis=1)
     measured = means.mean(axis=0) / radiance[:, None]
     noise = np.abs(means[0] - means[1]) / (2.0 * radiance[:, None])
@@ -135,13 +141,15 @@ def measure_edge_response(python: Path, version: str, subsurface_method: str, sk
     }
 
 
-def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
+def binned_edge_response(cumulative_profile: CumulativeProfile, burley_width_mm: Floats) -> Floats:
     """Return the predicted edge response (3, n) of a profile, averaged over the pixel columns of each bin.
 
-    curve : cumulative form of the profile
-    d_mm : (3,) Burley widths of the channels, to which the width of a bin is proportional [mm]
+    cumulative_profile : cumulative form of the profile
+    burley_width_mm : (3,) Burley widths of the channels, to which the width of a bin is proportional [mm]
     """
-    columns = [curve.edge_response(column_positions() * d_mm[c])[:, c] for c in range(3)]
+    columns = [
+        cumulative_profile.edge_response(column_edge_distances() * burley_width_mm[c])[:, c] for c in range(3)
+    ]
     return np.asarray(np.array(columns).reshape(3, EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=-1))
 
 

@@ -149,8 +149,8 @@ def render_dermis(subject: Subject, picture_side: int) -> Floats:
 def render_cycles(
     subject: Subject,
     subsurface_method: str,
-    version: str,
-    python: Path,
+    blender_version: str,
+    python_program: Path,
     picture_side: int,
     samples: int,
     seed_count: int,
@@ -158,11 +158,11 @@ def render_cycles(
     """Return linear pictures (h, w, 4) of the exported scene rendered by Cycles, one per random seed.
 
     subsurface_method : name of a variant of the export target "blender"
-    python : Python program that has Blender's module bpy
+    python_program : Python program that has Blender's module bpy
     """
     with TemporaryDirectory() as folder_name:
         folder = Path(folder_name) / "head"
-        export_skin(subject, "blender", folder, version=version, variant=subsurface_method)
+        export_skin(subject, "blender", folder, version=blender_version, variant=subsurface_method)
         script = folder / "skin.py"
         text = script.read_text(encoding="utf-8")
         script.write_text(
@@ -173,7 +173,7 @@ def render_cycles(
         for seed in range(seed_count):
             picture = folder / f"{seed}.exr"
             options = ["--render", str(picture), "--samples", str(samples), "--seed", str(seed)]
-            command = [str(python), "-I", str(script), "--", *options]
+            command = [str(python_program), "-I", str(script), "--", *options]
             subprocess.run(command, check=True, capture_output=True)
             result.append(read_image(picture).astype(np.float64))
     return result

@@ -57,7 +57,7 @@ def skin_errors() -> JsonObject:
     return results
 
 
-def validate_files() -> JsonObject:
+def validate_exported_files() -> JsonObject:
     """Validate exported MaterialX and USD files; return the errors found and the libraries' versions."""
     MaterialX = import_extra("MaterialX", "checking its files")
     import_extra("pxr", "checking USD")
@@ -110,5 +110,5 @@ def openpbr() -> None:
     The errors are also printed. Needs the packages usd-core and MaterialX; no renderer of these formats is
     run.
     """
-    write_results(RESULTS_FILE, {"libraries": validate_files(), "skins": skin_errors()}, 4)
+    write_results(RESULTS_FILE, {"libraries": validate_exported_files(), "skins": skin_errors()}, 4)
     print_lines(*error_table(read_results(RESULTS_FILE)["skins"]))

@@ -55,29 +55,29 @@ class MeanImage:
     variance: Floats
 
 
-def scene_results(renders: PeerRenders) -> JsonObject:
+def scene_results(peer_renders: PeerRenders) -> JsonObject:
     """Return the times and errors of all renderers in one scene as a JSON object."""
-    mask = common_mask(renders)
-    means = {method: mean_of_passes(turns) for method, turns in renders.cycles.items()}
-    ours = [_dermis_row(renders, name, mask) for name in DERMIS_VARIANTS]
-    gpu_gems_3 = [_dermis_row(renders, name, mask) for name in GPU_GEMS_3_VARIANTS]
-    rows = [*ours, *gpu_gems_3, _mitsuba_row(renders, mask)]
+    mask = skin_only_mask(peer_renders)
+    means = {method: mean_of_passes(turns) for method, turns in peer_renders.cycles.items()}
+    ours = [_dermis_row(peer_renders, name, mask) for name in DERMIS_VARIANTS]
+    gpu_gems_3 = [_dermis_row(peer_renders, name, mask) for name in GPU_GEMS_3_VARIANTS]
+    rows = [*ours, *gpu_gems_3, _mitsuba_row(peer_renders, mask)]
     for method, mean in means.items():
-        rows += _cycles_rows(renders, method, mean, mask)
+        rows += _cycles_rows(peer_renders, method, mean, mask)
     scene: JsonObject = {
-        "light": renders.light,
-        "region": renders.region,
+        "light": peer_renders.light,
+        "region": peer_renders.region,
         "pixels": int(mask.sum()),
         "rows": [asdict(row) for row in rows],
-        "left_out": renders.left_out,
+        "left_out": peer_renders.left_out,
         "ours_energy_put_right": {
-            name: _energy_corrected_error(renders, name, mask) for name in DERMIS_VARIANTS
+            name: _energy_corrected_error(peer_renders, name, mask) for name in DERMIS_VARIANTS
         },
         "published": {row.setting: _time_ratios(row, ours[0]) for row in gpu_gems_3},
     }
     if "random-walk" in means:
         mean = means["random-walk"]
-        scene["as_near"] = {row.setting: _equal_error_costs(renders, mean, row, mask) for row in ours}
+        scene["as_near"] = {row.setting: _equal_error_costs(peer_renders, mean, row, mask) for row in ours}
     if len(means) == len(CYCLES_NAMES):
         random_walk, burley = means["random-walk"], means["burley"]
         scene["burley_against_random_walk"] = relative_rmse(
@@ -86,10 +86,10 @@ def scene_results(renders: PeerRenders) -> JsonObject:
     return scene
 
 
-def common_mask(renders: PeerRenders) -> Mask:
+def skin_only_mask(peer_renders: PeerRenders) -> Mask:
     """Return the mask (h, w) of pixels that show only skin in the pictures of all renderers."""
-    mask = renders.reference.mask > 0.999
-    for turns in renders.cycles.values():
+    mask = peer_renders.reference.mask > 0.999
+    for turns in peer_renders.cycles.values():
         for one in turns[0]:
             mask = mask & (one.coverage > 0.999)
     return mask
@@ -149,8 +149,8 @@ def _reference_mean_image(reference: PathTraced) -> MeanImage:
     return MeanImage(reference.image.astype(np.float64), reference.variance.astype(np.float64))
 
 
-def _dermis_row(renders: PeerRenders, variant_name: str, mask: Mask) -> RendererRow:
-    frames, reference = renders.ours[variant_name], renders.reference
+def _dermis_row(peer_renders: PeerRenders, variant_name: str, mask: Mask) -> RendererRow:
+    frames, reference = peer_renders.ours[variant_name], peer_renders.reference
     error = relative_rmse(frames.image, reference.image, mask, reference.variance)
     energy = energy_ratio(frames.image, reference.image, mask, reference.variance)
     times = statistics.median(frames.seconds), statistics.median(frames.core_seconds)
@@ -168,24 +168,24 @@ def _time_ratios(renderer_row: RendererRow, dermis_row: RendererRow) -> dict[str
     }
 
 
-def _mitsuba_row(renders: PeerRenders, mask: Mask) -> RendererRow:
-    reference = renders.reference
+def _mitsuba_row(peer_renders: PeerRenders, mask: Mask) -> RendererRow:
+    reference = peer_renders.reference
     energy = _signal_energy(_reference_mean_image(reference), mask)
     noise = float(np.sqrt(reference.variance[mask].sum(dtype=np.float64) / energy))
     setting = _samples_text(reference.samples)
-    times = reference.seconds, renders.reference_core_seconds
+    times = reference.seconds, peer_renders.reference_core_seconds
     return RendererRow("Mitsuba, volpathmis", setting, *times, noise, None, None, None, None)
 
 
 def _cycles_rows(
-    renders: PeerRenders, subsurface_method: str, mean_image: MeanImage, mask: Mask
+    peer_renders: PeerRenders, subsurface_method: str, mean_image: MeanImage, mask: Mask
 ) -> list[RendererRow]:
     """Return the rows for a Cycles method: one for each number of paths, and one for the mean image.
 
     The errors of the mean image are corrected for its noise.
     """
-    reference, rows = renders.reference, []
-    for level in zip(*renders.cycles[subsurface_method], strict=True):
+    reference, rows = peer_renders.reference, []
+    for level in zip(*peer_renders.cycles[subsurface_method], strict=True):
         pairs = [(one.image, reference.image, mask, reference.variance) for one in level]
         error = np.mean([relative_rmse(*one) for one in pairs], axis=0).tolist()
         energy = np.mean([energy_ratio(*one) for one in pairs], axis=0).tolist()
@@ -207,7 +207,7 @@ def _cycles_rows(
 
 
 def _equal_error_costs(
-    renders: PeerRenders, mean_image: MeanImage, dermis_row: RendererRow, mask: Mask
+    peer_renders: PeerRenders, mean_image: MeanImage, dermis_row: RendererRow, mask: Mask
 ) -> JsonObject:
     """Return the times in which the random walk of Cycles reaches the error of dermis, and a low noise.
 
@@ -216,7 +216,7 @@ def _equal_error_costs(
 
     dermis_row : row of dermis; its error against the reference is the target for Cycles
     """
-    reference, levels = renders.reference, list(zip(*renders.cycles["random-walk"], strict=True))
+    reference, levels = peer_renders.reference, list(zip(*peer_renders.cycles["random-walk"], strict=True))
     bias = relative_rmse(
         mean_image.image, reference.image, mask, reference.variance, mean_image.variance
     ).value
@@ -250,12 +250,12 @@ def _cycles_cost(
     return {"samples": paths_per_pixel, "seconds": seconds, **ratios}
 
 
-def _energy_corrected_error(renders: PeerRenders, variant_name: str, mask: Mask) -> float:
+def _energy_corrected_error(peer_renders: PeerRenders, variant_name: str, mask: Mask) -> float:
     """Return the relative RMSE of an image by dermis whose channels are scaled to the reference's energy [-].
 
     variant_name : name of the variant of dermis
     """
-    reference, image = renders.reference, renders.ours[variant_name].image.astype(np.float64)
+    reference, image = peer_renders.reference, peer_renders.ours[variant_name].image.astype(np.float64)
     scale = reference.image[mask].sum(axis=0, dtype=np.float64) / image[mask].sum(axis=0)
     return relative_rmse(image * scale, reference.image, mask, reference.variance).value
 

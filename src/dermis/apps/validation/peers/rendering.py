@@ -123,7 +123,7 @@ class PeerRenders:
 def render_peers(
     head: Head,
     light: str,
-    plan: PeerPlan,
+    comparison_plan: PeerPlan,
     renderer: Renderer,
     on_progress: Callable[[int], None] = lambda step_count: None,
 ) -> PeerRenders:
@@ -134,7 +134,7 @@ def render_peers(
     on_progress : function called with the number of steps since its last call
     """
     medium = published_media()["skin1"].with_eta(1.0)
-    settings = Settings(size=(plan.side, plan.side))
+    settings = Settings(size=(comparison_plan.side, comparison_plan.side))
     cycles: dict[str, list[list[CyclesPass]]] = {method: [] for method in CYCLES_METHODS}
     ours: dict[str, FrameTimes] = {}
     left_out: dict[str, str] = {}
@@ -146,19 +146,23 @@ def render_peers(
     with TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES), scene_context as (scene, _):
         for seed in FIRST_SEED_BY_TURN:
             for method in CYCLES_METHODS:
-                _time_frames(ours, renderer, scene, plan)
+                _time_frames(ours, renderer, scene, comparison_plan)
                 on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
                 try:
-                    cycles[method].append(_cycles_passes(scene, medium, plan, settings, method, seed))
+                    cycles[method].append(
+                        _cycles_passes(scene, medium, comparison_plan, settings, method, seed)
+                    )
                 except DermisError as fault:
                     left_out[method] = str(fault)
-                on_progress(_PROGRESS_STEPS_BY_RENDERER[method] * sum(plan.samples))
-        _time_frames(ours, renderer, scene, plan)
+                on_progress(_PROGRESS_STEPS_BY_RENDERER[method] * sum(comparison_plan.samples))
+        _time_frames(ours, renderer, scene, comparison_plan)
         on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
         cpu_started = time.process_time()
-        reference = path_trace(scene, medium, plan.paths, settings, use_cache=False, progress=report_pass)
+        reference = path_trace(
+            scene, medium, comparison_plan.paths, settings, use_cache=False, progress=report_pass
+        )
         core_seconds = time.process_time() - cpu_started
-        _time_frames(ours, renderer, scene, plan)
+        _time_frames(ours, renderer, scene, comparison_plan)
         on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
     complete = {method: turns for method, turns in cycles.items() if method not in left_out}
     return PeerRenders(light, default_region(light), ours, complete, left_out, reference, core_seconds)
@@ -167,7 +171,7 @@ def render_peers(
 def _cycles_passes(
     scene: Scene,
     medium: Medium,
-    plan: PeerPlan,
+    comparison_plan: PeerPlan,
     settings: Settings,
     subsurface_method: SubsurfaceMethod,
     first_seed: int,
@@ -179,12 +183,12 @@ def _cycles_passes(
     first_seed : random seed of the first pass
     """
     return cycles_passes(
-        scene, medium, (1, *plan.samples), settings, method=subsurface_method, seed=first_seed
+        scene, medium, (1, *comparison_plan.samples), settings, method=subsurface_method, seed=first_seed
     )[1:]
 
 
 def _time_frames(
-    dermis_frames: dict[str, FrameTimes], renderer: Renderer, scene: Scene, plan: PeerPlan
+    dermis_frames: dict[str, FrameTimes], renderer: Renderer, scene: Scene, comparison_plan: PeerPlan
 ) -> None:
     """Draw and time frames of each variant of dermis; each frame recomputes all stages.
 
@@ -192,12 +196,12 @@ def _time_frames(
     """
     for name, variant in (DERMIS_VARIANTS | GPU_GEMS_3_VARIANTS).items():
         values = {"technique": variant.technique, "atlas": variant.atlas}
-        settings = Settings.model_validate(values | {"size": (plan.side, plan.side)})
+        settings = Settings.model_validate(values | {"size": (comparison_plan.side, comparison_plan.side)})
         skin = Skin(**(scene.skin.model_dump() | {"direction": variant.direction}))
         variant_scene = replace(scene, skin=skin)
         drawn = renderer.draw(variant_scene, settings, force=True)
         frames = dermis_frames.setdefault(name, FrameTimes(drawn.linear()))
-        for _ in range(plan.frames):
+        for _ in range(comparison_plan.frames):
             started, cpu_started = time.perf_counter(), time.process_time()
             renderer.draw(variant_scene, settings, force=True)
             frames.seconds.append(time.perf_counter() - started)

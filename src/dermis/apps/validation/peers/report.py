@@ -73,7 +73,7 @@ def peers(
     print_lines(machine, "", scenes)
 
 
-def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) -> JsonObject:
+def compare_peers(head: str, lights: list[str], comparison_plan: PeerPlan, adapter: str) -> JsonObject:
     """Render and compare all scenes, and return the report as a JSON object.
 
     If Cycles cannot run, its rows are missing.
@@ -96,9 +96,9 @@ def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) ->
         def report_steps(step_count: int) -> None:
             nonlocal done
             done += step_count
-            bar(done, len(lights) * plan.progress_steps)
+            bar(done, len(lights) * comparison_plan.progress_steps)
 
-        scenes = [render_peers(loaded, light, plan, renderer, report_steps) for light in lights]
+        scenes = [render_peers(loaded, light, comparison_plan, renderer, report_steps) for light in lights]
     return {
         "date": date.today().isoformat(),
         "head": head,
@@ -107,7 +107,7 @@ def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) ->
         "adapter": renderer.device.adapter.name,
         "versions": software_versions(scenes),
         "denoising": False,
-        "plan": asdict(plan),
+        "plan": asdict(comparison_plan),
         "scenes": [scene_results(one) for one in scenes],
     }
 
@@ -186,8 +186,11 @@ def _scene_sentences(scene_report: JsonObject) -> list[str]:
     return sentences + [f"Skipped: {name}. {reason}" for name, reason in scene_report["left_out"].items()]
 
 
-def _random_walk_sentence(setting: str, cycles_times: dict[str, dict[str, float]]) -> str:
-    walk, clean = f"{setting}: Cycles' random walk", f"noise of 5 % takes {_cost_text(cycles_times['clean'])}"
+def _random_walk_sentence(dermis_setting: str, cycles_times: dict[str, dict[str, float]]) -> str:
+    walk, clean = (
+        f"{dermis_setting}: Cycles' random walk",
+        f"noise of 5 % takes {_cost_text(cycles_times['clean'])}",
+    )
     if "same_error" not in cycles_times:
         return f"{walk} never has as small an error, because its bias is larger; {clean}."
     same = cycles_times["same_error"]

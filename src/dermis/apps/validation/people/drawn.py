@@ -44,7 +44,7 @@ class DrawnPeople(NamedTuple):
     sex: Doubles
 
 
-def site_variables(look: SkinLook) -> Doubles:
+def site_skin_variables(look: SkinLook) -> Doubles:
     """Return the arguments (7, 4) of `model_spectra` for a skin look, one row for each of `HEAD_SITES`."""
     differences = np.vstack([np.zeros(3), look.sites.as_array()])
     cheek = np.log2([look.melanin, look.blood])
@@ -54,17 +54,17 @@ def site_variables(look: SkinLook) -> Doubles:
 
 
 @logged_step("drawing people")
-def draw_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
+def draw_random_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
     """Draw random people of a group, and compute their skin colours with the spectral model."""
     drawn = [Human.drawn(seed, skin_ancestry=group) for seed in seeds]
-    variables = np.concatenate([site_variables(one.look) for one in drawn])
+    variables = np.concatenate([site_skin_variables(one.look) for one in drawn])
     colours = model_lab(variables).reshape(len(drawn), len(HEAD_SITES), 3)
     return DrawnPeople(colours, np.array([one.age for one in drawn]), np.array([one.sex for one in drawn]))
 
 
-def draw_all_groups(seed_count: int = _SEED_COUNT) -> dict[str, DrawnPeople]:
+def draw_random_people_by_group(seed_count: int = _SEED_COUNT) -> dict[str, DrawnPeople]:
     """Return a dictionary from each group to randomly drawn people, with the same seeds for all groups."""
-    return {group: draw_people(group, range(seed_count)) for group in GROUP_OF_CODE.values()}
+    return {group: draw_random_people(group, range(seed_count)) for group in GROUP_OF_CODE.values()}
 
 
 def people(seeds: int = _SEED_COUNT) -> None:
@@ -91,7 +91,7 @@ def page(seeds: int = _SEED_COUNT) -> None:
 
 
 def _people_tables(seed_count: int) -> dict[str, str]:
-    archive, drawn = read_archive(), draw_all_groups(seed_count)
+    archive, drawn = read_archive(), draw_random_people_by_group(seed_count)
     return {
         "people_cheek": cheek_table(archive, drawn),
         "people_sites": sites_table(archive, drawn),

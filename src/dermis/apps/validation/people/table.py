@@ -88,7 +88,7 @@ def build_measured_table(archive: Archive, skin_variables: Doubles) -> dict[str,
 
     skin_variables : (n, 4) skin variables of the measurements, from `invert_spectra`
     """
-    cheek, y = person_medians(archive, skin_variables, _CHEEK_SITE_INDEX)
+    cheek, y = person_median_measurements(archive, skin_variables, _CHEEK_SITE_INDEX)
     sex, age = _sex_age_effects(cheek, y)
     ages, sexes = _random_ages_and_sexes()
     table_document: dict[str, Any] = {
@@ -123,7 +123,9 @@ def build_measured_table(archive: Archive, skin_variables: Doubles) -> dict[str,
     return table_document
 
 
-def person_medians(archive: Archive, skin_variables: Doubles, site_index: int) -> tuple[Archive, Doubles]:
+def person_median_measurements(
+    archive: Archive, skin_variables: Doubles, site_index: int
+) -> tuple[Archive, Doubles]:
     """Return the measurement of median lightness for each person at a site, and its skin variables (n, 4).
 
     skin_variables : skin variables of all measurements, from `invert_spectra`
@@ -183,9 +185,9 @@ def _site_differences(archive: Archive, skin_variables: Doubles) -> tuple[Double
     """
     shifts, counts = np.zeros((len(GROUP_OF_CODE), len(SITES), 3)), np.zeros((len(GROUP_OF_CODE), len(SITES)))
     slope, spread = np.zeros((len(SITES), 2)), np.zeros((len(SITES), 2))
-    cheek, y = person_medians(archive, skin_variables, _CHEEK_SITE_INDEX)
+    cheek, y = person_median_measurements(archive, skin_variables, _CHEEK_SITE_INDEX)
     for site in (k for k in range(len(SITES)) if k != _CHEEK_SITE_INDEX):
-        other, z = person_medians(archive, skin_variables, site)
+        other, z = person_median_measurements(archive, skin_variables, site)
         _, here, there = np.intersect1d(cheek.person, other.person, return_indices=True)
         difference, deviation = z[there, :3] - y[here, :3], y[here].copy()
         group = np.array([list(GROUP_OF_CODE).index(code) for code in cheek.group[here]])
@@ -261,7 +263,7 @@ class _Population(NamedTuple):
 
 
 def _calibrate_group(
-    table_document: dict[str, Any], group_name: str, group_archive: Archive, people: _Population
+    table_document: dict[str, Any], group_name: str, group_archive: Archive, random_people: _Population
 ) -> float:
     """Adjust the statistics of one group in place, as in `_calibrate_median_colours`.
 
@@ -270,12 +272,12 @@ def _calibrate_group(
     group = table_document["groups"][group_name]
     target, loss = np.median(group_archive.cielab[group_archive.site == _CHEEK_SITE_INDEX], axis=0), 0.0
     shift, error = _colour_matching_shift(
-        _drawn_cheek_variables(table_document, group_name, people)[1], target, 3
+        _drawn_cheek_variables(table_document, group_name, random_people)[1], target, 3
     )
     loss += float(error @ error)
     group["quantiles"] = _rounded_lists(np.array(group["quantiles"]) + shift[:, None])
-    found, y = _drawn_cheek_variables(table_document, group_name, people)
-    differences = found.site_differences({group_name: 1.0}, y, people.site_normals)
+    found, y = _drawn_cheek_variables(table_document, group_name, random_people)
+    differences = found.site_differences({group_name: 1.0}, y, random_people.site_normals)
     sites = np.array(group["sites"])
     for site in range(len(SITES)):
         measured = group_archive.site == site
@@ -290,12 +292,12 @@ def _calibrate_group(
 
 
 def _drawn_cheek_variables(
-    table_document: dict[str, Any], group: str, people: _Population
+    table_document: dict[str, Any], group: str, random_people: _Population
 ) -> tuple[MeasuredTable, Doubles]:
     """Return the parsed statistics, and skin variables (n, 4) at the cheek of people drawn from a group."""
     found, weights = parse_measured_table(table_document), {group: 1.0}
-    scores = people.normals @ symmetric_square_root(found.group_mean("correlation", weights)[:4, :4])
-    return found, found.cheek_variables(weights, people.sexes, people.ages, scores)
+    scores = random_people.normals @ symmetric_square_root(found.group_mean("correlation", weights)[:4, :4])
+    return found, found.cheek_variables(weights, random_people.sexes, random_people.ages, scores)
 
 
 def _colour_matching_shift(
@@ -380,7 +382,7 @@ def _cell_row(
     archive: Archive,
     skin_variables: Doubles,
     row_mask: NDArray[np.bool_],
-    cell_names: tuple[object, ...],
+    cell_labels: tuple[object, ...],
     has_covariance: bool = False,
 ) -> list[object]:
     colours, y = archive.cielab[row_mask], skin_variables[row_mask]
@@ -398,7 +400,7 @@ def _cell_row(
         if has_covariance and people > 2
         else ["", ""]
     )
-    return [*cell_names, people, int(row_mask.sum()), *values, *covariances]
+    return [*cell_labels, people, int(row_mask.sum()), *values, *covariances]
 
 
 def _pooled_cell_texts(measured_table: MeasuredTable, group: str, site_index: int) -> list[str]:

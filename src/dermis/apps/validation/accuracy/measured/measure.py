@@ -250,11 +250,11 @@ def _category_errors(
     return rows
 
 
-def _illuminant_errors(fits: dict[str, SpectralFit]) -> JsonObject:
+def _illuminant_errors(fits_by_unknown_count: dict[str, SpectralFit]) -> JsonObject:
     """Return percentiles of the colour differences between spectra and fits under each illuminant."""
     return {
         name: {light: _percentiles(fit.delta_e(colour_weights(light))) for light in ILLUMINANTS}
-        for name, fit in fits.items()
+        for name, fit in fits_by_unknown_count.items()
     }
 
 
@@ -319,8 +319,8 @@ def _jacques_model(parameter_values: ParameterValues) -> Floats:
     """Return the reflectance (n, 31) of skins with the baseline and scattering of [Jacques1998]."""
     bloodless, sigma_s_prime = baseline_absorption(WAVELENGTHS_NM), jacques_scattering(WAVELENGTHS_NM)
 
-    def parameter_column(name: str, default: float) -> Floats:
-        return np.asarray(parameter_values.get(name, np.float64(default)))[..., None]
+    def parameter_column(name: str, default_value: float) -> Floats:
+        return np.asarray(parameter_values.get(name, np.float64(default_value)))[..., None]
 
     m, b, oxygen = (
         parameter_column("melanin", 0.0),
