@@ -28,10 +28,10 @@ def test_chosen_axes_override_those_of_the_file() -> None:
     file = Axes("z", "x")
     assert Axes().fill_unknown_from(file) == Axes("z").fill_unknown_from(file) == file
     assert Axes(front="y").fill_unknown_from(file) == Axes("z", "y")
-    assert Axes("y").fill_unknown_from(file) == Axes("y") and Axes("y").fill_unknown_from(file).face == "z"
+    assert Axes("y").fill_unknown_from(file) == Axes("y") and Axes("y").fill_unknown_from(file).front_or_default == "z"
     assert Axes("y").fill_unknown_from(Axes(front="-z")) == Axes("y", "-z")
     assert Axes("-y").fill_unknown_from(Axes(front="-z")) == Axes("-y")
 
 
 def test_default_front_is_minus_y_with_z_up_and_plus_z_otherwise() -> None:
-    assert [Axes(up).face for up in ("y", "-y", "x", "z", "-z")] == ["z", "z", "z", "-y", "-y"]
+    assert [Axes(up).front_or_default for up in ("y", "-y", "x", "z", "-z")] == ["z", "z", "z", "-y", "-y"]

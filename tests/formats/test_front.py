@@ -42,7 +42,7 @@ def found(rigged: RiggedMesh) -> list[str]:
 @AXES
 def test_scan_is_rotated_to_face_the_viewer(tmp_path: Path, up: Axis, front: Axis) -> None:
     path = write_obj(tmp_path / "a.obj", in_file(person(), up, front))
-    rigged, usual = load_rigged(path, up=up), Axes(up).face
+    rigged, usual = load_rigged(path, up=up), Axes(up).front_or_default
     np.testing.assert_allclose(np.ptp(rigged.mesh.positions, axis=0), person().size_mm, rtol=1e-4)
     np.testing.assert_allclose(rigged.mesh.positions[:, 2].max(), person().positions[:, 2].max(), rtol=1e-4)
     note = f"its face looks along {front} and is turned to the viewer; --front={usual} keeps it as it is"

@@ -75,7 +75,7 @@ class DeformableMesh:
         displacement = np.zeros((len(self.rig.positions_mm), 3))
         for number, weight in enumerate(rest.tolist()):
             displacement += weight * self._control_displacements(number)
-        return (mesh.positions - self._refine_vectors(displacement)[mesh.point]).astype(np.float32)
+        return (mesh.positions - self._subdivide_vectors(displacement)[mesh.point]).astype(np.float32)
 
     @cached_property
     def normals(self) -> Floats:
@@ -91,7 +91,7 @@ class DeformableMesh:
         """Yield the morph targets in the order in which the rig lists them."""
         mesh = self.head.mesh
         for number in range(len(self.rig.targets.names)):
-            delta = self._refine_vectors(self._control_displacements(number))
+            delta = self._subdivide_vectors(self._control_displacements(number))
             delta[np.abs(delta).max(axis=1) < _MIN_DISPLACEMENT_MM] = 0.0
             delta_mm = delta[mesh.point].astype(np.float32)
             normal = self._normal_changes(delta_mm)
@@ -134,7 +134,7 @@ class DeformableMesh:
         displacement[targets.point[part]] = targets.delta_mm[part]
         return displacement
 
-    def _refine_vectors(self, control_vectors: Doubles) -> Doubles:
+    def _subdivide_vectors(self, control_vectors: Doubles) -> Doubles:
         """Interpolate vectors at control points (p, 3) to the points of the subdivided mesh, (q, 3)."""
         return (
             control_vectors
@@ -146,7 +146,7 @@ class DeformableMesh:
 def point_bone_influences(rig: Rig, subdivision_matrix: csr_array | None) -> tuple[Index, Doubles]:
     """Return four bone indices and weights for each of q mesh points, (q, 4) each; weights sum to 1.
 
-    subdivision_matrix : (q, p) subdivision matrix from control points to mesh points; None without subdivision
+    subdivision_matrix : (q, p) matrix from control points to mesh points; None without subdivision
 
     Without subdivision, the weights of the rig are kept. With subdivision, four bones and their weights are
     fitted. The fit minimises the squared distance between the skinned mesh point and the point that

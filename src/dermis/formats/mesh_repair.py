@@ -83,14 +83,14 @@ class RawMesh:
         return build_mesh(*arrays, materials, self.normals, self.point, self.quads)
 
     @cached_property
-    def corners(self) -> Index:
+    def corner_points(self) -> Index:
         """Return the point index at each corner of the triangles, (f, 3)."""
         return self.point[self.triangles].astype(np.int64)
 
     @cached_property
     def sides(self) -> _Sides:
         """Return the sides of the triangles, grouped by edge."""
-        return _group_sides(self.corners)
+        return _group_sides(self.corner_points)
 
     def with_triangles(self, triangle_mask: Mask) -> RawMesh:
         """Return the mesh with the triangles that a mask (f,) selects."""
@@ -156,9 +156,9 @@ def repair_mesh(
     if flat.mean() > _MAX_FLAT_FRACTION:
         return mesh, ()
     repaired = _turn_outwards(_separate_sheets(_drop_triangles(mesh, flat, is_skin, notes), notes), notes)
-    return _move_uv(repaired if repaired is mesh else repaired.without_unused(), materials, notes), tuple(
-        notes
-    )
+    return _move_uv_charts(
+        repaired if repaired is mesh else repaired.without_unused(), materials, notes
+    ), tuple(notes)
 
 
 def _count_with_noun(item_count: int, noun: str) -> str:
@@ -176,7 +176,7 @@ def _drop_triangles(mesh: RawMesh, flat_mask: Mask, is_skin: Mask, notes: list[s
     if flat_mask.any():
         notes.append(f"left out {_count_with_noun(int(flat_mask.sum()), 'triangle')} without area")
         mesh = mesh.with_triangles(~flat_mask)
-    key = triangle_keys(mesh.corners, int(mesh.point.max()) + 1)
+    key = triangle_keys(mesh.corner_points, int(mesh.point.max()) + 1)
     ordered = np.sort(key)
     if (ordered[1:] == ordered[:-1]).any():
         order = np.lexsort((np.arange(len(key)), mesh.material, key))
@@ -271,7 +271,7 @@ def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
         kept[np.concatenate((sides.manifold_pairs, _pair_continuing_sides(mesh, max_pairs_per_edge=1)))] = (
             True
         )
-        apart, corners = ~kept.reshape(-1, 3).all(axis=1), mesh.corners.copy()
+        apart, corners = ~kept.reshape(-1, 3).all(axis=1), mesh.corner_points.copy()
         corners[apart] = corners.max() + 1 + np.arange(3 * int(apart.sum())).reshape(-1, 3)
         mesh = mesh.with_corner_points(corners)
     return mesh
@@ -338,7 +338,7 @@ def _split_points(mesh: RawMesh, side_pairs: Index) -> Index:
 
     side_pairs : (n, 2) pairs of triangle sides that stay connected
     """
-    sides, flat = mesh.sides, mesh.corners.ravel()
+    sides, flat = mesh.sides, mesh.corner_points.ravel()
     crowded = sides.side[sides.first[sides.counts > 2]]
     busy = np.zeros(int(flat.max()) + 1, bool)
     busy[sides.start[crowded]] = busy[sides.end[crowded]] = True
@@ -540,7 +540,7 @@ def _inside_out_components(
     return np.asarray((balance < -_MIN_VISIBILITY_BALANCE) | opposed | ((balance == 0) & backs_prevail))
 
 
-def _move_uv(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: list[str]) -> RawMesh:
+def _move_uv_charts(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: list[str]) -> RawMesh:
     """Return the mesh with uv charts moved by whole tiles to [0, 1]; charts that do not fit stay in place.
 
     The uv of charts that fit are clamped to [0, 1].

@@ -55,7 +55,7 @@ def parse_obj(path: Path, obj_text: str) -> MeshFile:
     known = [library.materials.get(pair[0]) for pair in geometry.pairs]
     colours = [DEFAULT_COLOUR if own is None else own.colour or DEFAULT_COLOUR for own in known]
     groups = [MaterialGroup(name, colour) for name, colour in zip(names, colours, strict=True)]
-    parts = geometry.polygons.parts(groups, geometry.pair, "by polygon")
+    parts = geometry.polygons.mesh_parts(groups, geometry.pair, "by polygon")
     used, none = {part.group for part in parts}, np.empty((0, 3))
     empty = [MeshPart(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in used]
     assigned, materials, notes = with_materials(path, [*parts, *empty], library)

@@ -198,7 +198,7 @@ def read_ply(path: Path) -> MeshFile:
     elif picture is not None:
         notes.append(f"its picture {picture} is not in its folder. Put it there, or set it with --colour")
     group = MaterialGroup((path.stem,), material=0 if materials else -1)
-    parts = polygons.parts([group], np.zeros_like(counts), "by kind")
+    parts = polygons.mesh_parts([group], np.zeros_like(counts), "by kind")
     return MeshFile(parts, materials=materials, notes=tuple(notes))
 
 

@@ -42,7 +42,7 @@ class Polygons:
         """Return the mask (n,) of polygons whose corners all have uv."""
         return np.minimum.reduceat(self.corners[:, 1], np.cumsum(self.counts) - self.counts) >= 0
 
-    def parts(
+    def mesh_parts(
         self, groups: Sequence[MaterialGroup], group_index: Index, triangle_order: TriangleOrder
     ) -> list[MeshPart]:
         """Return a mesh part for each group that has polygons, in the order of the groups' first polygons.

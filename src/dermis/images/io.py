@@ -326,18 +326,22 @@ def write_png(path: str | Path, pixel_levels: Numbers, zlib_level: int = 6) -> N
         temporary.write_bytes(data)
 
 
-def write_exr(path: str | Path, linear: NDArray[np.floating], use_run_length_encoding: bool = False) -> None:
+def write_exr(
+    path: str | Path, linear_picture: NDArray[np.floating], use_run_length_encoding: bool = False
+) -> None:
     """Write a float32 OpenEXR file with lossless compression.
 
-    linear : (H, W, 3) or (H, W, 4), linear Rec. 709, stored as channels R, G, B (and A)
+    linear_picture : (H, W, 3) or (H, W, 4), linear Rec. 709, stored as channels R, G, B (and A)
     use_run_length_encoding : whether to use run-length encoding instead of ZIP, which is twice as fast; files
         of a rendered head are then 4 % larger
     """
     import OpenEXR
 
-    if linear.ndim != 3 or linear.shape[2] not in (3, 4):
-        refuse(path, "pixels (H, W, 3 or 4)", f"they have shape {linear.shape}", "Stack them first")
-    channels = {"RGB" if linear.shape[2] == 3 else "RGBA": np.ascontiguousarray(linear, np.float32)}
+    if linear_picture.ndim != 3 or linear_picture.shape[2] not in (3, 4):
+        refuse(path, "pixels (H, W, 3 or 4)", f"they have shape {linear_picture.shape}", "Stack them first")
+    channels = {
+        "RGB" if linear_picture.shape[2] == 3 else "RGBA": np.ascontiguousarray(linear_picture, np.float32)
+    }
     with atomic_write.atomic_file(path) as temporary:
         OpenEXR.File(_exr_header(use_run_length_encoding), channels).write(str(temporary))
 

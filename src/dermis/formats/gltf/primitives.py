@@ -167,7 +167,7 @@ def _vertex_attributes(
 
 
 def _bone_attributes(
-    buffer_builder: BufferBuilder, deformable: DeformableMesh, vertex_index: NDArray[np.integer]
+    buffer_builder: BufferBuilder, deformable_mesh: DeformableMesh, vertex_index: NDArray[np.integer]
 ) -> dict[str, int]:
     """Append joints and weights of vertices to the buffer; return accessor indices by attribute name.
 
@@ -175,9 +175,9 @@ def _bone_attributes(
 
     The result is empty for a mesh without a skeleton.
     """
-    if deformable.rig.skeleton is None:
+    if deformable_mesh.rig.skeleton is None:
         return {}
-    bone, weight = deformable.bone_influences
+    bone, weight = deformable_mesh.bone_influences
     return {
         "JOINTS_0": buffer_builder.add_accessor(bone[vertex_index], VERTEX_TARGET),
         "WEIGHTS_0": buffer_builder.add_accessor(weight[vertex_index], VERTEX_TARGET),

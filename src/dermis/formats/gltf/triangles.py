@@ -104,7 +104,7 @@ def read_gltf(path: Path) -> MeshFile:
     armature, weights = read_armature(document, nodes), default_weights(document, nodes)
     materials = read_materials(document)
     reader = _SceneReader(document, nodes, armature, weights, materials, avatar)
-    parts, bones = list(reader.parts()), armature.bones if armature else None
+    parts, bones = list(reader.read_parts()), armature.bones if armature else None
     notes = (*note_unread(document, nodes, _READ_EXTENSIONS), *avatar.notes, *reader.notes)
     return MeshFile(parts, bones, weights, materials, notes, axes=avatar.axes)
 
@@ -137,7 +137,7 @@ class _SceneReader:
     avatar: vrm.Avatar
     notes: dict[str, None] = field(default_factory=dict)
 
-    def parts(self) -> Iterator[MeshPart]:
+    def read_parts(self) -> Iterator[MeshPart]:
         """Yield each triangle primitive of the scene as a mesh part; check the scene's total size."""
         counts = dict.fromkeys(_MAX_SCENE_COUNTS, 0)
         for part in self._all_parts():

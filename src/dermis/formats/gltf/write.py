@@ -92,7 +92,7 @@ def encode_head(
 
 
 def _primitive_sources(
-    deformable: DeformableMesh,
+    deformable_mesh: DeformableMesh,
     pictures: dict[str, bytes],
     map_entries: FrozenTree,
     roughness: float,
@@ -103,7 +103,7 @@ def _primitive_sources(
     pictures : PNG files by name; this function adds the pictures of eyes, hairs and parts that are not skin
     map_entries : description of the maps for the extras of the skin material, see `encode_skin_maps`
     """
-    head = deformable.head
+    head = deformable_mesh.head
     eye_materials = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
     if eyes is not None and eye_materials:
         pictures |= encode_eye_pictures(eyes)
@@ -113,7 +113,7 @@ def _primitive_sources(
     parts, materials = list[PrimitiveSource](), list[Tree]()
     for index in np.unique(head.mesh.material).tolist():
         eye = eye_materials.index(index) if index in eye_materials else -1
-        parts.append(SurfacePrimitive(deformable, np.flatnonzero(head.mesh.material == index), eye))
+        parts.append(SurfacePrimitive(deformable_mesh, np.flatnonzero(head.mesh.material == index), eye))
         own = head.mesh.materials[index]
         if eye >= 0:
             materials.append(eye_material(own))
@@ -124,7 +124,7 @@ def _primitive_sources(
     for name, strands in ((BROWS, head.strands), (HAIR, hair_strands(head))):
         if strands is not None and len(strands):
             fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_EXPORTED_HAIRS, _KNOTS_PER_HAIR[name])
-            parts.append(HairPrimitive(deformable, fibres))
+            parts.append(HairPrimitive(deformable_mesh, fibres))
             materials.append(hair_material(name))
             pictures[name] = encode_colours_png(fibres.colours()[0])
     return parts, materials
@@ -138,7 +138,7 @@ def _gltf_asset(head: Head, notes: FrozenTree | None) -> Tree:
 
 
 def _gltf_mesh(
-    deformable: DeformableMesh,
+    deformable_mesh: DeformableMesh,
     buffer_builder: BufferBuilder,
     primitive_sources: list[PrimitiveSource],
     weights: Mapping[str, float],
@@ -151,11 +151,11 @@ def _gltf_mesh(
         source.add_primitive(buffer_builder) | {"material": number}
         for number, source in enumerate(primitive_sources)
     ]
-    mesh: Tree = {"name": _mesh_name(deformable.head), "primitives": primitives}
-    names, rest = deformable.rig.targets.names, deformable.rig.targets.rest
+    mesh: Tree = {"name": _mesh_name(deformable_mesh.head), "primitives": primitives}
+    names, rest = deformable_mesh.rig.targets.names, deformable_mesh.rig.targets.rest
     if not names:
         return mesh
-    for target in deformable.targets():
+    for target in deformable_mesh.targets():
         for primitive, source in zip(primitives, primitive_sources, strict=True):
             primitive.setdefault("targets", []).append(source.add_target(buffer_builder, target))
     resting = {} if rest is None else dict(zip(names, rest.tolist(), strict=True))

@@ -206,7 +206,7 @@ def check_weights(culprits: Sequence[object], shape_names: Sequence[str], shape_
         refuse(culprits[row], expected, actual, "Correct or remove the line")
 
 
-def check_size(culprit: object, frame_count: int, column_count: int) -> None:
+def check_capture_size(culprit: object, frame_count: int, column_count: int) -> None:
     """Refuse a capture with too many frames or too many columns.
 
     frame_count : number of frames read so far

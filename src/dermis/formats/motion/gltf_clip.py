@@ -26,12 +26,12 @@ class _BoneTransforms(NamedTuple):
     scale: Doubles
 
 
-class _TrackOfHead(NamedTuple):
+class _MatchedTrack(NamedTuple):
     """Animation curve of a track, with n of its bones or morph targets: those that the head also has.
 
     path : "translation", "rotation", "scale" or "weights"
     columns : (n,) indices of these bones or morph targets in the track
-    indices : (n,) indices of their names in the result of `_animated_names_of_head`
+    indices : (n,) indices of their names in the result of `_matched_names`
     """
 
     path: str
@@ -50,15 +50,13 @@ def load_gltf_clip(path: Path, head: Head, clip_name: str | None) -> Clip:
     Raises DermisError for a damaged clip, and if no name matches the head.
     """
     clip, skeleton = read_clip(path, clip_name), head.control.skeleton
-    bones = _animated_names_of_head([track for track in clip.tracks if track.path != "weights"], head.bones)
-    targets = _animated_names_of_head(
-        [track for track in clip.tracks if track.path == "weights"], head.targets
-    )
+    bones = _matched_names([track for track in clip.tracks if track.path != "weights"], head.bones)
+    targets = _matched_names([track for track in clip.tracks if track.path == "weights"], head.targets)
     names = tuple(dict.fromkeys(name for track in clip.tracks for name in track.names))
     if not bones and not targets:
         refuse_unmatched_motion(f"{path}: clip {clip.name!r}", names, head)
     used_tracks = [
-        _track_of_head(track, targets if track.path == "weights" else bones) for track in clip.tracks
+        _match_track(track, targets if track.path == "weights" else bones) for track in clip.tracks
     ]
     rest = _rest_transforms(skeleton, bones) if skeleton is not None and bones else None
 
@@ -84,16 +82,18 @@ def load_gltf_clip(path: Path, head: Head, clip_name: str | None) -> Clip:
     return Clip(clip.name, end, rate, tuple(targets), tuple(bones), unused, sample)
 
 
-def _animated_names_of_head(tracks: list[AnimationTrack], head_names: tuple[str, ...]) -> list[str]:
+def _matched_names(tracks: list[AnimationTrack], head_names: tuple[str, ...]) -> list[str]:
     """Return the names of animated bones or morph targets that the head has, without duplicates."""
     return [
         name for name in dict.fromkeys(name for track in tracks for name in track.names) if name in head_names
     ]
 
 
-def _track_of_head(track: AnimationTrack, used_names: list[str]) -> _TrackOfHead:
+def _match_track(track: AnimationTrack, used_names: list[str]) -> _MatchedTrack:
     columns = [k for k, name in enumerate(track.names) if name in used_names]
-    return _TrackOfHead(track.path, track.curve, columns, [used_names.index(track.names[k]) for k in columns])
+    return _MatchedTrack(
+        track.path, track.curve, columns, [used_names.index(track.names[k]) for k in columns]
+    )
 
 
 def _rest_transforms(skeleton: Skeleton, bones: list[str]) -> _BoneTransforms:

@@ -26,7 +26,7 @@ from dermis.formats.motion.captures import (
     CaptureSamples,
     RotationBones,
     capture_clip,
-    check_size,
+    check_capture_size,
     check_weights,
     fill_gaps,
     find_rotation_bones,
@@ -122,7 +122,7 @@ def _read_table(path: Path, fps: float | None) -> _CaptureTable:
             times.append("" if time is None else row[time].strip().replace(",", "."))
             states_shapes.append(count is not None and row[count].strip() not in ("", "0"))
             rows.append(_row_values(culprit, header, row, columns))
-            check_size(path, len(rows), len(columns))
+            check_capture_size(path, len(rows), len(columns))
     if not rows:
         refuse(path, f"{expected} with a header and rows", "it has only its header", "Export it again")
     times_s = _row_times(path, lines, times, None if time is None else keys[time], fps)
@@ -153,7 +153,7 @@ def _check_row(culprit: str, header: Sequence[str], table_row: list[str], count_
 
 
 def _check_header(culprit: str, header: Sequence[str]) -> None:
-    check_size(culprit, 0, len(header))
+    check_capture_size(culprit, 0, len(header))
     folded = [name.casefold() for name in header if name]
     repeated = [name for name in header if name and folded.count(name.casefold()) > 1]
     if repeated:

@@ -24,7 +24,7 @@ from dermis.formats.motion.captures import (
     CaptureSamples,
     RotationBones,
     capture_clip,
-    check_size,
+    check_capture_size,
     check_weights,
     fill_gaps,
     find_rotation_bones,
@@ -102,7 +102,7 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     record: object = None
     for index, (culprit, record) in enumerate(records):
         frames.append(_parse_frame(culprit, index, record, columns))
-        check_size(path, len(frames), len(columns))
+        check_capture_size(path, len(frames), len(columns))
     lost, several = sum(frame.faces == 0 for frame in frames), sum(frame.faces > 1 for frame in frames)
     if lost == len(frames):
         found = ", ".join(record) if isinstance(record, dict) and record else "nothing"

@@ -123,7 +123,7 @@ def _mesh_parts(
         mesh.get("normals", none),
         mesh.get("colours"),
     )
-    return geometry.parts(groups, mesh["group"][kept][polygons], "by polygon"), notes + missing_uv_notes(
+    return geometry.mesh_parts(groups, mesh["group"][kept][polygons], "by polygon"), notes + missing_uv_notes(
         geometry
     )
 

@@ -149,7 +149,7 @@ def skin_material(
 
 
 def untextured_part_material(material: Material) -> OpenPbrMaterial:
-    """Return the OpenPBR material of a part of the head that is not skin, such as teeth, tongue or lashes."""
+    """Return the OpenPBR material, without textures, of a part of the head such as the teeth or lashes."""
     name = material.name.casefold()
     roughness = next(
         (value for part, value in _ROUGHNESS_BY_KIND.items() if part in name), _DEFAULT_PART_ROUGHNESS
