@@ -1,4 +1,4 @@
-"""Fitting of other programs' diffusion profiles to a skin's reference profile, and errors of the fits."""
+"""Fits of other programs' diffusion profiles to a skin's reference profile, and the errors of these fits."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def fit_radius_scale(reference_profile: CumulativeProfile, unit_profile: Cumulat
 
     In each channel, the largest difference between the scaled and the reference profile is minimised.
 
-    unit_profile : cumulative profile to scale, for a length of 1
+    unit_profile : cumulative profile to scale, whose radii are in units of the returned lengths
     """
     middle = np.log(reference_profile.radius_at_fraction(0.5) / unit_profile.radius_at_fraction(0.5))
     return _fit_radius_scale_in_range(
@@ -129,7 +129,8 @@ def fit_homogeneous_medium(
 ) -> HomogeneousMedium:
     """Return the homogeneous medium whose cumulative profile is closest to a reference profile.
 
-    energy : (3,) light that leaves the medium per incident light [-]; by default that of the reference
+    energy : (3,) light that leaves the medium per incident light [-]; by default the energy of the reference
+        profile
     half_space_kind : surface and illumination of the half-space, see `half_space`
     """
     albedo = tabulated_albedo(half_space_kind, reference_profile.energy if energy is None else energy)

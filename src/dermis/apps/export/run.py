@@ -1,4 +1,4 @@
-"""Export of a skin or head to another program, with a report of how wrongly the program renders the skin."""
+"""Export of a skin or head to another program, with a report of the predicted errors of the rendered skin."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def export_skin(
     adapter: str = "auto",
     **head: Any,
 ) -> ExportReport:
-    """Write a skin or a head for another program, and report how wrongly the program will render the skin.
+    """Write a skin or a head for another program, and report the predicted errors of the rendered skin.
 
     Parameters
     ----------

@@ -38,9 +38,9 @@ class MotionFile:
 class MotionPlayer:
     """Player of a motion, which knows the current time in the motion and the state to display.
 
-    While the motion plays, its current pose is displayed instead of the pose of the state; the rest of the
-    state can still be changed. When the motion pauses or ends, its current pose becomes a step of the undo
-    history.
+    While the motion plays, its current pose is displayed instead of the pose of the viewer state; everything
+    else in the state can be changed. When the motion pauses or ends, its current pose becomes a step of the
+    undo history.
 
     motion : motion to play; None if there is no motion
     clock : function that returns the time [s]

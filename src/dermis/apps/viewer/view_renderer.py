@@ -1,4 +1,4 @@
-"""Rendering of viewer states: images, adaptive quality in motion, and preparation of new heads."""
+"""Rendering of viewer states, at reduced quality while the picture changes; preparation of new heads."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ class Pointer(_InputMessage):
 
 
 class Wheel(_InputMessage):
-    """Event of the mouse wheel, in pixels of the browser."""
+    """Event of the mouse wheel, in CSS pixels."""
 
     type: Literal["wheel"]
     x: Coordinate

@@ -36,8 +36,8 @@ class Uploads:
 
     app : application that handles all other requests
     canvas : canvas of the page; it issues the ticket required for an upload, and opens each received file
-    folder : folder for the received files; the file names that pages send are only displayed, and not used in
-        paths
+    upload_folder : folder for the received files; the file names that pages send are only displayed, and not
+        used in paths
     """
 
     def __init__(self, app: App, canvas: PageCanvas, upload_folder: Path) -> None:

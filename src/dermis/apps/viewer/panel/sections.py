@@ -238,7 +238,7 @@ def draw_motion_controls(session: Session) -> None:
 
 
 def _animated_names(session: Session) -> frozenset[str]:
-    """Return the names of all morph targets and bones that the playing motion sets, to lock their sliders."""
+    """Return the names of morph targets and bones that the playing motion sets; their sliders are locked."""
     clip = session.player.clip if session.player.is_playing else None
     return frozenset() if clip is None else frozenset((*clip.targets, *clip.bones))
 

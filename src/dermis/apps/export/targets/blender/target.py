@@ -133,7 +133,7 @@ def random_walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> 
 def _interpolate_random_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Floats, Floats]:
     """Return radii [mean free paths] and the fraction of light within each radius [-], for one albedo.
 
-    The fractions are interpolated in a table. There are eight times as many radii as in the table.
+    The fractions are interpolated from a table, at eight times as many radii as in the table.
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -149,8 +149,8 @@ def _interpolate_random_walk_table(albedo: float, walk_entry: WalkEntry) -> tupl
 def _load_random_walk_tables() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
     """Return a table of Cycles' random walks for each way in which a walk enters the medium.
 
-    A table is a tuple of three arrays: n values of sqrt(1 - albedo) [-], m radii [mean free paths], and
-    fractions (n, m) of the light that leave the medium within each radius [-].
+    A table consists of three arrays: values of sqrt(1 - albedo) (n,) [-], radii (m,) [mean free paths], and
+    the fraction of light (n, m) that leaves the medium within each radius [-].
     """
     by_entry: dict[str, list[list[float]]] = {}
     for row in read_rows(__package__, "cycles_walk"):

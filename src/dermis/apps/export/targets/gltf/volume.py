@@ -82,7 +82,8 @@ def volume_profile(volume: Volume) -> CumulativeProfile:
 def fit_volume(reference_profile: CumulativeProfile, energy: Floats | None = None) -> Volume:
     """Return the volume whose cumulative profile is closest to a reference profile.
 
-    energy : (3,) light that leaves the volume per incident light [-]; by default that of the reference
+    energy : (3,) light that leaves the volume per incident light [-]; by default the energy of the reference
+        profile
     """
     medium = fit_homogeneous_medium(reference_profile, energy)
     return volume_from_mean_free_paths(medium.mfp_mm, multiscatter_colour(medium.albedo))

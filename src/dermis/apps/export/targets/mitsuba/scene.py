@@ -1,4 +1,4 @@
-"""Files of a Mitsuba scene; `mitsuba scene.xml -D boundary=rough` selects the surface of the skin."""
+"""Files of a Mitsuba scene; `mitsuba scene.xml -D boundary=rough` selects a surface model of the skin."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ _KIND_BY_PLUGIN = {plugin: kind for kind, plugins in _PLUGINS_BY_KIND.items() fo
 
 
 class Transform:
-    """Affine transformation; each method returns this transformation applied after another one."""
+    """Affine transformation; each method returns a combination of another transformation with this one."""
 
     def __init__(self, matrix: ArrayLike | None = None) -> None:
         self.matrix = np.eye(4) if matrix is None else np.asarray(matrix, np.float64).reshape(4, 4)
@@ -68,7 +68,7 @@ class Bitmap:
 class XmlBackend:
     """Substitute for the module `mitsuba` in functions that describe scenes; needs no installed Mitsuba.
 
-    bitmaps : images of the elements converted so far, in the order in which the images are written
+    bitmaps : images of all elements created so far, in the order of their file names
     """
 
     bitmaps: list[NDArray[np.float32]] = field(default_factory=list)
@@ -101,7 +101,7 @@ def object_element(description: Mapping[str, object], object_name: str, backend:
 
     description : properties of the object; "type" is the name of the plugin
     object_name : name of the object in the parent element; "" for an object without a name
-    backend : collector of the images that the description contains
+    backend : object that collects the images in the description
     """
     plugin = str(description["type"])
     node = ET.Element(_KIND_BY_PLUGIN[plugin], {"type": plugin, **_name_attributes(object_name, description)})

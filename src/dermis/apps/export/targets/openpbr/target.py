@@ -160,7 +160,7 @@ def fitted_mean_free_path_mm(subject: Subject) -> Floats:
 
 
 def published_mean_free_path_mm(subject: Subject) -> Floats:
-    """Return the diffuse mean free paths (3,) of the tissue by the dipole model [mm].
+    """Return the diffuse mean free paths (3,) that the dipole model gives for the tissue [mm].
 
     A diffuse mean free path is 1 / sigma_tr of the lowest layer, [Jensen2001]. If the coefficients of this
     layer are not given for RGB, the widths of the closest Burley profiles are returned instead.

@@ -121,8 +121,8 @@ def build_page_content(
 ) -> PageContent:
     """Capture the frames of all kinds of adapter, and return the data that the page embeds.
 
-    on_frames_captured : function called for each kind of adapter after its frames were captured; it receives
-        the renderer, whose maps are those of the page, the scene and the settings
+    on_frames_captured : function called for each kind of adapter after its frames were captured, with the
+        renderer (which then uses the maps of the page), the scene and the settings
     """
     content = PageContent()
     for adapter_kind in (one for one in ADAPTER_KINDS if request.sizes.get(one)):
