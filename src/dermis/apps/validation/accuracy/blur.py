@@ -149,10 +149,10 @@ def surface_tables(adapter: str) -> dict[str, str]:
 def sphere_blur_row(renderer: Renderer, radius_mm: float) -> str:
     """Return a Markdown row that compares three ways to blur light on a sphere.
 
-    They are the blur on the atlas, the heat equation on the sphere, and an integral over the sphere in which
-    the weight of a point depends on its Euclidean distance. Each blurs by the widest Gaussian of
-    `BLUR_PROFILE`. The irradiance is proportional to x, so that each blur multiplies it by a constant. The
-    row contains these constants.
+    They are the blur on the atlas, the heat equation on the sphere, and an integral over the sphere with
+    weights that depend on Euclidean distance. Each blurs by the widest Gaussian of `BLUR_PROFILE`. The
+    irradiance is proportional to x, so that each blur multiplies it by a constant. The row contains these
+    constants.
     """
     from atlas_reading import shown
     from cut_meshes import cut_sphere

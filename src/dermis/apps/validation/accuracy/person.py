@@ -95,7 +95,7 @@ class Measurement:
     person : key of `_PEOPLE`
     view : key of `ALL_VIEWS`
     truth : kind of path-traced reference, one of `comparisons.person.TRUTHS`
-    cause : cause of error that is left out of both pictures, or None
+    cause : cause of error that both renderers leave out, or None
     """
 
     person: PersonName

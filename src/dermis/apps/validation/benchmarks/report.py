@@ -87,8 +87,8 @@ def row_cells(benchmark_row: BenchmarkRow) -> tuple[str, ...]:
 def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
     """Return a table of the stages of the base frame, with column titles as its first row.
 
-    The columns are the device time, its lower bound, the ratio of the two, and the device times of the frame
-    when it is drawn with the passes of GPU Gems 3.
+    The first columns are the device time, its lower bound, and the ratio of the two. Further columns have the
+    device times of frames drawn with the passes of GPU Gems 3.
     """
     if benchmark.base_row is None:
         return []

@@ -133,7 +133,7 @@ def shared_skin(renderer: Renderer, head: Head, reference_kind: TruthName, folde
 class PersonSubject:
     """Scene of a person, and the textures of the skin for the path tracer.
 
-    cause : cause of error that is left out of both pictures, or None
+    cause : cause of error that both renderers leave out, or None
     """
 
     scene: Scene

@@ -236,8 +236,8 @@ def _category_errors(
 ) -> list[list[float]]:
     """Return the number of spectra and three median errors for each group of people or each site.
 
-    The errors are the colour errors of fits of two and of three unknowns, and the RMS difference between
-    measured and fitted spectra for five unknowns.
+    The first two are colour errors of fits of two and of three unknowns. The third is the RMS difference
+    between measured and fitted spectra for five unknowns.
 
     categories : all groups or all sites
     category_by_spectrum : (n,) group or site of each spectrum
