@@ -240,7 +240,7 @@ def _quadratic_error(
     hessian = np.zeros((len(points), descendant_matrix.shape[1], descendant_matrix.shape[1]))
     gradient = np.zeros(hessian.shape[:2])
     for bone in np.flatnonzero(descendant_matrix.any(axis=1)):
-        origin, moves = np.array(skeleton.origin_mm[bone]), descendant_matrix[bone]
+        origin, moves = np.array(skeleton.joint_positions_mm[bone]), descendant_matrix[bone]
         arm = points - origin
         target = np.asarray(
             subdivision_matrix @ (descendant_weights[:, bone, None] * (positions_mm - origin))

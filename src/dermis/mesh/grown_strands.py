@@ -83,7 +83,7 @@ def hair_cover(groom: Groom, mesh: Mesh) -> Doubles:
     return hair_cover_of_points(mesh, kept, 2.0 * part["radius_mm"] * np.minimum(length, _COVERING_LENGTH_MM))
 
 
-def absorbed_by_hair(groom: Groom) -> float:
+def mean_hair_absorptance(groom: Groom) -> float:
     """Return the mean fraction of diffuse light that a single hair absorbs [-].
 
     The mean is over the colour channels, and over scalp hair and beard.
@@ -114,13 +114,13 @@ def _posed_guides(groom: Groom, points_mm: NDArray[np.floating]) -> tuple[Double
     """
     guides = groom.guides
     a, b, c, d = np.moveaxis(points_mm.astype(np.float64)[guides.corner], -2, 0)
-    along = _unit((b - a) + (c - d))
+    along = _unit_vectors((b - a) + (c - d))
     across = np.cross(c - a, d - b)
-    normal = _unit(across - (across * along).sum(axis=-1, keepdims=True) * along)
+    normal = _unit_vectors(across - (across * along).sum(axis=-1, keepdims=True) * along)
     axes = np.stack([along, np.cross(normal, along), normal], axis=-2)
     knots = 0.25 * (a + b + c + d) + np.einsum("gkaic,gkai->gkac", axes, guides.local_mm)
     weight = guides.weight[..., None]
-    bound, outward = (weight * knots).sum(axis=2), _unit((weight * normal).sum(axis=2))
+    bound, outward = (weight * knots).sum(axis=2), _unit_vectors((weight * normal).sum(axis=2))
     moved, total = bound - guides.rest_mm[..., :3], 0.0
     smooth = np.zeros_like(moved)
     for step in range(-_SMOOTHING_KNOTS, _SMOOTHING_KNOTS + 1):
@@ -292,18 +292,18 @@ def _interpolate_guides(
         tangent += weight * (b - a)
         heights = (1.0 - part[..., 0]) * height_mm[guide, first] + part[..., 0] * height_mm[guide, first + 1]
         height += weight[..., 0] * heights
-    normal = _unit(normal)
+    normal = _unit_vectors(normal)
     near = 1.0 / (1.0 + (np.maximum(height, 0.0) / _LIFTED_HEIGHT_MM) ** 2)
     sag = near * np.maximum(square - (middle**2).sum(axis=-1), 0.0) / (2.0 * _HEAD_RADIUS_MM)
     position += sag[..., None] * normal
-    return _Curves(position, height, normal, _unit(tangent + 1e-9 * normal))
+    return _Curves(position, height, normal, _unit_vectors(tangent + 1e-9 * normal))
 
 
 def _cross_section_axes(curves: _Curves) -> tuple[Doubles, Doubles]:
     """Return two unit vectors (n, k, 3) at each point, orthogonal to the tangent and to each other."""
     side = np.cross(curves.tangent, curves.normal)
     upright = (side**2).sum(axis=-1, keepdims=True) < 0.08
-    side = _unit(np.where(upright, np.cross(curves.tangent, _FALLBACK_AXIS), side))
+    side = _unit_vectors(np.where(upright, np.cross(curves.tangent, _FALLBACK_AXIS), side))
     return side, np.cross(side, curves.tangent)
 
 
@@ -406,7 +406,7 @@ def _strand_absorption(strand_number: UInt32s, hair_parameters: NDArray[np.void]
     )
 
 
-def _unit(vectors: Doubles) -> Doubles:
+def _unit_vectors(vectors: Doubles) -> Doubles:
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))
 
 

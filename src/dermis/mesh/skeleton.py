@@ -58,7 +58,7 @@ class Skeleton(ShortRepr):
         return self.matrices().astype(np.float32)
 
     @cached_property
-    def origin_mm(self) -> list[list[float]]:
+    def joint_positions_mm(self) -> list[list[float]]:
         """Return the positions (b, 3) of the joints at rest, in head space [mm]."""
         origins: list[list[float]] = (self.to_head @ self._bone_to_file(self.local))[:, :3, 3].tolist()
         return origins
@@ -69,7 +69,7 @@ class Skeleton(ShortRepr):
         degrees : angles about x, y and z, see `angles_matrix`
         """
         (a, b, c), (d, e, f), (g, h, i) = angles_matrix(degrees)
-        x, y, z = self.origin_mm[bone_index]
+        x, y, z = self.joint_positions_mm[bone_index]
         p, q, r = x - a * x - b * y - c * z, y - d * x - e * y - f * z, z - g * x - h * y - i * z
         return [a, b, c, p, d, e, f, q, g, h, i, r, 0.0, 0.0, 0.0, 1.0]
 

@@ -35,7 +35,7 @@ _FLOAT_FIELDS = (
     "rope_mm", "braid", "curl_mm", "pitch_mm", "incoherence", "frizz_mm", "flyaways", "radius_mm", "cover",
     "grey", "hairs_per_strand",
 )  # fmt: skip
-PART_DTYPE = np.dtype(
+HAIR_PARAMETERS_DTYPE = np.dtype(
     [
         *((name, "f4") for name in _FLOAT_FIELDS),
         ("dark", "f4", 3),
@@ -66,7 +66,7 @@ def make_groom(
     tables = style_strands(scalp, bearded, root_finder, levels)
     parts = [_scalp_parameters(scalp, look, recession)] if scalp else []
     parts += [_beard_parameters(look)] if bearded else []
-    parameters, strands = np.array(parts, PART_DTYPE), round(hair_fraction * len(tables.roots))
+    parameters, strands = np.array(parts, HAIR_PARAMETERS_DTYPE), round(hair_fraction * len(tables.roots))
     heights, knots = hairline_heights(max(recession, scalp.crown if scalp else 0.0)), _knot_count(parameters)
     return Groom(tables.guides, tables.roots, parameters, strands, knots, heights, tables.centre_mm)
 
@@ -97,7 +97,7 @@ def _parameter_row(
     thinning: float = 0.0,
     hairline_effect: float = 0.0,
 ) -> tuple[object, ...]:
-    """Return the parameters of scalp hair or of a beard as a row of `PART_DTYPE`.
+    """Return the parameters of scalp hair or of a beard as a row of `HAIR_PARAMETERS_DTYPE`.
 
     densities : number of strand roots per area [1/cm2], number of real hairs per area [1/cm2], and fraction
         of the roots from which a strand grows
@@ -137,13 +137,13 @@ def _parameter_row(
         "white": tuple(absorption_per_mm(_MIN_EUMELANIN, 0.0)),
         "pad": 0.0,
     }
-    return tuple(values[name] for name in PART_DTYPE.names or ())
+    return tuple(values[name] for name in HAIR_PARAMETERS_DTYPE.names or ())
 
 
 def _knot_count(parameters: NDArray[np.void]) -> int:
     """Return a number of knots per strand that resolves the longest and most tightly curled strands.
 
-    parameters : (p,) rows of `PART_DTYPE`, for scalp hair and beard
+    parameters : (p,) rows of `HAIR_PARAMETERS_DTYPE`, for scalp hair and beard
     """
     lengths, pitches, curls, ropes = (
         parameters[name] for name in ("length_mm", "pitch_mm", "curl_mm", "rope_mm")

@@ -24,7 +24,10 @@ FIELD_RANGES = {
 # Artist's values.
 _TYPICAL_CURL = {"african": 0.95, "asian": 0.0, "caucasian": 0.2}
 _MIN_TIGHT_CURL = 0.6  # curl above which hair is worn in the styles of tightly coiled hair
-_BALD_CHANCES = {False: 0.01, True: 0.1}  # of women and of men; those of the styles are in styles.toml
+_BALD_CHANCE_BY_IS_MAN = {
+    False: 0.01,
+    True: 0.1,
+}  # of women and of men; those of the styles are in styles.toml
 _BALD_STYLE = Style("up", max_length_mm=500.0, length_mm=6.0)
 _MAX_BEARD_MM = 14.0
 _DARK_EUMELANIN = 3.0  # eumelanin above which shaved hair has full visibility
@@ -159,7 +162,9 @@ def _pick_style(uniform_sample: float, is_man: bool, is_tightly_coiled: bool) ->
     is_tightly_coiled : whether the hair is tightly coiled
     """
     worn = {name: one for name, one in styles().items() if (one.tight if is_tightly_coiled else one.loose)}
-    chances = np.array([_BALD_CHANCES[is_man], *(one.men if is_man else one.women for one in worn.values())])
+    chances = np.array(
+        [_BALD_CHANCE_BY_IS_MAN[is_man], *(one.men if is_man else one.women for one in worn.values())]
+    )
     index = int(np.searchsorted(np.cumsum(chances) / chances.sum(), uniform_sample, side="right"))
     return ("none", *worn)[min(index, len(worn))]
 

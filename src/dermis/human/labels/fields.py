@@ -26,7 +26,7 @@ from dermis.mesh.strands import quad_corners
 
 Doubles = NDArray[np.float64]
 
-HUMAN_FIELDS = (
+HUMAN_FIELD_CLASSES = (
     "right_ear",
     "left_ear",
     "mouth_interior",
@@ -55,7 +55,7 @@ _LABEL_CACHE_LOCK = Lock()
 
 @cache
 def label_fields() -> Doubles:
-    """Return signed distances (k, p) of control points to the borders of the classes in `HUMAN_FIELDS` [mm].
+    """Return signed distances (k, p) of control points to the borders of `HUMAN_FIELD_CLASSES` [mm].
 
     Distances are positive inside a class.
     """
@@ -76,7 +76,7 @@ def label_fields() -> Doubles:
     for name, values in (("ear", _ear_field()), ("eye", -lids), ("brow", _brow_field(points))):
         fields[f"left_{name}"] = np.where(left, values, _FIELD_OUTSIDE_CLASS_MM)
         fields[f"right_{name}"] = np.where(left, _FIELD_OUTSIDE_CLASS_MM, values)
-    return np.stack([fields[name] for name in HUMAN_FIELDS])
+    return np.stack([fields[name] for name in HUMAN_FIELD_CLASSES])
 
 
 def dense_label_fields() -> tuple[Doubles, Doubles]:
@@ -88,7 +88,7 @@ def dense_label_fields() -> tuple[Doubles, Doubles]:
     assert head.control.stencils is not None
     skin = np.unique(head.mesh.point[head.mesh.triangles[head.mesh.material == 0]])
     fields = head.control.stencils.points(label_fields().T.copy())[skin].T
-    outer = fields[HUMAN_FIELDS.index("mouth_interior")] < 0
+    outer = fields[HUMAN_FIELD_CLASSES.index("mouth_interior")] < 0
     return head.mesh.points_mm[skin][outer], fields[:, outer]
 
 
@@ -210,7 +210,7 @@ def _iris_fields(head: Head) -> dict[str, Doubles]:
     """Return the signed distances (p,) of the head's points to the border of each iris [mm].
 
     The keys are the label classes of the two irises. Distances are positive inside the iris, and scaled as if
-    the eye had average size. Points outside the eyeball get a large negative value.
+    the eye had average size. Points outside the eyeball get -1.
     """
     if head.eyes is None:
         return {}
@@ -232,14 +232,14 @@ def _skin_fields(head: Head) -> dict[str, Doubles]:
     """Return the signed distances (p,) of the head's points to the borders of parts of the skin [mm].
 
     The keys are the label classes of these parts, such as lips, brows and ears. Points that are not on the
-    skin get a large negative value.
+    skin get -1.
     """
     mesh = head.mesh
     count = int(mesh.point.max()) + 1
     if is_human(head):
         stencils = head.control.stencils
         refined: Callable[[Doubles], Doubles] = stencils.points if stencils else lambda values: values
-        fields = dict(zip(HUMAN_FIELDS, refined(label_fields().T.copy()).T, strict=True))
+        fields = dict(zip(HUMAN_FIELD_CLASSES, refined(label_fields().T.copy()).T, strict=True))
     elif (landmarks := known_landmarks(head)) is not None:
         fields = _warped_fields(head, landmarks)
     else:
@@ -263,4 +263,4 @@ def _warped_fields(head: Head, landmarks: Mapping[str, tuple[float, float, float
     points = head.mesh.points_mm
     average, values = dense_label_fields()
     _, near = cKDTree(average).query(warp_to_average(head, landmarks, points))
-    return {name: values[k][near] for k, name in enumerate(HUMAN_FIELDS) if not name.endswith("_eye")}
+    return {name: values[k][near] for k, name in enumerate(HUMAN_FIELD_CLASSES) if not name.endswith("_eye")}

@@ -40,7 +40,7 @@ def with_eyeballs(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> Rig:
     first = len(rig.positions_mm) + np.cumsum([0, *(len(one.points) for one in eyeballs)])
     rotations, targets, followers = list(rig.bone_rotations), rig.targets, list(rig.rigid_followers)
     for eyeball, bone, begin in zip(eyeballs, bones, first, strict=False):
-        origin = np.array(skeleton.origin_mm[bone])
+        origin = np.array(skeleton.joint_positions_mm[bone])
         own, shifts = _rigid_target_motions(rig, eyeball, skeleton.names[bone], origin)
         rotations += own
         points = begin + np.arange(len(eyeball.points))

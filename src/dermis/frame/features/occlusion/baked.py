@@ -26,7 +26,7 @@ from dermis.gpu import (
 from dermis.gpu.textures import texture_from_array
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.groom import Groom
-from dermis.mesh.grown_strands import absorbed_by_hair, hair_cover
+from dermis.mesh.grown_strands import hair_cover, mean_hair_absorptance
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 
@@ -172,7 +172,7 @@ def _hair_transmittance(
     packed_texels : (s, s, 2) words of the atlas texels: triangle index plus 1, and packed barycentric weights
     result_side : side of the atlas in the result [texels]
     """
-    absorbed = absorbed_by_hair(hair)
+    absorbed = mean_hair_absorptance(hair)
     passing = np.exp(-DIFFUSIVITY_FACTOR * absorbed * hair_cover(hair, mesh))[mesh.point].astype(np.float32)
     rows = ((np.arange(result_side) + 0.5) * len(packed_texels) / result_side).astype(int)
     chosen = packed_texels[np.ix_(rows, rows)]
