@@ -128,8 +128,8 @@ def _blur_surface_bytes(inputs: FrameInputs, texel_count: int) -> float:
 def _translucency_bytes(translucency: Translucency, levels: PyramidLevels, blur: Blur) -> float:
     """Return the memory traffic of the stage that transmits light through thin parts of the head [byte].
 
-    Light enters at source texels and leaves at receiver texels. The stage reads a list of weighted sources for
-    each receiver, and the light at the sources. It writes the light at the receivers. If the transmittance
+    Light enters at source texels and leaves at receiver texels. The stage reads a list of weighted sources
+    for each receiver, and the light at the sources. It writes the light at the receivers. If the transmittance
     depends on the direction of the light, it also reads positions and normals of the sources.
     """
     pairs, halving = translucency.pairs, blur.halvings[blur.profile_levels[1 + translucency.source_level]]
