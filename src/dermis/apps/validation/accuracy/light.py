@@ -24,7 +24,7 @@ from dermis.environment.prefilter import (
     LAYER_ROUGHNESSES,
     MAX_LAYER_ROUGHNESS,
     MIN_LAYER_ROUGHNESS,
-    Prefiltered,
+    PrefilteredPanorama,
     prefilter,
 )
 from dermis.frame.features.occlusion.baked import SKY_DIRECTION_COUNT, bake_occlusion
@@ -74,7 +74,9 @@ def normalise(vectors: Array) -> Array:
 
 
 @cache
-def prefiltered_panorama(panorama_name: str, row_count: int = 256) -> tuple[Array, Array, Prefiltered]:
+def prefiltered_panorama(
+    panorama_name: str, row_count: int = 256
+) -> tuple[Array, Array, PrefilteredPanorama]:
     """Return directions (n, 3) and light (n, 3) of a panorama's texels, and the prefiltered panorama.
 
     Light is radiance times solid angle; suns are removed.

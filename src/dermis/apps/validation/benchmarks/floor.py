@@ -129,8 +129,8 @@ def _translucency_bytes(translucency: Translucency, levels: PyramidLevels, blur:
     """Return the memory traffic of the stage that transmits light through thin parts of the head [byte].
 
     Light enters at source texels and leaves at receiver texels. The stage reads a list of weighted sources
-    for each receiver, and the light at the sources. It writes the light at the receivers. If the transmittance
-    depends on the direction of the light, it also reads positions and normals of the sources.
+    for each receiver, and the light at the sources. It writes the light at the receivers. If the
+    transmittance depends on the direction of the light, it also reads positions and normals of the sources.
     """
     pairs, halving = translucency.pairs, blur.halvings[blur.profile_levels[1 + translucency.source_level]]
     receivers, sources = pairs.receivers[1], pairs.sources[1]
