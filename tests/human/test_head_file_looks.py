@@ -116,7 +116,7 @@ def test_hairs_are_as_light_as_their_pigment() -> None:
         head = Human(hair=look).head(subdivide=0)
         assert head.strands is not None
         return np.asarray(
-            FibreTubes.from_strands(head.strands, head.mesh, 5000, 5).colours()[0].mean(axis=(0, 1))
+            FibreTubes.from_strands(head.strands, head.mesh, 5000, 5).palette_and_uv()[0].mean(axis=(0, 1))
         )
 
     black, brown, blond = (colour(HairLook(eumelanin=e, pheomelanin=0.0)) for e in (8.0, 1.3, 0.3))

@@ -45,7 +45,7 @@ def reflection_constants() -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Prefiltered:
+class PrefilteredPanorama:
     """Panorama convolved with a cosine and with lobes of several roughnesses, for lookups by the shader.
 
     layers : (14, h, 2 h, 3) panoramas: first the irradiance by normal direction, then, for each of
@@ -58,7 +58,7 @@ class Prefiltered:
 
 
 @logged_step("filtering the environment")
-def prefilter(panorama_name: str) -> Prefiltered:
+def prefilter(panorama_name: str) -> PrefilteredPanorama:
     """Load a panorama, separate its suns, and convolve the remainder with isotropic kernels.
 
     panorama_name : see `load_panorama`
@@ -75,7 +75,7 @@ def prefilter(panorama_name: str) -> Prefiltered:
         *(isotropic_lobe_factors(float(m)) for m in LAYER_ROUGHNESSES),
     ]
     layers = synthesise_panoramas(coefficients, np.stack(kernels), LAYER_HEIGHT)
-    return Prefiltered(np.maximum(layers, 0.0).astype(np.float32), tuple(suns))
+    return PrefilteredPanorama(np.maximum(layers, 0.0).astype(np.float32), tuple(suns))
 
 
 def isotropic_lobe_factors(roughness: float) -> Floats:

@@ -122,7 +122,7 @@ def _load_uncached(
         counts = [len(part.triangles) for part in mesh_file.parts]
         material = np.repeat(np.array(assigned.of_part, np.int32), counts)
         axes, turned = _find_front(
-            _resolve_axes(axes, mesh_file.axes, mesh_path), mesh_file, part, assigned.skin[material]
+            _resolve_axes(axes, mesh_file.axes, mesh_path), mesh_file, part, assigned.is_skin[material]
         )
         assert part.uv is not None and part.normals is not None
         to_head[:3, :3] = to_y_up(unit * np.eye(3), axes).T
@@ -137,7 +137,7 @@ def _load_uncached(
             point = split_points(point, vertices, to_head[:3, :3], mesh_path)
         arrays = positions[used], normals[used], uv[used], point, corners, material, part.quads, vertices
         in_file = [mesh_file.materials[index] if index >= 0 else None for index in assigned.in_file]
-        raw, repairs = repair_mesh(RawMesh(*arrays, np.arange(len(used))), in_file, assigned.skin)
+        raw, repairs = repair_mesh(RawMesh(*arrays, np.arange(len(used))), in_file, assigned.is_skin)
         raw, assigned, emptied = _without_empty_materials(raw, assigned)
         mesh, vertices, point = raw.build_mesh(assigned.materials), raw.vertices, raw.point
         has_pictures = any(one.textures for one in mesh_file.materials)
@@ -225,7 +225,7 @@ class _AssignedMaterials(NamedTuple):
     has_uv: tuple[bool, ...]
 
     @property
-    def skin(self) -> Mask:
+    def is_skin(self) -> Mask:
         """Return the mask (m,) of the materials that are skin."""
         return np.array([one.kind == "skin" for one in self.materials])
 
@@ -276,7 +276,7 @@ def _without_empty_materials(
 ) -> tuple[RawMesh, _AssignedMaterials, tuple[str, ...]]:
     """Remove materials without triangles; return mesh, materials, and a note if any were removed."""
     kept = np.bincount(mesh.material, minlength=len(assigned_materials.materials)) > 0
-    if kept.all() or not kept[assigned_materials.skin].any():
+    if kept.all() or not kept[assigned_materials.is_skin].any():
         return mesh, assigned_materials, ()
     names = list_names([one.name for one in compress(assigned_materials.materials, ~kept)])
     assigned_materials = assigned_materials._replace(
@@ -357,12 +357,14 @@ def cached_rigged(
     """
     digest = hashlib.sha256(f"{_CACHE_VERSION} {options_text}".encode())
     digest.update(file_bytes)
-    return _from_arrays(
-        load_or_make("meshes", digest.hexdigest()[:40], _ARRAY_NAMES, lambda: _to_arrays(load_from_file()))
+    return _rigged_from_arrays(
+        load_or_make(
+            "meshes", digest.hexdigest()[:40], _ARRAY_NAMES, lambda: _rigged_to_arrays(load_from_file())
+        )
     )
 
 
-def _to_arrays(rigged: RiggedMesh) -> Arrays:
+def _rigged_to_arrays(rigged: RiggedMesh) -> Arrays:
     """Return mesh and rig as arrays by name for the disk cache; absent fields are empty arrays."""
     mesh, rig, notes, surface = rigged[:4]
     assert rigged.file_vertices is not None
@@ -391,7 +393,7 @@ def _prefixed_fields(instance: MorphTargets | Skeleton, prefix: str, field_names
     return {name: _ABSENT_FIELD if array is None else array for name, array in arrays.items()}
 
 
-def _from_arrays(arrays: Arrays) -> RiggedMesh:
+def _rigged_from_arrays(arrays: Arrays) -> RiggedMesh:
     metadata = json.loads(arrays["metadata"].tobytes())
     triples = ("colour", "emission")
     materials = [

@@ -44,7 +44,7 @@ class SkinAdditions:
     extras: FrozenTree = field(default_factory=dict)
     pictures: Mapping[str, bytes] = field(default_factory=dict)
 
-    def apply_to(self, material: FrozenTree) -> Tree:
+    def add_to_material(self, material: FrozenTree) -> Tree:
         """Return a copy of a glTF material with these properties added.
 
         If `surface` replaces the base colour texture, the texture moves to the extras.

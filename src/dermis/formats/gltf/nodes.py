@@ -33,7 +33,7 @@ class Nodes:
     world: Doubles
     scene_nodes: tuple[int, ...] | None
 
-    def ancestors(self, node_index: int) -> list[int]:
+    def node_and_ancestors(self, node_index: int) -> list[int]:
         """Return the index of a node, followed by the indices of its ancestors up to the root."""
         path = [node_index]
         while self.parent[path[-1]] >= 0:

@@ -59,7 +59,7 @@ class SurfacePrimitive:
         return self.deformable.head
 
     @cached_property
-    def vertices(self) -> Ints:
+    def used_vertices(self) -> Ints:
         """Return the indices of the mesh vertices that the triangles use, (v,), in increasing order."""
         return np.unique(self._head.mesh.triangles[self.faces])
 
@@ -69,7 +69,7 @@ class SurfacePrimitive:
         The extras of the primitive record whether its triangles form quads, and whether no other primitive
         shares points with it.
         """
-        used, mesh = self.vertices, self._head.mesh
+        used, mesh = self.used_vertices, self._head.mesh
         index = buffer_builder.add_triangles(np.searchsorted(used, mesh.triangles[self.faces]), len(used))
         uv = mesh.uv[used] if self.eye < 0 else self._eye_uv()
         attributes = _vertex_attributes(
@@ -86,17 +86,17 @@ class SurfacePrimitive:
 
         Returns a dictionary from attribute name to accessor index.
         """
-        used = np.flatnonzero(np.isin(vertex_target.vertex, self.vertices, assume_unique=True))
-        row = np.searchsorted(self.vertices, vertex_target.vertex[used])
+        used = np.flatnonzero(np.isin(vertex_target.vertex, self.used_vertices, assume_unique=True))
+        row = np.searchsorted(self.used_vertices, vertex_target.vertex[used])
         columns = [to_metres(vertex_target.delta_mm[used]), vertex_target.normal[used]]
-        accessors = buffer_builder.add_displacements(row, columns, len(self.vertices))
+        accessors = buffer_builder.add_displacements(row, columns, len(self.used_vertices))
         return dict(zip(("POSITION", "NORMAL"), accessors, strict=True))
 
     def _eye_uv(self) -> Floats:
         head = self._head
         assert head.eyes is not None
         frame = head.eyes.eye_matrices(head.control, head.control.rest)[self.eye]
-        return eye_uv(head.mesh.positions[self.vertices] @ frame[:3, :3].T + frame[:3, 3])
+        return eye_uv(head.mesh.positions[self.used_vertices] @ frame[:3, :3].T + frame[:3, 3])
 
     def _has_quads(self) -> bool:
         """Return whether triangles 0 and 1, 2 and 3, and so on are the halves of quads."""
@@ -130,7 +130,7 @@ class HairPrimitive:
         The extras of the primitive mark it as hair, so that `read_gltf` skips it.
         """
         positions, normals = self.fibres.pose_vertices(self._rest_points)
-        _, uv = self.fibres.colours()
+        _, uv = self.fibres.palette_and_uv()
         attributes = _vertex_attributes(buffer_builder, positions, normals.astype(np.float32), uv)
         attributes |= _bone_attributes(
             buffer_builder,
@@ -305,7 +305,7 @@ class FibreTubes:
         start = self.vertices_per_hair * np.arange(len(self.strands))
         return np.asarray((start[:, None, None] + np.concatenate(faces)).reshape(-1, 3), np.int64)
 
-    def colours(self) -> tuple[Floats, Floats]:
+    def palette_and_uv(self) -> tuple[Floats, Floats]:
         """Return a palette (1, c, 3) of c linear hair colours, and the uv (n m, 2) of tube vertices in it."""
         absorbance = self.strands.absorption * self.strands.radius_mm.max(axis=1, keepdims=True)
         albedo = np.exp(-_HAIR_ALBEDO_EXPONENT * np.sqrt(absorbance.astype(np.float64)))

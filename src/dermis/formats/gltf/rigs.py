@@ -59,7 +59,7 @@ class Armature:
 
         node : index of the node that carries the mesh
         """
-        bones = (self.bone_of_node[k] for k in nodes.ancestors(node_index) if k in self.bone_of_node)
+        bones = (self.bone_of_node[k] for k in nodes.node_and_ancestors(node_index) if k in self.bone_of_node)
         return next(bones, self.static_bone)
 
 
@@ -72,13 +72,13 @@ def read_armature(document: Document, nodes: Nodes) -> Armature | None:
     skinned = [k for k in meshes if "skin" in document.top_level_array("nodes")[k]]
     rigid = [k for k in meshes if k not in set(skinned)]
     joints = {joint for k in skinned for joint in _node_skin(document, k)["joints"]}
-    mesh_ancestors = {node for k in rigid for node in nodes.ancestors(k)}
+    mesh_ancestors = {node for k in rigid for node in nodes.node_and_ancestors(k)}
     moving = joints | (_animated_nodes(document) & mesh_ancestors)
-    bone_nodes = {node for k in moving for node in nodes.ancestors(k)}
+    bone_nodes = {node for k in moving for node in nodes.node_and_ancestors(k)}
     if not bone_nodes:
         return None
     check_limit(document.path, len(bone_nodes), MAX_BONES, "bones", "Export it with fewer")
-    has_static = any(bone_nodes.isdisjoint(nodes.ancestors(k)) for k in rigid)
+    has_static = any(bone_nodes.isdisjoint(nodes.node_and_ancestors(k)) for k in rigid)
     ordered = [k for k in nodes.order if k in bone_nodes]
     bone_of_node = {node: number + has_static for number, node in enumerate(ordered)}
     names = [nodes.names[k] for k in ordered]

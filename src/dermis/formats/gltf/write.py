@@ -63,7 +63,7 @@ def encode_head(
     parts, materials = _primitive_sources(deformable, pictures, roles, roughness, eyes)
     if skin_additions is not None:
         materials = [
-            skin_additions.apply_to(material) if "dermis" in material.get("extras", {}) else material
+            skin_additions.add_to_material(material) if "dermis" in material.get("extras", {}) else material
             for material in materials
         ]
     images = [
@@ -126,7 +126,7 @@ def _primitive_sources(
             fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_EXPORTED_HAIRS, _KNOTS_PER_HAIR[name])
             parts.append(HairPrimitive(deformable_mesh, fibres))
             materials.append(hair_material(name))
-            pictures[name] = encode_colours_png(fibres.colours()[0])
+            pictures[name] = encode_colours_png(fibres.palette_and_uv()[0])
     return parts, materials
 
 

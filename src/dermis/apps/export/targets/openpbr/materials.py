@@ -199,7 +199,7 @@ def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
 
 
 def open_pbr_maps(head_maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
-    """Return a dictionary from role to map of a skin, with the values that OpenPBR expects.
+    """Return the maps of the skin by role, converted to the values that OpenPBR expects.
 
     slopes : (n, n, 2) slopes of the relief, used if `head_maps` has no normals
     """

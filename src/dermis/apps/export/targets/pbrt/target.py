@@ -127,7 +127,7 @@ def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
 
 
 def _single_scattering(radius: Floats, eta: float) -> Floats:
-    """Return the radiant exitance (m,) of light scattered once; albedo and extinction coefficient are 1.
+    """Return the radiant exitance (m,) of light scattered once, for an albedo and an extinction of 1.
 
     radius : (m,) distances from a beam of unit power [mean free paths]
     """
