@@ -1,1 +1,1 @@
-"""Export of skins and heads to other programs, with the predicted error of each program's skin."""
+"""Export of skins and heads to other programs, with predicted errors of the skin that a program renders."""

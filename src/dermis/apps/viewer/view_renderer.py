@@ -43,7 +43,7 @@ _FRAME_STREAK_LENGTH = (
 
 @dataclass(frozen=True)
 class Quality:
-    """Upper limits of render settings for frames in motion; still frames are rendered without limits.
+    """Upper limits of render settings while the picture changes; a still picture has no limits.
 
     scale : factor by which the width and height of the image are multiplied [-]
     samples, atlas, shadow_size : maximum values of the fields of `Settings` with these names
@@ -81,11 +81,11 @@ class QualityController:
 
     @property
     def quality(self) -> Quality:
-        """Return the quality limits of the next frame in motion."""
+        """Return the quality limits of the next frame if the picture is changing."""
         return QUALITY_LEVELS[self._level]
 
     def record_frame_time(self, frame_ms: float) -> None:
-        """Record how long a frame in motion took; after several slow or fast frames, change the quality.
+        """Record the time of a frame of a changing picture; change the quality after slow or fast frames.
 
         frame_ms : time taken by the frame, without its setup [ms]
         """
@@ -240,7 +240,10 @@ class ViewRenderer:
         return image_copy
 
     def _frame_settings(self, state: ViewerState, view_size: tuple[int, int], is_moving: bool) -> Settings:
-        """Return the settings of a frame; in motion, their quality is limited, except in the atlas view."""
+        """Return the settings of a frame, with limited quality while the picture changes.
+
+        In the atlas view, the quality is never limited.
+        """
         return self.quality_controller.limited_settings(
             state.settings, view_size, is_moving and state.view != ATLAS_VIEW_NAME
         )
@@ -348,7 +351,7 @@ class HeadPreparation:
         return self._future is not None
 
     def reset(self) -> None:
-        """Discard the prepared meshes and the image shown meanwhile, because the renderer was replaced."""
+        """Discard the prepared meshes and the image shown during preparation."""
         self._ready_mesh = self._future = self._next_mesh = self._held_image = None
 
     def prepare_head(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:

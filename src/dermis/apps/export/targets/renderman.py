@@ -40,7 +40,7 @@ class RenderMan(JsonTarget):
         return _material_parameters(albedo, fit_burley_width(subject.curve) * shape_factor_diffuse(albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the widths d of the closest Burley profiles in place of diffuse mean free paths."""
+        """Return parameters with the widths d of the closest Burley profiles as diffuse mean free paths."""
         return _material_parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:

@@ -392,7 +392,7 @@ def draw_picture_settings(session: Session) -> None:
 
 
 def draw_historical_comparisons(session: Session) -> None:
-    """Draw controls that reproduce the faults and older methods that a conference talk compared.
+    """Draw the controls that switch on older methods and rendering faults, for comparison.
 
     Source: [dEonLuebke2007].
     """

@@ -77,7 +77,7 @@ class Babylon(EnginePage):
         return spiral_profile(profile, metres, subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the library's script elements, and the URLs or hashes that the page's policy must allow."""
+        """Return the script elements of Babylon.js, and the URLs or hashes that script-src allows."""
         files = self.library_files[version]
         if self.library_folder is None:
             return "\n".join(file.html_element for file in files), [file.url for file in files]

@@ -289,7 +289,7 @@ class Blender(Target):
         return [RandomWalk(float(one), "straight" if plain else "skin") for one in albedos]
 
     def _unit_cdf_by_channel(self, subject: Subject, version: str) -> list[Cdf]:
-        """Return each channel's cumulative profile as a function of radius / `_lengths_per_unit_radius`."""
+        """Return each channel's cumulative profile; radii are in Burley widths or mean free paths."""
         if self.variant in ("burley", "eevee"):
             return [burley_cdf] * 3
         return [walk.cdf for walk in self._random_walks(subject, version)]

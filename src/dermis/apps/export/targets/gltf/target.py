@@ -1,4 +1,4 @@
-"""Export to glTF: a .glb whose skin scatters light (draft extension) or transmits it (ratified extension)."""
+"""Export to glTF: a .glb file whose skin scatters light (draft extension) or transmits light (ratified)."""
 
 from __future__ import annotations
 

@@ -88,14 +88,15 @@ class OpenPbr(Target):
         return surface_parameters(subject, self.shader, path, meaning)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return published diffuse mean free paths as the radius, where OpenPBR expects mean free paths."""
+        """Return parameters with published diffuse mean free paths, where OpenPBR expects mean free paths."""
         meaning = "diffuse mean free path, as published"
         return surface_parameters(subject, self.shader, published_mean_free_path_mm(subject), meaning)
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile that the renderer will show for the exported radii.
 
-        Variants that end in "profile" show MaterialX's Burley profile, other variants that of a random walk.
+        For variants that end in "profile", this is MaterialX's Burley profile, otherwise the profile of a
+        random walk.
         """
         radius = get_radii_mm(parameters, self.shader)
         if self.uses_burley_profile:

@@ -125,9 +125,9 @@ class EnginePage(Target):
 
     @abstractmethod
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the library's HTML elements, and the script sources that the page's policy must allow.
+        """Return the HTML elements of the library, and the sources for script-src.
 
-        The policy is the page's Content-Security-Policy; a source is a URL, a scheme or a hash.
+        A source is a URL, a scheme or a hash that the page's Content-Security-Policy allows.
         """
 
     def _page_settings_json(self, subject: Subject, parameters: Parameters, version: str) -> Json:
@@ -186,7 +186,7 @@ def page_camera_json(scene: Scene, centre_mm: Sequence[float]) -> Json:
 
 
 def page_light_json(light: Light) -> Json:
-    """Return the JSON of a directional light that replaces a light, with the same irradiance at the head."""
+    """Return the JSON of a directional light with the direction and irradiance of a light at the head."""
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction, np.float64)
     else:

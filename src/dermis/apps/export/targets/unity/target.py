@@ -76,7 +76,7 @@ class Unity(Target):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour as the scattering colour, as the inspector suggests, with multiplier 1."""
+        """Return parameters with the skin's colour as the scattering colour, and multiplier 1."""
         colour = flat_tuple(subject.clipped_albedo())
         values: dict[str, ParameterValue] = {
             _SCATTERING_DISTANCE_NAME: colour,

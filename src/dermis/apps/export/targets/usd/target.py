@@ -43,7 +43,7 @@ class Usd(OpenPbr):
         return (*super().parameters(subject, version), _UNIT_PARAMETER)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return published diffuse mean free paths in place of OpenPBR's mean free paths."""
+        """Return parameters with published diffuse mean free paths, where OpenPBR expects mean free paths."""
         return (*super().naive_parameters(subject, version), _UNIT_PARAMETER)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:

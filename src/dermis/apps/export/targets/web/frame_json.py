@@ -35,10 +35,10 @@ class NamedFrame:
 
 
 class PictureMap(NamedTuple):
-    """Map of the head whose first mip levels are stored as WebP pictures.
+    """Map of the head, of which the first mip levels are stored as WebP images.
 
     role : name of the map's binding in shaders, such as "colour_map"
-    mips : number of mip levels stored as pictures
+    mips : number of mip levels stored as WebP images
     mip_passes : passes that compute the remaining mip levels on the device; None if these levels are stored
         as texels
     """
@@ -199,7 +199,7 @@ def resources_read_before_write(capture: FrameCapture, captured_frames: Frames) 
 def resources_bound_as(
     capture: FrameCapture, captured_frames: Frames, binding_names: tuple[str, ...]
 ) -> dict[int, str]:
-    """Return a dictionary from resource index to the name in `binding_names` under which shaders bind it."""
+    """Return the resources that shaders bind by one of the given names, as a dictionary by resource index."""
     found: dict[int, str] = {}
     for one in (one for frame in captured_frames for one in frame.passes if one.program is not None):
         bound_names = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]

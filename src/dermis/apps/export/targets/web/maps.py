@@ -1,4 +1,4 @@
-"""Maps of captured frames as WebP pictures, with 8 bits per channel and a curve that decodes each channel."""
+"""Maps of captured frames as WebP images, with 8 bits per channel and a curve that decodes each channel."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ _COLOUR_CHANNEL_COUNT = 3
 
 @dataclass(frozen=True)
 class Picture:
-    """One layer of a map, encoded as a WebP picture.
+    """One layer of a map, encoded as a WebP image.
 
-    data : WebP file: a colour picture for a colour map, otherwise a grey picture of the channels, stacked
+    data : WebP file: a colour image for a colour map, otherwise a grey image of the channels, stacked
         vertically
-    curves : (c, 256) value to which each of the 256 levels of a channel is decoded
-    texels : (h, w, c) texels decoded from the picture
+    curves : (c, 256) values to which the 8-bit values of each channel are decoded
+    texels : (h, w, c) texels decoded from the image
     """
 
     data: bytes
@@ -44,7 +44,7 @@ class Picture:
 
 
 def encode_picture(texels: Halves, is_colour_map: bool) -> Picture:
-    """Return one layer of a map encoded as a WebP picture.
+    """Return one layer of a map encoded as a WebP image.
 
     texels : (h, w, c) texels
     is_colour_map : whether the first three channels are a colour; all further channels are then constant
@@ -81,9 +81,9 @@ def _quantisation_curve(texels: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _nearest_levels(texels: Halves, quantisation_curve: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Return the index of the curve value nearest to each texel.
+    """Return, for each texel, the index of the nearest value in `quantisation_curve`.
 
-    quantisation_curve : increasing values
+    quantisation_curve : increasing values to which texels are quantised
     """
     midpoints = 0.5 * (quantisation_curve[1:] + quantisation_curve[:-1])
     return np.searchsorted(midpoints, texels.astype(np.float64)).astype(np.uint8)
@@ -129,7 +129,7 @@ class MapPictures:
     def replace_textures(
         self, renderer: Renderer, capture: FrameCapture, captured_frames: Frames
     ) -> PictureMaps:
-        """Encode the frames' maps as pictures, and upload the decoded texels to the renderer's textures.
+        """Encode the frames' maps as WebP images, and upload the decoded texels to the renderer's textures.
 
         The renderer then draws with the same maps as the page. Returns a dictionary from resource index to
         replaced map.
@@ -151,7 +151,7 @@ class MapPictures:
     def _add_pictures(
         self, capture: FrameCapture, resource_index: int, map_role: str, mip_level: int
     ) -> NDArray[np.float16]:
-        """Add the pictures of a mip level, and return the (l, h, w, c) texels decoded from the pictures.
+        """Encode a mip level as WebP images, and return the (l, h, w, c) texels decoded from these images.
 
         resource_index : index of the texture or buffer in the capture
         mip_level : mip level, 0 for the full resolution
@@ -207,7 +207,7 @@ def read_texels(capture: FrameCapture, resource_index: int, mip_level: int) -> N
 
 
 def _picture_textures(capture: FrameCapture, captured_frames: Frames) -> dict[int, str]:
-    """Return a dictionary from resource index to role, for the map textures that are stored as pictures.
+    """Return a dictionary from resource index to role, for the map textures that are stored as WebP images.
 
     These are the half-float textures whose sides have at least `MIN_PICTURE_SIDE` texels. The role of a
     texture is its name in the shaders.

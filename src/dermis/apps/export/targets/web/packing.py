@@ -1,4 +1,4 @@
-"""Compression of buffers: differences between rows are reordered by byte and compressed by gzip.
+"""Compression of buffers by gzip, after taking differences between rows and regrouping the bytes.
 
 The script packed.js of the page reverses these steps.
 """
