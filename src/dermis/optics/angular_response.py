@@ -149,15 +149,20 @@ class _HalfSpace:
             np.eye(len(self._mu)) - self._reflected_radiance(self._mu, self._H) * flux * internal
         )
 
-    def _reflected_radiance(self, mu: Floats, H: Floats) -> Floats:
+    def _reflected_radiance(self, incident_cosine: Floats, h_values: Floats) -> Floats:
         """Return pi times the radiance that the medium reflects into each of the discrete directions [-].
 
         The result (d, n) has a row for each discrete direction and a column for each incident direction.
 
-        mu : (n,) cosines of the directions of incident light below the surface
-        H : (n,) H function at these cosines
+        incident_cosine : (n,) cosines of the directions of incident light below the surface
+        h_values : (n,) H function at these cosines
         """
-        return 0.25 * self._albedo * np.outer(self._H, H) / np.maximum(self._mu[:, None] + mu, 1e-12)
+        return (
+            0.25
+            * self._albedo
+            * np.outer(self._H, h_values)
+            / np.maximum(self._mu[:, None] + incident_cosine, 1e-12)
+        )
 
     def reflectance(self, cosine: ArrayLike) -> Floats:
         """Return the fraction of the entering light that leaves again, for given directions [-].

@@ -182,14 +182,14 @@ def fit_profile(
 
 
 def fit_radial(
-    radial: RadialProfile, profile_name: str, similar_fit: GaussianSum | None = None
+    radial_profile: RadialProfile, profile_name: str, similar_fit: GaussianSum | None = None
 ) -> GaussianSum:
     """Fit six Gaussians to a radial profile; fits to photon counts keep the total reflectance.
 
     profile_name : name of the fitted profile
     similar_fit : fit of a similar profile, as start of the new fit, which is then several times faster
     """
-    return _fit_rings(radial.rings(), radial.model, profile_name, similar_fit)
+    return _fit_rings(radial_profile.rings(), radial_profile.model, profile_name, similar_fit)
 
 
 def _fit_rings(

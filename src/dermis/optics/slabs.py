@@ -206,15 +206,24 @@ class _Transport:
         return int(np.ceil(np.log2(max(depth * self.phase.extinction / _MIN_OPTICAL_DEPTH, 1.0))))
 
 
-def _slabs_in_air(transport: _Transport, R: Floats, T: Floats, unscattered_fraction: Floats) -> Slabs:
+def _slabs_in_air(
+    transport: _Transport, reflection: Floats, transmission: Floats, unscattered_fraction: Floats
+) -> Slabs:
     """Return the reflection and transmission of slabs with faces to air, from those of slabs without faces.
 
-    R, T : (n, m, m) reflection and transmission without faces, as pi times the radiance for unit power from
-        each direction
+    reflection, transmission : (n, m, m) reflection and transmission without faces, as pi times the radiance
+        for unit power from each direction
     unscattered_fraction : (n, m) fraction of light that crosses the slab without scattering [-]
     """
     flux, escapes = transport.flux, transport.escapes
-    reflected, transmitted = _add_faces(R * flux, T * flux, unscattered_fraction, transport.internal, R, T)
+    reflected, transmitted = _add_faces(
+        reflection * flux,
+        transmission * flux,
+        unscattered_fraction,
+        transport.internal,
+        reflection,
+        transmission,
+    )
     leaving = flux * (1.0 - transport.internal)
     entering = leaving[escapes] / leaving[escapes].sum()
     up, down = (np.einsum("k,nkm->nm", leaving, part[..., escapes]) for part in (reflected, transmitted))
@@ -254,17 +263,17 @@ def _direction_quadrature(eta: float, direction_nodes: int) -> tuple[Floats, Flo
 
 
 def _doubling_steps(
-    transport: _Transport, tau: Floats, doubling_count: int
+    transport: _Transport, initial_depth: Floats, doubling_count: int
 ) -> Iterator[tuple[Floats, Floats, Floats]]:
     """Yield reflection, transmission and unscattered light of slabs, then those of slabs twice as thick, etc.
 
     Reflection and transmission (n, m, m) are pi times the radiance for unit power from each direction. The
     unscattered light (n, m) is the fraction that crosses the slab without scattering.
 
-    tau : (n,) initial thicknesses in reduced mean free paths
+    initial_depth : (n,) initial thicknesses in reduced mean free paths
     """
     mu, flux, albedo = transport.mu, transport.flux, transport.phase.albedo
-    t = transport.phase.extinction * tau[:, None, None]
+    t = transport.phase.extinction * initial_depth[:, None, None]
     a, b = mu[:, None], mu[None, :]
     R = -0.25 * albedo / (a + b) * np.expm1(-t * (1.0 / a + 1.0 / b)) * transport.phase.backward
     T = 0.25 * albedo * t / (a * b) * np.exp(-0.5 * t * (1.0 / a + 1.0 / b)) * transport.phase.forward
@@ -284,22 +293,23 @@ def _add_faces(
     transmission_operator: Floats,
     unscattered_fraction: Floats,
     face_reflectance: Floats,
-    R: Floats,
-    T: Floats,
+    reflection: Floats,
+    transmission: Floats,
 ) -> tuple[Floats, Floats]:
     """Return the scattered light that meets the faces of slabs, including internal reflections.
 
     The results (n, m, m) are pi times the radiance at the upper face and at the lower face, for unit power
     from each direction.
 
-    reflection_operator, transmission_operator : (n, m, m) `R` and `T`, each column multiplied by the flux of
-        its direction
+    reflection_operator, transmission_operator : (n, m, m) `reflection` and `transmission`, each column
+        multiplied by the flux of its direction
     unscattered_fraction : (n, m) fraction of light that crosses the slab without scattering [-]
     face_reflectance : (m,) reflectance of a face from inside [-]
-    R, T : (n, m, m) reflection and transmission of the slabs without faces, as pi times the radiance
+    reflection, transmission : (n, m, m) reflection and transmission of the slabs without faces, as pi times
+        the radiance
     """
     if not face_reflectance.any():
-        return R, T
+        return reflection, transmission
     identity, count = np.eye(len(face_reflectance)), len(face_reflectance)
     passing = (transmission_operator + unscattered_fraction[:, :, None] * identity) * face_reflectance
     system = np.block(
@@ -311,8 +321,8 @@ def _add_faces(
     # Unscattered light is reflected back and forth between the faces.
     passes = 1.0 / (1.0 - (unscattered_fraction * face_reflectance) ** 2)
     below = face_reflectance * unscattered_fraction * passes
-    top = R * (passes[:, None, :]) + T * below[:, None, :]
-    bottom = T * passes[:, None, :] + R * below[:, None, :]
+    top = reflection * (passes[:, None, :]) + transmission * below[:, None, :]
+    bottom = transmission * passes[:, None, :] + reflection * below[:, None, :]
     solved = np.linalg.solve(system, np.concatenate([top, bottom], axis=1))
     return solved[:, :count], solved[:, count:]
 

@@ -53,7 +53,7 @@ class IrradianceSamples:
 
 def sample_irradiance(
     mesh: Mesh,
-    light: IrradianceFunction,
+    irradiance_at: IrradianceFunction,
     spacing_mm: float,
     min_spacing_mm: float | None = None,
     contrast_threshold: float = 0.05,
@@ -63,7 +63,7 @@ def sample_irradiance(
     Sides longer than `spacing_mm` are halved. Then sides of high contrast are halved further. The contrast of
     a side is the difference between the irradiances at its ends, relative to the largest irradiance.
 
-    light : function that returns the irradiance (n, 3) at `MeshPoints`; called once for each point
+    irradiance_at : function that returns the irradiance (n, 3) at `MeshPoints`; called once for each point
     spacing_mm : greatest side length of the small triangles [mm]
     min_spacing_mm : smallest side length that the further halving may yield; None for no further halving [mm]
     contrast_threshold : contrast above which a side is halved further [-]
@@ -78,7 +78,7 @@ def sample_irradiance(
         actual = f"got {spacing_mm}, {min_spacing_mm} and {contrast_threshold}"
         refuse("irradiance samples", "spacing >= finest > 0 and a contrast above 0", actual, "Correct them")
     subdivision = _subdivide_to(_skin_triangles(mesh), spacing_mm)
-    irradiance = light(_sample_points(subdivision))
+    irradiance = irradiance_at(_sample_points(subdivision))
     while min_spacing_mm is not None:
         ends, side, length = _edges_with_lengths(subdivision)
         contrast_across = np.abs(irradiance[ends[:, 0]] - irradiance[ends[:, 1]]).max(axis=1)
@@ -89,7 +89,7 @@ def sample_irradiance(
             break
         known_count = len(irradiance)
         subdivision = _halve_edges(subdivision, side, _add_longest_sides(side, length, high_contrast))
-        irradiance = np.vstack((irradiance, light(_sample_points(subdivision, known_count))))
+        irradiance = np.vstack((irradiance, irradiance_at(_sample_points(subdivision, known_count))))
     return IrradianceSamples(_sample_points(subdivision).positions, subdivision.corners, irradiance)
 
 

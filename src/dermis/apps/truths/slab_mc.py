@@ -176,7 +176,7 @@ def _layer_stack(layers: Sequence[ScatteringLayer]) -> LayerStack:
 
 
 def _trace_batches(
-    layer_stack: LayerStack, photons: int, seed: int, edges: Floats, progress: ProgressCallback | None
+    layer_stack: LayerStack, photons: int, seed: int, ring_edges_mm: Floats, progress: ProgressCallback | None
 ) -> PhotonTally:
     from numba import config
 
@@ -185,13 +185,15 @@ def _trace_batches(
     stop = Event()
 
     def trace_batch(photon_count: int, seeds: np.random.SeedSequence) -> PhotonTally:
-        lengths = (len(edges), len(edges), 2, len(layer_stack.eta) - 2, 1)
+        lengths = (len(ring_edges_mm), len(ring_edges_mm), 2, len(layer_stack.eta) - 2, 1)
         tally = PhotonTally(*(np.zeros(length, np.int64) for length in lengths))
         rng = seeds.generate_state(4, np.uint64).astype(np.uint64)
         for done in range(0, photon_count, _PHOTONS_PER_CALL):
             if stop.is_set():
                 break
-            trace_photons(min(_PHOTONS_PER_CALL, photon_count - done), layer_stack, edges**2, rng, tally)
+            trace_photons(
+                min(_PHOTONS_PER_CALL, photon_count - done), layer_stack, ring_edges_mm**2, rng, tally
+            )
         return tally
 
     sizes = [
@@ -211,11 +213,11 @@ def _trace_batches(
     return PhotonTally(*(np.sum(parts, axis=0) for parts in zip(*tallies, strict=True)))
 
 
-def _slab_result(tally: PhotonTally, photons: int, edges: Floats, eta: float) -> SlabResult:
+def _slab_result(tally: PhotonTally, photons: int, ring_edges_mm: Floats, eta: float) -> SlabResult:
     from dermis.apps.truths.photon import refract
 
     specular = refract(1.0, 1.0 / eta)[0]
-    ring_areas = np.pi * np.diff(edges**2)
+    ring_areas = np.pi * np.diff(ring_edges_mm**2)
 
     def power_fraction(photon_counts: Counts) -> Floats:
         return (1.0 - specular) * photon_counts / photons
@@ -227,7 +229,7 @@ def _slab_result(tally: PhotonTally, photons: int, edges: Floats, eta: float) ->
     reflected, transmitted = tally.reflected, tally.transmitted
     return SlabResult(
         photons=photons,
-        edges_mm=edges,
+        edges_mm=ring_edges_mm,
         specular=specular,
         reflectance=power_fraction(reflected[:-1]) / ring_areas,
         reflectance_se=standard_error(reflected[:-1]) / ring_areas,

@@ -68,7 +68,7 @@ def integrate_exitance(
     return exitance
 
 
-def _weight_error_bounds(tree: Octree, error_weight: float) -> Octree:
+def _weight_error_bounds(octree: Octree, error_weight: float) -> Octree:
     """Return the octree with larger bounds for errors that hardly cancel in the sum over nodes.
 
     `centroid_error` is multiplied by a weight, and `moment_error` times this weight is added to
@@ -76,5 +76,5 @@ def _weight_error_bounds(tree: Octree, error_weight: float) -> Octree:
 
     error_weight : weight of both bounds
     """
-    second_moment = tree.second_moment + error_weight * tree.moment_error
-    return tree._replace(second_moment=second_moment, centroid_error=error_weight * tree.centroid_error)
+    second_moment = octree.second_moment + error_weight * octree.moment_error
+    return octree._replace(second_moment=second_moment, centroid_error=error_weight * octree.centroid_error)

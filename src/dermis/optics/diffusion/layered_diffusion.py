@@ -64,44 +64,48 @@ class _DownwardTransfer(NamedTuple):
 
 
 def solve_layers(
-    frequency: ArrayLike, medium: Medium, A: float, source_kind: SourceKind = "beam"
+    frequency: ArrayLike, medium: Medium, mismatch: float, source_kind: SourceKind = "beam"
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms (n, c) of R(r) and of T(r) of a layered medium [-].
 
     R(r) and T(r) are the profiles at the upper and the lower face, per power that enters.
 
     frequency : (n,) frequencies s > 0 [1/mm]
-    A : boundary mismatch with air; internal interfaces are index-matched [-]
+    mismatch : boundary mismatch with air; internal interfaces are index-matched [-]
     source_kind : "beam" if light first scatters along the beam, in which case R(r) diverges logarithmically
         at r = 0; "point" if all light first scatters at a depth of one mean free path, in which case R(r) is
         finite
 
     Source: [Haskell1994] for the boundary, [Kienle1998] for layers, [Farrell1992] for the beam.
     """
-    return _solve_sublayers(frequency, _sublayers(medium, source_kind), medium.channels, A)
+    return _solve_sublayers(frequency, _sublayers(medium, source_kind), medium.channels, mismatch)
 
 
 def solve_reflectance(
-    frequency: ArrayLike, medium: Medium, A: float, source_kind: SourceKind = "beam"
+    frequency: ArrayLike, medium: Medium, mismatch: float, source_kind: SourceKind = "beam"
 ) -> Floats:
     """Return the Hankel transform (n, c) of R(r) of a layered medium [-].
 
     R(r) is per power that enters. This function is faster than `solve_layers`, which also computes T(r).
 
     frequency : (n,) frequencies s > 0 [1/mm]
-    A : boundary mismatch with air [-]
+    mismatch : boundary mismatch with air [-]
     source_kind : "beam" or "point", the place where light first scatters, see `solve_layers`
     """
-    return _solve_upwards(frequency, _sublayers(medium, source_kind), medium.channels, A)[0] / (2.0 * A)
+    return _solve_upwards(frequency, _sublayers(medium, source_kind), medium.channels, mismatch)[0] / (
+        2.0 * mismatch
+    )
 
 
-def solve_two_layers(upper_layer: Layer, thickness_mm: ArrayLike, lower_layer: Layer, A: float) -> Floats:
+def solve_two_layers(
+    upper_layer: Layer, thickness_mm: ArrayLike, lower_layer: Layer, mismatch: float
+) -> Floats:
     """Return the total reflectance (n, c) of n skins with two layers, per power that enters [-].
 
     upper_layer : upper layers, with coefficients (n, c), or (c,) if they are the same for all skins
     thickness_mm : (n, 1) thicknesses of the upper layers, or one number [mm]
     lower_layer : semi-infinite lower layers, with coefficients (n, c) or (c,)
-    A : boundary mismatch with air [-]
+    mismatch : boundary mismatch with air [-]
     """
     d = np.asarray(thickness_mm, dtype=np.float64)
     ones = np.ones(np.shape(upper_layer.sigma_a)[-1])
@@ -110,54 +114,54 @@ def solve_two_layers(upper_layer: Layer, thickness_mm: ArrayLike, lower_layer: L
         _Sublayer(upper_layer, d, ones, 0.0 * ones),
         _Sublayer(lower_layer, np.inf, beam, 0.0 * ones),
     ]
-    return _solve_upwards(_NEAR_ZERO_FREQUENCY, sublayers, len(ones), A)[0] / (2.0 * A)
+    return _solve_upwards(_NEAR_ZERO_FREQUENCY, sublayers, len(ones), mismatch)[0] / (2.0 * mismatch)
 
 
 def solve_thicknesses(
-    frequency: ArrayLike, layer: Layer, thickness_mm: Floats, A: float
+    frequency: ArrayLike, layer: Layer, thickness_mm: Floats, mismatch: float
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms (n, m, c) of R(r) and of T(r) of n slabs of one material [-].
 
     frequency : (m,) frequencies s > 0 [1/mm]
     layer : absorption and scattering of the slabs; its field `thickness_mm` is ignored
     thickness_mm : (n,) thicknesses of the slabs [mm]
-    A : boundary mismatch with air [-]
+    mismatch : boundary mismatch with air [-]
     """
     ones = np.ones(len(layer.sigma_a))
     sublayer = _Sublayer(layer, thickness_mm[:, None, None], ones, np.zeros_like(ones))
-    return _solve_sublayers(frequency, [sublayer], len(ones), A)
+    return _solve_sublayers(frequency, [sublayer], len(ones), mismatch)
 
 
 def _solve_sublayers(
-    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, A: float
+    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, mismatch: float
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms of R(r) and T(r) of a stack of sublayers, topmost first [-]."""
-    fluence, transfers = _solve_upwards(frequency, sublayers, channel_count, A)
-    R = fluence / (2.0 * A)
+    fluence, transfers = _solve_upwards(frequency, sublayers, channel_count, mismatch)
+    R = fluence / (2.0 * mismatch)
     for transfer in transfers:
         fluence = transfer.lower_fluence(fluence)
-    return R, fluence / (2.0 * A)
+    return R, fluence / (2.0 * mismatch)
 
 
 def _solve_upwards(
-    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, A: float
+    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, mismatch: float
 ) -> tuple[Floats, list[_DownwardTransfer]]:
     """Return the fluence at the surface, and the transfer through each sublayer, topmost sublayer first."""
     s = np.asarray(frequency, dtype=np.float64)[..., None]
     zero = np.zeros((*s.shape[:-1], channel_count))
-    face, transfers = _BoundaryCondition(zero + 1.0 / (2.0 * A), zero), list[_DownwardTransfer]()
+    face, transfers = _BoundaryCondition(zero + 1.0 / (2.0 * mismatch), zero), list[_DownwardTransfer]()
     for sublayer in reversed(sublayers):
         face, transfer = _propagate_up(s, sublayer, face)
         transfers.insert(0, transfer)
-    return np.asarray(2.0 * A * face.W / (1.0 + 2.0 * A * face.Z)), transfers
+    return np.asarray(2.0 * mismatch * face.W / (1.0 + 2.0 * mismatch * face.Z)), transfers
 
 
 def _propagate_up(
-    s: Floats, sublayer: _Sublayer, lower_face: _BoundaryCondition
+    frequency: Floats, sublayer: _Sublayer, lower_face: _BoundaryCondition
 ) -> tuple[_BoundaryCondition, _DownwardTransfer]:
     """Propagate the boundary condition from the lower face of a sublayer to its upper face.
 
-    s : frequencies [1/mm]
+    frequency : frequencies [1/mm]
     lower_face : boundary condition at the lower face
 
     Returns the boundary condition at the upper face, and the coefficients that transfer the fluence from the
@@ -165,7 +169,7 @@ def _propagate_up(
     """
     layer, d = sublayer.layer, sublayer.thickness_mm
     D, sigma_t = layer.D, layer.sigma_t_prime
-    q = np.sqrt(layer.sigma_tr**2 + s**2)
+    q = np.sqrt(layer.sigma_tr**2 + frequency**2)
     source = layer.sigma_s_prime * sublayer.beam / D
     slope = source / (sigma_t + q)  # slope of the particular solution that is 0 at the upper face
     if np.all(np.isinf(d)):

@@ -173,24 +173,28 @@ class StackResponse:
         )
 
 
-def stack_response(frequency: ArrayLike, medium: Medium, A: float, clamp: Clamp = "layer") -> StackResponse:
+def stack_response(
+    frequency: ArrayLike, medium: Medium, mismatch: float, clamp: Clamp = "layer"
+) -> StackResponse:
     """Return the response of the stack of all layers of a medium, at frequencies s [1/mm].
 
-    A : boundary mismatch with air, above and below; internal interfaces are index-matched [-]
+    mismatch : boundary mismatch with air, above and below; internal interfaces are index-matched [-]
     clamp : whether sources are kept inside thin layers ("layer") or not ("none"), see `Slab`
     """
-    slabs = layer_slabs(medium, A, clamp)
+    slabs = layer_slabs(medium, mismatch, clamp)
     stack = _single_slab_response(frequency, slabs[-1])
     for slab in reversed(slabs[:-1]):
         stack = _single_slab_response(frequency, slab).placed_over(stack)
     return stack
 
 
-def layer_slabs(medium: Medium, A: float, clamp: Clamp = "layer") -> list[Slab]:
-    """Return one slab per layer of a medium, with the boundary mismatch A at the faces that touch air."""
+def layer_slabs(medium: Medium, mismatch: float, clamp: Clamp = "layer") -> list[Slab]:
+    """Return one slab per layer of a medium; only the faces that touch air have a given boundary mismatch."""
     last = len(medium.layers) - 1
     layers = enumerate(medium.layers)
-    return [Slab(layer, A if i == 0 else 1.0, A if i == last else 1.0, clamp) for i, layer in layers]
+    return [
+        Slab(layer, mismatch if i == 0 else 1.0, mismatch if i == last else 1.0, clamp) for i, layer in layers
+    ]
 
 
 def _single_slab_response(frequency: ArrayLike, slab: Slab) -> StackResponse:

@@ -182,16 +182,16 @@ def _variances_of_fit(
     return similar_fit.variance_mm2[used] if used.sum() == gaussian_count else None
 
 
-def _combine_fits(fits: list[tuple[Floats, Floats]], profile_name: str) -> GaussianSum:
+def _combine_fits(channel_fits: list[tuple[Floats, Floats]], profile_name: str) -> GaussianSum:
     """Combine fits of separate channels into one sum of Gaussians, in which equal variances occur once.
 
-    fits : variances (k,) and weights (k, c) of each fit
+    channel_fits : variances (k,) and weights (k, c) of each fit
     """
-    variance, index = np.unique(np.concatenate([v for v, _ in fits]), return_inverse=True)
-    channels = sum(w.shape[1] for _, w in fits)
+    variance, index = np.unique(np.concatenate([v for v, _ in channel_fits]), return_inverse=True)
+    channels = sum(w.shape[1] for _, w in channel_fits)
     weight = np.zeros((len(variance), channels))
     row = channel = 0
-    for v, w in fits:
+    for v, w in channel_fits:
         rows = index[row : row + len(v)]
         np.add.at(weight[:, channel : channel + w.shape[1]], rows, w)
         row, channel = row + len(v), channel + w.shape[1]

@@ -325,15 +325,15 @@ def _sd_from_assumed_parameters(subject: FitSubject, best_point: FitPoint) -> di
     return unknown_skin_sd(values["melanin"], values["blood"], skin, subject.known)
 
 
-def warn_of_poor_fit(photo_source: object, residual: float) -> None:
+def warn_of_poor_fit(photo_source: object, median_residual: float) -> None:
     """Notify the user if a fit is so poor that the picture probably does not show the given head.
 
     photo_source : name of the photograph, for the notification
-    residual : median relative residual over blocks of the picture [-]
+    median_residual : median relative residual over blocks of the picture [-]
     """
-    if residual > _MAX_BLOCK_RESIDUAL:
+    if median_residual > _MAX_BLOCK_RESIDUAL:
         notify(
-            f"{photo_source}: the fit differs from it by {100 * residual:.0f} % (median of blocks); "
+            f"{photo_source}: the fit differs from it by {100 * median_residual:.0f} % (median of blocks); "
             "1 % is usual, up to 10 % for the shape of another person. It probably does not show the head in "
             "this place, "
             "and the results mean nothing: check the camera and that it is upright, or use landmarks"

@@ -215,16 +215,18 @@ def _normal_equations(problem: FitProblem, fit_state: FitState, derivatives: Flo
     return H, J.T @ r - problem.prior_offsets(fit_state.point) / prior_sd**2
 
 
-def _eliminate_lights(fit_state: FitState, J: Floats) -> tuple[Floats, Floats]:
+def _eliminate_lights(fit_state: FitState, weighted_derivatives: Floats) -> tuple[Floats, Floats]:
     """Return derivatives (3 p, u) with changes of the lights projected out, and weighted residuals (3 p,).
 
     A sun of strength 0 keeps this strength, because it cannot decrease further.
 
-    J : (3 p, u) derivatives of the radiance, multiplied by the weights
+    weighted_derivatives : (3 p, u) derivatives of the radiance, multiplied by the weights
     """
     free = [k for k in range(len(fit_state.basis)) if k < AMBIENT_LOBE_COUNT or fit_state.strengths[k] > 0.0]
     Q = np.linalg.qr((fit_state.basis[free] * fit_state.weight).reshape(len(free), -1).T)[0]
-    return J - Q @ (Q.T @ J), (fit_state.residual * fit_state.weight).ravel()
+    return weighted_derivatives - Q @ (Q.T @ weighted_derivatives), (
+        fit_state.residual * fit_state.weight
+    ).ravel()
 
 
 _BLOCKS_PER_SIDE = 16
