@@ -142,7 +142,7 @@ def _shared_bindings(
     shape_resources: shape.Resources,
     strands: hair.Resources | None,
 ) -> MutableBindings:
-    """Return the shader resources that all atlas layouts share, apart from maps and lights of the scene."""
+    """Return the shader resources that all atlas layouts share, except the maps and the lights."""
     skin, program = request.skin, shade_program(device)
     environment, total = request.environment, request.split.total
     curvature, light_count = shape_resources.curvature, sum(request.light_part_counts)

@@ -19,8 +19,7 @@ Floats = NDArray[np.float64]
 class ProfileSplit:
     """Split of a profile into a narrow Gaussian that is relit, and Gaussians with which the atlas is blurred.
 
-    Relit means that the Gaussian is so narrow that it is not blurred; instead, light is evaluated at each
-    pixel.
+    The relit Gaussian is so narrow that light is not blurred with it, but evaluated at each pixel.
 
     relit : (3,) weights of the relit Gaussian [-]
     total : (3,) sums of the weights of all Gaussians [-]

@@ -74,8 +74,8 @@ def facing_irradiance(width_mm: float, height_mm: float, distance_mm: float) -> 
     width_mm, height_mm : sides of the rectangle [mm]
     distance_mm : distance of the point from the centre [mm]
 
-    Source: [Baum1989], whose equation holds for a point opposite a corner; here it is the common corner of
-    the four quarters.
+    Source: [Baum1989] for a point opposite the corner of a rectangle, applied to the four quarters of this
+    rectangle.
     """
     a, b = 0.5 * width_mm / distance_mm, 0.5 * height_mm / distance_mm
     across, along = math.hypot(1.0, a), math.hypot(1.0, b)

@@ -11,7 +11,10 @@ from dermis.scene.settings import Settings
 
 
 class OneBlur(TextureSpace):
-    """Technique that blurs with one Gaussian instead of the profile, as wide in texels everywhere."""
+    """Technique that blurs with a single Gaussian instead of the profile.
+
+    The width of the Gaussian in texels is the same everywhere.
+    """
 
     sources = ("Borshukov2003", "Green2004")
     stitches_seams = False
@@ -22,7 +25,7 @@ class OneBlur(TextureSpace):
         return single_gaussian(profile)
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Return a split with one blurred Gaussian, and without corrections for light within a texel."""
+        """Return a split with one blurred Gaussian, without a correction for light that varies within a texel."""
         return AtlasTechnique.split(self, profile, normalise_weights)
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:

@@ -115,7 +115,7 @@ def sphere_irradiance_table(profile: GaussianSum) -> Floats:
 def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
     """Return max(N.L, 0) convolved on the sphere with the normalised kernel exp(k cos a) [-].
 
-    The angle a is the angle at the centre of the sphere.
+    The angle a is the angle between two points of the sphere, as seen from its centre.
 
     cosines : values of N.L at which the result is evaluated [-]
     concentration : k, the squared radius of the sphere divided by the variance of the Gaussian [-]

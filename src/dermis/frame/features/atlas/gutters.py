@@ -27,7 +27,9 @@ _NO_NEIGHBOUR_WORD = 0xFFFFFFFF  # word of a triangle edge without skin across i
 
 @dataclass(frozen=True, eq=False)
 class GutterTracing:
-    """Constant inputs of the passes that trace a path from a chart to the source of each gutter texel.
+    """Constant inputs of the passes that determine from where on the surface each gutter texel copies light.
+
+    The passes trace a path from the edge of the chart across the seam.
 
     starts : buffer of the point at which each path starts, for gutter_trace.wgsl
     sides : buffer of the neighbouring triangle across each edge of each triangle, for gutter_trace.wgsl
@@ -41,7 +43,7 @@ class GutterTracing:
 
 
 def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: AtlasTextures) -> GutterTracing:
-    """Upload the constant inputs of the passes that trace gutters, for an atlas that has gutters."""
+    """Upload the buffers of `GutterTracing` for an atlas that has gutters."""
     starts, sides = (
         device.buffer(words, "STORAGE") for words in (_path_start_words(atlas), _neighbour_words(mesh))
     )
@@ -51,7 +53,7 @@ def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: Atla
 
 
 def with_separate_gutters(device: Device, textures: AtlasTextures) -> AtlasTextures:
-    """Return a copy of the atlas with separate, empty gutter buffers, which `draw` fills for a person."""
+    """Return a copy of the atlas with gutter buffers of its own, which `draw` fills for each person."""
 
     def with_gutter_list(level: AtlasTextures) -> AtlasTextures:
         words = np.zeros((len(level.gutter_texels), GUTTER_ENTRY_BYTES // 4), np.uint32)
@@ -63,9 +65,9 @@ def with_separate_gutters(device: Device, textures: AtlasTextures) -> AtlasTextu
 def _path_start_words(atlas: Atlas) -> Words:
     """Return (a, 5) words for gutter_trace.wgsl, one row for each gutter texel.
 
-    Word 0 packs the coordinates of the texel. Words 1 and 2 are the point where the path to the source
-    starts: a triangle, and two packed barycentric weights. Words 3 and 4 are the source position (x, y) to
-    use if tracing fails, as floats.
+    Word 0 packs the coordinates of the texel. Words 1 and 2 are the point where the traced path starts: a
+    triangle, and two packed barycentric weights. Words 3 and 4 are, as floats, the position (x, y) from which
+    to copy light if tracing fails.
     """
     root = np.full((atlas.size, atlas.size), -1, np.int64)
     root[atlas.outside[:, 1], atlas.outside[:, 0]] = np.arange(len(atlas.outside))
@@ -110,7 +112,7 @@ def _halving_buffers(
 
 
 def draw(graph: Recorder, atlas: AtlasTextures, tracing: GutterTracing, rest_head: HeadGeometry) -> None:
-    """Declare the passes that trace the source of each gutter texel, at all resolutions of the atlas.
+    """Declare the passes that trace from where each gutter texel copies light, at all atlas resolutions.
 
     atlas : result of `with_separate_gutters`; the passes fill its gutter buffers
     rest_head : surface of the person at rest

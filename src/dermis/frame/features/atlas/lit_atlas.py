@@ -12,7 +12,7 @@ from dermis.gpu import MutableBindings, Texture
 
 @dataclass(frozen=True, eq=False)
 class GutterUpdate:
-    """Inputs of the passes that find the sources of an atlas's gutter texels for each person.
+    """Inputs of the passes that determine, for each person, from where gutter texels copy light.
 
     tracing : inputs that are the same for all people
     head : surface of the person at rest

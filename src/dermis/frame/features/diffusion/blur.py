@@ -1,4 +1,4 @@
-"""Passes that fill the blur pyramid: each level blurs the previous level along u and then along v."""
+"""Passes that fill the blur pyramid: each level is the previous level, blurred along u and then along v."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def _spread_members(
 ) -> Iterator[dict[str, float]]:
     """Yield the members of the shader struct `Spread` for each blurred level.
 
-    They are the variance that the level's blur adds, and the variances that other steps add or have added.
+    They are the variance that the blur of the level adds, and the variances that resampling adds.
     """
     source_mm2 = previous_resampling = previous_mm2 = 0.0
     for variance, (source_halvings, level_halvings) in zip(variance_mm2, pairwise(halvings), strict=True):

@@ -159,8 +159,7 @@ def choose_halvings(
     max_halvings : largest number of times that the resolution of any level may be halved
 
     A level is computed by blurring the previous level. Its resolution is halved once more than that of the
-    previous level if that level is smooth enough, as set by `MIN_SMOOTHNESS`. docs/performance.md lists the
-    errors.
+    previous level if the previous level is smooth enough, as set by `MIN_SMOOTHNESS`.
     """
     halvings = [0]
     for source_mm2 in (0.0, *variance_mm2[:-1]):

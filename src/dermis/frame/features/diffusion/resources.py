@@ -21,7 +21,7 @@ class BlurScheme(Protocol):
     """Interface of techniques, which choose the texture format and the resolutions of their blurs."""
 
     def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
-        """Allocate the blur pyramid for an atlas of side x side texels."""
+        """Allocate the blur pyramid for a square atlas with a side of `atlas_side` texels."""
 
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str

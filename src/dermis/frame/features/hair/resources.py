@@ -156,7 +156,7 @@ def caster_strand_counts(device: Device, coarse_counts: StrandCounts) -> StrandC
 
 
 def adapter_strand_detail(device: Device) -> StrandDetail:
-    """Return the level of detail of hair on a device."""
+    """Return the limits of the detail of coarse strands for the adapter of a device."""
     return _SOFTWARE_DETAIL if device.adapter.kind == "CPU" else _GPU_DETAIL
 
 

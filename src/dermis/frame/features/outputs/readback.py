@@ -27,7 +27,7 @@ _PIXELS_PER_INVOCATION, _WORDS_PER_INVOCATION = 4, 3  # read and written by pack
 
 @dataclass(frozen=True)
 class Readback:
-    """Readback of a picture and its outputs, which is in progress.
+    """Readback in progress of a picture and its outputs.
 
     fetched : readback of the buffers
     size : (width, height) [pixel]

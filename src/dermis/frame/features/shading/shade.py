@@ -43,7 +43,7 @@ def draw(
     scattered_light : texture of scattered light over the atlas, or tables of pre-integrated skin
     radiance_image : texture for the radiance and, as alpha, the coverage by the head
     subsurface_layers : texture for the subsurface light (layer 0), and for the fraction of this light that
-        leaves towards the camera (layer 1); None to add the subsurface light to the image instead
+        leaves the skin towards the camera (layer 1); None to add the subsurface light to the image instead
     """
     device, (width, height) = graph.device, picture_size
     bindings = {

@@ -1,4 +1,4 @@
-"""Uniform record of the shading pass: camera rays, samples, poses of the eyes, and factors of the light."""
+"""Uniform record of the shading pass, which holds camera rays, samples, materials and poses of the eyes."""
 
 from __future__ import annotations
 

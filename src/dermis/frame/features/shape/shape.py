@@ -30,7 +30,7 @@ MIN_RELATIVE_TANGENT = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class ShapeTables:
-    """Buffers of a head's mesh and rig that are constant over frames, with the number of points, bones etc.
+    """Buffers of a head's mesh and rig that are constant over frames, and the numbers of their elements.
 
     morphs : dictionary from names in shape_pose.wgsl to morph targets and bone weights, empty for heads that
         do not move
@@ -242,7 +242,7 @@ def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
     """Return the (v, 3) normals of a mesh, each in a frame that moves with its vertex.
 
     The axes of the frame are the smooth normal, the u direction made orthogonal to the normal, and the cross
-    product of these two axes. In it, a normal of the mesh stays constant while the surface deforms.
+    product of these two axes. In this frame, the normal of a vertex is constant while the surface deforms.
     """
     smooth = vertex_normals(mesh.positions, mesh.point, mesh.triangles).astype(np.float64)
     axis = np.eye(3)[np.abs(smooth).argmin(axis=1)]

@@ -49,7 +49,7 @@ _CELL_COARSENING_FACTOR = 1.5  # factor of the cell side when memory does not ho
 
 
 def thin_part_tables(memo: Memo, request: FrameRequest) -> ThinParts | None:
-    """Return the transmittance of thin tissue as a function of its thickness, None for Lambertian skin."""
+    """Return tables of the light that thin tissue transmits and loses, None for Lambertian skin."""
     if request.skin.direction != "half-space":
         return None
     split, maps = request.split, request.head.maps

@@ -30,7 +30,9 @@ class StrainGauge:
         self._rest_lengths = self._pair_lengths(self._rest_mm, self._pairs)
 
     def strain(self, positions_mm: Floats) -> float:
-        """Return the strain of a shape: the 90th percentile of the relative changes of distances [-].
+        """Return the strain of a shape, the 90th percentile of the relative changes of distances [-].
+
+        The distances are those between neighbouring control points.
 
         positions_mm : (p, 3) control points of the shape [mm]
         """

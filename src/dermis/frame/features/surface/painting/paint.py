@@ -1,4 +1,4 @@
-"""Painted maps of human skin: colour, gloss and relief of a face at rest, and the changes by expressions."""
+"""Painted maps of human skin: colour, gloss and relief, at rest and with facial expressions."""
 
 from __future__ import annotations
 
