@@ -53,7 +53,7 @@ class Weighed:
 @pytest.fixture(scope="module")
 def weighed(device: Device) -> Weighed:
     """Return the pairs of a small wedge with their weights."""
-    return weighed_of(device, wedge(12.0, 1.0, 4.0, cells=2))
+    return weighed_of(device, wedge(12.0, 1.0, 4.0, cells_per_side=2))
 
 
 def weighed_of(device: Device, mesh: Mesh) -> Weighed:

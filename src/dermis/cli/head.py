@@ -251,4 +251,6 @@ def _write_glb(
     from dermis.scene.skin import Skin
 
     Pose(expression).motion(head.control, EXPRESSION_OPTION)  # raises for unknown names and invalid weights
-    return write_person_glb(output, person, head, roughness=Skin().roughness, weights=expression, eyes=eyes)
+    return write_person_glb(
+        output, person, head, roughness=Skin().roughness, expression_weights=expression, eyes=eyes
+    )

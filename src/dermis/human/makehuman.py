@@ -38,21 +38,21 @@ class TargetDeltas(NamedTuple):
     delta_mm: NDArray[np.float32]
 
 
-def morphed_points_mm(weights: Mapping[str, float]) -> Points:
+def morphed_points_mm(target_weights: Mapping[str, float]) -> Points:
     """Return the points (n, 3) of a person's mesh, followed by the joints of the skeleton [mm].
 
     The origin is the midpoint between the eyes.
 
-    weights : mapping from names of MakeHuman's morph targets to weights
+    target_weights : mapping from names of MakeHuman's morph targets to weights
 
     Raises DermisError for unknown targets.
     """
     arrays, targets = makehuman_arrays(), target_deltas()
     points = [np.arange(len(arrays["positions_mm"]))]
     deltas: list[NDArray[np.floating]] = [arrays["positions_mm"].astype(np.float64)]
-    check_targets(weights)
+    check_targets(target_weights)
     known = _target_indices()
-    for name, weight in weights.items():
+    for name, weight in target_weights.items():
         part = slice(*targets.first[known[name] : known[name] + 2])
         points.append(targets.point[part])
         deltas.append(weight * targets.delta_mm[part])

@@ -65,15 +65,15 @@ class _LayoutFaces(NamedTuple):
     material: Index
 
 
-def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: EyeLook) -> Head:
+def build_head(target_weights: Mapping[str, float], maps: Maps, layout: Layout, eye_look: EyeLook) -> Head:
     """Return the bare head of a person before subdivision, without hair.
 
-    weights : mapping from names of MakeHuman's morph targets to weights
+    target_weights : mapping from names of MakeHuman's morph targets to weights
     maps : maps of the skin
     layout : uv layout
-    eyes : look of the eyes
+    eye_look : look of the eyes
     """
-    points_mm, faces = morphed_points_mm(weights), _layout_faces(layout)
+    points_mm, faces = morphed_points_mm(target_weights), _layout_faces(layout)
     sockets = _eye_sockets(points_mm)
     (left, left_centre), (right, right_centre) = map(lids.place_eyeball, sockets)
     points = np.concatenate([lids.fit_lids(points_mm, sockets)[: mesh_point_count()], left, right])
@@ -91,15 +91,15 @@ def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
     apex, back, _ = eyeball.axis_points()
     contact = lids.lid_contact(mesh_point_count(), len(left), apex, back)
     rig = Rig(points.astype(np.float32), targets, bones, bone_rotations=gaze_rotations(), contact=contact)
-    return Head("human", mesh, maps, MAKEHUMAN_CREDIT, rig, _build_eyes(eyes))
+    return Head("human", mesh, maps, MAKEHUMAN_CREDIT, rig, _build_eyes(eye_look))
 
 
-def control_points_mm(weights: Mapping[str, float]) -> NDArray[np.float32]:
+def control_points_mm(target_weights: Mapping[str, float]) -> NDArray[np.float32]:
     """Return the control points (p, 3) of a person in rest pose, relative to the midpoint of the eyes [mm].
 
-    weights : mapping from names of MakeHuman's morph targets to weights
+    target_weights : mapping from names of MakeHuman's morph targets to weights
     """
-    points_mm = morphed_points_mm(weights)
+    points_mm = morphed_points_mm(target_weights)
     sockets = _eye_sockets(points_mm)
     balls = [lids.place_eyeball(eye)[0] for eye in sockets]
     skin = lids.fit_lids(points_mm, sockets)[: mesh_point_count()]
@@ -112,12 +112,12 @@ def _eye_sockets(points_mm: Points) -> tuple[lids.EyeSocket, lids.EyeSocket]:
     return left, right
 
 
-def _build_eyes(look: EyeLook) -> Eyes:
+def _build_eyes(eye_look: EyeLook) -> Eyes:
     size = len(lids.eyeball_mesh()[0])
     first = mesh_point_count() + np.array([0, size], np.int32)
     apex, back, side = (np.asarray(first + point, np.int32) for point in eyeball.axis_points())
     material = np.array([list(MATERIAL_OF_GROUP).index(name) for name in (LEFT_EYE, RIGHT_EYE)], np.int32)
-    return Eyes(apex, back, side, material, look)
+    return Eyes(apex, back, side, material, eye_look)
 
 
 @cache

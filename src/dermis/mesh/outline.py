@@ -88,21 +88,21 @@ class RigOutline(ShortRepr):
     weight: Floats | None
     bones: Intp
 
-    def pose(self, weights: Floats, matrices: Floats) -> Floats:
+    def pose(self, target_weights: Floats, bone_matrices: Floats) -> Floats:
         """Return the outline points (s, 3) in a pose [mm].
 
-        weights : (t,) weights of the targets, relative to the rest pose
-        matrices : (b, 3, 4) matrices of all bones of the rig
+        target_weights : (t,) weights of the targets, relative to the rest pose
+        bone_matrices : (b, 3, 4) matrices of all bones of the rig
         """
-        columns, active = self.rest_mm, weights.nonzero()[0]
+        columns, active = self.rest_mm, target_weights.nonzero()[0]
         if len(active):
-            few = 2 * len(active) < len(weights)
-            delta = weights[active] @ self.delta_mm[active] if few else weights @ self.delta_mm
+            few = 2 * len(active) < len(target_weights)
+            delta = target_weights[active] @ self.delta_mm[active] if few else target_weights @ self.delta_mm
             columns = columns.copy()
             columns[:3] += delta.reshape(3, -1)
         if self.weight is None:
             return columns[:3].T
-        blended = matrices[self.bones].reshape(-1, 12).T @ self.weight
+        blended = bone_matrices[self.bones].reshape(-1, 12).T @ self.weight
         return np.asarray((blended.reshape(3, 4, -1) * columns).sum(axis=1).T)
 
 

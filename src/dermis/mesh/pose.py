@@ -210,12 +210,12 @@ def _bone_transforms(
     return changes
 
 
-def _check_matrices(matrices: Doubles, bone_names: list[str], culprit: object) -> None:
+def _check_matrices(bone_matrices: Doubles, bone_names: list[str], culprit: object) -> None:
     """Raise DermisError if one of the matrices (n, 4, 4) is singular.
 
     bone_names : (n,) names of the bones
     """
-    linear = matrices[:, :3, :3]
+    linear = bone_matrices[:, :3, :3]
     size = np.sqrt(np.einsum("nij,nij->n", linear, linear))
     singular = np.abs(np.linalg.det(linear)) <= _MIN_RELATIVE_DETERMINANT * size**3
     if singular.any():
@@ -229,13 +229,13 @@ def _refuse_bone_value(culprit: str, bone_value: object) -> NoReturn:
 
 
 def _refuse_weights(
-    weights: Mapping[str, object], target_names: tuple[str, ...], culprit: object
+    target_weights: Mapping[str, object], target_names: tuple[str, ...], culprit: object
 ) -> NoReturn:
     """Raise DermisError for the first invalid weight or unknown morph target.
 
     target_names : names of the morph targets of the rig
     """
-    for name, weight in weights.items():
+    for name, weight in target_weights.items():
         if name not in target_names:
             _refuse_name(f"{culprit}: weights", name, target_names, "morph target")
         checked_number(f"{culprit}: weights.{name}", weight, -MAX_WEIGHT, MAX_WEIGHT)

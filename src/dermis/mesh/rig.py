@@ -246,17 +246,17 @@ class Rig(ShortRepr):
             vars(self)["_last"] = points, dense
         return np.asarray(dense)
 
-    def pose(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
+    def pose(self, target_weights: Doubles, bone_matrices: Doubles | None = None) -> Doubles:
         """Return all control points (p, 3) in a pose, computed on the CPU [mm].
 
-        weights : (t,) weights of the targets, relative to the rest pose
-        matrices : (b, 3, 4) matrices of the bones, from `Skeleton.matrices`; None for the rest pose
+        target_weights : (t,) weights of the targets, relative to the rest pose
+        bone_matrices : (b, 3, 4) matrices of the bones, from `Skeleton.matrices`; None for the rest pose
         """
         targets, points = self.targets, self.positions_mm.astype(np.float64)
-        row_weights = np.repeat(weights, np.diff(targets.first))
+        row_weights = np.repeat(target_weights, np.diff(targets.first))
         np.add.at(points, targets.point, row_weights[:, None] * targets.delta_mm)
-        if self.skeleton is not None and matrices is not None:
+        if self.skeleton is not None and bone_matrices is not None:
             homogeneous = np.concatenate([points, np.ones((len(points), 1))], axis=1)
-            blended = np.einsum("pk,pkij->pij", self.skeleton.weight, matrices[self.skeleton.bone])
+            blended = np.einsum("pk,pkij->pij", self.skeleton.weight, bone_matrices[self.skeleton.bone])
             points = np.asarray(np.einsum("pij,pj->pi", blended, homogeneous))
         return points if self.contact is None else self.contact.push_out(points)

@@ -145,7 +145,7 @@ class _Section(NamedTuple):
     middle: float
 
 
-def _horizontal_section(positions: Doubles, cut_triangles: Ints, height: float) -> _Section:
+def _horizontal_section(positions: Doubles, cut_triangles: Ints, plane_height: float) -> _Section:
     """Return the intersection of a mesh with the horizontal plane at a height.
 
     cut_triangles : (n, 3) vertex indices of the triangles that the plane cuts
@@ -154,8 +154,8 @@ def _horizontal_section(positions: Doubles, cut_triangles: Ints, height: float) 
         return _Section(0, 0.0, 0.0)
     (x, y), a, b = positions.T[:2], cut_triangles, np.roll(cut_triangles, 1, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        crossing: Doubles = x[a] + (x[b] - x[a]) * (height - y[a]) / (y[b] - y[a])
-    crossing[(y[a] > height) == (y[b] > height)] = np.nan
+        crossing: Doubles = x[a] + (x[b] - x[a]) * (plane_height - y[a]) / (y[b] - y[a])
+    crossing[(y[a] > plane_height) == (y[b] > plane_height)] = np.nan
     low, high = np.nanmin(crossing, axis=1), np.nanmax(crossing, axis=1)
     order = np.argsort(low)
     low, reached = low[order], np.maximum.accumulate(high[order])

@@ -216,33 +216,37 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
     return _coarsen_triangles(mesh.triangles[~mesh.cut_out_mask], mesh.positions, skipped, tolerance_mm)
 
 
-def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
+def _coarsen_triangles(
+    triangles: Ints, positions_mm: Floats, dropped_levels: int, tolerance_mm: float
+) -> Ints:
     """Return triangles (t, 3) of a mesh after Loop subdivision, with fewer levels in flat regions.
 
     triangles : (f, 3) triangles of the finest level; Loop's rules divide a triangle into four, of which the
         first three are at its corners
-    levels : number of subdivision levels to leave out in flat regions
+    dropped_levels : number of subdivision levels to leave out in flat regions
     tolerance_mm : largest deviation of a region that counts as flat [mm]
     """
     coarse, finer = triangles, triangles
-    for _ in range(levels):
+    for _ in range(dropped_levels):
         coarse, finer = coarse.reshape(-1, 4, 3)[:, :3, 0], coarse
     middles = finer.reshape(-1, 4, 3)[:, :3, 1]
     deviation = _edge_deviation_mm(positions_mm, middles, coarse, np.roll(coarse, -1, axis=1))
     is_curved = deviation.max(axis=1) > tolerance_mm
-    return np.concatenate((coarse[~is_curved], triangles[np.repeat(is_curved, 4**levels)]))
+    return np.concatenate((coarse[~is_curved], triangles[np.repeat(is_curved, 4**dropped_levels)]))
 
 
-def _coarsen_quads(quads: CornerIndices, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
+def _coarsen_quads(
+    quads: CornerIndices, positions_mm: Floats, dropped_levels: int, tolerance_mm: float
+) -> Ints:
     """Return triangles (t, 3) of a mesh after Catmull-Clark subdivision, with fewer levels in flat regions.
 
     quads : (q, 4) quads of the finest level; the rules divide a polygon into quads, one from each corner to
         its centre
-    levels : number of subdivision levels to leave out in flat regions
+    dropped_levels : number of subdivision levels to leave out in flat regions
     tolerance_mm : largest deviation of a region that counts as flat [mm]
     """
     coarse = quads
-    for _ in range(levels - 1):
+    for _ in range(dropped_levels - 1):
         coarse = coarse[:, 0].reshape(-1, 4)
     corner, side, centre = coarse[:, 0], coarse[:, 1], coarse[:, 2]
     is_first = np.append(True, centre[1:] != centre[:-1])
@@ -253,7 +257,7 @@ def _coarsen_quads(quads: CornerIndices, positions_mm: Floats, levels: int, tole
     is_curved[polygon[_edge_deviation_mm(positions_mm, side, corner, following) > tolerance_mm]] = True
     in_fan = ~is_first & ~is_last & ~is_curved[polygon]
     fans = np.column_stack((corner[first], corner, following))[in_fan]
-    fine = quads[np.repeat(is_curved[polygon], 4 ** (levels - 1))]
+    fine = quads[np.repeat(is_curved[polygon], 4 ** (dropped_levels - 1))]
     return np.concatenate((fans, split_quads(fine))).astype(np.int32)
 
 

@@ -40,17 +40,17 @@ class SurfacePoints(NamedTuple):
     derivative_x: Doubles
     derivative_y: Doubles
 
-    def xy_steps(self, directions: Doubles, length: Doubles) -> tuple[Doubles, Doubles]:
+    def xy_steps(self, directions: Doubles, step_length: Doubles) -> tuple[Doubles, Doubles]:
         """Return the changes (n,) of x and (n,) of y by steps along the skin [mm].
 
         directions : (n, 3) directions of the steps, whose components along the normal are ignored
-        length : (n,) length of each step along the skin [mm]
+        step_length : (n,) length of each step along the skin [mm]
         """
         u, v = self.derivative_x, self.derivative_y
         pairs = (u, u), (u, v), (v, v), (u, directions), (v, directions)
         xx, xy, yy, x, y = (_row_dots(a, b) for a, b in pairs)
         dx, dy = yy * x - xy * y, xx * y - xy * x
-        scale = length / np.sqrt(xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy)
+        scale = step_length / np.sqrt(xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy)
         return scale * dx, scale * dy
 
 
@@ -148,42 +148,47 @@ def brow_outline(position_across: float) -> Doubles:
     return np.stack([x, y], axis=-1)
 
 
-def hair_count(look: HairLook) -> int:
+def hair_count(hair_look: HairLook) -> int:
     """Return the number of hairs in each brow, which grows with `HairLook.bushy`."""
-    return int(_MAX_HAIRS * (0.55 + 0.45 * look.bushy))
+    return int(_MAX_HAIRS * (0.55 + 0.45 * hair_look.bushy))
 
 
-def sample_shapes(u: Doubles, v: Doubles, rng: np.random.Generator, look: HairLook) -> Doubles:
+def sample_shapes(
+    position_along: Doubles, position_across: Doubles, rng: np.random.Generator, hair_look: HairLook
+) -> Doubles:
     """Return random shape parameters (5, n) of brow hairs.
 
     The five rows are: the angle of the hair at its root [rad], the change of this angle from root to tip
     [rad], the length of the hair [mm], its height above the skin [mm], and its radius at the root [mm]. Seen
     from the front, the angle is 0 for a hair that points outwards and pi / 2 for a hair that points up.
 
-    u, v : (n,) positions along and across the brow, from `sample_positions`
+    position_along, position_across : (n,) positions along and across the brow, from `sample_positions`
     """
-    n = len(u)
+    n = len(position_along)
     # hairs of the upper and the lower half lean towards each other
     angle = (
-        np.interp(u, _POSITIONS_ALONG_BROW, _HAIR_ANGLES_RADIANS)
-        - 0.6 * v * np.minimum(2.5 * u, 1.0)
+        np.interp(position_along, _POSITIONS_ALONG_BROW, _HAIR_ANGLES_RADIANS)
+        - 0.6 * position_across * np.minimum(2.5 * position_along, 1.0)
         + rng.normal(0, 0.13, n)
     )
     bend = (
         -0.5
         * np.clip(
-            angle - np.interp(np.minimum(u + 0.2, 1), _POSITIONS_ALONG_BROW, _HAIR_ANGLES_RADIANS), 0, 1
+            angle
+            - np.interp(np.minimum(position_along + 0.2, 1), _POSITIONS_ALONG_BROW, _HAIR_ANGLES_RADIANS),
+            0,
+            1,
         )
-        - 0.25 * v * u
+        - 0.25 * position_across * position_along
     )
     bend += rng.normal(0, 0.14, n)
     length = (
-        np.interp(u, _POSITIONS_ALONG_BROW, _HAIR_LENGTH_MM)
+        np.interp(position_along, _POSITIONS_ALONG_BROW, _HAIR_LENGTH_MM)
         * rng.uniform(0.6, 1.1, n)
-        * (0.85 + 0.3 * look.bushy)
+        * (0.85 + 0.3 * hair_look.bushy)
     )
     rise = np.clip(rng.gamma(4.0, 0.15, n), 0.15, 1.3)
-    radius = rng.uniform(0.03, 0.05, n) * (0.9 + 0.2 * look.bushy)
+    radius = rng.uniform(0.03, 0.05, n) * (0.9 + 0.2 * hair_look.bushy)
     return np.stack([angle, bend, length, rise, radius])
 
 

@@ -235,19 +235,19 @@ def _root_directions(points: Doubles, normals: Doubles, style: Style) -> Doubles
     return unit_vectors(np.reshape(lift, (-1, 1)) * normals + combed)
 
 
-def _grow_one_step(surface: SkinSurface, state: Growth, step_mm: float, style: Style) -> Growth:
+def _grow_one_step(surface: SkinSurface, growth: Growth, step_mm: float, style: Style) -> Growth:
     """Return the state of guides after one step of growth.
 
     step_mm : length of the step [mm]
     """
-    direction, length, tied = _next_directions(state, style), state.length_mm + step_mm, state.tied_mm
+    direction, length, tied = _next_directions(growth, style), growth.length_mm + step_mm, growth.tied_mm
     if style.comb == "gather":
         near = (
-            np.linalg.norm(state.position_mm - style.tie_mm - _tie_offsets(state, style), axis=1)
+            np.linalg.norm(growth.position_mm - style.tie_mm - _tie_offsets(growth, style), axis=1)
             < _TIE_REACH_MM
         )
         tied = np.where(near & ~np.isfinite(tied), length, tied)
-    moved = state.position_mm + step_mm * direction
+    moved = growth.position_mm + step_mm * direction
     base, normal = surface.project(moved)
     height = ((moved - base) * normal).sum(axis=1)
     height_of_ears = _EAR_HEIGHT_MM * ear_weight(base) if style.comb in _COMBS_OVER_EARS else 0.0
@@ -256,11 +256,11 @@ def _grow_one_step(surface: SkinSurface, state: Growth, step_mm: float, style: S
     pushed = np.clip(least - height, 0.0, 0.8 * step_mm)[:, None]
     moved += pushed * normal
     if style.comb == "fall":
-        loose = fringe_weight(state.root_mm, style)[:, None] < 0.5
+        loose = fringe_weight(growth.root_mm, style)[:, None] < 0.5
         moved = np.where(loose, _move_off_face(moved), moved)
     if style.coil_mm:
         wound = np.clip((length - tied) / 25.0, 0.0, 1.0)[:, None]
-        moved += wound * (_bun_points(state, length, style) - moved)
+        moved += wound * (_bun_points(growth, length, style) - moved)
     # hair that is held out slides along the obstacle: it loses its inward motion, but gains no outward motion
     inward = np.minimum((direction * normal).sum(axis=1, keepdims=True), 0.0)
     direction = np.where(
@@ -268,69 +268,69 @@ def _grow_one_step(surface: SkinSurface, state: Growth, step_mm: float, style: S
     )
     base, normal = surface.project(moved)
     height = ((moved - base) * normal).sum(axis=1)
-    return state._replace(position_mm=moved, direction=direction, skin_normal=normal, height_mm=height,
+    return growth._replace(position_mm=moved, direction=direction, skin_normal=normal, height_mm=height,
                           length_mm=length, tied_mm=tied)  # fmt: skip
 
 
-def _next_directions(state: Growth, style: Style) -> Doubles:
+def _next_directions(growth: Growth, style: Style) -> Doubles:
     """Return the unit directions (g, 3) in which guides grow in the next step."""
-    free = np.minimum(state.length_mm / 60.0, 1.0)[:, None] + 0.15
+    free = np.minimum(growth.length_mm / 60.0, 1.0)[:, None] + 0.15
     pull = 4.0 * style.gravity * free * np.array([0.0, -1.0, 0.0])
     if style.comb in ("gather", "rows", "back"):
         combed = unit_vectors(
-            tangent_component(COMBS[style.comb](state.position_mm, style), state.skin_normal)
+            tangent_component(COMBS[style.comb](growth.position_mm, style), growth.skin_normal)
         )
-        close = np.exp(-np.maximum(state.height_mm - style.volume_mm, 0.0) / 8.0)[:, None]
+        close = np.exp(-np.maximum(growth.height_mm - style.volume_mm, 0.0) / 8.0)[:, None]
         if style.comb == "gather":
-            to_tie = np.array(style.tie_mm) + _tie_offsets(state, style) - state.position_mm
+            to_tie = np.array(style.tie_mm) + _tie_offsets(growth, style) - growth.position_mm
             distance = np.linalg.norm(to_tie, axis=1, keepdims=True)
             combed = unit_vectors(np.where(distance < 35.0, to_tie, combed))
-            tail = _tail_directions(state, style, pull)
+            tail = _tail_directions(growth, style, pull)
             return np.where(
-                np.isfinite(state.tied_mm)[:, None], tail, unit_vectors(0.5 * state.direction + combed)
+                np.isfinite(growth.tied_mm)[:, None], tail, unit_vectors(0.5 * growth.direction + combed)
             )
-        return unit_vectors(0.6 * state.direction + 0.8 * close * combed + 0.3 * (1.0 - close) * pull)
-    return unit_vectors(style.stiffness * state.direction + (1.0 - style.stiffness) * pull)
+        return unit_vectors(0.6 * growth.direction + 0.8 * close * combed + 0.3 * (1.0 - close) * pull)
+    return unit_vectors(style.stiffness * growth.direction + (1.0 - style.stiffness) * pull)
 
 
-def _tie_offsets(state: Growth, style: Style) -> Doubles:
+def _tie_offsets(growth: Growth, style: Style) -> Doubles:
     """Return where guides pass through the hair tie of a ponytail or bun, relative to its middle (g, 3) [mm].
 
     A guide passes through the side of the tie that is nearest to the root of the guide.
     """
     outward = unit_vectors(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
     away = tangent_component(
-        state.root_mm - np.array(style.tie_mm), np.broadcast_to(outward, state.root_mm.shape)
+        growth.root_mm - np.array(style.tie_mm), np.broadcast_to(outward, growth.root_mm.shape)
     )
     reach = np.linalg.norm(away, axis=1, keepdims=True)
     return np.asarray(_TIE_RADIUS_MM * np.minimum(reach / 60.0, 1.0) * unit_vectors(away))
 
 
-def _tail_directions(state: Growth, style: Style, gravity_pull: Doubles) -> Doubles:
+def _tail_directions(growth: Growth, style: Style, gravity_pull: Doubles) -> Doubles:
     """Return the directions (g, 3) of hair beyond the hair tie: outwards, then down and slightly apart.
 
     gravity_pull : (g, 3) pull of gravity, as vectors
     """
     outward = unit_vectors(np.array(style.tie_mm) - _SKULL_CENTRE_MM)[None]
-    since = np.maximum(state.length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, 0.0), 0.0)[
+    since = np.maximum(growth.length_mm - np.where(np.isfinite(growth.tied_mm), growth.tied_mm, 0.0), 0.0)[
         :, None
     ]
-    apart = _tie_offsets(state, style) / _TIE_RADIUS_MM
+    apart = _tie_offsets(growth, style) / _TIE_RADIUS_MM
     spread = 0.12 * np.exp(-since / 60.0) - 0.03 * smoothstep(150.0, 400.0, since)
     return unit_vectors(
-        0.85 * state.direction + 0.15 * gravity_pull + 0.3 * np.exp(-since / 25.0) * outward + spread * apart
+        0.85 * growth.direction + 0.15 * gravity_pull + 0.3 * np.exp(-since / 25.0) * outward + spread * apart
     )
 
 
-def _length_beyond_tie(state: Growth, length_mm: Doubles) -> Doubles:
+def _length_beyond_tie(growth: Growth, length_mm: Doubles) -> Doubles:
     """Return the length (g,) of each guide beyond the hair tie [mm]; 0 before the guide reaches the tie.
 
     length_mm : (g,) lengths from the roots [mm]
     """
-    return np.maximum(length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, length_mm), 0.0)
+    return np.maximum(length_mm - np.where(np.isfinite(growth.tied_mm), growth.tied_mm, length_mm), 0.0)
 
 
-def _bun_points(state: Growth, length_mm: Doubles, style: Style) -> Doubles:
+def _bun_points(growth: Growth, length_mm: Doubles, style: Style) -> Doubles:
     """Return points (g, 3) on guides that are wound into a bun beyond the hair tie [mm].
 
     length_mm : (g,) lengths from the roots to the points [mm]
@@ -338,10 +338,10 @@ def _bun_points(state: Growth, length_mm: Doubles, style: Style) -> Doubles:
     outward = unit_vectors(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
     side = unit_vectors(np.cross(outward, [0.0, 1.0, 0.0]))
     up = np.cross(side, outward)
-    offset = _tie_offsets(state, style)
+    offset = _tie_offsets(growth, style)
     turn = np.arctan2(offset @ up, offset @ side)
     rank = np.linalg.norm(offset, axis=1) / _TIE_RADIUS_MM
-    since = _length_beyond_tie(state, length_mm)
+    since = _length_beyond_tie(growth, length_mm)
     radius = style.coil_mm * (0.7 + 0.3 * rank)
     tilt = 1.9 - 1.5 * smoothstep(0.0, 260.0, since) + 0.25 * np.sin(3.0 * turn)
     turn = turn + since / (0.8 * radius)

@@ -48,48 +48,52 @@ HAIR_PARAMETERS_DTYPE = np.dtype(
 
 
 def make_groom(
-    look: HairLook, recession: float, root_finder: RootFinder, levels: int, hair_fraction: float = 1.0
+    hair_look: HairLook,
+    recession: float,
+    root_finder: RootFinder,
+    subdivision_levels: int,
+    hair_fraction: float = 1.0,
 ) -> Groom | None:
     """Return the scalp hair and beard of a person; None for a bald person without a beard.
 
     recession : recession of the hairline, 0 to 1, see `SkinLook`
     root_finder : root finder of the mean person
-    levels : subdivision levels of the person's mesh
+    subdivision_levels : subdivision levels of the person's mesh
     hair_fraction : fraction of the strands to grow; the strands are widened by the inverse of this fraction,
         so that coverage stays the same
     """
-    scalp, bearded = styles().get(look.style), look.beard_mm > 0.0
-    if look.density == 0.0:
+    scalp, bearded = styles().get(hair_look.style), hair_look.beard_mm > 0.0
+    if hair_look.density == 0.0:
         scalp = None
     if scalp is None and not bearded:
         return None
-    tables = style_strands(scalp, bearded, root_finder, levels)
-    parts = [_scalp_parameters(scalp, look, recession)] if scalp else []
-    parts += [_beard_parameters(look)] if bearded else []
+    tables = style_strands(scalp, bearded, root_finder, subdivision_levels)
+    parts = [_scalp_parameters(scalp, hair_look, recession)] if scalp else []
+    parts += [_beard_parameters(hair_look)] if bearded else []
     parameters, strands = np.array(parts, HAIR_PARAMETERS_DTYPE), round(hair_fraction * len(tables.roots))
     heights, knots = hairline_heights(max(recession, scalp.crown if scalp else 0.0)), _knot_count(parameters)
     return Groom(tables.guides, tables.roots, parameters, strands, knots, heights, tables.centre_mm)
 
 
-def _scalp_parameters(style: Style, look: HairLook, recession: float) -> tuple[object, ...]:
-    length, fade = min(look.length_mm, style.max_length_mm), look.fade if style.fade else 0.0
-    densities = STRANDS_PER_CM2, MAX_HAIRS_PER_CM2, look.density
+def _scalp_parameters(style: Style, hair_look: HairLook, recession: float) -> tuple[object, ...]:
+    length, fade = min(hair_look.length_mm, style.max_length_mm), hair_look.fade if style.fade else 0.0
+    densities = STRANDS_PER_CM2, MAX_HAIRS_PER_CM2, hair_look.density
     return _parameter_row(
-        style, look, length, densities, _HAIR_RADIUS_MM, fade, max(recession, style.crown), 1.0
+        style, hair_look, length, densities, _HAIR_RADIUS_MM, fade, max(recession, style.crown), 1.0
     )
 
 
-def _beard_parameters(look: HairLook) -> tuple[object, ...]:
+def _beard_parameters(hair_look: HairLook) -> tuple[object, ...]:
     length, densities = (
-        min(look.beard_mm, BEARD.max_length_mm),
+        min(hair_look.beard_mm, BEARD.max_length_mm),
         (BEARD_STRANDS_PER_CM2, BEARD_HAIRS_PER_CM2, 1.0),
     )
-    return _parameter_row(BEARD, look, length, densities, _BEARD_RADIUS_MM)
+    return _parameter_row(BEARD, hair_look, length, densities, _BEARD_RADIUS_MM)
 
 
 def _parameter_row(
     style: Style,
-    look: HairLook,
+    hair_look: HairLook,
     length_mm: float,
     densities: tuple[float, float, float],
     hair_radius_mm: float,
@@ -105,7 +109,7 @@ def _parameter_row(
     strands_per_cm2, hairs_per_cm2, density = densities
     hairs_per_strand = hairs_per_cm2 / strands_per_cm2
     curl_mm, pitch_mm, incoherence, frizz_mm = (
-        float(np.interp(look.curl, _CURL_NODES, column))
+        float(np.interp(hair_look.curl, _CURL_NODES, column))
         for column in (_CURL_RADIUS_MM, _CURL_PITCH_MM, _CURL_INCOHERENCE, _FRIZZ_MM)
     )
     rope = style.rope_mm > 0.0
@@ -130,10 +134,10 @@ def _parameter_row(
         "flyaways": 0.3 * _FLYAWAY_FRACTION if rope else _FLYAWAY_FRACTION,
         "radius_mm": radius,
         "cover": min(cover, 4.0),
-        "grey": look.grey,
+        "grey": hair_look.grey,
         "hairs_per_strand": hairs_per_strand,
-        "dark": tuple(absorption_per_mm(look.eumelanin, look.pheomelanin)),
-        "seed": look.seed % _SEED_COUNT,
+        "dark": tuple(absorption_per_mm(hair_look.eumelanin, hair_look.pheomelanin)),
+        "seed": hair_look.seed % _SEED_COUNT,
         "white": tuple(absorption_per_mm(_MIN_EUMELANIN, 0.0)),
         "pad": 0.0,
     }

@@ -57,35 +57,37 @@ LOWER_LASHES = LashRow(
 )
 
 
-def sample_positions(row: LashRow, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
+def sample_positions(lash_row: LashRow, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
     """Return random root positions of lashes on a lid, as two arrays (n,) of coordinates from 0 to 1.
 
     The coordinates are `edge_position` and `edge_distance` of `RootFinder.lid_edge_roots`.
     """
-    u = (np.arange(row.hairs) + rng.uniform(-0.3, 1.3, row.hairs)) / row.hairs
-    across = 0.04 + 0.12 * rng.integers(0, 3, row.hairs)
-    return row.start + (row.end - row.start) * np.clip(u, 0, 1), np.asarray(across, np.float64)
+    u = (np.arange(lash_row.hairs) + rng.uniform(-0.3, 1.3, lash_row.hairs)) / lash_row.hairs
+    across = 0.04 + 0.12 * rng.integers(0, 3, lash_row.hairs)
+    return lash_row.start + (lash_row.end - lash_row.start) * np.clip(u, 0, 1), np.asarray(across, np.float64)
 
 
-def sample_shapes(row: LashRow, u: Doubles, rng: np.random.Generator, first_clump: int) -> Doubles:
+def sample_shapes(
+    lash_row: LashRow, edge_position: Doubles, rng: np.random.Generator, first_clump: int
+) -> Doubles:
     """Return random shape parameters (7, n) of lashes.
 
     The seven rows are: the splay [-], the elevation of the first segment [rad], the elevation of the last
     segment [rad], the length [mm], the radius at the root [mm], the index of the clump to which the lash
     sticks, and the attraction of the tip to this clump, 0 to 1.
 
-    u : (n,) positions along the edge of the lid, from `sample_positions`
+    edge_position : (n,) positions along the edge of the lid, from `sample_positions`
     first_clump : index of the first clump of this row
     """
-    n, fraction = len(u), (u - row.start) / (row.end - row.start)
-    splay = np.interp(fraction, [0, 1], row.splay) + rng.normal(0, 0.1, n)
-    first = row.rise[0] + rng.normal(0, 0.12, n)
-    last = row.rise[1] + rng.normal(0, 0.18, n)
-    length = np.interp(fraction, _LENGTH_POSITIONS, row.length) * rng.uniform(0.7, 1.08, n)
+    n, fraction = len(edge_position), (edge_position - lash_row.start) / (lash_row.end - lash_row.start)
+    splay = np.interp(fraction, [0, 1], lash_row.splay) + rng.normal(0, 0.1, n)
+    first = lash_row.rise[0] + rng.normal(0, 0.12, n)
+    last = lash_row.rise[1] + rng.normal(0, 0.18, n)
+    length = np.interp(fraction, _LENGTH_POSITIONS, lash_row.length) * rng.uniform(0.7, 1.08, n)
     clump = np.empty(n)  # neighbours that stick together
-    clump[np.argsort(u)] = first_clump + np.cumsum(rng.random(n) < 0.4)
+    clump[np.argsort(edge_position)] = first_clump + np.cumsum(rng.random(n) < 0.4)
     pull = rng.uniform(0.2, 0.7, n)
-    radius = row.radius * rng.uniform(0.8, 1.15, n)
+    radius = lash_row.radius * rng.uniform(0.8, 1.15, n)
     return np.stack([splay, first, last, length, radius, clump, pull])
 
 

@@ -125,18 +125,18 @@ class RootFinder:
         )[0]
 
     def lid_edge_roots(
-        self, lid: lashes.LashRow, side_sign: float, edge_position: Doubles, edge_distance: Doubles
+        self, lash_row: lashes.LashRow, side_sign: float, edge_position: Doubles, edge_distance: Doubles
     ) -> Roots:
         """Return lash roots near the edge of a lid, on the quads that adjoin the edge on the outside.
 
-        lid : row of lashes on the lid
+        lash_row : row of lashes on the lid
         side_sign : 1 for the left eye, -1 for the right eye
         edge_position : (n,) positions along the edge, as fractions of its arc length
         edge_distance : (n,) distances from the edge: 0 on the edge, 1 on the opposite side of the quad
         """
-        key = lid.edge_points, side_sign
+        key = lash_row.edge_points, side_sign
         if key not in self._lid_edges:
-            self._lid_edges[key] = self._lid_edge(np.array(lid.edge_points), side_sign)
+            self._lid_edges[key] = self._lid_edge(np.array(lash_row.edge_points), side_sign)
         lengths_mm, quad, frame = self._lid_edges[key]
         segment = np.clip(
             np.searchsorted(lengths_mm, edge_position * lengths_mm[-1], "right") - 1, 0, len(quad) - 1

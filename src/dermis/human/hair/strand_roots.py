@@ -55,14 +55,14 @@ class StyleStrands(NamedTuple):
 
 @lru_cache(_MAX_CACHED_STYLES)
 def style_strands(
-    scalp_style: Style | None, has_beard: bool, root_finder: RootFinder, levels: int
+    scalp_style: Style | None, has_beard: bool, root_finder: RootFinder, subdivision_levels: int
 ) -> StyleStrands:
     """Return the guides and the roots of a hair style and a beard.
 
     scalp_style : style of the hair of the head; None for a bald head
     has_beard : whether to include the beard
     root_finder : root finder of the mean person
-    levels : subdivision levels of the mesh on whose quads the roots lie
+    subdivision_levels : subdivision levels of the mesh on whose quads the roots lie
     """
     worn = [*([scalp_style] if scalp_style else []), *([BEARD] if has_beard else [])]
     parts = [_cached_style_arrays(style, root_finder) for style in worn]
@@ -80,7 +80,7 @@ def style_strands(
     some = slice(None, _CENTRE_ROOT_COUNT)
     corners_mm = root_finder.once_subdivided_mesh.points_mm[quad_corners(root_finder.mesh, quad[some])]
     centre_mm = np.einsum("nk,nkc->nc", quad_weights(position[some]), corners_mm).mean(axis=0)
-    roots = refine_roots(root_finder.mesh, Roots(quad, position), levels)
+    roots = refine_roots(root_finder.mesh, Roots(quad, position), subdivision_levels)
     return StyleStrands(guides, StrandRoots(roots, *rest), centre_mm)
 
 

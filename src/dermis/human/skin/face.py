@@ -66,14 +66,14 @@ def _movement_matrix(target_names: tuple[str, ...]) -> Floats:
 
 
 @lru_cache(maxsize=_MAX_CACHED_TABLES)
-def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> Floats:
+def zone_table(recession: float = 0.0, site_differences: SiteDifferences | None = None) -> Floats:
     """Return the Gaussian zones of the face as rows (k, 24) for the paint shader.
 
     The columns are the centre (3) [mm], a zero, the inverse radii (3) [1/mm], a zero, and the sixteen
     `ZONE_AMOUNTS`.
 
     recession : recession of the hair, 0 to 1, see `SkinLook`; it thins the hair at the crown
-    sites : differences in pigments between sites of the face and the cheek; None for no differences
+    site_differences : differences in pigments between sites of the face and the cheek; None for none
     """
     rows = read_rows(__package__, "zones")
     for row in rows:
@@ -82,9 +82,11 @@ def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> 
     columns = "x y z", "rx ry rz", " ".join(_AMOUNTS_IN_CSV)
     centres, radii, amounts = (float_columns(rows, names) for names in columns)
     amounts = np.hstack([amounts, np.zeros((len(rows), len(ZONE_AMOUNTS) - len(_AMOUNTS_IN_CSV)))])
-    if sites is not None:
+    if site_differences is not None:
         pigment_columns = [ZONE_AMOUNTS.index(name) for name in ("melanin", "blood", "oxygen")]
-        amounts[:, pigment_columns] += _zone_amounts_of_sites() @ np.vstack([np.zeros(3), sites.as_array()])
+        amounts[:, pigment_columns] += _zone_amounts_of_sites() @ np.vstack(
+            [np.zeros(3), site_differences.as_array()]
+        )
     zero = np.zeros((len(rows), 1))
     return np.hstack([centres, zero, 1.0 / radii, zero, amounts]).astype(np.float32)
 

@@ -170,7 +170,7 @@ def typical_skin(demographics: Demographics) -> SkinLook:
 
 
 def _typical_skin_look(
-    demographics: Demographics, pigments: MeasuredPigments, sites: SiteDifferences
+    demographics: Demographics, pigments: MeasuredPigments, site_differences: SiteDifferences
 ) -> SkinLook:
     """Return the typical look of a person with measured pigments."""
     old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
@@ -184,7 +184,7 @@ def _typical_skin_look(
         beard=0.45 * max(2.0 * demographics.sex - 1.0, 0.0),
         oil=0.45 - 0.25 * old,
         age=0.04 + (_MAX_AGE_FOLDS - 0.04) * old**1.5,
-        sites=sites,
+        sites=site_differences,
     )
 
 

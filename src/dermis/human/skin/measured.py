@@ -169,53 +169,54 @@ class MeasuredTable(NamedTuple):
     site_slope: Doubles
     site_spread: Doubles
 
-    def group_mean(self, field_name: str, weights: GroupWeights) -> Doubles:
+    def group_mean(self, field_name: str, weight_of_group: GroupWeights) -> Doubles:
         """Return a field of `_Group`, averaged over a mixture of groups.
 
         field_name : name of the field
-        weights : weight of each group in the mixture
+        weight_of_group : weight of each group in the mixture
         """
         parts = [
-            weight * np.asarray(getattr(self.groups[one], field_name)) for one, weight in weights.items()
+            weight * np.asarray(getattr(self.groups[one], field_name))
+            for one, weight in weight_of_group.items()
         ]
         return np.asarray(np.sum(parts, axis=0))
 
     def cheek_variables(
-        self, weights: GroupWeights, sex: ArrayLike, age: ArrayLike, normal_scores: Doubles
+        self, weight_of_group: GroupWeights, sex: ArrayLike, age: ArrayLike, normal_scores: Doubles
     ) -> Doubles:
         """Return the variables (n, 4) that describe the cheeks of n people, in the order of `MeasuredTable`.
 
-        weights : weight of each group in the mixture
+        weight_of_group : weight of each group in the mixture
         sex, age : (n,) sex and age of each person, or one number for all
         normal_scores : (n, 4) standard normal scores of the variables of each person, correlated as measured
         """
         from scipy.special import ndtri
 
-        nodes, quantiles = ndtri(self.probabilities), self.group_mean("quantiles", weights)
+        nodes, quantiles = ndtri(self.probabilities), self.group_mean("quantiles", weight_of_group)
         values = np.column_stack([np.interp(normal_scores[:, k], nodes, quantiles[k]) for k in range(4)])
         sexes, terms = np.asarray(sex, np.float64) - 0.5, age_term(age) - self.mean_age_term
         return np.asarray(values + sexes[..., None] * self.sex + terms[..., None] * self.age)
 
     def site_differences(
-        self, weights: GroupWeights, cheek_variables: Doubles, normal_samples: Doubles
+        self, weight_of_group: GroupWeights, cheek_variables: Doubles, normal_samples: Doubles
     ) -> Doubles:
         """Return the differences (n, 12, 3) between all sites and the cheek.
 
         The differences are in log2 of melanin, log2 of blood, and oxygen [-].
 
-        weights : weight of each group in the mixture
+        weight_of_group : weight of each group in the mixture
         cheek_variables : (n, 4) result of the method `cheek_variables`
         normal_samples : (n, 12, 2) independent samples of the standard normal distribution, zeros for typical
             people
         """
-        middle = self.group_mean("quantiles", weights)[:2, len(self.probabilities) // 2]
+        middle = self.group_mean("quantiles", weight_of_group)[:2, len(self.probabilities) // 2]
         deviation = np.clip(
             cheek_variables[:, None, :2] - middle,
             -_MAX_CHEEK_DEVIATION_DOUBLINGS,
             _MAX_CHEEK_DEVIATION_DOUBLINGS,
         )
         found = np.broadcast_to(
-            self.group_mean("sites", weights), (len(cheek_variables), len(SITES), 3)
+            self.group_mean("sites", weight_of_group), (len(cheek_variables), len(SITES), 3)
         ).copy()
         found[:, :, :2] += self.site_slope * deviation + self.site_spread * normal_samples
         return found
@@ -274,10 +275,12 @@ def _split_union_weight(union_name: str, weight: float) -> dict[str, float]:
     return {one: weight / len(members) for one in members}
 
 
-def pigment_ancestry(weights: GroupWeights) -> tuple[float, float, float]:
+def pigment_ancestry(weight_of_group: GroupWeights) -> tuple[float, float, float]:
     """Return the African, Asian and European fractions that determine pigments of hair and eyes."""
-    african = weights.get("african", 0.0)
-    european = sum(weight * _EUROPEAN_FRACTION_OF_GROUP.get(name, 0.0) for name, weight in weights.items())
+    african = weight_of_group.get("african", 0.0)
+    european = sum(
+        weight * _EUROPEAN_FRACTION_OF_GROUP.get(name, 0.0) for name, weight in weight_of_group.items()
+    )
     return african, 1.0 - african - european, european
 
 
@@ -300,29 +303,29 @@ def group_probabilities(ita: float) -> dict[str, float]:
 
 
 def typical_pigments(
-    weights: GroupWeights, sex: float, age: float, ita: float | None = None
+    weight_of_group: GroupWeights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
     """Return the median pigments and site differences for a sex, an age and, optionally, an ITA.
 
-    weights : weight of each measured group
+    weight_of_group : weight of each measured group
     """
-    return _pigments_and_sites(weights, sex, age, ita, np.zeros(4), None)
+    return _pigments_and_sites(weight_of_group, sex, age, ita, np.zeros(4), None)
 
 
 def sample_pigments(
-    rng: np.random.Generator, weights: GroupWeights, sex: float, age: float, ita: float | None = None
+    rng: np.random.Generator, weight_of_group: GroupWeights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
     """Return random pigments and site differences of a person; pigments are correlated as measured.
 
-    weights : weight of each measured group
+    weight_of_group : weight of each measured group
     """
     return _pigments_and_sites(
-        weights, sex, age, ita, rng.standard_normal(4), rng.standard_normal((len(SITES), 2))
+        weight_of_group, sex, age, ita, rng.standard_normal(4), rng.standard_normal((len(SITES), 2))
     )
 
 
 def _pigments_and_sites(
-    weights: GroupWeights,
+    weight_of_group: GroupWeights,
     sex: float,
     age: float,
     ita: float | None,
@@ -335,13 +338,13 @@ def _pigments_and_sites(
     site_normal_samples : (12, 2) independent samples of the same distribution; None for a typical person
     """
     table = measured_table()
-    correlation = table.group_mean("correlation", weights)
+    correlation = table.group_mean("correlation", weight_of_group)
     covariance, mean = correlation[:4, :4], np.zeros(4)
     if ita is not None:
         slope = correlation[:4, 4]
-        mean, covariance = slope * _ita_score(ita, weights), covariance - np.outer(slope, slope)
+        mean, covariance = slope * _ita_score(ita, weight_of_group), covariance - np.outer(slope, slope)
     scores = mean + symmetric_square_root(covariance) @ normal_samples
-    variables = table.cheek_variables(weights, sex, age, scores[None])
+    variables = table.cheek_variables(weight_of_group, sex, age, scores[None])
     pigments = _clipped_pigments(variables[0])
     if ita is not None:
         pigments = with_ita(pigments, ita)
@@ -351,9 +354,11 @@ def _pigments_and_sites(
         np.zeros((1, len(SITES), 2)) if site_normal_samples is None else site_normal_samples[None]
     )
     middle = (
-        variables if not typical or ita is not None else np.tile(_median_cheek_variables(weights), (1, 1))
+        variables
+        if not typical or ita is not None
+        else np.tile(_median_cheek_variables(weight_of_group), (1, 1))
     )
-    sites = table.site_differences(weights, middle, samples_or_zeros)[0]
+    sites = table.site_differences(weight_of_group, middle, samples_or_zeros)[0]
     oxygen = variables[0, 2] + sites[:, 2]  # may exceed 1, where skin is redder than the model allows
     sites[:, 2] = np.clip(oxygen, 0.0, 1.0) - pigments.oxygen
     names = [name.replace(" ", "_") for name in SITES]
@@ -361,9 +366,9 @@ def _pigments_and_sites(
     return pigments, SiteDifferences(**rows)
 
 
-def _median_cheek_variables(weights: GroupWeights) -> Doubles:
+def _median_cheek_variables(weight_of_group: GroupWeights) -> Doubles:
     table = measured_table()
-    return table.group_mean("quantiles", weights)[:, len(table.probabilities) // 2]
+    return table.group_mean("quantiles", weight_of_group)[:, len(table.probabilities) // 2]
 
 
 def _clipped_pigments(pigment_values: Doubles) -> MeasuredPigments:
@@ -409,9 +414,9 @@ def with_ita(
     return pigments._replace(melanin=float(np.exp(0.5 * (low + high))))
 
 
-def _ita_score(ita: float, weights: GroupWeights) -> float:
+def _ita_score(ita: float, weight_of_group: GroupWeights) -> float:
     """Return the standard normal score of an ITA in a mixture of groups, limited to the range -2.9 to 2.9."""
-    quantiles = measured_table().group_mean("ita", weights)
+    quantiles = measured_table().group_mean("ita", weight_of_group)
     return float(np.clip(_ita_scores(np.array([ita]), quantiles)[0], -_MAX_NORMAL_SCORE, _MAX_NORMAL_SCORE))
 
 

@@ -53,7 +53,7 @@ class _EyeShape(NamedTuple):
 
 
 @logged_step("fitting the eyes")
-def with_fitted_eyes(head: Head, coarse_mesh: Mesh | None = None, look: EyeLook | None = None) -> Head:
+def with_fitted_eyes(head: Head, coarse_mesh: Mesh | None = None, eye_look: EyeLook | None = None) -> Head:
     """Return a head whose two eyeballs from a file are replaced by standard eyeballs with a cornea.
 
     The fitted eyeballs have the radius and position of the file's eyeballs, and follow the same bones and
@@ -63,7 +63,7 @@ def with_fitted_eyes(head: Head, coarse_mesh: Mesh | None = None, look: EyeLook 
 
     coarse_mesh : mesh of a subdivided head before subdivision, in which the lids still touch the eyeballs;
         None if the head is not subdivided
-    look : appearance of the eyes
+    eye_look : appearance of the eyes
     """
     mesh, control = head.mesh, head.control
     balls, reason = find_eyeballs(coarse_mesh or mesh)
@@ -88,12 +88,12 @@ def with_fitted_eyes(head: Head, coarse_mesh: Mesh | None = None, look: EyeLook 
     material = np.arange(-2, 0, dtype=np.int32) + len(new_mesh.materials)
     radii, offsets = np.array([(shape.radius_mm, shape.centre_offset_mm) for shape in shapes]).T
     gaze = np.stack([eye_axes(shape.axis) @ ball.gaze for ball, shape in pairs])
-    eyes = Eyes(apex, back, side, material, look or EyeLook(), radii, offsets, gaze)
+    eyes = Eyes(apex, back, side, material, eye_look or EyeLook(), radii, offsets, gaze)
     return replace(head, mesh=new_mesh, rig=rig, eyes=eyes)
 
 
 def _ball_triangles(
-    mesh: Mesh, stencils: Stencils | None, balls: tuple[DetectedEyeball, DetectedEyeball]
+    mesh: Mesh, stencils: Stencils | None, detected_eyeballs: tuple[DetectedEyeball, DetectedEyeball]
 ) -> tuple[Index, Index]:
     """Return the indices of the triangles of each eyeball.
 
@@ -102,22 +102,24 @@ def _ball_triangles(
     first = mesh.point[mesh.triangles[:, 0]]
     if stencils is not None:
         first = stencils.point[stencils.first[first]]
-    left, right = (np.flatnonzero(np.isin(first, ball.points)) for ball in balls)
+    left, right = (np.flatnonzero(np.isin(first, ball.points)) for ball in detected_eyeballs)
     return left, right
 
 
-def _eye_shapes(corners_mm: Doubles, balls: tuple[DetectedEyeball, DetectedEyeball]) -> list[_EyeShape]:
+def _eye_shapes(
+    corners_mm: Doubles, detected_eyeballs: tuple[DetectedEyeball, DetectedEyeball]
+) -> list[_EyeShape]:
     """Return the shapes of both eyes.
 
     If an eyeball of the file has no cornea, its axis points through the opening of the lids.
 
     corners_mm : (f, 3, 3) corners of all triangles that are not eyeballs
     """
-    lids = [lids_in_front(corners_mm, ball.sphere, ball.gaze) for ball in balls]
+    lids = [lids_in_front(corners_mm, ball.sphere, ball.gaze) for ball in detected_eyeballs]
     (left, a), (right, b) = (one.opening_angles for one in lids)
     outwards, up = (left - right) / 2 - _INWARD_GAZE_ANGLE_RADIANS * (left != right), (a + b) / 2
     shapes = []
-    for ball, lid, side in zip(balls, lids, (1.0, -1.0), strict=True):
+    for ball, lid, side in zip(detected_eyeballs, lids, (1.0, -1.0), strict=True):
         scale, sunk, axis = min(1.0, ball.sphere.radius / SCLERA_MM), 0.0, ball.gaze
         if not ball.cornea:
             axis = lid.turned_direction(side * outwards, up)

@@ -189,7 +189,7 @@ def wedge_rows(renderer: dermis.Renderer) -> str:
     """Return Markdown rows with errors of red light on the unlit side of wedges, near their edge."""
     rows = []
     for angle in WEDGE_DEGREES:
-        mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells=16)
+        mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells_per_side=16)
 
         def unlit_points(points: Array, normals: Array, half_angle: float = angle / 2) -> Mask:
             facing = normals @ [-np.sin(np.radians(half_angle)), 0.0, np.cos(np.radians(half_angle))] > 0.99
