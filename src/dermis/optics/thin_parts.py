@@ -19,7 +19,7 @@ from dermis.optics.angular_response import (
 )
 from dermis.optics.diffusion import hankel
 from dermis.optics.diffusion.boundary import boundary_mismatch
-from dermis.optics.diffusion.layered_diffusion import solve_thicknesses
+from dermis.optics.diffusion.layered_diffusion import solve_homogeneous_slabs
 from dermis.optics.equivalent_medium import MAX_EQUIVALENT_ALBEDO, MIN_EQUIVALENT_ALBEDO, albedo_for_total
 from dermis.optics.media import Layer, Medium
 from dermis.optics.slabs import DEEP_OPTICAL_DEPTH, DIRECTION_NODES, Slabs, solve_doubled_slabs, solve_slabs
@@ -196,7 +196,7 @@ def _spread_weights(medium: Medium, thickness_mm: Floats, variance_mm2: Floats) 
     layer, A, stiffness = medium.layers[0], boundary_mismatch(medium.eta, "exact"), 100.0
     s = _FIT_FREQUENCIES * float(layer.sigma_t_prime[0])
     frequency = np.concatenate([hankel.NEAR_ZERO_FREQUENCY, s])
-    transform = solve_thicknesses(frequency, layer, thickness_mm, A)[1][..., 0]
+    transform = solve_homogeneous_slabs(frequency, layer, thickness_mm, A)[1][..., 0]
     # the last row makes the weights sum to 1
     ones = np.full((1, len(variance_mm2)), stiffness)
     gaussians = np.vstack([np.exp(-0.5 * variance_mm2 * s[:, None] ** 2), ones])

@@ -100,7 +100,7 @@ def path_trace(
     check_traceable(medium)
     mi, size = load_mitsuba(), (settings or Settings()).size
     trace_settings = f"{mi.__version__} {variant} {SAMPLES_PER_PASS} {RUSSIAN_ROULETTE_DEPTH}"
-    key = scene_key(scene, medium, size, trace_settings) if use_cache else None
+    key = scene_cache_key(scene, medium, size, trace_settings) if use_cache else None
     return render_passes(
         mi,
         variant,
@@ -257,7 +257,7 @@ def hash_medium(digest: hashlib._Hash, medium: Medium) -> None:
         digest.update(np.ascontiguousarray([layer.sigma_a, layer.sigma_s_prime], np.float64).tobytes())
 
 
-def scene_key(
+def scene_cache_key(
     scene: Scene, medium: Medium | Lambertian, picture_size: tuple[int, int], trace_settings: str
 ) -> str:
     """Return a hash of all inputs of a path-traced image, used as the name of its cached passes.

@@ -137,9 +137,9 @@ def _unfinished_warnings(channel_results: Sequence[SlabResult]) -> list[str]:
     return [f"{lost:.1%} of the light was dropped after very many scatterings and is missing from the total"]
 
 
-def _scattering_layer(layer: Layer, channel: int, g: float, eta: float) -> ScatteringLayer:
-    sigma_s = float(layer.sigma_s_prime[channel]) / (1.0 - g)
-    return ScatteringLayer(float(layer.sigma_a[channel]), sigma_s, layer.thickness_mm, g, eta)
+def _scattering_layer(layer: Layer, channel_index: int, g: float, eta: float) -> ScatteringLayer:
+    sigma_s = float(layer.sigma_s_prime[channel_index]) / (1.0 - g)
+    return ScatteringLayer(float(layer.sigma_a[channel_index]), sigma_s, layer.thickness_mm, g, eta)
 
 
 def _checked_photon_count(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> int:

@@ -117,7 +117,7 @@ def solve_two_layers(
     return _solve_upwards(_NEAR_ZERO_FREQUENCY, sublayers, len(ones), mismatch)[0] / (2.0 * mismatch)
 
 
-def solve_thicknesses(
+def solve_homogeneous_slabs(
     frequency: ArrayLike, layer: Layer, thickness_mm: Floats, mismatch: float
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms (n, m, c) of R(r) and of T(r) of n slabs of one material [-].

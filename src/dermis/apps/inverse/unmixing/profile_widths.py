@@ -54,16 +54,16 @@ class ProfileMixture:
         return {"mixed": self.error.tolist(), "one_profile": self.single_error.tolist()}
 
 
-def profile_mixture(unmixed: UnmixResult) -> ProfileMixture:
+def profile_mixture(unmix_result: UnmixResult) -> ProfileMixture:
     """Return three profiles, and their weights in each texel from the texel's melanin and blood.
 
     Raises DermisError for a picture without skin.
     """
-    skin = unmixed.skin_texels()
+    skin = unmix_result.skin_texels()
     if not skin.any():
         refuse("widths", "a picture of skin", "no texel is like skin", "Give the skin's albedo")
-    axes = [_pigment_axis(one[skin]) for one in (unmixed.melanin, unmixed.blood)]
-    tissues = [_spectral_tissue(unmixed.skin, m, b) for m, b in product(*axes)]
+    axes = [_pigment_axis(one[skin]) for one in (unmix_result.melanin, unmix_result.blood)]
+    tissues = [_spectral_tissue(unmix_result.skin, m, b) for m, b in product(*axes)]
     nodes = np.array([_ring_fractions(one) for one in tissues])
     corners = [
         (m % _PIGMENT_GRID_NODES_PER_AXIS) * _PIGMENT_GRID_NODES_PER_AXIS + b % _PIGMENT_GRID_NODES_PER_AXIS
@@ -76,7 +76,9 @@ def profile_mixture(unmixed: UnmixResult) -> ProfileMixture:
     mixed = np.einsum("nk,krc->nrc", weights, nodes[corners])
     profiles = [fit_profile(tissues[k], name) for k, name in zip(corners, PROFILE_GRID_CORNERS, strict=True)]
     weight_map = _interpolate_weight_map(
-        weights[:, 1:].reshape(_PIGMENT_GRID_NODES_PER_AXIS, _PIGMENT_GRID_NODES_PER_AXIS, 2), axes, unmixed
+        weights[:, 1:].reshape(_PIGMENT_GRID_NODES_PER_AXIS, _PIGMENT_GRID_NODES_PER_AXIS, 2),
+        axes,
+        unmix_result,
     )
     errors = _rms_error(mixed, nodes), _rms_error(middle[None], nodes)
     return ProfileMixture(shared_gaussians(profiles), weight_map, *errors)
@@ -147,7 +149,7 @@ def _rms_error(mixed_ring_fractions: Floats, skin_ring_fractions: Floats) -> Flo
 
 
 def _interpolate_weight_map(
-    grid_weights: Floats, pigment_axes: Sequence[Floats], unmixed: UnmixResult
+    grid_weights: Floats, pigment_axes: Sequence[Floats], unmix_result: UnmixResult
 ) -> Pixels:
     """Return mixture weights (h, w, 2) of each texel, interpolated from the nodes of a pigment grid.
 
@@ -155,14 +157,14 @@ def _interpolate_weight_map(
 
     grid_weights : (m, b, 2) weights of the second and the third profile at the nodes
     pigment_axes : melanin fractions (m,) and blood fractions (b,) of the nodes
-    unmixed : melanin and blood of each texel
+    unmix_result : melanin and blood of each texel
     """
     from scipy.interpolate import RegularGridInterpolator
 
     logarithms = [np.log(axis) for axis in pigment_axes]
     interpolator = RegularGridInterpolator(logarithms, grid_weights, bounds_error=False, fill_value=None)
-    result = np.empty((*unmixed.melanin.shape, 2), np.float32)
-    for row, row_values in enumerate(zip(unmixed.melanin, unmixed.blood, strict=True)):
+    result = np.empty((*unmix_result.melanin.shape, 2), np.float32)
+    for row, row_values in enumerate(zip(unmix_result.melanin, unmix_result.blood, strict=True)):
         coordinates = [
             np.log(np.clip(one, a[0], a[-1])) for one, a in zip(row_values, pigment_axes, strict=True)
         ]

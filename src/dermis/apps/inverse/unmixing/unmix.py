@@ -308,14 +308,14 @@ UNMIX_SUMMARY_FILE = "unmixed.json"
 def save_maps(
     folder: Path,
     unmix_result: UnmixResult,
-    recoloured: NDArray[np.float32] | None = None,
+    recoloured_picture: NDArray[np.float32] | None = None,
     linear: bool = False,
 ) -> list[Path]:
     """Write all maps as EXR files, the summary, and the recoloured picture; return the paths of all files.
 
     Each file is written atomically.
 
-    recoloured : (h, w, 3) recoloured picture in linear Rec. 709; None to write no such picture
+    recoloured_picture : (h, w, 3) recoloured picture in linear Rec. 709; None to write no such picture
     linear : whether the recoloured picture is written as EXR instead of PNG
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
@@ -326,9 +326,9 @@ def save_maps(
         with atomic_file(path) as file:
             file.write_bytes(encode_exr(values if values.ndim == 3 else values[..., None]))
         written.append(path)
-    if recoloured is not None:
+    if recoloured_picture is not None:
         path = folder / ("recoloured.exr" if linear else "recoloured.png")
-        write_image(path, recoloured)
+        write_image(path, recoloured_picture)
         written.append(path)
     with atomic_file(folder / UNMIX_SUMMARY_FILE) as file:
         file.write_text(json.dumps(unmix_result.summary(), indent=2) + "\n", encoding="utf-8")

@@ -78,7 +78,7 @@ def path_trace_person(
     voxels = ALBEDO_GRID_SIDE_VOXELS
     constants = f"{SAMPLES_PER_PASS} {RUSSIAN_ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {voxels} {max_depth}"
     trace_settings = f"{_CACHE_VERSION} {mi.__version__} {variant} {constants} {size}"
-    key = person_key(scene, person, medium, trace_settings) if use_cache else None
+    key = person_cache_key(scene, person, medium, trace_settings) if use_cache else None
     return render_passes(
         mi,
         variant,
@@ -158,7 +158,7 @@ def _emissive_head(mi: Mitsuba, person: Person) -> SceneDict:
     return {"head": mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=emitter)}
 
 
-def person_key(scene: Scene, person: Person, medium: Medium | None, trace_settings: str) -> str:
+def person_cache_key(scene: Scene, person: Person, medium: Medium | None, trace_settings: str) -> str:
     """Return a hash of all inputs of a path-traced person, used as the name of the cached passes.
 
     medium : as in `path_trace_person`
