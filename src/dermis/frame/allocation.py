@@ -59,8 +59,8 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
     map_inputs = device, request.head, *map_options, request.has_animated_maps
     maps = memo.submit(device.executor, upload_maps, *map_inputs)  # in the background, as files load slowly
     shadow_maps = _shadow_maps(memo, device, request)
-    shapes = shape.make(memo, device, request)
-    strands = hair.make(memo, device, request)
+    shapes = shape.make_resources(memo, device, request)
+    strands = hair.make_resources(memo, device, request)
     bindings = _shared_bindings(memo, device, request, shadow_maps, shapes, strands)
     atlases = [
         _layout_atlas(memo, device, request, name, k) for k, name in enumerate(request.atlas_plan.layouts)
@@ -82,7 +82,9 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         expression_maps=uploaded.expression_maps,
         layouts=layouts,
         shadow_maps=shadow_maps,
-        diffusion=diffusion.make(memo, device, request, technique, [textures for _, textures in atlases]),
+        diffusion=diffusion.make_resources(
+            memo, device, request, technique, [textures for _, textures in atlases]
+        ),
         scattered=scattered,
         technique=resources,
         output_layers=technique.make_subsurface_layers(memo, device, settings) if needs_layers else None,
@@ -93,8 +95,8 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         visibility=cached(_visibility_layers, device, settings.size, settings.samples),
         view=_shade_record(device, request, technique, resources),
         constants=surface_constants(request.skin) + _shade_constants(request) + technique.shade_constants,
-        post=post.make(memo, device, request),
-        outputs=outputs.make(memo, device, request, shapes.tables, thin),
+        post=post.make_resources(memo, device, request),
+        outputs=outputs.make_resources(memo, device, request, shapes.tables, thin),
         suns=len(request.environment_map.suns),
         gaussians=len(request.profile.variance_mm2),
         unscattered_fraction=cached(atlases[0][0].unscattered_fraction, request.topology.mesh),

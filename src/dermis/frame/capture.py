@@ -34,10 +34,10 @@ def capture_renderer(device_kind: str, adapter: str) -> Renderer:
     return renderer
 
 
-def capture_frame(capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
+def capture_frame(frame_capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
     """Record the passes of a frame, with their resources, without running them."""
     technique = TECHNIQUES[inputs.settings.technique]
-    return capture.capture(lambda graph: draw_frame(graph, inputs, technique))
+    return frame_capture.capture(lambda graph: draw_frame(graph, inputs, technique))
 
 
 def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFrame:
@@ -52,9 +52,9 @@ def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFra
     return captured_frame
 
 
-def capture_mips(capture: FrameCapture, texture: Texture) -> CapturedFrame:
+def capture_mips(frame_capture: FrameCapture, texture: Texture) -> CapturedFrame:
     """Record the passes that compute the coarser mip levels of a map from its finest level."""
-    return capture.capture(lambda graph: map_mips.fill_mips(graph, map_mips.with_mip_views(texture)))
+    return frame_capture.capture(lambda graph: map_mips.fill_mips(graph, map_mips.with_mip_views(texture)))
 
 
 def update_map(renderer: Renderer, texture: Texture, mip_levels: list[NDArray[np.float16]]) -> None:

@@ -53,7 +53,7 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
     stage_inputs = _stage_inputs(graph, inputs, technique, scattered)
     shared, triangles = (bindings, view, inputs.light_constants), resources.visibility.texture
     if resources.hair:
-        labels = outputs.hair_labels(graph, resources.outputs, stage_inputs)
+        labels = outputs.hair_label_bindings(graph, resources.outputs, stage_inputs)
         geometry = resources.shape.shape, resources.head
         radiance = hair.draw(graph, resources.hair, geometry, shared, triangles, radiance, labels)
     post.draw(graph, resources.post, inputs.settings, radiance, *shared, triangles)

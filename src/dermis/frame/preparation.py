@@ -91,13 +91,15 @@ class Preparation:
 
         Raises DermisError for sizes that exceed the limits of the device.
         """
-        inputs = self._inputs(scene, settings, TECHNIQUES[settings.technique], view, (outputs, landmarks))
+        inputs = self._prepare_inputs(
+            scene, settings, TECHNIQUES[settings.technique], view, (outputs, landmarks)
+        )
         if "motion" in outputs:
             inputs = replace(inputs, previous=self._previous_scene(scene, previous or scene, inputs))
         self.memo.end_frame()
         return inputs
 
-    def _inputs(
+    def _prepare_inputs(
         self,
         scene: Scene,
         settings: Settings,

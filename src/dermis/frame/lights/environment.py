@@ -110,7 +110,7 @@ def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
 
 
 def environment_record(
-    program: ComputeProgram,
+    shading_program: ComputeProgram,
     environment: Environment | None,
     skin: Skin,
     albedo: NDArray[np.float64],
@@ -122,9 +122,9 @@ def environment_record(
     has_occlusion : whether the head hides parts of the environment from its own skin
     """
     if environment is None:
-        return program.record("Environment")
+        return shading_program.record("Environment")
     angle = np.radians(environment.rotation_degrees)
-    return program.record(
+    return shading_program.record(
         "Environment",
         turn=(np.cos(angle), np.sin(angle)),
         exposure=environment.exposure,

@@ -120,13 +120,13 @@ def light_shadow_views(scene: Scene, outline: Outline, map_side: int) -> list[Sh
 
 
 def light_records(
-    program: ComputeProgram, scene: Scene, shadow_views: list[ShadowView | None]
+    shading_program: ComputeProgram, scene: Scene, shadow_views: list[ShadowView | None]
 ) -> UniformRecord:
     """Return the uniform record `Lights` of all lights of the scene.
 
     shadow_views : result of `light_shadow_views`
     """
-    record = program.record("Lights", sample_points=light_sample_points())
+    record = shading_program.record("Lights", sample_points=light_sample_points())
     lights = record["light"]
     each = [KINDS[light.kind].parts(light) for light in scene.lights]
     divided = [(part, len(parts)) for parts in each for part in parts]

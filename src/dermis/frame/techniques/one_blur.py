@@ -25,7 +25,7 @@ class OneBlur(TextureSpace):
         return single_gaussian(profile)
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Return a split with one blurred Gaussian, without a correction for light that varies within a texel."""
+        """Return a split with one blurred Gaussian; light that varies within a texel is not corrected."""
         return AtlasTechnique.split(self, profile, normalise_weights)
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:

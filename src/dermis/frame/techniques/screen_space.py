@@ -134,39 +134,43 @@ def make_kernel(device: Device, profile: GaussianSum) -> Kernel:
 
 
 def draw(
-    graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window: Window, surface_light: Texture
+    graph: Recorder,
+    subsurface_layers: SubsurfaceLayers,
+    kernel: Kernel,
+    window: Window,
+    surface_light: Texture,
 ) -> Texture:
     """Declare the passes that diffuse the subsurface light, and return the picture with this light.
 
     window : rectangle of the image plane that the picture shows
     surface_light : shaded picture without the subsurface light
     """
-    assert layers.result is not None
-    draw_blur(graph, layers, kernel, window)
+    assert subsurface_layers.result is not None
+    draw_blur(graph, subsurface_layers, kernel, window)
     bound: MutableBindings = {
         "surface": surface_light,
-        "subsurface": layers.subsurface,
-        "transmittance": layers.transmittance,
-        "picture": layers.result,
+        "subsurface": subsurface_layers.subsurface,
+        "transmittance": subsurface_layers.transmittance,
+        "picture": subsurface_layers.result,
     }
     shader = program(graph.device, TECHNIQUES_FOLDER / "resurface.wgsl")
     graph.compute("screen space", shader, bound, surface_light.size[:2])
-    return layers.result
+    return subsurface_layers.result
 
 
-def draw_blur(graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window: Window) -> None:
+def draw_blur(graph: Recorder, subsurface_layers: SubsurfaceLayers, kernel: Kernel, window: Window) -> None:
     """Declare the passes that diffuse the subsurface light along rows, then along columns.
 
     window : rectangle of the image plane that the picture shows
     """
-    device, size = graph.device, layers.scratch.size[:2]
+    device, size = graph.device, subsurface_layers.scratch.size[:2]
     programs = [
         program(device, TECHNIQUES_FOLDER / "screen_space.wgsl", (("AXIS", axis),)) for axis in (0, 1)
     ]
     record = programs[0].record("Blur", half=window.half, shift=window.shift, reach=kernel.reach_mm)
     passes: tuple[tuple[TextureOrView, TextureOrView], ...] = (
-        (layers.subsurface, layers.scratch),
-        (layers.scratch, layers.subsurface),
+        (subsurface_layers.subsurface, subsurface_layers.scratch),
+        (subsurface_layers.scratch, subsurface_layers.subsurface),
     )
     for shader, (source, blurred) in zip(programs, passes, strict=True):
         bound: MutableBindings = {

@@ -111,7 +111,9 @@ def _halving_buffers(
     }
 
 
-def draw(graph: Recorder, atlas: AtlasTextures, tracing: GutterTracing, rest_head: HeadGeometry) -> None:
+def draw(
+    graph: Recorder, atlas: AtlasTextures, gutter_tracing: GutterTracing, rest_head: HeadGeometry
+) -> None:
     """Declare the passes that trace from where each gutter texel copies light, at all atlas resolutions.
 
     atlas : result of `with_separate_gutters`; the passes fill its gutter buffers
@@ -119,14 +121,14 @@ def draw(graph: Recorder, atlas: AtlasTextures, tracing: GutterTracing, rest_hea
     """
     device, size = graph.device, (("SIZE", atlas.resources["atlas"].size[0]),)
     assert atlas.gutter is not None
-    paths = {"starts": tracing.starts, "sides": tracing.sides, "gutter": atlas.gutter}
+    paths = {"starts": gutter_tracing.starts, "sides": gutter_tracing.sides, "gutter": atlas.gutter}
     trace = program(device, "atlas/gutter_trace.wgsl", size)
     halve = program(device, "atlas/gutter_halve.wgsl")
     graph.dispatch(
         "gutters", trace, {**rest_head.resources, **paths}, workgroup_grid(len(atlas.gutter_texels))
     )
     levels = [level for level in (atlas, *atlas.coarser) if level.gutter]
-    for (finer, coarser), halving in zip(pairwise(levels), tracing.halvings, strict=True):
+    for (finer, coarser), halving in zip(pairwise(levels), gutter_tracing.halvings, strict=True):
         assert finer.gutter is not None and coarser.gutter is not None
         bound = {**halving, "finer": finer.gutter, "coarser": coarser.gutter}
         graph.dispatch("gutters", halve, bound, workgroup_grid(len(coarser.gutter_texels)))

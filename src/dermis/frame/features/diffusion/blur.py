@@ -16,7 +16,7 @@ from dermis.frame.features.diffusion.kernels import (
     MAX_CHAINED_SIGMA_TEXELS,
     MAX_TABLE_VARIANCE,
     ROWS_PER_UNIT_VARIANCE,
-    kernel_table,
+    kernel_ratio_table,
 )
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
 from dermis.frame.programs import TILE_SIDE, program
@@ -93,7 +93,7 @@ def _axis_program(
 
 def _kernel_texture(device: Device) -> Texture:
     def make() -> Texture:
-        table = kernel_table()
+        table = kernel_ratio_table()
         return texture_from_array(device, np.dstack([table[:-1], table[1:]]), "rg32float")
 
     return device.cached("kernels", make)

@@ -47,7 +47,7 @@ def taps_per_side(variance: float, truncation_sigmas: float = KERNEL_TRUNCATION_
 
 
 @cache
-def kernel_table() -> NDArray[np.float32]:
+def kernel_ratio_table() -> NDArray[np.float32]:
     """Return a table of the ratio q for which the kernel w(n) = q^(n^2) has a given variance [-].
 
     w(n) is the weight of the n-th tap on either side of the centre, so q = w(1) / w(0). Row i of the table is

@@ -54,7 +54,7 @@ class Resources:
     mixture: Mixture | None
 
 
-def make(
+def make_resources(
     memo: Memo,
     device: Device,
     request: FrameRequest,

@@ -40,19 +40,19 @@ _SHADOW_RAY_STRIDE = 4  # one of four rays to an area light is traced: pictures 
 
 
 def draw_shadows(
-    graph: Graph, strands: Resources, shape: Shape, shadow_views: Views, lighting: Bindings
+    graph: Graph, strands: Resources, shape: Shape, shadow_views: Views, lighting_bindings: Bindings
 ) -> None:
     """Declare the passes that move the hair with the skin, and fill the deep opacity maps for its shadows."""
     graph.repeat(pose_guides, strands.tables, shape)
     if len(shadow_views.clips):
-        _draw_deep_opacity(graph, strands, shape, lighting)
+        _draw_deep_opacity(graph, strands, shape, lighting_bindings)
 
 
-def pose_guides(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
+def pose_guides(graph: Recorder, strand_tables: StrandTables, shape: Shape) -> None:
     """Declare the passes that move the guide strands of a hair style with the skin."""
-    if tables.groom is None:
+    if strand_tables.groom is None:
         return
-    style = tables.groom.style
+    style = strand_tables.groom.style
     guides: Bindings = {"guide_rest": style.guide_rest, "bound_guides": style.bound_guides}
     knots, points = style.guide_rest.size // 16, shape.surface["points"]
     _dispatch_hair(
@@ -62,7 +62,11 @@ def pose_guides(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
 
 
 def pose_strands(
-    graph: Recorder, tables: StrandTables, shape: Shape, posed_strands: Buffer, coarse_counts: StrandCounts
+    graph: Recorder,
+    strand_tables: StrandTables,
+    shape: Shape,
+    posed_strands: Buffer,
+    coarse_counts: StrandCounts,
 ) -> None:
     """Declare the passes that move brows and lashes with the skin, and interpolate other strands from guides.
 
@@ -71,14 +75,14 @@ def pose_strands(
     """
     shared: Bindings = {
         "points": shape.surface["points"],
-        "hairs": tables.record(coarse_counts),
+        "hairs": strand_tables.hairs_record(coarse_counts),
         "posed": posed_strands,
     }
-    if tables.fine.hairs:
-        fine: Bindings = {"strands": tables.strands, "knots": tables.knots}
-        _dispatch_hair(graph, "hair/strands_pose.wgsl", {**shared, **fine}, tables.fine.all_knots())
-    if tables.groom is not None:
-        groom, style = tables.groom, tables.groom.style
+    if strand_tables.fine.hairs:
+        fine: Bindings = {"strands": strand_tables.strands, "knots": strand_tables.knots}
+        _dispatch_hair(graph, "hair/strands_pose.wgsl", {**shared, **fine}, strand_tables.fine.all_knots())
+    if strand_tables.groom is not None:
+        groom, style = strand_tables.groom, strand_tables.groom.style
         person: Bindings = {"roots": groom.roots, "parts": groom.parts, "hairline": groom.hairline}
         guides: Bindings = {"guides": style.guides, "guide_cuts": style.guide_cuts}
         _dispatch_hair(
@@ -86,13 +90,19 @@ def pose_strands(
         )
 
 
-def _draw_deep_opacity(graph: Recorder, strands: Resources, shape: Shape, lighting: Bindings) -> None:
+def _draw_deep_opacity(
+    graph: Recorder, strands: Resources, shape: Shape, lighting_bindings: Bindings
+) -> None:
     """Declare the passes that fill the deep opacity maps of all lights that cast shadows."""
     tables, posed = strands.tables, strands.tables.buffers.casters
     pose_strands(graph, tables, shape, posed, tables.casters)
     segments = tables.fine.all_segments() + tables.casters.all_segments()
     knots = tables.fine.all_knots() + tables.casters.all_knots()
-    bindings: MutableBindings = {**lighting, "posed": posed, "hairs": tables.record(tables.casters)}
+    bindings: MutableBindings = {
+        **lighting_bindings,
+        "posed": posed,
+        "hairs": tables.hairs_record(tables.casters),
+    }
     bindings |= {"windows": strands.shadows, "opacity": strands.shadows}
     clear = program(graph.device, "hair/strands_clear.wgsl")
     graph.dispatch("strands", clear, bindings, (_CLEARING_WORKGROUP_COUNT, 1, 1))
@@ -106,7 +116,7 @@ def draw(
     graph: Recorder,
     strands: Resources,
     geometry: tuple[Shape, HeadGeometry],
-    shading: ShadingInputs,
+    shading_inputs: ShadingInputs,
     visibility_buffer: Texture,
     radiance: Texture,
     labels: Bindings | None = None,
@@ -114,12 +124,13 @@ def draw(
     """Declare the passes that shade the strands and draw them over the picture; return the new picture.
 
     geometry : current shape of the head, and its vertices and triangles
-    shading : resources of the lighting, uniform record of the shading pass, and constants of the lights
+    shading_inputs : resources of the lighting, uniform record of the shading pass, and pipeline constants of
+        the lights
     visibility_buffer : texture with the index of the triangle that is visible at each sample
     radiance : texture of the picture without hair
     labels : resources with which the pass labels pixels of hair, None if no labels are requested
     """
-    tables, picture, (lighting, view, light_constants) = strands.tables, strands.picture, shading
+    tables, picture, (lighting, view, light_constants) = strands.tables, strands.picture, shading_inputs
     shape, head = geometry
     width, height = picture.result.size[:2]
     pixel_mm = _pixel_footprint_mm(view, tables, height)
@@ -130,7 +141,7 @@ def draw(
     light_constants = (*light_constants, ("RAY_STRIDE", _SHADOW_RAY_STRIDE))
     light = program(graph.device, "hair/strands_light.wgsl", light_constants)
     record = _strand_view_record(light, strands, view, coarse.hairs)
-    hairs = tables.record(coarse)
+    hairs = tables.hairs_record(coarse)
     shared: Bindings = {"strand_view": record, "projected": tables.buffers.projected, "hairs": hairs}
     graph.dispatch("strands", light, {**lighting, **shared, "posed": posed}, workgroup_grid(knots))
     lists: Bindings = {"chains": picture.chains, "links": picture.links}
@@ -166,17 +177,19 @@ def _strand_view_record(
     return record
 
 
-def _pixel_footprint_mm(shade_record: UniformRecord, tables: StrandTables, picture_height: int) -> float:
+def _pixel_footprint_mm(
+    shade_record: UniformRecord, strand_tables: StrandTables, picture_height: int
+) -> float:
     """Return the side of the square that a pixel covers at the depth of the coarse strands [mm].
 
     shade_record : uniform record of the shading pass
     picture_height : height of the picture [pixels]
     """
-    depth = float(np.dot(tables.centre_mm - shade_record["eye"], shade_record["forward"]))
+    depth = float(np.dot(strand_tables.centre_mm - shade_record["eye"], shade_record["forward"]))
     return 2.0 * float(np.linalg.norm(shade_record["up"])) * max(depth, 1.0) / picture_height
 
 
-def _max_segments_in_tile(tables: StrandTables, segment_count: int, pixel_mm: float) -> int:
+def _max_segments_in_tile(strand_tables: StrandTables, segment_count: int, pixel_mm: float) -> int:
     """Estimate the number of strand segments in a crowded tile of the picture.
 
     The tile is assumed to contain all segments of fine strands, and several times as many segments of coarse
@@ -186,7 +199,7 @@ def _max_segments_in_tile(tables: StrandTables, segment_count: int, pixel_mm: fl
     pixel_mm : side of the square that a pixel covers at the depth of the strands [mm]
     """
     tiles = max(1.0, (_HAIR_EXTENT_MM / (TILE_SIDE_PIXELS * pixel_mm)) ** 2)
-    fine = tables.fine.all_segments()
+    fine = strand_tables.fine.all_segments()
     return int(fine + min(1.0, _CROWDING_FACTOR / tiles) * (segment_count - fine))
 
 

@@ -277,7 +277,7 @@ class StrandTables:
     width_mm: float
     cover: float
 
-    def record(self, coarse_counts: StrandCounts) -> UniformRecord:
+    def hairs_record(self, coarse_counts: StrandCounts) -> UniformRecord:
         """Return the numbers of strands as a uniform record of the struct Hairs in strand_knots.wgsl.
 
         coarse_counts : number of coarse strands to draw, and number of knots of each
@@ -328,7 +328,7 @@ def strand_constants(head: Head, settings: Settings) -> Constants:
     return (("STRANDS", 1),) if has_strands(head, settings) else ()
 
 
-def drawn_strand_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
+def drawn_strand_counts(strand_tables: StrandTables, pixel_mm: float) -> StrandCounts:
     """Return the number of coarse strands to draw, and the number of knots of each.
 
     Where strands are thinner than a pixel, fewer strands are drawn. They are wider, so that they cover the
@@ -336,13 +336,19 @@ def drawn_strand_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
 
     pixel_mm : side of the square that a pixel covers at the depth of the strands [mm]
     """
-    if not tables.coarse.hairs:
-        return tables.coarse
+    if not strand_tables.coarse.hairs:
+        return strand_tables.coarse
     pixel_mm = 2.0 ** (np.round(_DETAIL_LEVELS_PER_OCTAVE * np.log2(pixel_mm)) / _DETAIL_LEVELS_PER_OCTAVE)
-    drawn_px = tables.detail.width_px + _WIDTH_PER_COVER_PX * min(tables.cover, _MAX_DRAWN_COVER)
-    hairs = max(_MIN_DRAWN_STRANDS, tables.possible * tables.width_mm / (drawn_px * pixel_mm))
-    knots = max(_MIN_KNOTS, 1 + np.ceil(tables.length_mm / (tables.detail.segment_px * pixel_mm)))
-    return StrandCounts(int(min(tables.coarse.hairs, hairs)), int(min(tables.coarse.knots, knots)))
+    drawn_px = strand_tables.detail.width_px + _WIDTH_PER_COVER_PX * min(
+        strand_tables.cover, _MAX_DRAWN_COVER
+    )
+    hairs = max(_MIN_DRAWN_STRANDS, strand_tables.possible * strand_tables.width_mm / (drawn_px * pixel_mm))
+    knots = max(
+        _MIN_KNOTS, 1 + np.ceil(strand_tables.length_mm / (strand_tables.detail.segment_px * pixel_mm))
+    )
+    return StrandCounts(
+        int(min(strand_tables.coarse.hairs, hairs)), int(min(strand_tables.coarse.knots, knots))
+    )
 
 
 def make_strand_tables(
@@ -411,15 +417,15 @@ def make_groom_tables(device: Device, groom: Groom, guide_tables: GuideTables, r
     return GroomTables(guide_tables, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"))
 
 
-def _fill_strand_rows(rows: NDArray[np.void], head: Head, strands: Strands) -> None:
+def _fill_strand_rows(strand_rows: NDArray[np.void], head: Head, strands: Strands) -> None:
     if int(strands.roots.quad.max()) >= len(head.mesh.quads):
         actual = f"its mesh has {len(head.mesh.quads)} quads"
         refuse(head.name, "hairs rooted in quads of its mesh", actual, "Leave its strands out")
-    rows["corner"] = quad_corners(head.mesh, strands.roots.quad)
-    rows["weight"] = quad_weights(strands.roots.position)
-    rows["absorption"][:, :3] = strands.absorption
+    strand_rows["corner"] = quad_corners(head.mesh, strands.roots.quad)
+    strand_rows["weight"] = quad_weights(strands.roots.position)
+    strand_rows["absorption"][:, :3] = strands.absorption
     if strands.cover is not None:
-        rows["absorption"][:, 3] = strands.cover
+        strand_rows["absorption"][:, 3] = strands.cover
 
 
 def _knot_rows(strands: Strands) -> NDArray[np.float32]:
@@ -435,7 +441,7 @@ def mean_skin_albedo(head: Head) -> tuple[float, ...]:
     return (DEFAULT_COLOUR,) * 3 if colour is None else tuple(colour.tolist())
 
 
-def make(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
+def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
     """Return the resources for the hair of the requested head, None if no strands are drawn.
 
     Raises DermisError for strands whose roots do not lie on the head's mesh.

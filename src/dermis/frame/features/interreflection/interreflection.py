@@ -95,7 +95,9 @@ def make_interreflection(
         return None
     uploaded = memo.get(_upload_links, device, form_factors, caller_name=layout_key)
     key = f"{layout_key} {light_key}"
-    buffers = memo.get(_make_buffers, device, uploaded, has_occlusion, light_key, caller_name=key)
+    buffers = memo.get(
+        _make_interreflection_buffers, device, uploaded, has_occlusion, light_key, caller_name=key
+    )
     return Interreflection(buffers, profile_albedo)
 
 
@@ -134,7 +136,7 @@ def _upload_form_factors(
     return {"first": device.buffer(row_start, "STORAGE"), "links": device.buffer(links, "STORAGE")}
 
 
-def _make_buffers(
+def _make_interreflection_buffers(
     device: Device, link_buffers: LinkBuffers, stores_means: bool, _: str
 ) -> InterreflectionBuffers:
     sample_points, patch_links, cell_links = link_buffers
@@ -157,10 +159,12 @@ def _make_buffers(
     )
 
 
-def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, constants: Constants) -> None:
+def draw(
+    graph: Recorder, lighting_bindings: Bindings, interreflection: Interreflection, constants: Constants
+) -> None:
     """Declare the passes that compute the light that skin receives from other skin.
 
-    bindings : resources of the lighting
+    lighting_bindings : resources of the lighting
     constants : pipeline constants of the lights
 
     Source: [Goral1984].
@@ -174,7 +178,7 @@ def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, 
         "sample_exitance": buffers.sample_exitance,
         "from_skin": buffers.no_light,
     }
-    graph.dispatch("interreflection", shader, {**bindings, **own}, workgroup_grid(count))
+    graph.dispatch("interreflection", shader, {**lighting_bindings, **own}, workgroup_grid(count))
     graph.repeat(_draw_bounces, buffers)
 
 

@@ -128,11 +128,11 @@ def draw_thickness(graph: Recorder, planes: Planes, resources: LightOutputs, inp
     draw_planes(graph, planes, shader, bindings)
 
 
-def make_thickness_map(device: Device, pairs: PairBuffers) -> Texture:
+def make_thickness_map(device: Device, pair_buffers: PairBuffers) -> Texture:
     """Return a thickness texture over the coarse atlas, filled with the largest measurable thickness [mm]."""
-    surface = pairs.cells.receiver_mask
+    surface = pair_buffers.cells.receiver_mask
     texels = np.zeros((*surface.shape, 4), np.float32)
-    texels[..., 0], texels[..., 3] = pairs.cells.radius_mm * surface, surface
+    texels[..., 0], texels[..., 3] = pair_buffers.cells.radius_mm * surface, surface
     texture = make_texture(device, surface.shape, "rgba32float", texture_name="thickness")
     upload(device, texture, texels)
     return texture

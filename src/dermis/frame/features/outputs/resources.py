@@ -49,11 +49,11 @@ class Resources:
         return next(planes for planes in self.planes if output_name in planes.channels)
 
 
-def make(
+def make_resources(
     memo: Memo,
     device: Device,
     request: FrameRequest,
-    tables: ShapeTables,
+    shape_tables: ShapeTables,
     translucency: Sequence[Translucency | None],
 ) -> Resources | None:
     """Return the resources of the requested outputs, None if none are requested.
@@ -78,7 +78,9 @@ def make(
             for stage, outputs in stages.items()
         ),
         centres=None if settings.samples == 1 else cached(_make_centre_layers, device, settings.size),
-        previous=cached(make_shape, device, tables, caller_name="before") if "motion" in stages else None,
+        previous=cached(make_shape, device, shape_tables, caller_name="before")
+        if "motion" in stages
+        else None,
         light=make_light_outputs(memo, device, request, translucency),
         labels=make_label_buffers(memo, device, request),
         landmarks=cached(make_landmark_buffers, device, bare, sets) if sets else None,

@@ -24,7 +24,7 @@ DrawStage = Callable[[Graph, Planes, Resources, StageInputs], None]
 _SURFACE_CONSTANT_NAMES = ("DETAIL",)  # pipeline constants of surface.wgsl
 
 
-def hair_labels(graph: Graph, resources: Resources | None, inputs: StageInputs) -> Bindings | None:
+def hair_label_bindings(graph: Graph, resources: Resources | None, inputs: StageInputs) -> Bindings | None:
     """Return the resources with which the hair pass labels pixels, None if no labels are requested."""
     if not _needs_hair_labels(resources, inputs):
         return None
@@ -37,7 +37,7 @@ def draw(graph: Graph, resources: Resources | None, inputs: StageInputs) -> None
     """Declare the passes of all requested outputs."""
     if resources is None:
         return
-    if not _needs_hair_labels(resources, inputs):  # else `hair_labels` has drawn the centres
+    if not _needs_hair_labels(resources, inputs):  # else `hair_label_bindings` has drawn the centres
         _draw_centre_triangles(graph, inputs)
     for planes in resources.planes:
         DRAW_STAGES[planes.stage](graph, planes, resources, inputs)

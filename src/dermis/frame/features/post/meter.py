@@ -46,18 +46,18 @@ def make_meter(device: Device) -> Meter:
 def draw(
     graph: Recorder,
     meter: Meter,
-    shading: tuple[Bindings, UniformRecord, Constants],
+    shading_inputs: tuple[Bindings, UniformRecord, Constants],
     visibility_buffer: Texture,
     radiance_image: Texture,
 ) -> None:
     """Declare the passes that measure the irradiance of the visible skin, and derive the exposure from it.
 
-    shading : resources of the lighting, uniform record of the shading pass, and pipeline constants of the
-        lights
+    shading_inputs : resources of the lighting, uniform record of the shading pass, and pipeline constants of
+        the lights
     visibility_buffer : texture with the index of the triangle that covers each sample
     radiance_image : texture of the radiance of the picture
     """
-    lighting, view, constants = shading
+    lighting, view, constants = shading_inputs
     shader = program(graph.device, "post/meter.wgsl", constants)
     camera = shader.record("MeterCamera", rays=ray_record(shader, view), sample=view["jitter"][0, :2])
     images = {"visibility_buffer": visibility_buffer, "image": radiance_image}

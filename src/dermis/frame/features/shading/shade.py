@@ -26,7 +26,7 @@ def shade_program(device: Device, constants: Constants = ()) -> ComputeProgram:
 
 def draw(
     graph: Recorder,
-    lighting: Bindings,
+    lighting_bindings: Bindings,
     shade_record: UniformRecord,
     constants: Constants,
     visibility_layers: ViewLayers,
@@ -37,7 +37,7 @@ def draw(
 ) -> Texture:
     """Declare the pass that shades all samples of all pixels; return the image of radiance and coverage.
 
-    lighting : resources of the lighting
+    lighting_bindings : resources of the lighting
     shade_record : uniform record of the struct Shade
     constants : pipeline constants of the lights, the surface and the technique
     scattered_light : texture of scattered light over the atlas, or tables of pre-integrated skin
@@ -47,7 +47,7 @@ def draw(
     """
     device, (width, height) = graph.device, picture_size
     bindings = {
-        **lighting,
+        **lighting_bindings,
         "shade": shade_record,
         "visibility_buffer": visibility_layers.texture,
         "scattered": scattered_light,

@@ -81,7 +81,7 @@ def upload_triangles(device: Device, triangle_vertices: NDArray[np.integer]) -> 
 
 
 def _upload_triangle_table(
-    device: Device, triangle_table: NDArray[np.uint32], vertices: dict[str, Texture | Buffer]
+    device: Device, triangle_table: NDArray[np.uint32], vertex_resources: dict[str, Texture | Buffer]
 ) -> HeadGeometry:
     rows = np.concatenate([_arrange_in_rows(part, _TRIANGLES_PER_ROW) for part in triangle_table])
     read = device.adapter.kind != "CPU"  # see geometry.wgsl; an unread buffer must still be bound
@@ -90,7 +90,9 @@ def _upload_triangle_table(
         "triangle_buffer": device.buffer(rows if read else rows[:1, :3], "STORAGE"),
     }
     return HeadGeometry(
-        resources | vertices, device.buffer(triangle_table[0, :, :3], "INDEX"), triangle_table.shape[1]
+        resources | vertex_resources,
+        device.buffer(triangle_table[0, :, :3], "INDEX"),
+        triangle_table.shape[1],
     )
 
 
@@ -116,7 +118,7 @@ def rest_geometry(
     memo: Memo,
     device: Device,
     geometry: HeadGeometry,
-    tables: ShapeTables,
+    shape_tables: ShapeTables,
     head: Head,
     rest_positions_mm: NDArray[np.float32] | None,
     layout_index: int,
@@ -131,5 +133,5 @@ def rest_geometry(
     positions, owner = rest_positions_mm, "person"
     if positions is None:
         positions, owner = head.control.positions_mm, "head"
-    shape = memo.get(evaluate_rest_shape, device, tables, positions, caller_name=owner)
+    shape = memo.get(evaluate_rest_shape, device, shape_tables, positions, caller_name=owner)
     return memo.get(HeadGeometry.with_shape, geometry, shape, caller_name=f"{owner} {layout_index}")

@@ -27,7 +27,7 @@ class Resources:
     curvature: Curvature | None
 
 
-def make(memo: Memo, device: Device, request: FrameRequest) -> Resources:
+def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resources:
     """Return the buffers from which the shape of the requested head is computed."""
     cached, mesh = memo.get, request.topology.mesh
     tables = cached(shape_tables, device, request.topology, caller_name="shared" if request.is_shared else "")

@@ -100,27 +100,31 @@ def shape_tables(device: Device, head: Head) -> ShapeTables:
     )
 
 
-def make_shape(device: Device, tables: ShapeTables, *, is_animated: bool = True) -> Shape:
+def make_shape(device: Device, shape_tables: ShapeTables, *, is_animated: bool = True) -> Shape:
     """Create the buffers of a shape.
 
-    tables : constant buffers of the head, from `shape_tables`
+    shape_tables : constant buffers of the head, from `shape_tables`
     is_animated : whether morph targets and bones move the shape; False for a shape at rest
     """
-    rest, morphs, stencils = _point_buffer(device, tables.control), dict[str, Buffer](), dict[str, Buffer]()
+    rest, morphs, stencils = (
+        _point_buffer(device, shape_tables.control),
+        dict[str, Buffer](),
+        dict[str, Buffer](),
+    )
     weights, matrices = (
-        _float_buffer(device, max(1, tables.targets)),
-        _float_buffer(device, 12 * max(1, tables.bones)),
+        _float_buffer(device, max(1, shape_tables.targets)),
+        _float_buffer(device, 12 * max(1, shape_tables.bones)),
     )
     points = rest
-    if is_animated and tables.morphs:
-        points = _point_buffer(device, tables.control)
+    if is_animated and shape_tables.morphs:
+        points = _point_buffer(device, shape_tables.control)
         moving = {"rest": rest, "weights": weights, "matrices": matrices, "posed": points}
-        morphs = tables.morphs | moving
-    if tables.stencils:
-        finer = _point_buffer(device, tables.points)
-        stencils, points = tables.stencils | {"control": points, "points": finer}, finer
-    surface = tables.surface | {"points": points} | _vertex_resources(device, tables.vertices)
-    return Shape(rest, weights, matrices, morphs, stencils, surface, tables)
+        morphs = shape_tables.morphs | moving
+    if shape_tables.stencils:
+        finer = _point_buffer(device, shape_tables.points)
+        stencils, points = shape_tables.stencils | {"control": points, "points": finer}, finer
+    surface = shape_tables.surface | {"points": points} | _vertex_resources(device, shape_tables.vertices)
+    return Shape(rest, weights, matrices, morphs, stencils, surface, shape_tables)
 
 
 def _point_buffer(device: Device, point_count: int) -> Buffer:
@@ -131,8 +135,8 @@ def _float_buffer(device: Device, float_count: int) -> Buffer:
     return device.buffer(np.zeros(float_count, np.float32), "STORAGE")
 
 
-def _upload_tables(device: Device, tables: dict[str, NDArray[np.generic]]) -> dict[str, Buffer]:
-    return {name: device.buffer(table, "STORAGE") for name, table in tables.items()}
+def _upload_tables(device: Device, named_tables: dict[str, NDArray[np.generic]]) -> dict[str, Buffer]:
+    return {name: device.buffer(table, "STORAGE") for name, table in named_tables.items()}
 
 
 def _vertex_resources(device: Device, vertex_count: int) -> dict[str, Texture | Buffer]:
@@ -188,18 +192,18 @@ def _bone_influences(skeleton: Skeleton | None, point_count: int) -> Words:
     return np.ascontiguousarray(np.concatenate([skeleton.bone.astype(np.uint32), weight], axis=1))
 
 
-def _contact_words(contact: LidContact | None, point_count: int) -> Words:
+def _contact_words(lid_contact: LidContact | None, point_count: int) -> Words:
     """Return (p, 3) words with which the shader keeps points outside the eyeballs.
 
     The words are the indices of the front and back point of the eyeball, and the bits of a float: the least
     distance from the eyeball [mm]. They are 0 for points that may be anywhere.
     """
-    if contact is None:
+    if lid_contact is None:
         return np.zeros((1, 3), np.uint32)
     words = np.zeros((point_count, 3), np.uint32)
-    clearance = np.ascontiguousarray(contact.min_clearance_mm, np.float32).view(np.uint32)
-    ends = contact.apex[contact.ball], contact.back[contact.ball]
-    words[contact.point] = np.stack([*ends, clearance], axis=1)
+    clearance = np.ascontiguousarray(lid_contact.min_clearance_mm, np.float32).view(np.uint32)
+    ends = lid_contact.apex[lid_contact.ball], lid_contact.back[lid_contact.ball]
+    words[lid_contact.point] = np.stack([*ends, clearance], axis=1)
     return words
 
 
@@ -296,17 +300,19 @@ def draw(graph: Recorder, shape: Shape, motion: MotionBytes) -> None:
     graph.repeat(_evaluate_surface, shape)
 
 
-def make_rest_shape(device: Device, tables: ShapeTables) -> Shape:
+def make_rest_shape(device: Device, shape_tables: ShapeTables) -> Shape:
     """Create the buffers of a person's shape at rest, without morph targets and bones."""
-    return make_shape(device, tables, is_animated=False)
+    return make_shape(device, shape_tables, is_animated=False)
 
 
-def evaluate_rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArray[np.float32]) -> Shape:
+def evaluate_rest_shape(
+    device: Device, shape_tables: ShapeTables, positions_mm: NDArray[np.float32]
+) -> Shape:
     """Create the shape of a person at rest, and compute its vertices immediately.
 
     positions_mm : (p, 3) control points [mm]
     """
-    shape, frame = make_rest_shape(device, tables), CommandList(device, timed=False)
+    shape, frame = make_rest_shape(device, shape_tables), CommandList(device, timed=False)
     draw(frame, shape, MotionBytes(positions_mm.tobytes()))
     frame.submit()
     return shape

@@ -132,14 +132,14 @@ def has_part_materials(head: Head) -> bool:
     return head.maps.parts is not None or any(one.roughness is not None for one in head.mesh.materials)
 
 
-def _part_bindings(device: Device, maps: PartMaps | None) -> MutableBindings:
+def _part_bindings(device: Device, part_maps: PartMaps | None) -> MutableBindings:
     """Upload the maps of parts that are not skin as layers of one texture, named as in parts.wgsl."""
-    if maps is None:
+    if part_maps is None:
         flat = np.zeros((1, 1, 4), np.float32)
         return {"part_maps": map_mips.upload_layers(device, [flat, flat], "part maps")}
-    layers = [maps.colour, maps.surface]
-    if maps.emission is not None:
-        layers.append(np.pad(maps.emission, ((0, 0), (0, 0), (0, 1))))
+    layers = [part_maps.colour, part_maps.surface]
+    if part_maps.emission is not None:
+        layers.append(np.pad(part_maps.emission, ((0, 0), (0, 0), (0, 1))))
     return {"part_maps": map_mips.upload_layers(device, layers, "part maps")}
 
 

@@ -139,18 +139,18 @@ def relief_from_buffers(
     return mipped.texture
 
 
-def fill_relief(recorder: Recorder, relief: MippedTexture, heights: Buffer) -> None:
+def fill_relief(recorder: Recorder, relief_texture: MippedTexture, height_buffer: Buffer) -> None:
     """Declare the passes that fill a relief texture of even size from the heights in one buffer.
 
-    relief : texture for slopes and squared slopes
-    heights : buffer of heights with a border of one texel on all sides [mm]
+    relief_texture : texture for slopes and squared slopes
+    height_buffer : buffer of heights with a border of one texel on all sides [mm]
     """
-    _draw_slopes(recorder, relief, heights, 0, relief.size[1])
-    fill_mips(recorder, relief, 2)
+    _draw_slopes(recorder, relief_texture, height_buffer, 0, relief_texture.size[1])
+    fill_mips(recorder, relief_texture, 2)
 
 
 def _draw_slopes(
-    recorder: Recorder, relief: MippedTexture, heights: Buffer, first_row: int, row_count: int
+    recorder: Recorder, relief_texture: MippedTexture, height_buffer: Buffer, first_row: int, row_count: int
 ) -> None:
     device = recorder.device
     first = device.cached(
@@ -158,11 +158,11 @@ def _draw_slopes(
     )
     bound: Bindings = {
         "top": first,
-        "heights": heights,
-        "stored": relief.levels[0],
-        "halved": relief.levels[1],
+        "heights": height_buffer,
+        "stored": relief_texture.levels[0],
+        "halved": relief_texture.levels[1],
     }
-    size = -(-relief.size[0] // 2), -(-row_count // _RELIEF_ROWS_PER_INVOCATION)
+    size = -(-relief_texture.size[0] // 2), -(-row_count // _RELIEF_ROWS_PER_INVOCATION)
     recorder.compute(
         "maps", program(device, "surface/relief.wgsl", store_format=HALF_TEXEL_FORMAT), bound, size
     )

@@ -56,11 +56,11 @@ def eye_constants() -> dict[str, float]:
     }
 
 
-def fill_eye(record: UniformRecord, look: EyeLook) -> None:
+def fill_eye(eye_records: UniformRecord, look: EyeLook) -> None:
     """Write the appearance of eyes to the members of one or more records of the shader struct `Eye`."""
     for name in ("eumelanin", "pupil_mm", "redness"):
-        record[name] = getattr(look, name)
-    record["seed"] = look.seed % _EYE_SEED_COUNT
+        eye_records[name] = getattr(look, name)
+    eye_records["seed"] = look.seed % _EYE_SEED_COUNT
 
 
 def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
@@ -70,7 +70,7 @@ def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
 
 
 def skin_record(
-    program: ComputeProgram, skin: Skin, maps: Maps, profile: GaussianSum, light_count: int
+    shading_program: ComputeProgram, skin: Skin, maps: Maps, profile: GaussianSum, light_count: int
 ) -> UniformRecord:
     """Return the uniform record of the shader struct `Skin`.
 
@@ -78,9 +78,11 @@ def skin_record(
 
     light_count : number of lights; each part of a divided light counts as one
     """
-    members = struct_dtype(program.source.text, "Skin").names or ()
+    members = struct_dtype(shading_program.source.text, "Skin").names or ()
     values = {name: getattr(skin, name) for name in members if hasattr(skin, name)}
-    return program.record("Skin", **values, **_derived_members(skin, maps, profile), light_count=light_count)
+    return shading_program.record(
+        "Skin", **values, **_derived_members(skin, maps, profile), light_count=light_count
+    )
 
 
 def _derived_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:

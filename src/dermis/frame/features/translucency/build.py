@@ -137,7 +137,7 @@ class PairCache:
 
     A pair consists of a cell of the atlas where light enters a thin part, and a cell where this light leaves.
 
-    surface : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
+    surface_bindings : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
     """
 
     def __init__(self, device: Device, surface_bindings: Bindings, atlas: Atlas) -> None:
@@ -245,18 +245,20 @@ def with_profile_weights(
     )
 
 
-def make_translucency_buffers(device: Device, surface_bindings: Bindings, pairs: PairBuffers) -> Translucency:
+def make_translucency_buffers(
+    device: Device, surface_bindings: Bindings, pair_buffers: PairBuffers
+) -> Translucency:
     """Allocate the buffers of translucency; `with_profile_weights` adds the weights of a profile.
 
     surface_bindings : resources of geometry.wgsl and of the atlas, for the current shape
     """
-    receivers, sources = pairs.receivers[1], pairs.sources[1]
+    receivers, sources = pair_buffers.receivers[1], pair_buffers.sources[1]
     return Translucency(
-        pairs=pairs,
+        pairs=pair_buffers,
         surface=surface_bindings,
         receiver_points=mark_scratch(device, make_element_buffer(device, receivers, RECEIVER_BYTES)),
         source_points=make_element_buffer(device, sources, SOURCE_BYTES),
-        weights=make_element_buffer(device, pairs.count, 8),
+        weights=make_element_buffer(device, pair_buffers.count, 8),
         source_light=mark_scratch(device, make_element_buffer(device, sources, 16)),
         direction_factors=mark_scratch(device, make_element_buffer(device, sources, 8)),
         unit_light=device.buffer(np.tile(_PACKED_UNIT_LIGHT, (max(sources, 1), 2)), "STORAGE"),

@@ -195,7 +195,7 @@ def choose_source_level(source_spacing_mm: float, variance_mm2: Floats) -> int:
 
 def weight_bindings(
     device: Device,
-    pairs: PairBuffers,
+    pair_buffers: PairBuffers,
     variance_mm2: Floats,
     weight: Floats,
     thickness_tables: ThinParts | None = None,
@@ -215,9 +215,9 @@ def weight_bindings(
     record = _weights_program(device, len(weight), thickness_tables is not None).record(
         "PairProfile",
         reach_mm=1.0 if thickness_tables is None else thickness_tables.max_thickness_mm,
-        radius_mm=pairs.cells.radius_mm,
-        source_mm2=variance_mm2[choose_source_level(pairs.cells.cell_mm, variance_mm2)],
-        cell_mm2=pairs.cells.cell_mm**2,
+        radius_mm=pair_buffers.cells.radius_mm,
+        source_mm2=variance_mm2[choose_source_level(pair_buffers.cells.cell_mm, variance_mm2)],
+        cell_mm2=pair_buffers.cells.cell_mm**2,
         min_variance_ratio=_MIN_VARIANCE_RATIO,
         gaussian=gaussian,
     )

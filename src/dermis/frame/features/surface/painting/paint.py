@@ -288,24 +288,26 @@ class ExpressionMaps:
     relief: map_mips.MippedTexture
 
 
-def draw_expression(graph: Graph, maps: ExpressionMaps, movement_strengths: NDArray[np.float32]) -> None:
+def draw_expression(
+    graph: Graph, expression_maps: ExpressionMaps, movement_strengths: NDArray[np.float32]
+) -> None:
     """Declare the passes that compute the colour and relief of an expression.
 
     movement_strengths : (9,) strength of each facial movement, from `human.skin.face.movement_weights` [-]
     """
-    shader, side = program(graph.device, "surface/painting/expression.wgsl"), maps.colour.size[0]
+    shader, side = program(graph.device, "surface/painting/expression.wgsl"), expression_maps.colour.size[0]
     folding = movement_strengths[:_FOLDING_VALUE_COUNT].reshape(2, 4)
     record = shader.record(
         "Expression", folding=folding, pressed=movement_strengths[_FOLDING_VALUE_COUNT], side=side
     )
-    graph.compute("maps", shader, maps.bindings | {"expression": record}, (side, side))
-    graph.repeat(_fill_expression_maps, maps)
+    graph.compute("maps", shader, expression_maps.bindings | {"expression": record}, (side, side))
+    graph.repeat(_fill_expression_maps, expression_maps)
 
 
-def _fill_expression_maps(graph: Recorder, maps: ExpressionMaps) -> None:
+def _fill_expression_maps(graph: Recorder, expression_maps: ExpressionMaps) -> None:
     """Declare the passes that compute the mip levels of the colour, and the relief from the heights."""
-    map_mips.fill_mips(graph, maps.colour)
-    map_mips.fill_relief(graph, maps.relief, maps.heights)
+    map_mips.fill_mips(graph, expression_maps.colour)
+    map_mips.fill_relief(graph, expression_maps.relief, expression_maps.heights)
 
 
 class PaintedTextures(NamedTuple):
