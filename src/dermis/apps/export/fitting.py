@@ -33,13 +33,13 @@ _RELATIVE_CDF_RADII = np.geomspace(1e-4, 1e4, 2000)
 _LOG_LENGTH_BOUND, _LOG_LENGTH_TOLERANCE = 2.0, 1e-4  # search range and tolerance of least squares fits
 
 
-def cumulative_burley_profile(d_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
+def cumulative_burley_profile(burley_width_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
     """Return the cumulative form of Burley's profile R(r) = A (exp(-r/d) + exp(-r/3d)) / (8 pi d r).
 
-    d_mm : (3,) width d of each channel [mm]
+    burley_width_mm : (3,) width d of each channel [mm]
     energy : (3,) total energy A of each channel: emerging light per incident light [-]
     """
-    d = np.maximum(np.asarray(d_mm, np.float64), _MIN_WIDTH_MM)
+    d = np.maximum(np.asarray(burley_width_mm, np.float64), _MIN_WIDTH_MM)
     return CumulativeProfile.from_function(BurleyProfile(np.ones(3), 1.0 / d).energy_within, energy)
 
 
@@ -51,8 +51,10 @@ def fit_burley_width(profile: CumulativeProfile) -> Floats:
     median = np.array([np.interp(0.5, profile.fraction[:, i], profile.radii_mm) for i in range(3)])
     middle = np.log(median / _BURLEY_MEDIAN_RADIUS)
 
-    def cdf_difference(log_d: Floats) -> Floats:
-        return BurleyProfile(np.ones(3), np.exp(-log_d)).energy_within(profile.radii_mm) - profile.fraction
+    def cdf_difference(log_width: Floats) -> Floats:
+        return (
+            BurleyProfile(np.ones(3), np.exp(-log_width)).energy_within(profile.radii_mm) - profile.fraction
+        )
 
     return _bisect_minimax(
         cdf_difference,

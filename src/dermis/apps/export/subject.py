@@ -181,37 +181,40 @@ def load_subject(
     return Subject(path.name, curve, albedo, used_model, tissue, Scene(loaded, skin=skin))
 
 
-def _load_skin(skin_name: str, model: ModelName | None, head_options: Iterable[str]) -> Subject:
+def _load_skin(skin_name: str, profile_model: ModelName | None, head_options: Iterable[str]) -> Subject:
     for option in head_options:
         refuse(option, "a head", f"got the skin {skin_name}", "Omit this option, or name a head")
-    curve, used_model, tissue = reference_profile(Skin(profile=skin_name), model)
+    curve, used_model, tissue = reference_profile(Skin(profile=skin_name), profile_model)
     return Subject(Path(skin_name).name, curve, curve.energy, used_model, tissue)
 
 
 def reference_profile(
-    skin: Skin, model: ModelName | None = None
+    skin: Skin, profile_model: ModelName | None = None
 ) -> tuple[CumulativeProfile, str, Tissue | None]:
     """Return the cumulative reference profile of a skin, the name of its model, and its tissue.
 
-    model : model of the profile; by default, tabulated Monte Carlo for the built-in homogeneous media, and
-        layered diffusion for other tissue; a profile that is given as a table of Gaussians needs no model
+    profile_model : by default, tabulated Monte Carlo for the built-in homogeneous media, and layered diffusion
+        for other tissue; a profile that is given as a table of Gaussians needs no model
 
     Raises DermisError for an unknown model, and for a model requested for a table of Gaussians.
     """
-    if model is not None and model not in PROFILE_MODELS:
+    if profile_model is not None and profile_model not in PROFILE_MODELS:
         refuse(
-            "model", f"one of {', '.join(PROFILE_MODELS)}", f"got {format_value(model)}", "Choose one of them"
+            "model",
+            f"one of {', '.join(PROFILE_MODELS)}",
+            f"got {format_value(profile_model)}",
+            "Choose one of them",
         )
     table = None if skin.overrides_tissue else find_gaussians(skin.profile)
     if table is not None:
-        if model is not None:
+        if profile_model is not None:
             refuse("model", "a tissue", f"{skin.profile} is a table of Gaussians", "Omit this option")
         return CumulativeProfile.from_radial_profile(gaussian_radial_profile(table)), "table", None
     tissue = skin_tissue(skin)
-    may_be_tabulated = tissue.rgb is None and model in (None, "montecarlo")
+    may_be_tabulated = tissue.rgb is None and profile_model in (None, "montecarlo")
     if may_be_tabulated and (tabulated := tabulated_cumulative(tissue.medium)) is not None:
         return tabulated, "montecarlo", tissue
-    used_model: ModelName = model or "layered"
+    used_model: ModelName = profile_model or "layered"
     transmitted = 1.0 if tissue.rgb is None else 1.0 - normal_reflectance(tissue.medium.eta)
     return (
         CumulativeProfile.from_radial_profile(_model_profile(tissue, used_model), transmitted),
@@ -220,9 +223,9 @@ def reference_profile(
     )
 
 
-def _model_profile(tissue: Tissue, model: ModelName) -> RadialProfile:
-    if model != "montecarlo":
-        return tissue.profile(model)
+def _model_profile(tissue: Tissue, profile_model: ModelName) -> RadialProfile:
+    if profile_model != "montecarlo":
+        return tissue.profile(profile_model)
     from dermis.apps.truths.slab_mc import monte_carlo_profile
 
     return monte_carlo_profile(tissue.medium, tissue.rgb, _PHOTON_COUNT)

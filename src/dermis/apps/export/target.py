@@ -60,10 +60,10 @@ def flat_tuple(numbers: ArrayLike) -> tuple[float, ...]:
     return tuple(np.ravel(np.asarray(numbers, np.float64)).tolist())
 
 
-def write_files(output_folder: Path, contents: Iterable[tuple[str, bytes]]) -> list[Path]:
+def write_files(output_folder: Path, names_and_contents: Iterable[tuple[str, bytes]]) -> list[Path]:
     """Write files, given as pairs of name and content, into a folder, and return their paths."""
     written = []
-    for name, content in contents:
+    for name, content in names_and_contents:
         written.append(output_folder / name)
         written[-1].parent.mkdir(exist_ok=True)
         written[-1].write_bytes(content)

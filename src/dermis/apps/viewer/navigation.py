@@ -131,7 +131,7 @@ def interpolate_cameras(start_camera: Camera, end_camera: Camera, fraction: floa
     return end_camera if _cameras_nearly_equal(camera, end_camera) else camera
 
 
-def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Floats | None:
+def pick(scene: Scene, camera: Camera, x: float, y: float, aspect_ratio: float) -> Floats | None:
     """Return the surface point [mm] at a position in the image; None if no surface is visible there.
 
     The point is relative to the centre of the head.
@@ -140,12 +140,12 @@ def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Flo
     camera : camera to use instead of the scene's camera
     x : horizontal position in the image, from -1 (left) to 1 (right)
     y : vertical position in the image, from -1 (bottom) to 1 (top)
-    aspect : ratio of image width to height [-]
+    aspect_ratio : ratio of image width to height [-]
 
     Source: [MollerTrumbore1997].
     """
     right, up, forward = camera_axes(camera)
-    half_size, shift = camera.window(aspect)
+    half_size, shift = camera.window(aspect_ratio)
     ray = forward + (x + shift[0]) * half_size[0] * right + (y + shift[1]) * half_size[1] * up
     head, positions = scene.head, posed_positions(scene)
     origin = np.array(camera.position) + head.centre_mm

@@ -169,13 +169,13 @@ class MotionPlayer:
             self._seconds = clip.duration_s
             self.pause()
 
-    def state_at(self, seconds: float) -> ViewerState:
+    def state_at(self, time_in_motion_s: float) -> ViewerState:
         """Stop playing, and return the state with the pose that the motion has at a given time.
 
-        seconds : time in the motion [s]
+        time_in_motion_s : time in the motion [s]
 
         Raises DermisError if the frame at that time cannot be read.
         """
         self.stop()
         clip, state = self.clip, self._history.state
-        return state if clip is None else state.with_motion(clip, seconds)
+        return state if clip is None else state.with_motion(clip, time_in_motion_s)

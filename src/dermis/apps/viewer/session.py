@@ -65,17 +65,17 @@ class HeadLoader:
         """Return the original name of an uploaded file, given its path; return other names unchanged."""
         return self._original_names.get(name_or_path, name_or_path)
 
-    def open(self, name_or_path: str, uploaded_as: str = "") -> None:
+    def open(self, name_or_path: str, original_name: str = "") -> None:
         """Load a head or a scene in the background, and cancel earlier requests that have not started.
 
         name_or_path : name of a built-in head or sample, or path of a mesh or scene file
-        uploaded_as : original name of an uploaded file
+        original_name : original name of an uploaded file
         """
         if self._future:
             self._future.cancel()
         self._name = str(Path(name_or_path).resolve()) if Path(name_or_path).is_file() else name_or_path
-        if uploaded_as:
-            self._original_names[self._name] = uploaded_as
+        if original_name:
+            self._original_names[self._name] = original_name
         self._future = self._executor.submit(_load_head_or_scene, self._name)
         self._future.add_done_callback(lambda _: self.request_frame())
 

@@ -156,15 +156,15 @@ class ViewerState:
         """Return a copy with another pose, where None means the rest pose."""
         return self._with_scene(pose=pose)
 
-    def with_motion(self, clip: Clip, seconds: float) -> ViewerState:
+    def with_motion(self, clip: Clip, time_in_motion_s: float) -> ViewerState:
         """Return a copy posed by a motion; morph targets and bones not in the motion keep their values.
 
-        seconds : time in the motion [s]
+        time_in_motion_s : time in the motion [s]
 
         Raises DermisError if a frame cannot be read.
         """
-        pose = merge_poses(clip.pose_at(seconds), self.scene.pose)
-        return replace(self.with_pose(pose), seconds=seconds)
+        pose = merge_poses(clip.pose_at(time_in_motion_s), self.scene.pose)
+        return replace(self.with_pose(pose), seconds=time_in_motion_s)
 
     def with_head(self, head: Head, head_table: Table, rho_s: float) -> ViewerState:
         """Return a copy with another head, or with other maps for the same head.

@@ -163,17 +163,17 @@ class Viewer:
         is_ready = not self._preparation.is_running
         return is_ready and is_settled and is_final and not self._is_moving(self._clock())
 
-    def _draw(self, now: float) -> None:
+    def _draw(self, now_s: float) -> None:
         session, size = self.session, self._picture_size()
         session.show_loaded_head()
         session.player.advance()
-        state, elapsed = session.displayed_state, min(now - self._last_draw, _MAX_EASING_STEP_S)
+        state, elapsed = session.displayed_state, min(now_s - self._last_draw, _MAX_EASING_STEP_S)
         old_camera = self._easing.camera
         camera = self._easing.advance(state.scene.camera, elapsed)
         if state is not self._last_state or camera != old_camera or size != self._last_size:
-            self._last_change, self._last_state, self._last_size = now, state, size
-        self._last_draw, session.view_size = now, size
-        images = self._render_images(state, camera, size, self._is_moving(now))
+            self._last_change, self._last_state, self._last_size = now_s, state, size
+        self._last_draw, session.view_size = now_s, size
+        images = self._render_images(state, camera, size, self._is_moving(now_s))
         session.status = self._status_text(size)
         target = self._context.get_current_texture().create_view()
         self._blit.draw(self._image_patches(*images, size), target)

@@ -142,18 +142,20 @@ def encode_map_exr(map_name: str, texels: Floats) -> bytes:
     return encode_exr_parts({map_name: dict(zip(names, channels, strict=True))}, use_run_length_encoding=True)
 
 
-def quantise_map(texels: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], RangeEntries]:
+def quantise_map(
+    texels: Floats, png_encoding: PngEncoding
+) -> tuple[NDArray[np.uint8 | np.uint16], RangeEntries]:
     """Return a map quantised to integers for PNG, and JSON entries that say how to decode the integers."""
-    if encoding == "colour":
+    if png_encoding == "colour":
         return encode_srgb8(np.clip(texels, 0.0, 1.0)), {"png": "sRGB"}
-    if encoding == "light":
+    if png_encoding == "light":
         white = float(np.percentile(texels, _WHITE_PERCENTILE)) or 1.0
         return encode_srgb8(np.clip(texels / white, 0.0, 1.0)), {"png": "sRGB", "white": white}
-    if encoding == "normal":
+    if png_encoding == "normal":
         return _to_uint16(0.5 * texels + 0.5), {"png": "value = 2 level / 65535 - 1"}
-    if encoding == "root":
+    if png_encoding == "root":
         return _to_uint16(np.sqrt(texels)), {"png": "value = (level / 65535)^2"}
-    if encoding == "fraction":
+    if png_encoding == "fraction":
         return _to_uint16(texels), {"png": "value = level / 65535"}
     low, high = float(texels.min()), float(texels.max())
     span = high - low or 1.0

@@ -155,13 +155,13 @@ _TOO_MANY_PAGES_REASON = "Too many pages are open: close one of them."
 class RequestFilter:
     """ASGI middleware that rejects requests without the token or from other web sites.
 
-    app : ASGI application of rendercanvas
+    asgi_app : ASGI application of rendercanvas
     token : secret in the query of the URL and later in a cookie; empty if no secret is required
     cookie : name of the cookie, different for each port because browsers share cookies between ports
     """
 
-    def __init__(self, app: App, token: str, cookie: str = "dermis") -> None:
-        self._app, self._token, self._cookie = app, token, cookie
+    def __init__(self, asgi_app: App, token: str, cookie: str = "dermis") -> None:
+        self._app, self._token, self._cookie = asgi_app, token, cookie
         self._pages = 0
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
@@ -262,7 +262,7 @@ def _drop_invalid_messages(receive: Receive) -> Receive:
     return next_message
 
 
-async def _send_rejection(reason: str, scope: Message, receive: Receive, send: Send) -> None:
+async def _send_rejection(rejection_reason: str, scope: Message, receive: Receive, send: Send) -> None:
     if scope["type"] == "websocket":
         await receive()
         await send({"type": "websocket.close", "code": 1008})
@@ -270,4 +270,4 @@ async def _send_rejection(reason: str, scope: Message, receive: Receive, send: S
     # Close the connection, otherwise the client could send an endless body.
     headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"connection", b"close")]
     await send({"type": "http.response.start", "status": 403, "headers": headers})
-    await send({"type": "http.response.body", "body": reason.encode()})
+    await send({"type": "http.response.body", "body": rejection_reason.encode()})

@@ -34,14 +34,14 @@ _MAX_DISPLAYED_NAME_CHARACTERS = 80
 class Uploads:
     """ASGI middleware that receives files at upload/NAME from the page that controls the viewer.
 
-    app : application that handles all other requests
+    asgi_app : application that handles all other requests
     canvas : canvas of the page; it issues the ticket required for an upload, and opens each received file
     upload_folder : folder for the received files; the file names that pages send are only displayed, and not
         used in paths
     """
 
-    def __init__(self, app: App, canvas: PageCanvas, upload_folder: Path) -> None:
-        self._app, self._canvas, self._folder = app, canvas, upload_folder
+    def __init__(self, asgi_app: App, canvas: PageCanvas, upload_folder: Path) -> None:
+        self._app, self._canvas, self._folder = asgi_app, canvas, upload_folder
         self._count = self._bytes = 0
         self._is_busy = False
 

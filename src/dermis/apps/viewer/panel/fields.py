@@ -67,53 +67,64 @@ _COLOUR_TYPE: Any = Colour
 
 def draw_fields(
     session: Session,
-    model: FrozenModel,
+    pydantic_model: FrozenModel,
     state_with_fields: StateWithFields,
-    styles: Mapping[str, FieldStyle],
+    field_styles: Mapping[str, FieldStyle],
     field_names: Iterable[str] | None = None,
     label_suffix: str = "",
 ) -> None:
     """Draw a control for each field of a model; fields without a suitable control are skipped.
 
     state_with_fields : function that returns a state, given the new value of a field as keyword argument
-    styles : presentation of each field that differs from the defaults, by field name
+    field_styles : presentation of each field that differs from the defaults, by field name
     field_names : names of the fields to draw; None for all fields
     label_suffix : suffix "##id" that is not shown and distinguishes controls with equal labels
     """
-    for name in type(model).model_fields if field_names is None else field_names:
-        _draw_field(session, model, name, state_with_fields, styles.get(name, _DEFAULT_STYLE), label_suffix)
+    for name in type(pydantic_model).model_fields if field_names is None else field_names:
+        _draw_field(
+            session,
+            pydantic_model,
+            name,
+            state_with_fields,
+            field_styles.get(name, _DEFAULT_STYLE),
+            label_suffix,
+        )
 
 
 def _draw_field(
     session: Session,
-    model: FrozenModel,
+    pydantic_model: FrozenModel,
     field_name: str,
     state_with_fields: StateWithFields,
-    style: FieldStyle,
+    field_style: FieldStyle,
     label_suffix: str,
 ) -> None:
-    kind, value = type(model), getattr(model, field_name)
-    label = (style.label or _field_label(field_name)) + label_suffix
-    value_range = style.value_range or field_slider_range(kind, field_name) or SliderRange(0.0, 1.0)
+    kind, value = type(pydantic_model), getattr(pydantic_model, field_name)
+    label = (field_style.label or _field_label(field_name)) + label_suffix
+    value_range = field_style.value_range or field_slider_range(kind, field_name) or SliderRange(0.0, 1.0)
 
     def state_with_value(new_value: object) -> ViewerState:
         return state_with_fields(**{field_name: new_value})
 
     if keywords := field_keywords(kind, field_name):
-        _draw_keywords(session, label, value, keywords, state_with_value, style)
+        _draw_keywords(session, label, value, keywords, state_with_value, field_style)
         draw_tooltip(field_help(kind, field_name))
         if isinstance(value, str):
             return
     if isinstance(value, bool):
         apply_edited_value(session, label, imgui.checkbox(label, value), state_with_value)
-    elif style.options:
+    elif field_style.options:
         draw_combo(
-            session, label, str(value), map(str, style.options), lambda text: state_with_value(int(text))
+            session,
+            label,
+            str(value),
+            map(str, field_style.options),
+            lambda text: state_with_value(int(text)),
         )
     elif isinstance(value, (int, float)):
-        unit, convert = style.unit, round if isinstance(value, int) else float
+        unit, convert = field_style.unit, round if isinstance(value, int) else float
         formats = (_UNIT_FORMATS[end] for end in _UNIT_FORMATS if field_name.endswith(end))
-        number = style.number_format or next(formats, "%.3f")
+        number = field_style.number_format or next(formats, "%.3f")
         displayed = SliderRange(value_range.low / unit, value_range.high / unit, value_range.logarithmic)
         draw_slider(
             session, label, value / unit, lambda new: state_with_value(convert(unit * new)), displayed, number
@@ -134,7 +145,7 @@ def _draw_field(
             lambda new: state_with_value(tuple(clamp_to_range(c, value_range) for c in new)),
         )
     elif len(keywords := field_choices(kind, field_name)) > 1:
-        draw_combo(session, label, str(value), keywords, state_with_value, style.names)
+        draw_combo(session, label, str(value), keywords, state_with_value, field_style.names)
     else:
         return
     draw_tooltip(field_help(kind, field_name))
@@ -146,13 +157,13 @@ def _draw_keywords(
     current_value: object,
     keywords: tuple[str, ...],
     state_with_value: ToState,
-    style: FieldStyle,
+    field_style: FieldStyle,
 ) -> None:
     """Draw a drop-down list of the keywords that a field accepts instead of a number or colour.
 
     state_with_value : function that returns a state, given the new value
     """
-    custom_value = style.custom_value
+    custom_value = field_style.custom_value
 
     def state_with_keyword(keyword: str) -> ViewerState:
         return state_with_value(

@@ -47,17 +47,17 @@ _DIVIDER_HANDLE_RADIUS = 7.0  # of the divider
 _HELP_WIDTH, _SHORTCUT_COLUMN_FRACTION = 460.0, 0.4
 
 
-def draw_divider(split: SplitView, picture_left: float, window_size: tuple[float, float]) -> None:
+def draw_divider(split_view: SplitView, picture_left: float, window_size: tuple[float, float]) -> None:
     """Draw the divider of the before/after comparison, with a handle in its centre.
 
     picture_left : left edge of the picture
     window_size : width and height of the window [logical pixel]
     """
-    if split.frozen_state is None:
+    if split_view.frozen_state is None:
         return
     draw_list, x = (
         imgui.get_background_draw_list(),
-        picture_left + split.divider_position * (window_size[0] - picture_left),
+        picture_left + split_view.divider_position * (window_size[0] - picture_left),
     )
     light, dark = imgui.IM_COL32(230, 230, 230, 255), imgui.IM_COL32(0, 0, 0, 255)
     draw_list.add_line(imgui.ImVec2(x, 0.0), imgui.ImVec2(x, window_size[1]), light, 1.0)

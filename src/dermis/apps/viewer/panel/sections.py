@@ -118,8 +118,8 @@ def _draw_light(session: Session, light_index: int, light: Light) -> None:
     def state_with_fields(**fields: object) -> ViewerState:
         return session.state.with_light(light_index, **fields)
 
-    def state_with_exposure_stops(stops: float) -> ViewerState:
-        factor = 2.0**stops * math.pi / strength
+    def state_with_exposure_stops(exposure_stops: float) -> ViewerState:
+        factor = 2.0**exposure_stops * math.pi / strength
         return state_with_fields(irradiance=tuple(factor * c for c in light.irradiance))
 
     imgui.text_disabled(f"{LIGHT_KIND_NAMES.get(light.kind, light.kind)}, Shift and drag to move")
@@ -454,19 +454,21 @@ def stage_times_by_name(frame_times_ms: Sequence[dict[str, float]]) -> dict[str,
 
 
 def _plot_stacked_areas(
-    times_ms: dict[str, Floats], stage_colours: Sequence[tuple[float, float, float]], total_ms: Floats
+    stage_times_ms: dict[str, Floats],
+    stage_colours: Sequence[tuple[float, float, float]],
+    total_frame_times_ms: Floats,
 ) -> None:
     """Plot the times of stages over the frames as stacked areas, with the last frame at the right edge.
 
-    times_ms : (n,) times of each stage, by stage name [ms]
+    stage_times_ms : (n,) times of each stage, by stage name [ms]
     stage_colours : colour of each stage
-    total_ms : (n,) total times of the frames [ms]
+    total_frame_times_ms : (n,) total times of the frames [ms]
     """
-    last = max(1.0, len(total_ms) - 1.0)
-    if not begin_plot("stages", ("frames", "ms"), (0.0, last), max(float(total_ms.max()), 1e-3)):
+    last = max(1.0, len(total_frame_times_ms) - 1.0)
+    if not begin_plot("stages", ("frames", "ms"), (0.0, last), max(float(total_frame_times_ms.max()), 1e-3)):
         return
-    x, below = np.arange(len(total_ms), dtype=np.float64), np.zeros(len(total_ms))
-    for (name, values), colour in zip(times_ms.items(), stage_colours, strict=True):
+    x, below = np.arange(len(total_frame_times_ms), dtype=np.float64), np.zeros(len(total_frame_times_ms))
+    for (name, values), colour in zip(stage_times_ms.items(), stage_colours, strict=True):
         spec = implot.Spec()
         spec.fill_color = imgui.ImVec4(*colour, 1.0)
         implot.plot_shaded(name, x, below, below + values, spec)

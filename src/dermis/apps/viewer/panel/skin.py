@@ -165,36 +165,38 @@ def _profile_layers(profile_name: str) -> tuple[TissueLayer, ...]:
         return ()
 
 
-def _draw_layers(session: Session, layers: Layers) -> None:
+def _draw_layers(session: Session, tissue_layers: Layers) -> None:
     """Draw controls for the coefficients of all tissue layers, starting with the topmost layer."""
-    for index, layer in enumerate(layers):
+    for index, layer in enumerate(tissue_layers):
         depth = "semi-infinite" if layer.thickness_mm is None else f"{layer.thickness_mm:.3g} mm"
         is_open = imgui.tree_node_ex(f"layer{index}", 0, f"{index + 1} {layer.name}, {depth}")
         record_position(session, f"layer {index + 1}")
         if is_open:
-            _draw_layer(session, layers, index)
+            _draw_layer(session, tissue_layers, index)
             imgui.tree_pop()
 
 
-def _draw_layer(session: Session, layers: Layers, layer_index: int) -> None:
-    layer, label_suffix = layers[layer_index], f"##{layer_index + 1}"
+def _draw_layer(session: Session, tissue_layers: Layers, layer_index: int) -> None:
+    layer, label_suffix = tissue_layers[layer_index], f"##{layer_index + 1}"
 
     def state_with_fields(**fields: object) -> ViewerState:
-        return _replace_layer(session, layers, layer_index, validated_copy(layer, **fields))
+        return _replace_layer(session, tissue_layers, layer_index, validated_copy(layer, **fields))
 
     draw_fields(session, layer, state_with_fields, LAYER_STYLES, label_suffix=label_suffix)
     imgui.text_disabled("red, green, blue [1/mm]")
-    if len(layers) < MAX_LAYERS and draw_button(session, f"add above{label_suffix}"):
+    if len(tissue_layers) < MAX_LAYERS and draw_button(session, f"add above{label_suffix}"):
         copy = validated_copy(layer, thickness_mm=layer.thickness_mm or _NEW_LAYER_THICKNESS_MM)
-        run_action(session, lambda: session.change(_replace_layer(session, layers, layer_index, copy, layer)))
+        run_action(
+            session, lambda: session.change(_replace_layer(session, tissue_layers, layer_index, copy, layer))
+        )
     imgui.same_line()
-    if len(layers) > 1 and draw_button(session, f"remove{label_suffix}"):
-        run_action(session, lambda: session.change(_replace_layer(session, layers, layer_index)))
+    if len(tissue_layers) > 1 and draw_button(session, f"remove{label_suffix}"):
+        run_action(session, lambda: session.change(_replace_layer(session, tissue_layers, layer_index)))
 
 
 def _replace_layer(
-    session: Session, layers: Layers, layer_index: int, *new_layers: TissueLayer
+    session: Session, tissue_layers: Layers, layer_index: int, *new_layers: TissueLayer
 ) -> ViewerState:
     """Return the state in which one tissue layer is replaced by zero or more new layers."""
-    all_layers = (*layers[:layer_index], *new_layers, *layers[layer_index + 1 :])
+    all_layers = (*tissue_layers[:layer_index], *new_layers, *tissue_layers[layer_index + 1 :])
     return session.state.with_skin(layers=[layer.model_dump() for layer in all_layers])

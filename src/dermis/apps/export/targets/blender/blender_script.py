@@ -92,15 +92,15 @@ def place_head() -> None:
         set_skin_inputs(next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED"))
 
 
-def add_ball(diameter: float) -> None:
+def add_ball(diameter_m: float) -> None:
     """Add a ball with the skin material.
 
-    diameter : diameter of the ball [m]
+    diameter_m : diameter of the ball [m]
     """
     import bmesh  # type: ignore[import-not-found,unused-ignore]  # exists after bpy is imported
 
     mesh, shape = bpy.data.meshes.new("ball"), bmesh.new()
-    bmesh.ops.create_uvsphere(shape, u_segments=192, v_segments=96, radius=0.5 * diameter)
+    bmesh.ops.create_uvsphere(shape, u_segments=192, v_segments=96, radius=0.5 * diameter_m)
     shape.to_mesh(mesh)
     shape.free()
     mesh.shade_smooth()

@@ -21,7 +21,7 @@ from dermis.scene.model import Scene
 _SEGMENTS_PER_EDGE = 4  # segments per edge
 
 
-def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
+def skin_meshes(xml_backend: XmlBackend, head: Head) -> dict[str, bytes]:
     """Return the meshes of the skin's surface as PLY files, in a dictionary by shape name.
 
     Positions are in mm, relative to the head's centre. The shape "skin" has normals and uv, and "caps" closes
@@ -34,7 +34,7 @@ def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
     closed = closed_skin(mesh, head.name)
     closed = replace(closed, positions=(closed.positions - centre).astype(np.float32))
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
-    outer, _ = offset_inwards(closed, -interface_gap_mm(backend, closed), head.name)
+    outer, _ = offset_inwards(closed, -interface_gap_mm(xml_backend, closed), head.name)
     used, corners = np.unique(mesh.triangles[skin], return_inverse=True)
     solid_vertex = np.unique(mesh.point[used], return_inverse=True)[1]
     attributes = mesh.normals[used], mesh.uv[used]

@@ -133,7 +133,7 @@ class Mitsuba(Target):
 
 
 def fit_medium(
-    reference_profile: CumulativeProfile, colours: SkinColours, boundary: Boundary
+    reference_profile: CumulativeProfile, colours: SkinColours, surface_model: Boundary
 ) -> IsotropicMedium:
     """Return the medium that has the skin's lightest colour and the profile closest to the reference.
 
@@ -141,22 +141,22 @@ def fit_medium(
     matched for light incident along the normal.
 
     colours : mean and lightest colour of the skin
-    boundary : model of the surface above the medium
+    surface_model : model of the surface above the medium
     """
-    energy = colours.medium_colour(boundary) / _boundary_transmittance(boundary)
-    if boundary == "matched":
+    energy = colours.medium_colour(surface_model) / _boundary_transmittance(surface_model)
+    if surface_model == "matched":
         energy = half_space("matched", tabulated_albedo("walk", energy), np.ones(3)).energy
-    medium = fit_homogeneous_medium(reference_profile, energy, _half_space_kind(boundary))
+    medium = fit_homogeneous_medium(reference_profile, energy, _half_space_kind(surface_model))
     return IsotropicMedium(flat_tuple(1.0 / medium.mfp_mm), flat_tuple(medium.albedo))
 
 
-def _half_space_kind(boundary: Boundary) -> HalfSpaceKind:
-    return "matched" if boundary == "matched" else "skin"
+def _half_space_kind(surface_model: Boundary) -> HalfSpaceKind:
+    return "matched" if surface_model == "matched" else "skin"
 
 
-def _boundary_transmittance(boundary: Boundary) -> float:
+def _boundary_transmittance(surface_model: Boundary) -> float:
     """Return the transmittance of an index-matched surface, or 1 for a refracting surface [-]."""
-    return 1.0 - MATCHED_REFLECTANCE if boundary == "matched" else 1.0
+    return 1.0 - MATCHED_REFLECTANCE if surface_model == "matched" else 1.0
 
 
 def _image_roles_by_material(subject: Subject) -> dict[int, set[PartRole]]:
@@ -204,17 +204,19 @@ class SkinColours:
     brightest: Floats
     lightness_ratio: float
 
-    def medium_colour(self, boundary: Boundary) -> Floats:
+    def medium_colour(self, surface_model: Boundary) -> Floats:
         """Return the colour (3,) of the medium without textures.
 
         Under an index-matched surface, textures can only change lightness, so the colour is the mean colour
         scaled to the luminance of the lightest texels.
         """
-        return np.minimum(self.lightness_ratio * self.mean if boundary == "matched" else self.brightest, 0.97)
+        return np.minimum(
+            self.lightness_ratio * self.mean if surface_model == "matched" else self.brightest, 0.97
+        )
 
-    def transmittance(self, boundary: Boundary) -> tuple[float, ...]:
+    def transmittance(self, surface_model: Boundary) -> tuple[float, ...]:
         """Return the mean factor (3,) by which the textures dim light that enters and leaves the skin [-]."""
-        return flat_tuple(self.mean / self.medium_colour(boundary))
+        return flat_tuple(self.mean / self.medium_colour(surface_model))
 
 
 def skin_colours(subject: Subject) -> SkinColours:

@@ -71,13 +71,13 @@ LENGTH_INPUTS = ("subsurface_radius",)
 """Inputs that are lengths [m]."""
 
 
-def input_name(shader: str, open_pbr_name: str) -> str:
+def input_name(shader_category: str, open_pbr_name: str) -> str:
     """Return the name that an input of OpenPBR has in a shader.
 
-    shader : `OPEN_PBR` or `STANDARD_SURFACE`
+    shader_category : `OPEN_PBR` or `STANDARD_SURFACE`
     open_pbr_name : name of the input in OpenPBR
     """
-    return open_pbr_name if shader == OPEN_PBR else _STANDARD_SURFACE_NAMES[open_pbr_name]
+    return open_pbr_name if shader_category == OPEN_PBR else _STANDARD_SURFACE_NAMES[open_pbr_name]
 
 
 class MapType(NamedTuple):
@@ -185,15 +185,15 @@ def eye_material(material_name: str) -> OpenPbrMaterial:
     return OpenPbrMaterial(material_name, values, {"base_color": "eye"})
 
 
-def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
+def hair_material(absorption_per_mm: Floats, radius_mm: float) -> OpenPbrMaterial:
     """Return the OpenPBR material of hairs: an opaque surface with the mean colour of the hairs.
 
-    absorption : (n, 3) absorption coefficient inside the hairs [1/mm]
+    absorption_per_mm : (n, 3) absorption coefficient inside the hairs [1/mm]
     radius_mm : radius of the hairs [mm]
 
     Source: [Chiang2016] eq. 9 for the colour, at a roughness of 0.3.
     """
-    colour = flat_tuple(np.exp(-5.888 * np.sqrt(np.maximum(absorption.mean(axis=0), 0.0) * radius_mm)))
+    colour = flat_tuple(np.exp(-5.888 * np.sqrt(np.maximum(absorption_per_mm.mean(axis=0), 0.0) * radius_mm)))
     values: dict[str, InputValue] = {"base_color": colour, "specular_roughness": 0.4, "specular_ior": 1.55}
     return OpenPbrMaterial("hair", values, {})
 

@@ -118,10 +118,12 @@ class OpenPbr(Target):
         return [file, *maps.values(), *write_part_pictures(subject, file.parent, prefix)]
 
 
-def surface_parameters(subject: Subject, shader: str, radius_mm: Floats, radius_meaning: str) -> Parameters:
+def surface_parameters(
+    subject: Subject, shader_category: str, radius_mm: Floats, radius_meaning: str
+) -> Parameters:
     """Return the parameters of a surface with given subsurface radii.
 
-    shader : node category of the surface, `OPEN_PBR` or `STANDARD_SURFACE`
+    shader_category : node category of the surface, `OPEN_PBR` or `STANDARD_SURFACE`
     radius_mm : (3,) subsurface radii [mm]
     radius_meaning : explanation of subsurface_radius for the report
     """
@@ -137,7 +139,7 @@ def surface_parameters(subject: Subject, shader: str, radius_mm: Floats, radius_
         ("specular_weight", skin.strength, "-", "factor of the specular reflection; the mean of a map"),
         ("specular_roughness", roughness, "-", "square root of Beckmann's m, or its map"),
     )
-    return tuple(Parameter(input_name(shader, name), *values) for name, *values in inputs)
+    return tuple(Parameter(input_name(shader_category, name), *values) for name, *values in inputs)
 
 
 def profile_error_text(mfp_mm: Floats, subject: Subject) -> str:
@@ -149,10 +151,10 @@ def profile_error_text(mfp_mm: Floats, subject: Subject) -> str:
     return f"interpreted as d, errors at shadow edges are {', '.join(f'{error:.3f}' for error in errors)}"
 
 
-def get_radii_mm(parameters: Parameters, shader: str) -> Floats:
+def get_radii_mm(parameters: Parameters, shader_category: str) -> Floats:
     """Return the subsurface radii (3,) in a surface's parameters [mm]."""
-    longest = get_numbers(parameters, input_name(shader, "subsurface_radius"))[0] / _METRES_PER_MM
-    return longest * np.array(get_numbers(parameters, input_name(shader, "subsurface_radius_scale")))
+    longest = get_numbers(parameters, input_name(shader_category, "subsurface_radius"))[0] / _METRES_PER_MM
+    return longest * np.array(get_numbers(parameters, input_name(shader_category, "subsurface_radius_scale")))
 
 
 def fitted_mean_free_path_mm(subject: Subject) -> Floats:

@@ -32,17 +32,17 @@ _MAX_BOUNCES = 100
 
 
 def format_directive(
-    directive_name: str, implementation: str, parameters: DirectiveParameters | None = None
+    directive_name: str, implementation_name: str, parameters: DirectiveParameters | None = None
 ) -> str:
     """Return a directive of a scene file, such as `Material "subsurface" "float eta" [ 1.4 ]`.
 
     directive_name : first word of the directive, such as "Material"
-    implementation : pbrt's name of the implementation, such as "subsurface"
+    implementation_name : pbrt's name of the implementation, such as "subsurface"
     parameters : dictionary from type and name, such as "float eta", to a value: a Boolean, or one or more
         texts or numbers
     """
     texts = [f'"{key}" [ {_format_value(value)} ]' for key, value in (parameters or {}).items()]
-    return " ".join([directive_name, f'"{implementation}"', *texts])
+    return " ".join([directive_name, f'"{implementation_name}"', *texts])
 
 
 def _format_value(parameter_value: ArrayLike | Sequence[str]) -> str:

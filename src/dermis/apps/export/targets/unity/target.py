@@ -101,14 +101,18 @@ class Unity(Target):
         return [asset, *write_files(asset.parent, maps)]
 
 
-def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
+def _scattering_distances(burley_width_mm: Floats, version: str) -> Parameters:
     """Return Burley widths as parameters: a colour before HDRP 14; a colour and a multiplier since HDRP 14.
 
-    d_mm : (3,) widths of the Burley profiles [mm]
+    burley_width_mm : (3,) widths of the Burley profiles [mm]
     """
     if version == _VERSION_BEFORE_14:
-        return (Parameter(_SCATTERING_DISTANCE_NAME, flat_tuple(d_mm), "mm", "d as a linear HDR colour"),)
-    profile = unity_parameters(BurleyProfile(np.ones(3), 1.0 / d_mm))
+        return (
+            Parameter(
+                _SCATTERING_DISTANCE_NAME, flat_tuple(burley_width_mm), "mm", "d as a linear HDR colour"
+            ),
+        )
+    profile = unity_parameters(BurleyProfile(np.ones(3), 1.0 / burley_width_mm))
     return (
         Parameter(
             _SCATTERING_DISTANCE_NAME,

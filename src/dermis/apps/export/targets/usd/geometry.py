@@ -53,7 +53,7 @@ def first_vertex_by_point(mesh: Mesh) -> NDArray[np.intp]:
 
 
 def add_mesh(
-    stage: Usd.Stage, mesh_path: Sdf.Path, head: Head, deformable_mesh: DeformableMesh
+    usd_stage: Usd.Stage, mesh_path: Sdf.Path, head: Head, deformable_mesh: DeformableMesh
 ) -> dict[int, UsdGeom.Subset]:
     """Add the head's mesh in its rest pose to the stage; return the geometry subsets by material index.
 
@@ -61,7 +61,7 @@ def add_mesh(
     """
     mesh, polygons = head.mesh, mesh_polygons(head.mesh)
     vertex = first_vertex_by_point(mesh)
-    prim = UsdGeom.Mesh.Define(stage, mesh_path)
+    prim = UsdGeom.Mesh.Define(usd_stage, mesh_path)
     points = Vt.Vec3fArray.FromNumpy(to_metres(deformable_mesh.positions_mm[vertex]))
     prim.CreatePointsAttr(points)
     prim.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
@@ -107,10 +107,12 @@ def _add_uv(mesh_prim: UsdGeom.Mesh, uv: Floats, polygons: Polygons) -> None:
     primvar.SetIndices(Vt.IntArray.FromNumpy(polygons.vertices))
 
 
-def add_hairs(stage: Usd.Stage, curves_path: Sdf.Path, head: Head, strands: Strands) -> UsdGeom.BasisCurves:
+def add_hairs(
+    usd_stage: Usd.Stage, curves_path: Sdf.Path, head: Head, strands: Strands
+) -> UsdGeom.BasisCurves:
     """Add hairs in the rest pose to the stage, as linear curves with a width at each knot."""
     knots = strands.knot_positions_mm(head.mesh, head.mesh.points_mm)
-    prim = UsdGeom.BasisCurves.Define(stage, curves_path)
+    prim = UsdGeom.BasisCurves.Define(usd_stage, curves_path)
     count = np.full(len(knots), knots.shape[1], np.int32)
     points = Vt.Vec3fArray.FromNumpy(to_metres(knots.reshape(-1, 3)))
     widths = Vt.FloatArray.FromNumpy((2.0 * METRES_PER_MM * strands.radius_mm.ravel()).astype(np.float32))
@@ -129,7 +131,7 @@ def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
 
 
 def add_rig(
-    stage: Usd.Stage, rig_root_path: Sdf.Path, mesh_prim: Usd.Prim, deformable_mesh: DeformableMesh
+    usd_stage: Usd.Stage, rig_root_path: Sdf.Path, mesh_prim: Usd.Prim, deformable_mesh: DeformableMesh
 ) -> None:
     """Add blend shapes, a skeleton and a rest animation, so that programs can pose the head.
 
@@ -138,9 +140,9 @@ def add_rig(
     deformable_mesh : the head's mesh with morph targets and bone weights, all morph targets at weight 0
     """
     path = rig_root_path.AppendChild("skeleton")
-    skeleton = UsdSkel.Skeleton.Define(stage, path)
+    skeleton = UsdSkel.Skeleton.Define(usd_stage, path)
     joints = _add_joints(skeleton, deformable_mesh.rig.skeleton)
-    rest = UsdSkel.Animation.Define(stage, path.AppendChild("rest"))
+    rest = UsdSkel.Animation.Define(usd_stage, path.AppendChild("rest"))
     binding = UsdSkel.BindingAPI.Apply(mesh_prim)
     binding.CreateSkeletonRel().SetTargets([path])
     UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([rest.GetPath()])
@@ -149,7 +151,7 @@ def add_rig(
     rest.SetTransforms(skeleton.GetRestTransformsAttr().Get())
     names = unique_usd_names(deformable_mesh.rig.targets.names)
     if names:
-        _add_blend_shapes(stage, mesh_prim, deformable_mesh, names)
+        _add_blend_shapes(usd_stage, mesh_prim, deformable_mesh, names)
         binding.CreateBlendShapesAttr(names)
         shapes = [mesh_prim.GetPath().AppendChild(name) for name in names]
         binding.CreateBlendShapeTargetsRel().SetTargets([Sdf.Path(str(shape)) for shape in shapes])
@@ -212,14 +214,14 @@ def _bind_joints(mesh_binding: UsdSkel.BindingAPI, deformable_mesh: DeformableMe
 
 
 def _add_blend_shapes(
-    stage: Usd.Stage, mesh_prim: Usd.Prim, deformable_mesh: DeformableMesh, shape_names: Sequence[str]
+    usd_stage: Usd.Stage, mesh_prim: Usd.Prim, deformable_mesh: DeformableMesh, shape_names: Sequence[str]
 ) -> None:
     vertex = first_vertex_by_point(deformable_mesh.head.mesh)
     point = np.full(len(deformable_mesh.head.mesh.positions), -1, np.int32)
     point[vertex] = np.arange(len(vertex))
     titles = deformable_mesh.rig.targets.names
     for name, title, target in zip(shape_names, titles, deformable_mesh.targets(), strict=True):
-        shape = UsdSkel.BlendShape.Define(stage, mesh_prim.GetPath().AppendChild(name))
+        shape = UsdSkel.BlendShape.Define(usd_stage, mesh_prim.GetPath().AppendChild(name))
         points = point[target.vertex]
         order = np.flatnonzero(points >= 0)
         order = order[np.argsort(points[order])]

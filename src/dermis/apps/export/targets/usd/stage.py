@@ -64,39 +64,39 @@ def _has_rig(deformable_mesh: DeformableMesh) -> bool:
 
 
 def _add_materials(
-    stage: Usd.Stage,
+    usd_stage: Usd.Stage,
     materials_path: Sdf.Path,
     geometry_subsets: Mapping[int, UsdGeom.Subset],
     open_pbr_materials: Mapping[int, OpenPbrMaterial],
     file_prefix: str,
 ) -> None:
-    UsdGeom.Scope.Define(stage, materials_path)
+    UsdGeom.Scope.Define(usd_stage, materials_path)
     names = unique_usd_names([open_pbr_materials[kind].name for kind in geometry_subsets])
     for (kind, subset), name in zip(geometry_subsets.items(), names, strict=True):
         material = _add_material(
-            stage, materials_path.AppendChild(name), open_pbr_materials[kind], file_prefix
+            usd_stage, materials_path.AppendChild(name), open_pbr_materials[kind], file_prefix
         )
         UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
 
 
-def _add_hairs(stage: Usd.Stage, root_path: Sdf.Path, head: Head) -> None:
+def _add_hairs(usd_stage: Usd.Stage, root_path: Sdf.Path, head: Head) -> None:
     for name, strands in (("lashes_and_brows", head.strands), ("hair", hair_strands(head))):
         if strands is None:
             continue
-        curves = add_hairs(stage, root_path.AppendChild(name), head, strands)
+        curves = add_hairs(usd_stage, root_path.AppendChild(name), head, strands)
         definition = hair_material(strands.absorption, float(np.median(strands.radius_mm)))
-        material = _add_material(stage, root_path.AppendPath(f"materials/{name}"), definition, "")
+        material = _add_material(usd_stage, root_path.AppendPath(f"materials/{name}"), definition, "")
         UsdShade.MaterialBindingAPI.Apply(curves.GetPrim()).Bind(material)
 
 
 def _add_material(
-    stage: Usd.Stage, prim_path: Sdf.Path, open_pbr_material: OpenPbrMaterial, file_prefix: str
+    usd_stage: Usd.Stage, prim_path: Sdf.Path, open_pbr_material: OpenPbrMaterial, file_prefix: str
 ) -> UsdShade.Material:
     """Add an OpenPBR material with a preview surface to the stage, and return the material.
 
     file_prefix : prefix of the file names of the maps
     """
-    material = UsdShade.Material.Define(stage, prim_path)
+    material = UsdShade.Material.Define(usd_stage, prim_path)
     material.GetPrim().SetDisplayName(open_pbr_material.name)
     _add_open_pbr(material, open_pbr_material, file_prefix)
     _add_preview(material, open_pbr_material, file_prefix)

@@ -117,7 +117,7 @@ class PageRequest:
 
 
 def build_page_content(
-    request: PageRequest, on_frames_captured: OnFramesCaptured = lambda *_: None
+    page_request: PageRequest, on_frames_captured: OnFramesCaptured = lambda *_: None
 ) -> PageContent:
     """Capture the frames of all kinds of adapter, and return the data that the page embeds.
 
@@ -125,18 +125,18 @@ def build_page_content(
         renderer (which then uses the maps of the page), the scene and the settings
     """
     content = PageContent()
-    for adapter_kind in (one for one in ADAPTER_KINDS if request.sizes.get(one)):
-        renderer = capture_renderer(adapter_kind, request.adapter)
-        content.frames_by_kind[adapter_kind] = _capture_frames(content, renderer, request, adapter_kind)
-        settings = request.settings_for(request.sizes[adapter_kind][0])
-        on_frames_captured(renderer, request.scene, settings)
+    for adapter_kind in (one for one in ADAPTER_KINDS if page_request.sizes.get(one)):
+        renderer = capture_renderer(adapter_kind, page_request.adapter)
+        content.frames_by_kind[adapter_kind] = _capture_frames(content, renderer, page_request, adapter_kind)
+        settings = page_request.settings_for(page_request.sizes[adapter_kind][0])
+        on_frames_captured(renderer, page_request.scene, settings)
         if content.poster is None:
-            content.poster = renderer.draw(request.scene, settings).srgb8()
+            content.poster = renderer.draw(page_request.scene, settings).srgb8()
     return content
 
 
 def _capture_frames(
-    page_content: PageContent, renderer: Renderer, request: PageRequest, adapter_kind: str
+    page_content: PageContent, renderer: Renderer, page_request: PageRequest, adapter_kind: str
 ) -> Json:
     """Capture the frames for one kind of adapter, add their data to `page_content`, and return their JSON.
 
@@ -144,12 +144,12 @@ def _capture_frames(
     """
     capture, frames, slider_changes = FrameCapture(renderer.device), list[NamedFrame](), list[Json]()
     base: FrameInputs | None = None
-    for settings, merged_hairs in request.frame_settings(adapter_kind):
-        inputs = renderer.prepare(request.scene, settings)
+    for settings, merged_hairs in page_request.frame_settings(adapter_kind):
+        inputs = renderer.prepare(page_request.scene, settings)
         base, picture = base or inputs, inputs.resources.post.picture
         captured = reduce_hair(capture_frame(capture, inputs), merged_hairs)
         frames.append(NamedFrame(settings.technique, captured, picture, settings.size, merged_hairs))
-        changes = _frame_changes(page_content.byte_runs, renderer, request, settings, inputs, frames[-1])
+        changes = _frame_changes(page_content.byte_runs, renderer, page_request, settings, inputs, frames[-1])
         slider_changes.append(changes)
     captured_frames = [frame.captured for frame in frames]
     picture_maps = page_content.maps.replace_textures(renderer, capture, captured_frames)
@@ -159,24 +159,24 @@ def _capture_frames(
         frame_json["dials"] = changes
     kind_json["maps"] = {str(index): _mip_entries(page_content, one) for index, one in picture_maps.items()}
     assert base is not None
-    kind_json["hands"] = _interaction_json(request.scene, base)
-    kind_json["colours"] = _colour_maps(page_content, renderer, request, picture_maps)
+    kind_json["hands"] = _interaction_json(page_request.scene, base)
+    kind_json["colours"] = _colour_maps(page_content, renderer, page_request, picture_maps)
     return kind_json
 
 
 def _frame_changes(
     byte_runs: ByteRunCollector,
     renderer: Renderer,
-    request: PageRequest,
+    page_request: PageRequest,
     settings: Settings,
-    default_inputs: FrameInputs,
+    default_frame_inputs: FrameInputs,
     named_frame: NamedFrame,
 ) -> Json:
     """Return as JSON how a frame's uniform records and buffers change when a slider is moved.
 
     For each slider, the JSON contains the changes at each value for which a frame is captured.
 
-    default_inputs : inputs of the frame with all sliders at their default values
+    default_frame_inputs : inputs of the frame with all sliders at their default values
     named_frame : captured frame with all sliders at their default values
     """
     capture = FrameCapture(renderer.device)
@@ -191,10 +191,12 @@ def _frame_changes(
         slider.name: [
             *map(
                 slider_frame_json,
-                slider_frame_inputs(slider, lambda one: renderer.prepare(one, settings), default_inputs),
+                slider_frame_inputs(
+                    slider, lambda one: renderer.prepare(one, settings), default_frame_inputs
+                ),
             )
         ]
-        for slider in request.sliders
+        for slider in page_request.sliders
     }
 
 
@@ -208,7 +210,7 @@ def _mip_entries(page_content: PageContent, picture_map: PictureMap) -> list[lis
 
 
 def _colour_maps(
-    page_content: PageContent, renderer: Renderer, request: PageRequest, picture_maps: PictureMaps
+    page_content: PageContent, renderer: Renderer, page_request: PageRequest, picture_maps: PictureMaps
 ) -> Json:
     """Return the JSON of the colour maps that replace the head's colour map when a slider is moved.
 
@@ -218,8 +220,8 @@ def _colour_maps(
     map_index = next((k for k, one in picture_maps.items() if one.role == "colour_map"), None)
     if map_index is None:
         return {}
-    settings, entries = request.settings_for(min(map(min, request.sizes.values()))), {}
-    for slider in (one for one in request.sliders if not one.changes_pose_only):
+    settings, entries = page_request.settings_for(min(map(min, page_request.sizes.values()))), {}
+    for slider in (one for one in page_request.sliders if not one.changes_pose_only):
         scenes = enumerate(slider.scenes)
         nodes = [
             _colour_map_entry(page_content, renderer, one, settings, f"{slider.name} {k}")

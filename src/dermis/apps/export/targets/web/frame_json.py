@@ -53,7 +53,7 @@ PictureMaps = dict[int, PictureMap]
 
 
 def frames_json(
-    capture: FrameCapture,
+    frame_capture: FrameCapture,
     named_frames: list[NamedFrame],
     picture_maps: PictureMaps,
     quantisation_steps: dict[int, tuple[float, ...]],
@@ -69,28 +69,30 @@ def frames_json(
     byte_runs : collector of buffer and texture data, to which the JSON refers by index
     """
     pictures = [
-        [capture.index_of_resource(f.picture.bytes), capture.index_of_resource(f.picture.exposed)]
+        [frame_capture.index_of_resource(f.picture.bytes), frame_capture.index_of_resource(f.picture.exposed)]
         for f in named_frames
     ]
     captured_frames = [frame.captured for frame in named_frames]
-    contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TRIANGLE_TABLE_BINDINGS))
-    for index in resources_read_before_write(capture, captured_frames):
+    contents, tables = {}, set(resources_bound_as(frame_capture, captured_frames, _TRIANGLE_TABLE_BINDINGS))
+    for index in resources_read_before_write(frame_capture, captured_frames):
         if index in quantisation_steps:
             floats = (
-                capture.read_content(index)[0].view(np.float32).reshape(-1, len(quantisation_steps[index]))
+                frame_capture.read_content(index)[0]
+                .view(np.float32)
+                .reshape(-1, len(quantisation_steps[index]))
             )
             contents[index] = [byte_runs.add_floats(floats, quantisation_steps[index])]
             continue
         _, picture_count, mip_passes = picture_maps.get(index, PictureMap("", 0, None))
-        mips = [] if mip_passes else _mip_bytes(capture, index)[picture_count:]
+        mips = [] if mip_passes else _mip_bytes(frame_capture, index)[picture_count:]
         if any(one.any() for one in mips):
             add = byte_runs.add if index not in tables else _triangle_column_packer(byte_runs)
             contents[index] = [-1] * picture_count + [add(one) for one in mips]
     return {
-        "shaders": capture.shaders,
-        "programs": [_program_json(one) for one in capture.programs],
-        "resources": [_with_camel_case_keys(one) for one in capture.resources],
-        "structs": {name: _struct_json(dtype) for name, dtype in capture.structs.items()},
+        "shaders": frame_capture.shaders,
+        "programs": [_program_json(one) for one in frame_capture.programs],
+        "resources": [_with_camel_case_keys(one) for one in frame_capture.resources],
+        "structs": {name: _struct_json(dtype) for name, dtype in frame_capture.structs.items()},
         "contents": contents,
         "frames": [_frame_json(one, k, byte_runs) for one, k in zip(named_frames, pictures, strict=True)],
         "halved": {k: _passes_json(m.mip_passes, byte_runs) for k, m in picture_maps.items() if m.mip_passes},
@@ -105,12 +107,15 @@ def _triangle_column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], in
     return lambda data: byte_runs.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
-def _mip_bytes(capture: FrameCapture, resource_index: int) -> list[Bytes]:
+def _mip_bytes(frame_capture: FrameCapture, resource_index: int) -> list[Bytes]:
     """Return the bytes of each mip level of a texture, with all layers of the level joined.
 
     resource_index : index of the texture or buffer in the capture
     """
-    parts, layers = capture.read_content(resource_index), capture.resources[resource_index].get("size")
+    parts, layers = (
+        frame_capture.read_content(resource_index),
+        frame_capture.resources[resource_index].get("size"),
+    )
     count = layers[2] if isinstance(layers, list) else 1
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
@@ -162,11 +167,11 @@ def _struct_json(dtype: np.dtype[Any]) -> Json:
     return {"size": dtype.itemsize, "members": members}
 
 
-def _member_json(dtype: np.dtype[Any], offset: int) -> list[int] | Json:
+def _member_json(dtype: np.dtype[Any], byte_offset: int) -> list[int] | Json:
     base = dtype.base
     if base.fields is None:
-        return [offset // 4, dtype.itemsize // 4]
-    return {"offset": offset // 4, "each": base.itemsize // 4, "members": _struct_json(base)["members"]}
+        return [byte_offset // 4, dtype.itemsize // 4]
+    return {"offset": byte_offset // 4, "each": base.itemsize // 4, "members": _struct_json(base)["members"]}
 
 
 def _with_camel_case_keys(nested_value: object) -> object:
@@ -181,7 +186,7 @@ def _camel_case(snake_case: str) -> str:
     return first + "".join(word.title() for word in others)
 
 
-def resources_read_before_write(capture: FrameCapture, captured_frames: Frames) -> list[int]:
+def resources_read_before_write(frame_capture: FrameCapture, captured_frames: Frames) -> list[int]:
     """Return the sorted indices of the resources that a frame reads before writing to them.
 
     The page stores the data of these resources. A view of a texture counts as the whole texture, so a texture
@@ -191,18 +196,20 @@ def resources_read_before_write(capture: FrameCapture, captured_frames: Frames) 
     for frame in captured_frames:
         written: set[int] = set()
         for one in frame.passes:
-            found |= {viewed_resource(capture, k) for k in resources_read_by(capture, one)} - written
-            written |= {viewed_resource(capture, k) for k in resources_written_by(capture, one)}
+            found |= {
+                viewed_resource(frame_capture, k) for k in resources_read_by(frame_capture, one)
+            } - written
+            written |= {viewed_resource(frame_capture, k) for k in resources_written_by(frame_capture, one)}
     return sorted(found)
 
 
 def resources_bound_as(
-    capture: FrameCapture, captured_frames: Frames, binding_names: tuple[str, ...]
+    frame_capture: FrameCapture, captured_frames: Frames, binding_names: tuple[str, ...]
 ) -> dict[int, str]:
     """Return the resources that shaders bind by one of the given names, as a dictionary by resource index."""
     found: dict[int, str] = {}
     for one in (one for frame in captured_frames for one in frame.passes if one.program is not None):
-        bound_names = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]
+        bound_names = [name for _, name, _ in frame_capture.programs[one.program or 0]["bindings"]]
         found |= {
             k: name
             for k, name in zip(one.bound, bound_names, strict=True)
@@ -211,41 +218,41 @@ def resources_bound_as(
     return found
 
 
-def viewed_resource(capture: FrameCapture, resource_index: int) -> int:
+def viewed_resource(frame_capture: FrameCapture, resource_index: int) -> int:
     """Return the resource index of a view's texture; any other resource index is returned unchanged.
 
     resource_index : index of the texture or buffer in the capture
     """
-    return int(capture.resources[resource_index].get("of", resource_index))
+    return int(frame_capture.resources[resource_index].get("of", resource_index))
 
 
-def resources_read_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
+def resources_read_by(frame_capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may read.
 
     captured_pass : pass of a captured frame
     """
-    yield from (k for k, entry in _binding_entries(capture, captured_pass) if _allows_reading(entry))
+    yield from (k for k, entry in _binding_entries(frame_capture, captured_pass) if _allows_reading(entry))
     if captured_pass.raster and captured_pass.raster["indices"] >= 0:
         yield int(captured_pass.raster["indices"])
 
 
-def resources_written_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
+def resources_written_by(frame_capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may write.
 
     captured_pass : pass of a captured frame
     """
     if captured_pass.written:
         yield captured_pass.written[0]
-    yield from (k for k, entry in _binding_entries(capture, captured_pass) if _allows_writing(entry))
+    yield from (k for k, entry in _binding_entries(frame_capture, captured_pass) if _allows_writing(entry))
     if captured_pass.raster:
         yield from (
             int(captured_pass.raster[name]) for name in ("depth", "target") if captured_pass.raster[name] >= 0
         )
 
 
-def _binding_entries(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[tuple[int, Json]]:
+def _binding_entries(frame_capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[tuple[int, Json]]:
     if captured_pass.program is not None:
-        bindings = capture.programs[captured_pass.program]["bindings"]
+        bindings = frame_capture.programs[captured_pass.program]["bindings"]
         yield from (
             (k, entry) for k, (_, _, entry) in zip(captured_pass.bound, bindings, strict=True) if k >= 0
         )

@@ -127,7 +127,7 @@ class MapPictures:
         return bool(np.array_equal(self._encoded_texels[map_role], texels))
 
     def replace_textures(
-        self, renderer: Renderer, capture: FrameCapture, captured_frames: Frames
+        self, renderer: Renderer, frame_capture: FrameCapture, captured_frames: Frames
     ) -> PictureMaps:
         """Encode the frames' maps as WebP images, and upload the decoded texels to the renderer's textures.
 
@@ -135,28 +135,28 @@ class MapPictures:
         replaced map.
         """
         maps = {}
-        for index, role in _picture_textures(capture, captured_frames).items():
-            texture, description = capture.resource_at(index), capture.resources[index]
+        for index, role in _picture_textures(frame_capture, captured_frames).items():
+            texture, description = frame_capture.resource_at(index), frame_capture.resources[index]
             side, storable = min(description["size"][:2]), description["usage"] & _STORAGE_BINDING_USAGE
             mips = (
                 1 if storable else sum(side >> mip >= MIN_PICTURE_SIDE for mip in range(description["mips"]))
             )
-            levels = [self._add_pictures(capture, index, role, mip) for mip in range(mips)]
+            levels = [self._add_pictures(frame_capture, index, role, mip) for mip in range(mips)]
             small_mips = range(mips, description["mips"] if mips > 1 else 0)
-            levels += [read_texels(capture, index, mip) for mip in small_mips]
+            levels += [read_texels(frame_capture, index, mip) for mip in small_mips]
             update_map(renderer, texture, levels)
-            maps[index] = PictureMap(role, mips, capture_mips(capture, texture) if storable else None)
+            maps[index] = PictureMap(role, mips, capture_mips(frame_capture, texture) if storable else None)
         return maps
 
     def _add_pictures(
-        self, capture: FrameCapture, resource_index: int, map_role: str, mip_level: int
+        self, frame_capture: FrameCapture, resource_index: int, map_role: str, mip_level: int
     ) -> NDArray[np.float16]:
         """Encode a mip level as WebP images, and return the (l, h, w, c) texels decoded from these images.
 
         resource_index : index of the texture or buffer in the capture
         mip_level : mip level, 0 for the full resolution
         """
-        layers = read_texels(capture, resource_index, mip_level)
+        layers = read_texels(frame_capture, resource_index, mip_level)
         for layer, texels in enumerate(layers):
             if (map_role, mip_level, layer) not in self.pictures:
                 self.pictures[map_role, mip_level, layer] = encode_picture(texels, map_role == _COLOUR_ROLE)
@@ -181,32 +181,32 @@ def _reduce_map(texels: NDArray[np.float32], max_side: int) -> NDArray[np.float3
 
 
 def quantise_hairs(
-    renderer: Renderer, capture: FrameCapture, captured_frames: Frames
+    renderer: Renderer, frame_capture: FrameCapture, captured_frames: Frames
 ) -> dict[int, tuple[float, ...]]:
     """Round the knots of hairs in the device's buffers, so that the buffers compress well.
 
     Returns the rounding steps of a knot's x, y, z and radius [mm] for each buffer, by resource index.
     """
-    buffers = resources_bound_as(capture, captured_frames, ("knots",))
+    buffers = resources_bound_as(frame_capture, captured_frames, ("knots",))
     for index in buffers:
-        knots = capture.read_content(index)[0].view(np.float32).reshape(-1, len(_KNOT_STEPS_MM))
+        knots = frame_capture.read_content(index)[0].view(np.float32).reshape(-1, len(_KNOT_STEPS_MM))
         data = quantise(knots, _KNOT_STEPS_MM)
-        renderer.device.write(capture.resource_at(index), data.tobytes(), data.nbytes)
+        renderer.device.write(frame_capture.resource_at(index), data.tobytes(), data.nbytes)
     return dict.fromkeys(buffers, _KNOT_STEPS_MM)
 
 
-def read_texels(capture: FrameCapture, resource_index: int, mip_level: int) -> NDArray[np.float16]:
+def read_texels(frame_capture: FrameCapture, resource_index: int, mip_level: int) -> NDArray[np.float16]:
     """Return the (l, h, w, c) texels of a mip level of a half-float texture.
 
     resource_index : index of the texture or buffer in the capture
     """
-    width, height, layers = capture.resources[resource_index]["size"]
+    width, height, layers = frame_capture.resources[resource_index]["size"]
     sides = max(1, height >> mip_level), max(1, width >> mip_level)
-    parts = capture.read_content(resource_index)[mip_level * layers : (mip_level + 1) * layers]
+    parts = frame_capture.read_content(resource_index)[mip_level * layers : (mip_level + 1) * layers]
     return np.stack([one.view(np.float16).reshape(*sides, -1) for one in parts])
 
 
-def _picture_textures(capture: FrameCapture, captured_frames: Frames) -> dict[int, str]:
+def _picture_textures(frame_capture: FrameCapture, captured_frames: Frames) -> dict[int, str]:
     """Return a dictionary from resource index to role, for the map textures that are stored as WebP images.
 
     These are the half-float textures whose sides have at least `MIN_PICTURE_SIDE` texels. The role of a
@@ -214,7 +214,7 @@ def _picture_textures(capture: FrameCapture, captured_frames: Frames) -> dict[in
     """
     return {
         index: role
-        for index, role in resources_bound_as(capture, captured_frames, _MAP_ROLES).items()
-        if capture.resources[index].get("format", "").endswith("16float")
-        and min(capture.resources[index]["size"][:2]) >= MIN_PICTURE_SIDE
+        for index, role in resources_bound_as(frame_capture, captured_frames, _MAP_ROLES).items()
+        if frame_capture.resources[index].get("format", "").endswith("16float")
+        and min(frame_capture.resources[index]["size"][:2]) >= MIN_PICTURE_SIDE
     }

@@ -46,19 +46,19 @@ class Slider:
 
 
 def slider_frame_inputs(
-    slider: Slider, prepare_frame_inputs: Callable[[Scene], FrameInputs], default_inputs: FrameInputs
+    slider: Slider, prepare_frame_inputs: Callable[[Scene], FrameInputs], default_frame_inputs: FrameInputs
 ) -> Iterator[FrameInputs | None]:
     """Yield the frame inputs at each captured value of a slider; None at the default value.
 
     prepare_frame_inputs : function that returns the frame inputs of a scene
-    default_inputs : frame inputs of the default scene
+    default_frame_inputs : frame inputs of the default scene
     """
     for scene in slider.scenes:
         if scene is None:
             yield None
         elif slider.changes_pose_only:
             posed = prepare_frame_inputs(scene)
-            yield replace(default_inputs, motion=posed.motion, view=posed.view)
+            yield replace(default_frame_inputs, motion=posed.motion, view=posed.view)
         else:
             yield prepare_frame_inputs(scene)
 
@@ -91,10 +91,10 @@ def slider_frame_changes(
     }
 
 
-def _record_floats(record: UniformRecord) -> Floats:
+def _record_floats(uniform_record: UniformRecord) -> Floats:
     """Return the 4-byte words of a uniform record as floats, with 0 in place of integers."""
-    floats = np.frombuffer(record.tobytes(), "<f4").copy()
-    floats[~_float_word_mask(record.dtype)] = 0.0
+    floats = np.frombuffer(uniform_record.tobytes(), "<f4").copy()
+    floats[~_float_word_mask(uniform_record.dtype)] = 0.0
     return floats
 
 
