@@ -193,8 +193,8 @@ def reference_profile(
 ) -> tuple[CumulativeProfile, str, Tissue | None]:
     """Return the cumulative reference profile of a skin, the name of its model, and its tissue.
 
-    profile_model : by default, tabulated Monte Carlo for the built-in homogeneous media, and layered diffusion
-        for other tissue; a profile that is given as a table of Gaussians needs no model
+    profile_model : by default, tabulated Monte Carlo for the built-in homogeneous media, and layered
+        diffusion for other tissue; a profile that is given as a table of Gaussians needs no model
 
     Raises DermisError for an unknown model, and for a model requested for a table of Gaussians.
     """

@@ -45,8 +45,8 @@ class ByteRunCollector:
     ) -> int:
         """Add a run of bytes, and return the run's index in `runs`.
 
-        candidate_layouts : layouts to try, of which the best is used: bytes per word, words per row, and order
-            of the differences
+        candidate_layouts : layouts to try, of which the best is used: bytes per word, words per row, and
+            order of the differences
         """
         raw = np.frombuffer(raw_bytes, np.uint8)
         return self._add_run(raw, list(candidate_layouts or _possible_layouts(len(raw))), ())
