@@ -53,20 +53,23 @@ def skin_reflectance(
 
 
 def two_layer_reflectance(
-    epidermis: Floats,
-    dermis: Floats,
+    epidermis_absorption: Floats,
+    dermis_absorption: Floats,
     sigma_s_prime: Floats,
     epidermis_mm: ArrayLike,
     scattering_ratio: float = DERMIS_SCATTERING_RATIO,
 ) -> Floats:
     """Return the diffuse reflectance (n, c) of an epidermis on a semi-infinite dermis, per incident light.
 
-    epidermis, dermis : (n, c) absorption coefficients of the layers [1/mm]
+    epidermis_absorption, dermis_absorption : (n, c) absorption coefficients of the layers [1/mm]
     sigma_s_prime : (n, c) or (c,) reduced scattering coefficient of the epidermis [1/mm]
     epidermis_mm : (n, 1) thicknesses of the epidermis, or one number [mm]
     scattering_ratio : scattering coefficient of the dermis relative to the epidermis [-]
     """
-    upper, lower = Layer(epidermis, sigma_s_prime), Layer(dermis, scattering_ratio * sigma_s_prime)
+    upper, lower = (
+        Layer(epidermis_absorption, sigma_s_prime),
+        Layer(dermis_absorption, scattering_ratio * sigma_s_prime),
+    )
     A = boundary_mismatch(SKIN_ETA, "exact")
     return (1.0 - normal_reflectance(SKIN_ETA)) * solve_two_layers(upper, epidermis_mm, lower, A)
 

@@ -37,9 +37,9 @@ def blender_python(python: str | Path | None = None) -> Path:
     """
     path = python or os.environ.get(PYTHON_VARIABLE) or ""
     if not path:
-        _refuse_python("none is named")
+        _refuse_missing_python("none is named")
     if not Path(path).is_file():
-        _refuse_python(f"there is no file {path}")
+        _refuse_missing_python(f"there is no file {path}")
     return Path(path)
 
 
@@ -56,7 +56,7 @@ def run_blender(
     try:
         process = subprocess.run(command, capture_output=True, check=False, timeout=timeout_s)
     except OSError as fault:
-        _refuse_python(f"{python} cannot be run ({fault.strerror})")
+        _refuse_missing_python(f"{python} cannot be run ({fault.strerror})")
     except subprocess.TimeoutExpired:
         actual = f"it was ended after {timeout_s:.0f} s"
         refuse(blender_task.renderer, blender_task.goal, actual, "Take fewer samples or a smaller image")
@@ -70,10 +70,10 @@ def _refuse_failed_run(
     output = (process.stderr.strip() or process.stdout.strip()).decode("utf-8", "replace").splitlines()
     last_line = output[-1] if output else "no output"
     if "No module named" in last_line:
-        _refuse_python(f"{python} says: {last_line}")
+        _refuse_missing_python(f"{python} says: {last_line}")
     outcome = f"signal {-process.returncode} ended it" if process.returncode < 0 else "it failed"
     refuse(blender_task.renderer, blender_task.goal, f"{outcome} ({last_line})", blender_task.advice)
 
 
-def _refuse_python(actual_python: str) -> NoReturn:
+def _refuse_missing_python(actual_python: str) -> NoReturn:
     refuse("Cycles", "a Python that has Blender's module bpy", actual_python, _INSTALL_HINT)

@@ -151,16 +151,21 @@ def render_passes(
     )
 
 
-def pass_count(samples: int) -> int:
-    """Return the number of passes needed for at least `samples` paths per pixel in total.
+def pass_count(samples_per_pixel: int) -> int:
+    """Return the number of passes needed for at least `samples_per_pixel` paths per pixel in total.
 
-    Raises DermisError when `samples` is below 1 or too large.
+    Raises DermisError when `samples_per_pixel` is below 1 or too large.
     """
-    if not (isinstance(samples, int | np.integer) and 1 <= samples <= _MAX_SAMPLES_PER_PIXEL):
+    if not (
+        isinstance(samples_per_pixel, int | np.integer) and 1 <= samples_per_pixel <= _MAX_SAMPLES_PER_PIXEL
+    ):
         refuse(
-            "samples", f"a whole number from 1 to {_MAX_SAMPLES_PER_PIXEL}", f"got {samples}", "Correct it"
+            "samples",
+            f"a whole number from 1 to {_MAX_SAMPLES_PER_PIXEL}",
+            f"got {samples_per_pixel}",
+            "Correct it",
         )
-    return max(_MIN_PASS_COUNT, -(-samples // SAMPLES_PER_PASS))
+    return max(_MIN_PASS_COUNT, -(-samples_per_pixel // SAMPLES_PER_PASS))
 
 
 def add_passes(

@@ -157,12 +157,12 @@ def _solve_upwards(
 
 
 def _propagate_up(
-    frequency: Floats, sublayer: _Sublayer, lower_face: _BoundaryCondition
+    frequency: Floats, sublayer: _Sublayer, lower_condition: _BoundaryCondition
 ) -> tuple[_BoundaryCondition, _DownwardTransfer]:
     """Propagate the boundary condition from the lower face of a sublayer to its upper face.
 
     frequency : frequencies [1/mm]
-    lower_face : boundary condition at the lower face
+    lower_condition : boundary condition at the lower face
 
     Returns the boundary condition at the upper face, and the coefficients that transfer the fluence from the
     upper to the lower face.
@@ -179,9 +179,9 @@ def _propagate_up(
     near = np.where(gap * d < 1e-8, d, -np.expm1(-gap * d) / np.where(gap > 0.0, gap, 1.0))
     lower = source * np.exp(-np.minimum(q, sigma_t) * d) * near / (sigma_t + q)
     lower_slope = slope * E - sigma_t * lower
-    rho = (D * q - lower_face.Z) / (D * q + lower_face.Z)
-    W = lower_face.W + sublayer.point  # the flux jumps at a source on the face
-    beta = (W - lower_face.Z * lower - D * lower_slope) / (D * q + lower_face.Z)
+    rho = (D * q - lower_condition.Z) / (D * q + lower_condition.Z)
+    W = lower_condition.W + sublayer.point  # the flux jumps at a source on the face
+    beta = (W - lower_condition.Z * lower - D * lower_slope) / (D * q + lower_condition.Z)
     common = 1.0 / (1.0 + E**2 * rho)
     face = _BoundaryCondition(
         D * q * (1.0 - E**2 * rho) * common, 2.0 * D * q * beta * E * common + D * slope

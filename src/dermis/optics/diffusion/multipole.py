@@ -113,8 +113,8 @@ def _image_sum(frequency: ArrayLike, slab: Slab, real_source: Floats, image_sour
     q = np.sqrt(slab.layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)
     P = slab.image_period_mm
 
-    def periodic_source_sum(z: Floats) -> Floats:
-        z0 = np.mod(z, P)  # the series is odd and periodic: the sum of two geometric series
+    def periodic_source_sum(source_distance: Floats) -> Floats:
+        z0 = np.mod(source_distance, P)  # the series is odd and periodic: the sum of two geometric series
         return np.asarray((np.exp(-z0 * q) - np.exp(-(P - z0) * q)) / -np.expm1(-P * q))
 
     return np.asarray(

@@ -50,11 +50,11 @@ class BurleyProfile:
         s = self.shape
         return np.asarray(self.albedo * s / 4.0 * (1.0 / np.hypot(s, k) + 1.0 / np.hypot(s / 3.0, k)))
 
-    def radius_at_fraction(self, fraction: float) -> Floats:
+    def radius_at_fraction(self, light_fraction: float) -> Floats:
         """Return the radius (c,) within which a given fraction of the emerging light leaves [mm]."""
         # With t = exp(-s r / 3), the fraction outside r is (t^3 + 3 t) / 4; a hyperbolic sine solves this
         # cubic.
-        t = 2.0 * np.sinh(np.arcsinh(2.0 * (1.0 - fraction)) / 3.0)
+        t = 2.0 * np.sinh(np.arcsinh(2.0 * (1.0 - light_fraction)) / 3.0)
         return np.asarray(-3.0 * np.log(t) / self.shape)
 
 

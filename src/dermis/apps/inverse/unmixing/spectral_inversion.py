@@ -124,16 +124,16 @@ def skin_model_spectra(skin: SkinParameters = DEFAULT_SKIN) -> SpectralModel:
     """
 
     def reflectance(parameter_values: ParameterValues) -> Floats:
-        def parameter(name: str) -> Floats:
-            return np.asarray(parameter_values.get(name, getattr(skin, name)))
+        def parameter_value(parameter_name: str) -> Floats:
+            return np.asarray(parameter_values.get(parameter_name, getattr(skin, parameter_name)))
 
         return skin_reflectance(
-            parameter("melanin"),
-            parameter("blood"),
-            oxygen=parameter("oxygen"),
-            eumelanin_fraction=parameter("eumelanin"),
-            epidermis_mm=parameter("epidermis_mm"),
-            baseline=parameter("baseline"),
+            parameter_value("melanin"),
+            parameter_value("blood"),
+            oxygen=parameter_value("oxygen"),
+            eumelanin_fraction=parameter_value("eumelanin"),
+            epidermis_mm=parameter_value("epidermis_mm"),
+            baseline=parameter_value("baseline"),
             scattering=parameter_values.get("scattering", np.float64(1.0)),
         )
 
