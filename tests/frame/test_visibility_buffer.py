@@ -80,7 +80,7 @@ def shown(layers: ViewLayers, renderer: Renderer, head: Head, camera: Camera, sa
     draw_layers(frame, "nearest", layers, inputs.camera_views, inputs.resources.head)
     frame.submit()
     made = [download(renderer.device, layers.texture, layer=k) for k in range(layers.count)]
-    return made, inputs.camera_views.matrices(SIZE)
+    return made, inputs.camera_views.sample_matrices(SIZE)
 
 
 SOUP = soup(600)

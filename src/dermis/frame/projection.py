@@ -39,7 +39,7 @@ class Views(NamedTuple):
     clips: Matrix
     sample_positions: Matrix
 
-    def matrices(self, layer_size: tuple[int, int]) -> Matrix:
+    def sample_matrices(self, layer_size: tuple[int, int]) -> Matrix:
         """Return (k n, 4, 4) matrices from world to clip space, one for each of n samples of k views.
 
         They are shifted so that pixel centres fall on sample positions.

@@ -137,4 +137,4 @@ def _read_output(frame: FrameTextures, name: str) -> PlaneArray:
     planes = frame.outputs.planes_of_output(name)
     start, size = planes.byte_range(name)
     raw = frame.device.handle.queue.read_buffer(planes.buffer, start, size)
-    return planes.array(name, np.frombuffer(raw, np.uint8).copy())
+    return planes.decode_output(name, np.frombuffer(raw, np.uint8).copy())

@@ -41,7 +41,7 @@ FRAMES_IN_FLIGHT = 3
 Submit = Callable[[], Readback]
 Receive = Callable[[Readback], T]
 _MAX_CACHE_SIZE = 1000
-_WARM_UP_FRAMES = 100
+_WARM_UP_FRAME_COUNT = 100
 
 
 def pipeline_frames(
@@ -321,7 +321,7 @@ class Renderer:
         rendered = self.draw(scene, settings, force=True)
         if self.device.adapter.kind == "CPU":
             return rendered
-        for _ in range(_WARM_UP_FRAMES):
+        for _ in range(_WARM_UP_FRAME_COUNT):
             self.draw(scene, settings, force=True, timed=False)
         self.device.wait()
         return self.draw(scene, settings, force=True)

@@ -16,10 +16,10 @@ from dermis.scene.lights import Light, PointLight
 
 Members = dict[str, ArrayLike]
 """Members of a shader struct, by name."""
-L = TypeVar("L", bound=Light)
+LightT = TypeVar("LightT", bound=Light)
 
 
-class Kind(Generic[L]):
+class Kind(Generic[LightT]):
     """Kind of light. This base class is a punctual light that needs no shader members of its own.
 
     The shader has the name of the module, with the suffix .wgsl. It defines the following function, where
@@ -56,7 +56,7 @@ class Kind(Generic[L]):
         """Return the path of the WGSL file that computes the light at a point."""
         return Path(inspect.getfile(type(self))).with_suffix(".wgsl")
 
-    def has_size(self, light: L) -> bool:
+    def has_size(self, light: LightT) -> bool:
         """Return whether shadows of the light soften with the distance from the occluder.
 
         Parameters
@@ -66,7 +66,7 @@ class Kind(Generic[L]):
         """
         return not self.punctual
 
-    def parts(self, light: L) -> list[Light]:
+    def parts(self, light: LightT) -> list[Light]:
         """Divide a light into parts that together equal the light; each part gets a shadow map of its own.
 
         Parameters
@@ -81,7 +81,7 @@ class Kind(Generic[L]):
         """
         return [light]
 
-    def check(self, light: L, head: Head, culprit: str) -> None:
+    def check(self, light: LightT, head: Head, culprit: str) -> None:
         """Check that the light has a valid position.
 
         Parameters
@@ -99,7 +99,7 @@ class Kind(Generic[L]):
             When the light cannot be at its position.
         """
 
-    def members(self, light: L, centre: Triple, distance: float) -> Members:
+    def members(self, light: LightT, centre: Triple, distance: float) -> Members:
         """Return the members of the shader struct `Light` that only this kind sets.
 
         Parameters

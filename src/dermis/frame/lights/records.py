@@ -111,12 +111,12 @@ def light_shadow_views(scene: Scene, outline: Outline, map_side: int) -> list[Sh
     points = [(culprit, light) for culprit, light in shadowed if not isinstance(light, DirectionalLight)]
     point_views = iter(point_shadow_views(points, head.centre_mm, outline, map_side))
 
-    def view(light: Light) -> ShadowView:
+    def shadow_view(light: Light) -> ShadowView:
         if isinstance(light, DirectionalLight):
             return parallel_shadow_view(np.array(light.direction), outline, map_side)
         return next(point_views)
 
-    return [view(light) if light.shadows else None for _, light in numbered]
+    return [shadow_view(light) if light.shadows else None for _, light in numbered]
 
 
 def light_records(

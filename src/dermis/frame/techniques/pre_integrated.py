@@ -22,7 +22,7 @@ MAX_CURVATURE_PER_MM = 0.5
 
 _COSINE_COUNT = 257  # odd, so that one column is N.L = 0, where incident light begins
 _CURVATURE_ROWS, _SHADOW_EDGE_ROWS = 33, 9  # as in pre_integrated.wgsl
-_QUADRATURE_NODES = 48
+_QUADRATURE_NODE_COUNT = 48
 _INTEGRATION_SIGMAS = 7.0  # standard deviations over which a Gaussian is integrated
 _SHADOW_TAIL_FRACTION = (
     0.01  # fraction of the light that scatters farther across a shadow edge than the table covers
@@ -125,7 +125,7 @@ def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
     theta = np.arccos(np.asarray(cosines, dtype=np.float64))
     extent = _INTEGRATION_SIGMAS / np.sqrt(concentration)
     low, high = np.clip(theta - extent, 0.0, 0.5 * np.pi), np.clip(theta + extent, 0.0, 0.5 * np.pi)
-    x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)
+    x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODE_COUNT)
     half = 0.5 * (high - low)[..., None]
     lit, theta = low[..., None] + half * (1.0 + x), theta[..., None]
     ring = i0e(concentration * np.sin(theta) * np.sin(lit))  # the kernel over all azimuths
@@ -144,7 +144,7 @@ def shadow_edge_row(profile: GaussianSum, radius_mm: float, half_width_mm: float
     """
     kernel = preintegrated_kernel(profile)
     distance = radius_mm * np.linspace(-1.0, 1.0, _COSINE_COUNT)
-    x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)
+    x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODE_COUNT)
     x, w = 0.5 + 0.5 * x, w * (0.5 - 0.5 * x)  # one half of the tent, normalised
     ends = half_width_mm * np.concatenate([x, -x])
     lit = np.concatenate([0.5 * w, 0.5 * w]) @ kernel.half_line_integral(distance[:, None] - ends)

@@ -54,11 +54,11 @@ class SubsurfaceLayers(TechniqueResources):
     transmittance: TextureView
     scratch: Texture
     result: Texture | None
-    kernel: Kernel | None
+    kernel: KernelTexture | None
 
 
 @dataclass(frozen=True, eq=False)
-class Kernel:
+class KernelTexture:
     """Texture of a diffusion kernel, stored as integrals from 0 to increasing distances.
 
     reach_mm : distance of the last entry [mm]
@@ -127,16 +127,16 @@ def make_subsurface_layers(
     return SubsurfaceLayers(layers, subsurface, transmittance, scratch, result, None)
 
 
-def make_kernel(device: Device, profile: GaussianSum) -> Kernel:
+def make_kernel(device: Device, profile: GaussianSum) -> KernelTexture:
     """Compute the diffusion kernel of a profile, and upload it."""
     table, reach_mm = kernel_integral_table(preintegrated_kernel(profile))
-    return Kernel(texture_from_array(device, table, "rgba32float"), reach_mm)
+    return KernelTexture(texture_from_array(device, table, "rgba32float"), reach_mm)
 
 
 def draw(
     graph: Recorder,
     subsurface_layers: SubsurfaceLayers,
-    kernel: Kernel,
+    kernel: KernelTexture,
     window: Window,
     surface_light: Texture,
 ) -> Texture:
@@ -158,7 +158,9 @@ def draw(
     return subsurface_layers.result
 
 
-def draw_blur(graph: Recorder, subsurface_layers: SubsurfaceLayers, kernel: Kernel, window: Window) -> None:
+def draw_blur(
+    graph: Recorder, subsurface_layers: SubsurfaceLayers, kernel: KernelTexture, window: Window
+) -> None:
     """Declare the passes that diffuse the subsurface light along rows, then along columns.
 
     window : rectangle of the image plane that the picture shows

@@ -33,7 +33,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.scene.settings import Settings
 
 # Narrower Gaussians are finer than texels and pores: they are relit in the picture, not blurred.
-_RELIT_VARIANCE_MM2 = 0.1**2
+_MAX_RELIT_VARIANCE_MM2 = 0.1**2
 
 
 class Technique(TechniqueTraits):
@@ -151,7 +151,7 @@ class AtlasTechnique(Technique):
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
         """Return whether light evaluated at each pixel replaces the narrowest Gaussian."""
-        return bool(profile.variance_mm2[0] <= _RELIT_VARIANCE_MM2)
+        return bool(profile.variance_mm2[0] <= _MAX_RELIT_VARIANCE_MM2)
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
         """Split a profile into the narrowest Gaussian, if that is relit, and the Gaussians that are blurred.

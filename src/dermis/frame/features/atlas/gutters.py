@@ -55,11 +55,17 @@ def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: Atla
 def with_separate_gutters(device: Device, textures: AtlasTextures) -> AtlasTextures:
     """Return a copy of the atlas with gutter buffers of its own, which `draw` fills for each person."""
 
-    def with_gutter_list(level: AtlasTextures) -> AtlasTextures:
-        words = np.zeros((len(level.gutter_texels), GUTTER_ENTRY_BYTES // 4), np.uint32)
-        return replace(level, gutter=device.buffer(words, "STORAGE")) if len(words) else level
+    def with_empty_gutter_buffer(textures_at_mip: AtlasTextures) -> AtlasTextures:
+        words = np.zeros((len(textures_at_mip.gutter_texels), GUTTER_ENTRY_BYTES // 4), np.uint32)
+        return (
+            replace(textures_at_mip, gutter=device.buffer(words, "STORAGE"))
+            if len(words)
+            else textures_at_mip
+        )
 
-    return replace(with_gutter_list(textures), coarser=tuple(map(with_gutter_list, textures.coarser)))
+    return replace(
+        with_empty_gutter_buffer(textures), coarser=tuple(map(with_empty_gutter_buffer, textures.coarser))
+    )
 
 
 def _path_start_words(atlas: Atlas) -> Words:

@@ -177,14 +177,16 @@ def _upload_coarser(device: Device, mip: AtlasMip) -> tuple[AtlasTextures, ...]:
     while count < MAX_ATLAS_HALVINGS and len(mip.reach) % (2 << count) == 0:
         count += 1
 
-    def compute() -> dict[str, NDArray[np.generic]]:
+    def compute_coarser_mips() -> dict[str, NDArray[np.generic]]:
         mips = [mip]
         for _ in range(count):
             mips.append(halve_mip(mips[-1]))
         return {f"{k} {part}": getattr(coarser, part) for k, coarser in enumerate(mips[1:]) for part in parts}
 
     names = [f"{k} {part}" for k in range(count) for part in parts]
-    arrays = cached_arrays([getattr(mip, part) for part in parts], _HALVING_CACHE_KEY, names, compute)
+    arrays = cached_arrays(
+        [getattr(mip, part) for part in parts], _HALVING_CACHE_KEY, names, compute_coarser_mips
+    )
     mips = (AtlasMip(**{part: arrays[f"{k} {part}"] for part in parts}) for k in range(count))
     return tuple(_upload_mip(device, coarser, {}) for coarser in mips)
 

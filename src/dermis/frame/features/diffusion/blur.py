@@ -92,11 +92,11 @@ def _axis_program(
 
 
 def _kernel_texture(device: Device) -> Texture:
-    def make() -> Texture:
+    def upload_table() -> Texture:
         table = kernel_ratio_table()
         return texture_from_array(device, np.dstack([table[:-1], table[1:]]), "rg32float")
 
-    return device.cached("kernels", make)
+    return device.cached("kernels", upload_table)
 
 
 def _spread_members(

@@ -20,7 +20,7 @@ from dermis.gpu import Bindings, Device, Recorder, Texture, TextureView, make_te
 from dermis.gpu.textures import make_view
 from dermis.images.filters import mip_chain
 
-_CACHED_BLEND_MAPS = 4
+_CACHED_BLEND_MAP_COUNT = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ def load_blend_weights(image_path: str) -> NDArray[np.float32]:
     return _load_blend_map(path, (status.st_mtime_ns, status.st_size, status.st_ino))
 
 
-@lru_cache(_CACHED_BLEND_MAPS)
+@lru_cache(_CACHED_BLEND_MAP_COUNT)
 def _load_blend_map(path: Path, _: tuple[int, ...]) -> NDArray[np.float32]:
     return mixture_map(path)
 

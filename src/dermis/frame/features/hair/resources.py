@@ -28,7 +28,7 @@ DEEP_OPACITY_LAYERS = 6
 """Number of depth intervals of a deep opacity map, each with the cover of the hair within it."""
 DEEP_OPACITY_HEADER_WORDS = 8
 """Number of words that precede the texels of each light's deep opacity map."""
-_LINKS_PER_KNOT = 4
+_SEGMENT_LINKS_PER_KNOT = 4
 _MAX_SEGMENT_LINKS = 1 << 22
 # Steps to which capacities for fine strands and for knots are rounded up, so that most heads share them.
 _FINE_CAPACITY_STEP, _KNOT_CAPACITY_STEP = 1 << 12, 1 << 19
@@ -187,7 +187,7 @@ def make_strand_picture(
 ) -> StrandPicture:
     """Allocate the segment lists and the texture with hair for a picture of size (width, height)."""
     across, down = (-(-side // TILE_SIDE_PIXELS) for side in picture_size)
-    links = _LINKS_PER_KNOT * capacity.knots + capacity.fine * (across + down)
+    links = _SEGMENT_LINKS_PER_KNOT * capacity.knots + capacity.fine * (across + down)
     links = min(links, _MAX_SEGMENT_LINKS, device.max_storage_bytes // 8)
     per_tile = chains_per_tile(device, across * down)
     chains = _make_word_buffer(device, 1 + per_tile * across * down)

@@ -148,12 +148,12 @@ def cached_occlusion_map(
     side = min(atlas.size, _MAX_OCCLUSION_MAP_SIDE)
 
     @logged_step("computing the ambient occlusion")
-    def bake() -> NDArray[np.uint16]:
+    def bake_as_integers() -> NDArray[np.uint16]:
         baked = bake_occlusion(device, head, atlas, bindings, surface_texels, side)
         integers: NDArray[np.uint16] = np.rint(65535.0 * fill_occlusion_gaps(baked, side)).astype(np.uint16)
         return integers
 
-    integers = cached_occlusion(head.mesh, atlas, f"{OCCLUSION_CACHE_VERSION} {side}", bake)
+    integers = cached_occlusion(head.mesh, atlas, f"{OCCLUSION_CACHE_VERSION} {side}", bake_as_integers)
     visible = integers / np.float32(65535.0)
     if hair is not None and len(hair):
         visible = visible * _hair_transmittance(head.mesh, hair, download(device, surface_texels), side)

@@ -39,7 +39,7 @@ class LandmarkBuffers:
     results: Buffer
     count: int
 
-    def positions(self, result_bytes: NDArray[np.uint8]) -> LandmarkPositions:
+    def decode_positions(self, result_bytes: NDArray[np.uint8]) -> LandmarkPositions:
         """Return the positions and the visibility of the landmarks of each set.
 
         result_bytes : content of the buffer `results`, read back from the device

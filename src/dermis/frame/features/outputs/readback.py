@@ -62,10 +62,10 @@ class Readback:
             return self._decode_picture(raw), {}, {}
         for planes in self.outputs.planes:
             end = start + planes.buffer.size
-            arrays |= planes.arrays(raw[start:end])
+            arrays |= planes.decode_outputs(raw[start:end])
             start = end
         buffers = self.outputs.landmarks
-        landmarks = buffers.positions(raw[start : start + buffers.results.size]) if buffers else {}
+        landmarks = buffers.decode_positions(raw[start : start + buffers.results.size]) if buffers else {}
         return self._decode_picture(raw), {name: arrays[name] for name in self.outputs.names}, landmarks
 
     def _decode_picture(self, picture_bytes: NDArray[np.uint8]) -> PictureArray:

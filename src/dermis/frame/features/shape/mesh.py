@@ -35,7 +35,7 @@ class HeadGeometry:
     has_cutouts: bool = False
 
     @property
-    def constants(self) -> Constants:
+    def cutout_constants(self) -> Constants:
         """Return the pipeline constants that passes need to find the nearest surface of this head."""
         return (("CUTOUTS", 1),) if self.has_cutouts else ()
 

@@ -236,9 +236,9 @@ def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     }
 
 
-def run_bounds(sorted_values: NDArray[np.integer], run_values: NDArray[np.integer]) -> Words:
+def run_bounds(sorted_values: NDArray[np.integer], searched_values: NDArray[np.integer]) -> Words:
     """Return (n, 2) bounds: where the run of each of n values starts and ends in a sorted array."""
-    ends = [np.searchsorted(sorted_values, run_values, side) for side in ("left", "right")]
+    ends = [np.searchsorted(sorted_values, searched_values, side) for side in ("left", "right")]
     return np.stack(ends, axis=1).astype(np.uint32)
 
 
@@ -341,17 +341,17 @@ def _evaluate_surface(graph: Recorder, shape: Shape) -> None:
 def _dispatch_shape(
     graph: Recorder,
     shader_name: str,
-    bound_resources: Bindings,
+    bindings: Bindings,
     invocation_count: int,
     constants: Constants = (),
 ) -> None:
     """Declare a pass of the shape with one shader invocation for each of `invocation_count` elements.
 
-    bound_resources : resources of the shader
+    bindings : resources of the shader
     """
     graph.dispatch(
         "shape",
         program(graph.device, shader_name, constants),
-        bound_resources,
+        bindings,
         workgroup_grid(invocation_count),
     )

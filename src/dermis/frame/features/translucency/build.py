@@ -41,7 +41,7 @@ _MAX_THICKNESS_SIGMAS, _MAX_THICKNESS_MM = (
     40.0,
 )  # thickest part in the tables: in standard deviations, and in mm
 _WIDTH_STEPS_PER_DOUBLING, _MIN_WIDTH_MM = 2, 0.5  # spacing and minimum of rounded widths
-_CACHED_PAIR_SEARCHES = 4
+_CACHED_PAIR_SEARCH_COUNT = 4
 _PACKED_UNIT_LIGHT = np.array(
     [0xFE000, 0x3F8FE000], np.uint32
 )  # white light of 1, encoded as in packed_light.wgsl
@@ -117,7 +117,9 @@ def make_translucency(
     widest_mm = float(np.sqrt(variance_mm2[-1]))
     widest_mm = rounded_sigma_mm(widest_mm) if shares_pairs else widest_mm
     cells = memo.get(_cached_cell_division, atlas, caller_name=layout_key)(widest_mm)
-    pairs = memo.get(PairCache, device, rest_surface_bindings, atlas, caller_name=layout_key).find(cells)
+    pairs = memo.get(PairCache, device, rest_surface_bindings, atlas, caller_name=layout_key).pairs_for_cells(
+        cells
+    )
     buffers = memo.get(make_translucency_buffers, device, surface_bindings, pairs, caller_name=layout_key)
     return memo.get(
         with_profile_weights, device, buffers, variance_mm2, weight, thickness_tables, caller_name=layout_key
@@ -129,7 +131,7 @@ def _cached_cell_division(atlas: Atlas) -> Callable[[float], Cells]:
 
     The parameter of the returned function is the standard deviation of the widest Gaussian [mm].
     """
-    return lru_cache(_CACHED_PAIR_SEARCHES)(partial(divide_into_cells, atlas))
+    return lru_cache(_CACHED_PAIR_SEARCH_COUNT)(partial(divide_into_cells, atlas))
 
 
 class PairCache:
@@ -144,11 +146,11 @@ class PairCache:
         self._device, self._surface, self._atlas = device, surface_bindings, atlas
         self._cache: dict[Cells, PairBuffers] = {}
 
-    def find(self, cells: Cells) -> PairBuffers:
+    def pairs_for_cells(self, cells: Cells) -> PairBuffers:
         """Return the pairs for a division into cells, from the cache or by a new search."""
         pairs = self._cache.pop(cells, None)
         if pairs is None:
-            while len(self._cache) >= _CACHED_PAIR_SEARCHES:
+            while len(self._cache) >= _CACHED_PAIR_SEARCH_COUNT:
                 self._cache.pop(next(iter(self._cache)))
             pairs = find_pairs(self._device, self._surface, self._atlas, cells)
         self._cache[cells] = pairs

@@ -103,7 +103,7 @@ def draw_layers(
     if layers.nearness is not None:
         _draw_with_compute_pass(graph, stage_name, layers, views, head)
     else:
-        _draw_with_rasteriser(graph, stage_name, layers, views.matrices(layers.size), head)
+        _draw_with_rasteriser(graph, stage_name, layers, views.sample_matrices(layers.size), head)
 
 
 def draw(graph: Recorder, visibility_layers: ViewLayers, views: Views, head: HeadGeometry) -> None:
@@ -138,7 +138,7 @@ def _make_raster_layers(
 ) -> ViewLayers:
     name = "visibility buffer" if store_triangles else "shadow maps"
 
-    def layered(texel: str, layer_count: int) -> tuple[Texture, list[TextureView]]:
+    def make_layered_texture(texel: str, layer_count: int) -> tuple[Texture, list[TextureView]]:
         texture = make_texture(
             device,
             layer_size,
@@ -150,10 +150,10 @@ def _make_raster_layers(
         return texture, [make_view(texture, layer=k) for k in range(layer_count)]
 
     if not store_triangles:
-        texture, depth = layered("depth32float", view_count)
+        texture, depth = make_layered_texture("depth32float", view_count)
         return ViewLayers(texture, layer_size, view_count, store_triangles, depth, [None] * view_count)
-    _, depth = layered("depth32float", 1)
-    texture, targets = layered("r32uint", view_count)
+    _, depth = make_layered_texture("depth32float", 1)
+    texture, targets = make_layered_texture("r32uint", view_count)
     return ViewLayers(texture, layer_size, view_count, store_triangles, depth * view_count, targets)
 
 
@@ -182,7 +182,7 @@ def _draw_with_compute_pass(
     work, count = _divide_triangles_into_workgroups(triangles, len(clips), len(positions))
     groups = (min(count, _WORKGROUPS_PER_ROW), -(-count // _WORKGROUPS_PER_ROW), len(clips))
     for recorded in passes:
-        constants = (("RECORDED", recorded), ("SAMPLES", len(positions)), *work, *head.constants)
+        constants = (("RECORDED", recorded), ("SAMPLES", len(positions)), *work, *head.cutout_constants)
         shader = program(device, "visibility/visibility_buffer.wgsl", constants)
         graph.dispatch(stage_name, shader, resources, groups)
     graph.dispatch(stage_name, resolve, resources, (*_tile_counts(layers.size), layers.count))
@@ -229,7 +229,7 @@ def _raster_program(device: Device, store_triangles: bool, has_cutouts: bool) ->
     has_cutouts : whether opacity maps cut holes, which needs a fragment shader even if only depth is drawn
     """
 
-    def make() -> RenderProgram:
+    def compile_program() -> RenderProgram:
         by_triangle = store_triangles or has_cutouts
         name = "visibility/visibility_buffer_raster.wgsl" if by_triangle else "visibility/depth_raster.wgsl"
         path, folders = FEATURES_FOLDER / name, shader_folders(*(("CUTOUTS",) if has_cutouts else ()))
@@ -244,7 +244,7 @@ def _raster_program(device: Device, store_triangles: bool, has_cutouts: bool) ->
             has_fragment=by_triangle,
         )
 
-    return cached_program(device, ("visibility buffer", store_triangles, has_cutouts), (), make)
+    return cached_program(device, ("visibility buffer", store_triangles, has_cutouts), (), compile_program)
 
 
 def _views_record(

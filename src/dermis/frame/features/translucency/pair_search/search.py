@@ -50,7 +50,7 @@ class SearchPasses:
             "block": block,
         }
 
-    def add(
+    def add_pass(
         self, shader_name: str, invocation_count: int, bindings: Bindings, constants: Constants = ()
     ) -> None:
         """Add a pass with one shader invocation for each of `invocation_count` elements.
@@ -63,14 +63,14 @@ class SearchPasses:
             "pair search", shader, {**bindings, "search": record}, workgroup_grid(invocation_count)
         )
 
-    def read(self, buffer: Buffer, word_count: int) -> Index:
+    def submit_and_read(self, buffer: Buffer, word_count: int) -> Index:
         """Submit all passes that were added, and return the first `word_count` words of a buffer."""
         self.commands.submit()
         self.commands = CommandList(self.device, timed=False)
         words = np.frombuffer(self.device.handle.queue.read_buffer(buffer), np.uint32)
         return words[:word_count].astype(np.int64)
 
-    def upload(self, *columns: NDArray[np.integer]) -> Buffer:
+    def upload_table(self, *columns: NDArray[np.integer]) -> Buffer:
         """Upload integer columns as a table of 32-bit words; an empty table becomes one row of zeros."""
         return upload_words(self.device, *columns)
 
@@ -115,14 +115,14 @@ def find_tile_pairs(passes: SearchPasses, surface_bindings: Bindings, cells: Cel
     device, count = passes.device, cells.tiles_per_side**2
     tiles, counts = make_element_buffer(device, count, _TILE_BOUNDS_BYTES), make_element_buffer(device, count)
     bindings = {"tiles": tiles, "block_pairs": _find_block_pairs(passes, surface_bindings, cells, tiles)}
-    every_tile = passes.upload(np.arange(count), np.zeros(count, np.int64))
-    passes.add("tile_pairs", count, {**bindings, "queries": every_tile, "partners": counts})
-    partner_count = passes.read(counts, count)
+    every_tile = passes.upload_table(np.arange(count), np.zeros(count, np.int64))
+    passes.add_pass("tile_pairs", count, {**bindings, "queries": every_tile, "partners": counts})
+    partner_count = passes.submit_and_read(counts, count)
     tile = np.flatnonzero(partner_count)
     first = list_offsets(partner_count[tile])
     partners = make_element_buffer(device, int(first[-1]))
-    bindings |= {"queries": passes.upload(tile, first[:-1]), "partners": partners}
-    passes.add("tile_pairs", len(tile), bindings, (("LISTED", 1),))
+    bindings |= {"queries": passes.upload_table(tile, first[:-1]), "partners": partners}
+    passes.add_pass("tile_pairs", len(tile), bindings, (("LISTED", 1),))
     return TilePairs(tiles, tile, first, partners)
 
 
@@ -140,12 +140,12 @@ def _find_block_pairs(
     bounds = make_element_buffer(passes.device, blocks, _TILE_BOUNDS_BYTES)
     block_pairs = make_element_buffer(passes.device, words)
     triangles = {
-        "triangle_first": passes.upload(cells.triangle_first),
-        "triangles": passes.upload(cells.triangles),
+        "triangle_first": passes.upload_table(cells.triangle_first),
+        "triangles": passes.upload_table(cells.triangles),
     }
-    passes.add("tiles", cells.tiles_per_side**2, {**surface_bindings, **triangles, "tiles": tile_bounds})
-    passes.add("blocks", blocks, {"tiles": tile_bounds, "blocks": bounds})
-    passes.add("block_pairs", words, {"blocks": bounds, "block_pairs": block_pairs})
+    passes.add_pass("tiles", cells.tiles_per_side**2, {**surface_bindings, **triangles, "tiles": tile_bounds})
+    passes.add_pass("blocks", blocks, {"tiles": tile_bounds, "blocks": bounds})
+    passes.add_pass("block_pairs", words, {"blocks": bounds, "block_pairs": block_pairs})
     return block_pairs
 
 
@@ -232,8 +232,8 @@ def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple
     unused = np.zeros(len(candidates.receiver), np.int64)
     ranges = candidates.sources_first, candidates.sources_end
     bindings = {
-        "receiver_ranges": passes.upload(candidates.first, candidates.end, word[:-1], unused),
-        "source_ranges": passes.upload(*ranges),
+        "receiver_ranges": passes.upload_table(candidates.first, candidates.end, word[:-1], unused),
+        "source_ranges": passes.upload_table(*ranges),
     }
     return bindings, int(word[-1])
 
@@ -253,8 +253,8 @@ def list_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, 
         end = cells.gutter_copy_first[begin + np.minimum(x + 1, side - 1) + 1]
         ranges += [first, np.where(within, end, first)]
     copies = make_element_buffer(passes.device, _MAX_GUTTER_COPIES * len(source_cells))
-    resources = {**bindings, "rows": passes.upload(*ranges), "copies": copies}
-    passes.add("gutter_copies", len(source_cells), resources)
+    resources = {**bindings, "rows": passes.upload_table(*ranges), "copies": copies}
+    passes.add_pass("gutter_copies", len(source_cells), resources)
     return copies
 
 
@@ -312,13 +312,13 @@ def search_pairs(device: Device, surface_bindings: Bindings, cells: Cells) -> Pa
     points = compute_positions(passes, surface_bindings, cells, candidates)
     hits, counts = make_element_buffer(device, words), make_element_buffer(device, count)
     hit_bindings = {**ranges, "partners": tile_pairs.partners, "hits": hits}
-    passes.add("hits", count, {**hit_bindings, **points, "tiles": tile_pairs.bounds, "counts": counts})
-    pair_count = passes.read(counts, count)
+    passes.add_pass("hits", count, {**hit_bindings, **points, "tiles": tile_pairs.bounds, "counts": counts})
+    pair_count = passes.submit_and_read(counts, count)
     if _PAIR_BYTES * pair_count.sum() > device.max_storage_bytes:
         return None
-    gutters = passes.upload(*cells.gutter_copies.T)
-    map_bindings = {**points, "reach_map": surface_bindings["reach_map"], "gutters": gutters}
-    return _make_pair_table(passes, cells, candidates, pair_count, hit_bindings, map_bindings)
+    gutters = passes.upload_table(*cells.gutter_copies.T)
+    gutter_copy_bindings = {**points, "reach_map": surface_bindings["reach_map"], "gutters": gutters}
+    return _make_pair_table(passes, cells, candidates, pair_count, hit_bindings, gutter_copy_bindings)
 
 
 def _make_pair_table(
@@ -327,29 +327,31 @@ def _make_pair_table(
     candidates: CandidateCells,
     pair_count: Index,
     hit_bindings: Bindings,
-    map_bindings: Bindings,
+    gutter_copy_bindings: Bindings,
 ) -> PairTable:
     """Convert the bits that hits.wgsl wrote to a table of pairs, and drop the cells that are in no pair.
 
     pair_count : (r,) number of pairs of each receiver
     hit_bindings : resources that hits.wgsl and pairs.wgsl share
-    map_bindings : resources that gutter_copies.wgsl and offsets.wgsl share
+    gutter_copy_bindings : resources that gutter_copies.wgsl and offsets.wgsl share
     """
     device, sources, first = passes.device, len(candidates.source), list_offsets(pair_count)
-    count, first_pair = int(first[-1]), passes.upload(first)
+    count, first_pair = int(first[-1]), passes.upload_table(first)
     pairs, used = make_element_buffer(device, count, _PAIR_BYTES), make_element_buffer(device, sources)
-    passes.add("pairs", len(pair_count), {**hit_bindings, "first": first_pair, "pairs": pairs, "used": used})
-    is_receiver, is_source = pair_count > 0, passes.read(used, sources) > 0
+    passes.add_pass(
+        "pairs", len(pair_count), {**hit_bindings, "first": first_pair, "pairs": pairs, "used": used}
+    )
+    is_receiver, is_source = pair_count > 0, passes.submit_and_read(used, sources) > 0
     chosen = np.flatnonzero(is_source)
-    copy_bindings = {**map_bindings, "queries": passes.upload(chosen)}
+    copy_bindings = {**gutter_copy_bindings, "queries": passes.upload_table(chosen)}
     bindings = {
-        **map_bindings,
-        "receiver_index": passes.upload(np.cumsum(is_receiver) - is_receiver),
-        "source_index": passes.upload(np.cumsum(is_source) - is_source),
+        **gutter_copy_bindings,
+        "receiver_index": passes.upload_table(np.cumsum(is_receiver) - is_receiver),
+        "source_index": passes.upload_table(np.cumsum(is_source) - is_source),
         "copies": list_gutter_copies(passes, cells, candidates.source[chosen], copy_bindings),
         "pairs": pairs,
     }
-    passes.add("offsets", count, bindings)
+    passes.add_pass("offsets", count, bindings)
     passes.commands.submit()
     receiver = candidates.receiver[is_receiver]
     return PairTable(receiver, list_offsets(pair_count[is_receiver]), candidates.source[chosen], pairs)
