@@ -24,8 +24,8 @@ _ERROR_MEANINGS = {
     "edge": "largest error beside an edge of light",
     "energy": "relative error of the total light",
 }
-REPORT_FILE = "export.json"
-_REPORT_PAGE = "README.md"
+REPORT_JSON_FILE = "export.json"
+_REPORT_MARKDOWN_FILE = "README.md"
 _DEFAULT_MAP_SIDE = 2048
 
 
@@ -269,7 +269,7 @@ def _check_output_path(target: Target, output: str | Path) -> Path:
 def _staging_path(output: Path) -> Iterator[Path]:
     """Yield a temporary path for `Target.write`, and move the written files to `output` on success."""
     if not output.suffix:
-        with atomic_folder(output, REPORT_FILE) as folder:
+        with atomic_folder(output, REPORT_JSON_FILE) as folder:
             yield folder
         return
     with temporary_folder(output) as folder:
@@ -280,7 +280,7 @@ def _staging_path(output: Path) -> Iterator[Path]:
 
 def _move_written_files(staged_path: Path, output_path: Path) -> None:
     if staged_path.is_dir():
-        with atomic_folder(output_path, REPORT_FILE) as folder:
+        with atomic_folder(output_path, REPORT_JSON_FILE) as folder:
             folder.rmdir()
             staged_path.replace(folder)
         return
@@ -291,8 +291,8 @@ def _move_written_files(staged_path: Path, output_path: Path) -> None:
 def _write_report(report: ExportReport, output: Path) -> list[Path]:
     """Write the report as two files, beside the output file or into the output folder; return their paths."""
     single = bool(output.suffix)
-    page = output.with_name(f"{output.name}.md") if single else output / _REPORT_PAGE
-    data_file = output.with_name(f"{output.name}.json") if single else output / REPORT_FILE
+    page = output.with_name(f"{output.name}.md") if single else output / _REPORT_MARKDOWN_FILE
+    data_file = output.with_name(f"{output.name}.json") if single else output / REPORT_JSON_FILE
     page.write_text(report.markdown(), encoding="utf-8")
     data_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
     return [page, data_file]

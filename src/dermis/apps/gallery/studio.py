@@ -78,12 +78,12 @@ class Studio:
         scale : width and height of the image, relative to those of a gallery panel [-]
         settings : fields of `Settings`
         """
-        from dermis.apps.viewer.state import PART_VIEWS
+        from dermis.apps.viewer.state import LIGHT_COMPONENT_VIEWS
         from dermis.apps.viewer.views import IntermediateViews
         from dermis.gpu import download
 
-        if view in ("picture", *PART_VIEWS):
-            return self.render(scene, scale, parts=PART_VIEWS.get(view, "all"), **settings)
+        if view in ("picture", *LIGHT_COMPONENT_VIEWS):
+            return self.render(scene, scale, parts=LIGHT_COMPONENT_VIEWS.get(view, "all"), **settings)
 
         def draw_view() -> NDArray[np.uint8]:
             self._draw(scene, scale, settings)

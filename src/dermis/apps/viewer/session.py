@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from dermis.apps.viewer.controls import Controls, SplitView
 from dermis.apps.viewer.player import MotionFile, MotionPlayer
 from dermis.apps.viewer.state import (
-    PART_VIEWS,
+    LIGHT_COMPONENT_VIEWS,
     PICTURE_VIEW_NAME,
     UndoHistory,
     ViewerState,
@@ -268,7 +268,7 @@ class Session:
                 f"got {picture_path.name!r}",
                 "Rename it",
             )
-        if suffix == ".exr" and view not in (PICTURE_VIEW_NAME, *PART_VIEWS):
+        if suffix == ".exr" and view not in (PICTURE_VIEW_NAME, *LIGHT_COMPONENT_VIEWS):
             refuse(f"view {view} as .exr", "a view of linear light", "it shows display colours", "Use .png")
         self._write_or_offer_download(
             picture_path,

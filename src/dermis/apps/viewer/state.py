@@ -73,7 +73,7 @@ P = TypeVar("P", bound=FrozenModel)
 Table = Mapping[str, Any]
 """The [head] table of a scene file."""
 PICTURE_VIEW_NAME = "picture"
-PART_VIEWS = {"diffuse": "diffuse", "specular": "specular"}
+LIGHT_COMPONENT_VIEWS = {"diffuse": "diffuse", "specular": "specular"}
 """Views that show a part of the reflected light, with the value of `Settings.parts` for each."""
 
 
@@ -208,7 +208,7 @@ def save_state(path: Path, state: ViewerState) -> None:
     """
     if not state.head:
         refuse(path, "a head from a file or a sample", "it was created in memory", "Write it to a file first")
-    parts = state.view if state.view in PART_VIEWS else state.settings.parts
+    parts = state.view if state.view in LIGHT_COMPONENT_VIEWS else state.settings.parts
     save_scene(path, state.scene, validated_copy(state.settings, parts=parts), state.head_table)
 
 
@@ -268,7 +268,7 @@ def initial_state(scene: Scene, settings: Settings, head_table: Table, rig_name:
     head_table : table from which the head was loaded, with the keys of the [head] table of a scene file
     rig_name : name of the light preset; empty for custom lights
     """
-    view = settings.parts if settings.parts in PART_VIEWS else PICTURE_VIEW_NAME
+    view = settings.parts if settings.parts in LIGHT_COMPONENT_VIEWS else PICTURE_VIEW_NAME
     return ViewerState(scene, validated_copy(settings, parts="all"), head_table, view, rig_name)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.viewer.state import (
     ATLAS_VIEW_NAME,
-    PART_VIEWS,
+    LIGHT_COMPONENT_VIEWS,
     PICTURE_VIEW_NAME,
     ViewerState,
     states_equal,
@@ -55,9 +55,9 @@ class Quality:
     shadow_size: int
 
 
-_UNLIMITED_SIZE = 1 << 14
+_NO_LIMIT = 1 << 14
 QUALITY_LEVELS = (
-    Quality(1.0, _UNLIMITED_SIZE, _UNLIMITED_SIZE, _UNLIMITED_SIZE),
+    Quality(1.0, _NO_LIMIT, _NO_LIMIT, _NO_LIMIT),
     Quality(1.0, 2, 1024, 1024),
     Quality(1.0, 1, 512, 512),
     Quality(0.75, 1, 512, 512),
@@ -268,7 +268,7 @@ class ViewRenderer:
         image = self._draw(state.with_settings(size=picture_size))
         self._image_inputs = None
         is_linear, rendered = picture_path.suffix.lower() == ".exr", self.rendered
-        if not rendered or state.view not in (PICTURE_VIEW_NAME, *PART_VIEWS):
+        if not rendered or state.view not in (PICTURE_VIEW_NAME, *LIGHT_COMPONENT_VIEWS):
             write_png(picture_path, self.download_image(image))
         elif state.settings.background == "none":
             write_image(picture_path, rendered.linear_rgba()) if is_linear else write_png(
@@ -289,14 +289,14 @@ class ViewRenderer:
         return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
 
     def _draw(self, state: ViewerState, divider_side: str = "") -> Texture:
-        parts = PART_VIEWS.get(state.view, state.settings.parts)
+        parts = LIGHT_COMPONENT_VIEWS.get(state.view, state.settings.parts)
         settings = self.settings = validated_copy(state.settings, parts=parts)
         if state.view == ATLAS_VIEW_NAME and self._has_atlas_light(state, divider_side):
             return self._views.draw_atlas(state.scene, settings, state.atlas_view, divider_side)
         self._atlas_state = None
         self.rendered = self.renderer.draw(state.scene, settings, view=divider_side)
         self._atlas_state = state, divider_side
-        if state.view in (PICTURE_VIEW_NAME, *PART_VIEWS):
+        if state.view in (PICTURE_VIEW_NAME, *LIGHT_COMPONENT_VIEWS):
             return self.rendered.picture.bytes
         if state.view == ATLAS_VIEW_NAME:
             return self._views.draw_atlas(state.scene, settings, state.atlas_view, divider_side)

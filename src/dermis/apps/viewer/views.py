@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.apps.viewer.state import ATLAS_VIEW_NAME, PART_VIEWS, AtlasView
+from dermis.apps.viewer.state import ATLAS_VIEW_NAME, LIGHT_COMPONENT_VIEWS, AtlasView
 from dermis.base.errors import refuse
 from dermis.frame.features.post.meter import read_meter
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
@@ -36,7 +36,7 @@ BLUR_LEVELS_BY_VIEW = {"irradiance": 0} | {f"blur {k}": k for k in range(1, 7)}
 ATLAS_LAYERS = (*BLUR_LEVELS_BY_VIEW, "stretch", "thickness")
 """Names of the atlas maps that the view "atlas" can show."""
 
-VIEW_NAMES = ("picture", *PART_VIEWS, *ATLAS_LAYERS, "shadow", "normals", ATLAS_VIEW_NAME)
+VIEW_NAMES = ("picture", *LIGHT_COMPONENT_VIEWS, *ATLAS_LAYERS, "shadow", "normals", ATLAS_VIEW_NAME)
 """Names of all views."""
 
 _INTERMEDIATE_SHADER_PATH = Path(__file__).parent / "intermediate.wgsl"

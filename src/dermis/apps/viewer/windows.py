@@ -48,7 +48,7 @@ def show_window(
     viewer = Viewer(state, canvas, adapter, motion=motion)
     with _without_signal_handlers():
         backend.loop.run()
-    _raise_failure(viewer)
+    _raise_viewer_failure(viewer)
 
 
 @contextmanager
@@ -102,7 +102,7 @@ def serve(
             http_server, listener, lambda: prepare_viewer(http_server, canvas, load_state, adapter)
         )
     if viewer:
-        _raise_failure(viewer)
+        _raise_viewer_failure(viewer)
 
 
 @renamed_keywords(shown="subject")
@@ -191,6 +191,6 @@ def _raise_no_display(failure_reason: object) -> NoReturn:
     refuse("window", "a display", f"none can be opened ({failure_reason})", "Set DISPLAY, or use --browser")
 
 
-def _raise_failure(viewer: Viewer) -> None:
+def _raise_viewer_failure(viewer: Viewer) -> None:
     if viewer.failure:
         raise viewer.failure

@@ -115,7 +115,7 @@ class Uploads:
             folder.mkdir(mode=0o700)
             try:
                 with path.open("xb") as file:
-                    await self._copy_body(file_name, receive, file)
+                    await self._copy_request_body(file_name, receive, file)
             except BaseException:
                 path.unlink(missing_ok=True)
                 folder.rmdir()
@@ -135,7 +135,7 @@ class Uploads:
         finally:
             self._is_busy = False
 
-    async def _copy_body(self, file_name: str, receive: Receive, file: BinaryIO) -> None:
+    async def _copy_request_body(self, file_name: str, receive: Receive, file: BinaryIO) -> None:
         more, size = True, 0
         while more:
             try:

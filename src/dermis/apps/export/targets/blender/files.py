@@ -53,7 +53,7 @@ _GGX_PER_BECKMANN_ROUGHNESS = 0.5
 _MAX_FILE_NAME_LENGTH = 60  # characters; Blender truncates names to 63
 _EXPORT_DATA_LINE = "EXPORT: dict[str, Any] = {}\n"
 _HELPER_IMPORT_PATTERN = re.compile(r"from dermis\.apps\.truths\.cycles_script import (.*)\n")
-_TYPE_COMMENT = "  # type: ignore[import-not-found,unused-ignore]"
+_BPY_TYPE_COMMENT = "  # type: ignore[import-not-found,unused-ignore]"
 _MAIN_GUARD = 'if __name__ == "__main__":'
 
 
@@ -161,7 +161,7 @@ def blender_script_text(export_data: Mapping[str, object]) -> str:
         names += sorted(called & functions.keys() - {*names})
     copied = "\n\n\n".join(str(ast.get_source_segment(source, functions[name])) for name in names)
     literal = pformat(dict(export_data), width=110, sort_dicts=False)
-    text = _HELPER_IMPORT_PATTERN.sub("from mathutils import Matrix\n", text).replace(_TYPE_COMMENT, "")
+    text = _HELPER_IMPORT_PATTERN.sub("from mathutils import Matrix\n", text).replace(_BPY_TYPE_COMMENT, "")
     text = text.replace(_MAIN_GUARD, f"{copied}\n\n\n{_MAIN_GUARD}")
     return text.replace(_EXPORT_DATA_LINE, f"EXPORT: dict[str, Any] = {literal}\n")
 

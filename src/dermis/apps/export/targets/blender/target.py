@@ -208,11 +208,11 @@ class Blender(Target):
         units = self._unit_cdf_by_channel(subject, version)
         fitted = np.array([fit_length_scale(subject.curve, k, unit) for k, unit in enumerate(units)])
         radius = fitted / self._lengths_per_unit_radius(subject, version)
-        return self._parameters(tuple(round(float(x), 5) for x in radius), version)
+        return self._material_parameters(tuple(round(float(x), 5) for x in radius), version)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return parameters with published diffuse mean free paths of skin as the subsurface radius."""
-        return self._parameters(JENSEN_DMFP_MM, version)
+        return self._material_parameters(JENSEN_DMFP_MM, version)
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile, predicted by the formulas of Cycles' kernel and EEVEE's shader."""
@@ -247,7 +247,7 @@ class Blender(Target):
             else (list(_FIRST_SUPPORTED_VERSION), list(_FIRST_MFP_VERSION))
         )
 
-    def _parameters(self, subsurface_radius: tuple[float, ...], version: str) -> Parameters:
+    def _material_parameters(self, subsurface_radius: tuple[float, ...], version: str) -> Parameters:
         method = self.variant.replace("-", "_").upper()
         parameters = [
             Parameter("Subsurface Method", method, "-", "of the Principled BSDF"),

@@ -182,8 +182,11 @@ def _scene_elements(
     """
     sizes = zip(("width", "height", "samples"), map(str, picture_size_and_samples), strict=True)
     sensor = mitsuba_sensor(xml_backend, scene.camera, picture_size_and_samples[:2])
-    sensor["film"] |= {"width": xml.Override("integer", "width"), "height": xml.Override("integer", "height")}
-    sensor["sampler"]["sample_count"] = xml.Override("integer", "samples")
+    sensor["film"] |= {
+        "width": xml.CommandLineProperty("integer", "width"),
+        "height": xml.CommandLineProperty("integer", "height"),
+    }
+    sensor["sampler"]["sample_count"] = xml.CommandLineProperty("integer", "samples")
     # Spectral multiple importance sampling, as extinction differs between channels.
     integrator = {"type": "volpathmis", "rr_depth": RUSSIAN_ROULETTE_DEPTH, "hide_emitters": True}
     parts: list[SceneDict] = [integrator, sensor]
@@ -237,8 +240,8 @@ def _skin_elements(
         shapes = dict.fromkeys(("upper", "upper_caps"), "skin_surface")
         shapes |= dict.fromkeys(("skin", "caps"), "skin_below")
     for name in (name for name in shapes if name in meshes_by_shape_name):
-        shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": xml.Ref(shapes[name])}
-        parts.append({**shape, "interior": xml.Ref("skin_medium")})
+        shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": xml.ObjectReference(shapes[name])}
+        parts.append({**shape, "interior": xml.ObjectReference("skin_medium")})
     return [xml.object_element(part, "", xml_backend) for part in parts]
 
 
@@ -259,8 +262,8 @@ def _part_bsdf(image_roles: set[PartRole]) -> SceneDict:
     )
 
 
-def _part_texture(image_role: PartRole) -> xml.Ref:
-    return xml.Ref(f"parts_{image_role}")
+def _part_texture(image_role: PartRole) -> xml.ObjectReference:
+    return xml.ObjectReference(f"parts_{image_role}")
 
 
 def _part_picture_file(image_role: PartRole) -> str:

@@ -78,14 +78,14 @@ class XmlBackend:
 
 
 @dataclass(frozen=True)
-class Ref:
+class ObjectReference:
     """Reference to an object of the scene by its id."""
 
     name: str
 
 
 @dataclass(frozen=True)
-class Override:
+class CommandLineProperty:
     """Property of a scene whose value is set on the command line by `mitsuba -D NAME=VALUE`.
 
     kind : type of the property, such as "integer"
@@ -151,9 +151,9 @@ def _name_attributes(object_name: str, object_description: Mapping[str, object])
 
 
 def _property_element(property_name: str, property_value: object, xml_backend: XmlBackend) -> ET.Element:
-    if isinstance(property_value, Ref):
+    if isinstance(property_value, ObjectReference):
         return ET.Element("ref", {"name": property_name, "id": property_value.name})
-    if isinstance(property_value, Override):
+    if isinstance(property_value, CommandLineProperty):
         return ET.Element(property_value.kind, {"name": property_name, "value": f"${property_value.name}"})
     if isinstance(property_value, Transform):
         node = ET.Element("transform", {"name": property_name})

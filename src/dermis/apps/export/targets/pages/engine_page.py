@@ -30,9 +30,9 @@ _CDN_URL = "https://cdn.jsdelivr.net/npm"
 _MAX_SCRIPT_BYTES = 32 << 20
 _METRES_PER_MM = 1e-3
 _SHADOW_MAP_SIDE = 2048
-_WARM_UP_FRAMES = 4  # frames until all shaders are compiled
+_WARM_UP_FRAME_COUNT = 4  # frames until all shaders are compiled
 _LOAD_ERROR_TEXT = "{} could not be loaded from {}. Check the network, or export again with --library."
-_TEXTURE_POLICY = "img-src blob: data:; connect-src blob: data:"  # for textures in the head's file
+_TEXTURE_CSP_DIRECTIVES = "img-src blob: data:; connect-src blob: data:"  # for textures in the head's file
 _PAGE_FOLDER = Path(__file__).parent
 
 
@@ -114,7 +114,7 @@ class EnginePage(Target):
             title=f"{subject.name} in {self.title}",
             note=f"{self.title} {version} ({self.licence}). {self.limitations}",
             script=escape_script(script),
-            policy=_TEXTURE_POLICY,
+            policy=_TEXTURE_CSP_DIRECTIVES,
             script_sources=sources,
             settings=html_safe_json(self._page_settings_json(subject, parameters, version)),
             head=base64.b64encode(encode_glb(subject, {"KHR_materials_ior": {"ior": SKIN_ETA}}, "")).decode(),
@@ -138,7 +138,7 @@ class EnginePage(Target):
             "lights": [page_light_json(light) for light in scene.lights],
             "skin": {one.name.rpartition(".")[2]: one.value for one in parameters},
             "shadow_side": _SHADOW_MAP_SIDE,
-            "warm_frames": _WARM_UP_FRAMES,
+            "warm_frames": _WARM_UP_FRAME_COUNT,
             "smooth": True,
             "no_library": _LOAD_ERROR_TEXT.format(self.title, self.library_files[version][0].url),
         }

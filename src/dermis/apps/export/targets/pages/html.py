@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
-_BASE_POLICY = "default-src 'none'; base-uri 'none'; form-action 'none'"
+_BASE_CSP_DIRECTIVES = "default-src 'none'; base-uri 'none'; form-action 'none'"
 _SCRIPT_END_PATTERN = re.compile("</(?=script)", re.IGNORECASE)
 
 
@@ -35,7 +35,9 @@ def render_page(
     style = (folder / "page.css").read_text("utf-8")
     allowed = " ".join([csp_hash(script), *script_sources])
     return Template((folder / "page.html").read_text("utf-8")).substitute(
-        policy=html.escape(f"{_BASE_POLICY}; {policy}; style-src {csp_hash(style)}; script-src {allowed}"),
+        policy=html.escape(
+            f"{_BASE_CSP_DIRECTIVES}; {policy}; style-src {csp_hash(style)}; script-src {allowed}"
+        ),
         title=html.escape(title),
         note=html.escape(note),
         style=style,

@@ -16,7 +16,7 @@ from dermis.formats.deformable_mesh import DeformableMesh
 from dermis.mesh.grown_strands import hair_strands
 from dermis.mesh.head import Head
 
-_IMAGE_NODES = {"color3": "ND_image_color3", "float": "ND_image_float", "vector3": "ND_image_vector3"}
+_IMAGE_NODE_BY_TYPE = {"color3": "ND_image_color3", "float": "ND_image_float", "vector3": "ND_image_vector3"}
 _PREVIEW_INPUTS = {
     "base_color": "diffuseColor",
     "subsurface_color": "diffuseColor",
@@ -117,7 +117,7 @@ def _add_open_pbr(material: UsdShade.Material, open_pbr_material: OpenPbrMateria
     for key, role in open_pbr_material.maps.items():
         map_type, types = MAP_TYPES[role], Sdf.ValueTypeNames
         usd_type = {"color3": types.Color3f, "float": types.Float, "vector3": types.Float3}[map_type.type]
-        image = _add_shader(material, f"{role}_image", _IMAGE_NODES[map_type.type])
+        image = _add_shader(material, f"{role}_image", _IMAGE_NODE_BY_TYPE[map_type.type])
         file = image.CreateInput("file", types.Asset)
         file.Set(Sdf.AssetPath(f"./{file_prefix}{role}.png"))
         file.GetAttr().SetColorSpace(map_type.space or "raw")

@@ -21,7 +21,7 @@ from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
 
 _PACKAGE_SUFFIX, _BINARY_SUFFIX = ".usdz", ".usdc"
-_UNIT_PARAMETER = Parameter("metersPerUnit", 1.0, "m", "unit of all lengths, also in materials")
+_METERS_PER_UNIT_PARAMETER = Parameter("metersPerUnit", 1.0, "m", "unit of all lengths, also in materials")
 
 
 class Usd(OpenPbr):
@@ -40,11 +40,11 @@ class Usd(OpenPbr):
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the OpenPBR parameters for which the random walk is closest to the reference profile."""
-        return (*super().parameters(subject, version), _UNIT_PARAMETER)
+        return (*super().parameters(subject, version), _METERS_PER_UNIT_PARAMETER)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return parameters with published diffuse mean free paths, where OpenPBR expects mean free paths."""
-        return (*super().naive_parameters(subject, version), _UNIT_PARAMETER)
+        return (*super().naive_parameters(subject, version), _METERS_PER_UNIT_PARAMETER)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the stage, with the maps beside the stage file or inside the .usdz package."""

@@ -24,7 +24,7 @@ PictureKey = tuple[str, int, int]
 MIN_PICTURE_SIDE = 64
 """Minimum side of a map that is stored as a picture [texel]."""
 _WEBP_QUALITY = 88
-_LEVEL_COUNT = 256
+_QUANTISATION_LEVEL_COUNT = 256
 _COLOUR_CHANNEL_COUNT = 3
 
 
@@ -76,7 +76,7 @@ def _quantisation_curve(texels: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     limits = np.array([texels.min(), texels.max()])
     first, last = np.sign(limits) * np.sqrt(np.abs(limits))
-    root = np.linspace(first, last, _LEVEL_COUNT)
+    root = np.linspace(first, last, _QUANTISATION_LEVEL_COUNT)
     return np.asarray(np.sign(root) * root * root)
 
 
