@@ -77,7 +77,9 @@ class TechniqueTraits:
     subsurface_layer_bytes: ClassVar[int] = 0
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Split a profile into a relit Gaussian and blurred Gaussians. In this class, none is blurred.
+        """Split a profile into a Gaussian evaluated at each pixel (relit), and Gaussians that are blurred.
+
+        In this class, none is blurred.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo

@@ -154,7 +154,7 @@ class AtlasTechnique(Technique):
         return bool(profile.variance_mm2[0] <= _MAX_RELIT_VARIANCE_MM2)
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Split a profile into the narrowest Gaussian, if that is relit, and the Gaussians that are blurred.
+        """Split a profile into Gaussians that are blurred and, if narrow enough, one evaluated at each pixel.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo

@@ -25,7 +25,9 @@ class TextureSpace(AtlasTechnique):
     mixes_profiles = True
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Split a profile into relit and blurred Gaussians; `fine` corrects light that varies within a texel.
+        """Split a profile into a Gaussian evaluated at each pixel (relit), and Gaussians that are blurred.
+
+        The member `fine` of the result corrects light that varies within a texel.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo

@@ -165,10 +165,10 @@ def draw(
 def _strand_view_record(
     shader: ComputeProgram, strands: Resources, shade_record: UniformRecord, coarse_count: int
 ) -> UniformRecord:
-    """Return a record of the shader's struct StrandView: camera, samples and number of coarse strands.
+    """Return a record of the shader's struct StrandView: camera, samples and number of strands.
 
     shade_record : uniform record of the shading pass
-    coarse_count : number of coarse strands to draw
+    coarse_count : number of strands of scalp hair and beard to draw
     """
     members = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "light_factors")
     record = shader.record("StrandView", **{name: shade_record[name] for name in members})
@@ -180,7 +180,7 @@ def _strand_view_record(
 def _pixel_footprint_mm(
     shade_record: UniformRecord, strand_tables: StrandTables, picture_height: int
 ) -> float:
-    """Return the side of the square that a pixel covers at the depth of the coarse strands [mm].
+    """Return the side of the square that a pixel covers at the depth of scalp hair and beard [mm].
 
     shade_record : uniform record of the shading pass
     picture_height : height of the picture [pixels]
@@ -192,8 +192,8 @@ def _pixel_footprint_mm(
 def _max_segments_in_tile(strand_tables: StrandTables, segment_count: int, pixel_mm: float) -> int:
     """Estimate the number of strand segments in a crowded tile of the picture.
 
-    The tile is assumed to contain all segments of fine strands, and several times as many segments of coarse
-    strands as the mean tile.
+    The tile is assumed to contain all segments of brows and lashes, and several times as many segments of
+    other strands as the mean tile.
 
     segment_count : number of segments of all strands that are drawn
     pixel_mm : side of the square that a pixel covers at the depth of the strands [mm]

@@ -77,7 +77,7 @@ _GPU_DETAIL, _SOFTWARE_DETAIL = (
 
 
 class StrandCounts(NamedTuple):
-    """Number of strands of one group (fine or coarse), and number of knots of each strand."""
+    """Number of strands of a group, such as scalp hair and beard, and number of knots of each strand."""
 
     hairs: int
     knots: int
@@ -145,7 +145,7 @@ def max_coarse_counts(device: Device, head: Head) -> StrandCounts:
 
 
 def caster_strand_counts(device: Device, coarse_counts: StrandCounts) -> StrandCounts:
-    """Return how many strands represent all coarse strands in shadow maps, and how many knots each has.
+    """Return how many strands represent scalp hair and beard in shadow maps, and how many knots each has.
 
     coarse_counts : result of `max_coarse_counts`
     """
@@ -156,7 +156,7 @@ def caster_strand_counts(device: Device, coarse_counts: StrandCounts) -> StrandC
 
 
 def adapter_strand_detail(device: Device) -> StrandDetail:
-    """Return the limits of the detail of coarse strands for the adapter of a device."""
+    """Return the limits of the detail of scalp hair and beard for the adapter of a device."""
     return _SOFTWARE_DETAIL if device.adapter.kind == "CPU" else _GPU_DETAIL
 
 
@@ -329,7 +329,7 @@ def strand_constants(head: Head, settings: Settings) -> Constants:
 
 
 def drawn_strand_counts(strand_tables: StrandTables, pixel_mm: float) -> StrandCounts:
-    """Return the number of coarse strands to draw, and the number of knots of each.
+    """Return the number of strands of scalp hair and beard to draw, and the number of knots of each.
 
     Where strands are thinner than a pixel, fewer strands are drawn. They are wider, so that they cover the
     same area.
@@ -354,11 +354,11 @@ def drawn_strand_counts(strand_tables: StrandTables, pixel_mm: float) -> StrandC
 def make_strand_tables(
     device: Device, head: Head, coarse_counts: StrandCounts, buffers: StrandBuffers, groom: GroomTables | None
 ) -> StrandTables:
-    """Upload the fine strands of a head, and collect the buffers of its coarse strands.
+    """Upload the brows and lashes of a head, and collect the buffers of its scalp hair and beard.
 
     coarse_counts : result of `max_coarse_counts`
     buffers : buffers that each frame fills
-    groom : buffers from which coarse strands are interpolated, None if there are no coarse strands
+    groom : buffers from which scalp hair and beard are interpolated, None if there are none
 
     Raises DermisError for strands whose roots do not lie on the head's mesh.
     """

@@ -183,7 +183,7 @@ def draw(
 
 
 def _draw_bounces(graph: Recorder, buffers: InterreflectionBuffers) -> None:
-    """Declare the passes that compute the bounces of light between patches, then the light at each cell."""
+    """Declare the passes that compute the light bounced between patches, and then the light at the atlas."""
     device = graph.device
     team = (
         1 if device.adapter.kind == "CPU" else _INVOCATIONS_PER_PATCH

@@ -117,7 +117,7 @@ def make_rotation_anchors(head: Head) -> RotationAnchors:
 
 
 def head_rotation(anchors: RotationAnchors, motion: Motion) -> Floats:
-    """Return the (3, 3) rotation that best fits the motion of the anchors of a head [Kabsch1976].
+    """Return the (3, 3) rotation that best fits the motion of the control points in `anchors` [Kabsch1976].
 
     Morph targets do not rotate a head and are ignored.
     """

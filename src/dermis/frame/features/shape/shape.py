@@ -216,8 +216,8 @@ def _stencil_tables(stencils: Stencils) -> dict[str, NDArray[np.generic]]:
 def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     """Return the tables that shape_vertices.wgsl reads, by name: vertices, triangle corners and spans.
 
-    Corners are ordered by point and then by vertex. The spans give, for each vertex, the range of the corners
-    at its point and the range of its own corners.
+    Vertices with different uv can share a point. Corners are ordered by point and then by vertex. The spans
+    give, for each vertex, the range of the corners at its point and the range of its own corners.
     """
     count, corner = len(mesh.positions), mesh.triangles.ravel().astype(np.int64)
     table = np.zeros(count, _VERTEX_DTYPE)

@@ -147,7 +147,7 @@ class PairCache:
         self._cache: dict[Cells, PairBuffers] = {}
 
     def pairs_for_cells(self, cells: Cells) -> PairBuffers:
-        """Return the pairs for a division into cells, from the cache or by a new search."""
+        """Return the pairs for a division of the atlas into cells, from the cache or by a new search."""
         pairs = self._cache.pop(cells, None)
         if pairs is None:
             while len(self._cache) >= _CACHED_PAIR_SEARCH_COUNT:
@@ -170,7 +170,10 @@ def rounded_sigma_mm(widest_sigma_mm: float) -> float:
 
 @logged_step("finding the thin parts")
 def find_pairs(device: Device, surface_bindings: Bindings, atlas: Atlas, cells: Cells) -> PairBuffers:
-    """Find the translucent pairs of cells; if a buffer cannot hold all pairs, use coarser cells."""
+    """Find the pairs of cells between which light passes through thin tissue.
+
+    If a buffer cannot hold all pairs, coarser cells are used.
+    """
     table, times = search_pairs(device, surface_bindings, cells), count(1)
     while table is None:
         cells = divide_into_cells(atlas, cells.max_sigma_mm, _CELL_COARSENING_FACTOR ** next(times))
@@ -179,7 +182,7 @@ def find_pairs(device: Device, surface_bindings: Bindings, atlas: Atlas, cells: 
 
 
 def make_pair_buffers(device: Device, cells: Cells, pair_table: PairTable) -> PairBuffers:
-    """Create the buffers of translucent pairs that the passes of a frame read.
+    """Create the buffers of cell pairs that the passes of a frame read.
 
     pair_table : result of the search for pairs
     """
@@ -196,10 +199,11 @@ def make_pair_buffers(device: Device, cells: Cells, pair_table: PairTable) -> Pa
 
 
 def _receiver_ranges(cells: Cells, pair_table: PairTable) -> NDArray[np.uint32]:
-    """Return (m, 3) words: the packed cell of each receiver, and the first and end index of its pairs.
+    """Return (m, 3) words, one row for each cell where light leaves (receiver).
 
-    If there are no receivers, the result is one row of zeros. Receivers with many pairs come first, so that
-    invocations of the same workgroup take similar time.
+    A row holds the packed position of the cell, and the first and end index of its pairs. If there are no
+    receivers, the result is one row of zeros. Receivers with many pairs come first, so that invocations of
+    the same workgroup take similar time.
     """
     first, end = pair_table.first[:-1], pair_table.first[1:]
     order = np.argsort(first - end, kind="stable")

@@ -1,4 +1,4 @@
-"""Choice of the shape in which translucent pairs of cells are searched: at rest or deformed."""
+"""Choice of the shape, at rest or deformed, in which the cell pairs of translucency are searched."""
 
 from __future__ import annotations
 

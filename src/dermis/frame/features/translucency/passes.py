@@ -1,4 +1,4 @@
-"""Passes of translucency: positions of the paired cells, weights of the pairs, and the transmitted light."""
+"""Passes of translucency, the light that enters the head in one cell of the surface and leaves in another."""
 
 from __future__ import annotations
 
@@ -160,10 +160,10 @@ def sum_pair_light(
 
 
 def draw_weights(graph: Recorder, translucency: Translucency) -> None:
-    """Declare the passes that compute the weights of all translucent pairs for the current shape.
+    """Declare the passes that compute, for the current shape, the weights of all pairs of cells.
 
-    The passes also sum the fraction of the blurred light that each receiver cell loses because its tissue is
-    thin.
+    A weight is the fraction of the light of the source cell that leaves in the receiver cell. The passes also
+    sum the fraction of the blurred light that each receiver cell loses because its tissue is thin.
     """
     pairs, cells = translucency.pairs, translucency.pairs.cells
     draw_cell_points(

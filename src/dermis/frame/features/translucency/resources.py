@@ -10,7 +10,9 @@ from dermis.gpu import Bindings, Buffer, Texture
 
 @dataclass(frozen=True, eq=False)
 class PairBuffers:
-    """Translucent pairs of a surface: source cells, where light enters, and receiver cells, where it leaves.
+    """Pairs of surface cells between which light passes through thin tissue.
+
+    Light enters the source cell and leaves the receiver cell.
 
     cells : cells of the coarse atlas
     receivers : buffer of the receiver cells, and its number of rows, see translucency_receivers.wgsl

@@ -100,7 +100,7 @@ class PaintInputs(NamedTuple):
 
 
 def paint_inputs(surface: PaintedSurface, look: SkinLook, map_side: int) -> PaintInputs:
-    """Return the shader inputs with which the maps of a look are painted.
+    """Return the inputs of the shader that paints skin with a given look.
 
     map_side : side of the maps [texels]
 
@@ -338,7 +338,7 @@ class RawPaintedArrays(NamedTuple):
 def paint_textures(
     device: Device, surface: PaintedSurface, look: SkinLook, map_side: int, with_expressions: bool = False
 ) -> PaintedTextures:
-    """Paint the maps of a look as textures.
+    """Paint the maps of skin with a given look as textures.
 
     map_side : side of the maps [texels]
     with_expressions : whether expressions change colour and relief; if so, `draw_expression` fills these maps
@@ -366,9 +366,10 @@ def paint_textures(
 
 
 def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, map_side: int) -> Maps:
-    """Paint the maps of a look as arrays, without pores and furrows, which are too fine for maps.
+    """Paint the maps of skin with a given look as arrays.
 
-    Heights fade to 0 outside the charts of the uv layout.
+    Pores and furrows are left out, because they are too fine for maps. Heights fade to 0 outside the charts
+    of the uv layout.
     """
     arrays = paint_raw_arrays(device, surface, look, map_side)
     rho_s = DEFAULT_RHO_S * arrays.specular[..., 0]
@@ -383,7 +384,7 @@ def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, map_si
 def paint_raw_arrays(
     device: Device, surface: PaintedSurface, look: SkinLook, map_side: int
 ) -> RawPaintedArrays:
-    """Paint the maps of a look as arrays, with all channels that the shader writes."""
+    """Paint the maps of skin with a given look as arrays, with all channels that the shader writes."""
     maps = paint_rest_maps(device, paint_inputs(surface, look, map_side), map_side)
     textures = maps.colour, maps.specular, maps.roughness
     colour, specular, roughness = (download(device, one.texture).astype(np.float32) for one in textures)

@@ -1,4 +1,4 @@
-"""Search for translucent pairs of surface cells.
+"""Search for pairs of surface cells between which light passes through thin tissue.
 
 The cells are grouped into tiles, and tiles into blocks. Only pairs of tiles with opposed normals are
 searched.
@@ -30,7 +30,9 @@ _PAIR_BYTES = 12
 
 
 class SearchPasses:
-    """Passes of a search, submitted in batches because the sizes of later passes depend on earlier results.
+    """Passes of the search for cell pairs.
+
+    They are submitted in batches, because the sizes of later passes depend on earlier results.
 
     commands : command list of the passes that are not yet submitted
     blocks : number of blocks of tiles along a side of the atlas
@@ -93,7 +95,9 @@ def list_offsets(list_lengths: Index) -> Index:
 
 @dataclass(frozen=True, eq=False)
 class TilePairs:
-    """Pairs of tiles that may contain translucent pairs of cells. A tile is a square of cells.
+    """Pairs of tiles between which light may pass through thin tissue.
+
+    A tile is a square of cells of the atlas.
 
     bounds : buffer of the bounding box and normal cone of each tile
     tile : (t,) indices of the tiles that are in at least one pair
@@ -108,7 +112,7 @@ class TilePairs:
 
 
 def find_tile_pairs(passes: SearchPasses, surface_bindings: Bindings, cells: Cells) -> TilePairs:
-    """Find the pairs of tiles that may contain translucent pairs of cells.
+    """Find the pairs of tiles between which light may pass through thin tissue.
 
     surface_bindings : resources of geometry.wgsl
     """
@@ -129,7 +133,7 @@ def find_tile_pairs(passes: SearchPasses, surface_bindings: Bindings, cells: Cel
 def _find_block_pairs(
     passes: SearchPasses, surface_bindings: Bindings, cells: Cells, tile_bounds: Buffer
 ) -> Buffer:
-    """Return a buffer with one bit for each pair of blocks, set if the blocks may contain translucent pairs.
+    """Return a buffer with one bit for each pair of blocks, set if light may pass between them.
 
     A block is a square of tiles.
 
@@ -151,7 +155,7 @@ def _find_block_pairs(
 
 @dataclass(frozen=True, eq=False)
 class CandidateCells:
-    """Cells that may be in translucent pairs, ordered by the tiles that contain them.
+    """Cells between which light may pass through thin tissue, ordered by the tiles that contain them.
 
     receiver : (r,) cells that receive light, as indices into `Cells.receivers`
     source : (s,) cells that emit light, as indices into the coarse atlas
@@ -283,7 +287,7 @@ def upload_sources(device: Device, cells: Cells, source_cells: Index) -> tuple[B
 
 @dataclass(frozen=True, eq=False)
 class PairTable:
-    """Translucent pairs of cells as the search returns them, ordered by receiver.
+    """Pairs of cells between which light passes through thin tissue, ordered by receiver.
 
     receiver : (m,) cells that receive light from at least one source, as indices into `Cells.receivers`
     first : (m + 1,) offsets into `pairs`; the pairs of receiver[i] are from first[i] up to first[i + 1]
@@ -298,7 +302,7 @@ class PairTable:
 
 
 def search_pairs(device: Device, surface_bindings: Bindings, cells: Cells) -> PairTable | None:
-    """Return all pairs of cells between which enough light crosses the head, None if a buffer is too small.
+    """Return all pairs of cells between which enough light passes, None if a buffer is too small.
 
     surface_bindings : resources of geometry.wgsl for the shape to search in, and of the atlas
     """
@@ -329,7 +333,7 @@ def _make_pair_table(
     hit_bindings: Bindings,
     gutter_copy_bindings: Bindings,
 ) -> PairTable:
-    """Convert the bits that hits.wgsl wrote to a table of pairs, and drop the cells that are in no pair.
+    """Convert the bits that hits.wgsl wrote to a table of cell pairs, and drop the cells that are in no pair.
 
     pair_count : (r,) number of pairs of each receiver
     hit_bindings : resources that hits.wgsl and pairs.wgsl share
