@@ -174,7 +174,7 @@ class SplitView:
         self.is_dragged = False
 
     def freeze(self, state: ViewerState) -> None:
-        """Show a divider, with the given state to its left."""
+        """Freeze a state, and show it to the left of a divider."""
         self.frozen_state = state
 
     def release(self) -> None:

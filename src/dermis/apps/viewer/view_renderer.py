@@ -291,7 +291,7 @@ class ViewRenderer:
     def _draw(self, state: ViewerState, divider_side: str = "") -> Texture:
         parts = LIGHT_COMPONENT_VIEWS.get(state.view, state.settings.parts)
         settings = self.settings = validated_copy(state.settings, parts=parts)
-        if state.view == ATLAS_VIEW_NAME and self._has_atlas_light(state, divider_side):
+        if state.view == ATLAS_VIEW_NAME and self._atlas_shows_state(state, divider_side):
             return self._views.draw_atlas(state.scene, settings, state.atlas_view, divider_side)
         self._atlas_state = None
         self.rendered = self.renderer.draw(state.scene, settings, view=divider_side)
@@ -302,10 +302,10 @@ class ViewRenderer:
             return self._views.draw_atlas(state.scene, settings, state.atlas_view, divider_side)
         return self._views.draw(state.scene, settings, state.view, divider_side)
 
-    def _has_atlas_light(self, state: ViewerState, divider_side: str) -> bool:
-        """Return whether the atlas already holds the light of a state, so no frame needs to be rendered.
+    def _atlas_shows_state(self, state: ViewerState, divider_side: str) -> bool:
+        """Return whether the maps in the atlas belong to a state already, so no frame needs to be rendered.
 
-        divider_side : name of the side of the divider that shows the state; empty for the live side
+        divider_side : "before" for the frozen state left of the divider, "" for the live state
         """
         if self._atlas_state is None or self._atlas_state[1] != divider_side:
             return False

@@ -64,7 +64,7 @@ class IntermediateViews:
         """Return an image of sRGB bytes that shows an intermediate result of the last frame on the head.
 
         view_name : name of the view, one of `VIEW_NAMES`
-        divider_side : name of the side of the divider that is drawn; empty for the live side
+        divider_side : "before" for the frozen state left of the divider, "" for the live state
 
         Raises DermisError if the technique does not compute the intermediate result.
         """
@@ -89,7 +89,7 @@ class IntermediateViews:
     ) -> Texture:
         """Return an image of sRGB bytes that shows a part of the atlas of the last frame.
 
-        divider_side : name of the side of the divider that is drawn; empty for the live side
+        divider_side : "before" for the frozen state left of the divider, "" for the live state
 
         Raises DermisError if the technique does not compute the displayed map.
         """
