@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from web_page import FLAGS, SOFTWARE, STATE
 
 import dermis
-from dermis.apps.export.targets.web.build import PageRequest, build_content
+from dermis.apps.export.targets.web.build import PageRequest, build_page_content
 from dermis.apps.export.targets.web.maps import with_reduced_maps
 from dermis.apps.export.targets.web.target import page_html
 from dermis.apps.validation.pages import chromium_page
@@ -52,7 +52,7 @@ def main(head: str, adapter: str = "auto") -> None:
         settings_for = settings.model_copy(update={"size": (side, side)})
         original = capture_renderer(form, adapter).draw(scene, settings_for).linear()
         references = list[NDArray[np.float32]]()
-        content = build_content(
+        content = build_page_content(
             PageRequest(scene, (), settings, {form: (side,)}, adapter),
             lambda renderer, *_, settings_for=settings_for, references=references: references.append(
                 renderer.draw(scene, settings_for).linear()

@@ -12,7 +12,7 @@ from pydantic import Field
 
 import dermis
 from dermis.base.registry import RegisteredName, Registry
-from dermis.scene.field_errors import Keywords
+from dermis.scene.field_errors import AcceptedWords
 from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.skin import Pigments, TissueLayer
 
@@ -40,7 +40,7 @@ class Sample(FrozenModel):
     """Where it is, with a text so long that it does not fit on one line of a help text of the usual width."""
     kind: Literal["raw", "cooked"] | None = None
     """How it was made."""
-    gain: Annotated[float, Field(gt=0), Keywords("auto")] = 1.0
+    gain: Annotated[float, Field(gt=0), AcceptedWords("auto")] = 1.0
     """Factor."""
     colour: Annotated[str, RegisteredName(COLOURS)] = "red"
     """Which it has."""

@@ -38,7 +38,7 @@ def page_text() -> str:
 
 def _table(rows: Iterable[FileProperty], treatments: tuple[str, ...] = ("treatment",)) -> str:
     head = ["property", *treatments, "details"]
-    cells = [head, ["---"] * len(head), *(row.cells(len(treatments) > 1) for row in rows)]
+    cells = [head, ["---"] * len(head), *(row.documentation_cells(len(treatments) > 1) for row in rows)]
     return "\n".join(f"| {' | '.join(row)} |" for row in cells)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.human.hair import brows
 from dermis.human.model import MATERIAL_OF_GROUP
-from dermis.human.regions.average import AVERAGE_HUMAN, average_head, part_quads
+from dermis.human.regions.average import AVERAGE_HUMAN, average_head, quads_of_parts
 from dermis.human.skin.surface import BORDER_FIELDS, average_surface, lid_rings
 from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
@@ -71,7 +71,9 @@ class Surface:
     @cached_property
     def face(self) -> NDArray[np.bool_]:
         """Return the (n,) mask of candidates on skin outside mouth and ears."""
-        return self.skin & ~np.isin(self.quad, np.concatenate([part_quads()["mouth"], part_quads()["ears"]]))
+        return self.skin & ~np.isin(
+            self.quad, np.concatenate([quads_of_parts()["mouth"], quads_of_parts()["ears"]])
+        )
 
     def nearest(self, wanted: Doubles, among: NDArray[np.bool_] | None = None) -> int:
         """Return the index of the candidate nearest to a position (3,) [mm]."""

@@ -11,7 +11,7 @@ from dermis.atlas.translucency.cells import CELLS_PER_TILE_SIDE, Cells, divide_i
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
 
-MESHES = {"slab": lambda: wedge(30.0, 2.0, 4.0, cells=6), "ball": lambda: uv_sphere(20.0, 48, 24)}
+MESHES = {"slab": lambda: wedge(30.0, 2.0, 4.0, cells_per_side=6), "ball": lambda: uv_sphere(20.0, 48, 24)}
 WIDEST_MM = 4.0
 Divided = tuple[Mesh, Atlas, Cells]
 

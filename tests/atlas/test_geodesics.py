@@ -7,9 +7,9 @@ import pytest
 from cut_meshes import cut_cone, cut_cylinder, cut_sphere
 from numpy.typing import NDArray
 
-from dermis.atlas.stitched.build import find_pieces
+from dermis.atlas.stitched.build import find_chart_pieces
 from dermis.atlas.stitched.geodesics import trace_geodesics
-from dermis.atlas.stitched.overlap_cuts import cut_overlaps, find_conflicts
+from dermis.atlas.stitched.overlap_cuts import cut_overlaps, find_gutter_conflicts
 from dermis.atlas.stitched.surface import FlatSurface, flat_surface
 from dermis.mesh.mesh import Mesh, build_mesh
 
@@ -108,14 +108,14 @@ def test_a_closed_geodesic_on_a_sphere_returns_to_its_start() -> None:
 def test_overlapping_charts_are_cut_until_gutters_fit() -> None:
     """Check the unrolled cone, whose sides meet at the apex and would need the same texels."""
     surface = flat_surface(cut_cone(40.0, 50.0))
-    piece, _ = find_pieces(surface)
+    piece, _ = find_chart_pieces(surface)
     assert piece.max() == 0
-    complete = find_conflicts(surface, piece >= 0, np.flatnonzero(piece == 0), 8.0).length_mm
+    complete = find_gutter_conflicts(surface, piece >= 0, np.flatnonzero(piece == 0), 8.0).length_mm
     cut = cut_overlaps(surface, piece, 8.0)
     assert 1 <= cut.max() <= 3
     assert np.array_equal(cut >= 0, piece >= 0)
     left = sum(
-        find_conflicts(surface, cut >= 0, np.flatnonzero(cut == k), 8.0).length_mm
+        find_gutter_conflicts(surface, cut >= 0, np.flatnonzero(cut == k), 8.0).length_mm
         for k in range(int(cut.max()) + 1)
     )
     assert complete > 8.0
@@ -125,6 +125,6 @@ def test_overlapping_charts_are_cut_until_gutters_fit() -> None:
 @pytest.mark.parametrize("mesh", [cut_cylinder(RADIUS, HEIGHT, 6), cut_sphere(30.0, 12)])
 def test_charts_without_overlap_are_not_cut(mesh: Mesh) -> None:
     surface = flat_surface(mesh)
-    piece, _ = find_pieces(surface)
+    piece, _ = find_chart_pieces(surface)
     cut = cut_overlaps(surface, piece, 8.0)
     assert cut.max() == piece.max()

@@ -9,9 +9,9 @@ import pytest
 
 from dermis.atlas.atlas import GUTTER_MM
 from dermis.atlas.build import build_atlas
-from dermis.atlas.interreflection import FormFactors, compute_form_factors, form_factor_table
+from dermis.atlas.interreflection import FormFactors, compute_form_factors, form_factor_table_name
 from dermis.atlas.shipped import shipped_arrays
-from dermis.atlas.stitched.build import LAYOUT_ARRAY_NAMES, find_stitched_layout, layout_table
+from dermis.atlas.stitched.build import LAYOUT_ARRAY_NAMES, find_stitched_layout, layout_table_name
 from dermis.human.model import template
 from dermis.mesh.mesh import Mesh
 
@@ -25,7 +25,7 @@ def mesh() -> Mesh:
 
 
 def test_layout_is_that_of_the_package(mesh: Mesh) -> None:
-    shipped = shipped_arrays(mesh, layout_table(GUTTER_MM), LAYOUT_ARRAY_NAMES)
+    shipped = shipped_arrays(mesh, layout_table_name(GUTTER_MM), LAYOUT_ARRAY_NAMES)
     assert shipped is not None, ADVICE
     computed = find_stitched_layout(mesh, GUTTER_MM)
     np.testing.assert_array_equal(shipped["piece"], computed["piece"], ADVICE)
@@ -36,7 +36,7 @@ def test_layout_is_that_of_the_package(mesh: Mesh) -> None:
 @pytest.mark.usefixtures("many_form_factor_lines")
 def test_form_factors_are_those_of_the_package(mesh: Mesh) -> None:
     atlas = build_atlas(mesh, 1024, "stitched")
-    shipped = shipped_arrays(mesh, form_factor_table(atlas.mapped), FACTOR_NAMES)
+    shipped = shipped_arrays(mesh, form_factor_table_name(atlas.mapped), FACTOR_NAMES)
     assert shipped is not None, ADVICE
     computed = compute_form_factors(mesh, atlas.corner_uv, atlas.mapped)
     for name in FACTOR_NAMES:
@@ -45,11 +45,11 @@ def test_form_factors_are_those_of_the_package(mesh: Mesh) -> None:
 
 def test_atlas_of_another_side_has_tables_too(mesh: Mesh) -> None:
     mapped = build_atlas(mesh, 2048, "stitched").mapped
-    assert shipped_arrays(mesh, form_factor_table(mapped), FACTOR_NAMES) is not None, ADVICE
+    assert shipped_arrays(mesh, form_factor_table_name(mapped), FACTOR_NAMES) is not None, ADVICE
 
 
 def test_other_shapes_of_the_topology_have_no_tables(mesh: Mesh) -> None:
-    table = layout_table(GUTTER_MM)
+    table = layout_table_name(GUTTER_MM)
     positions = mesh.positions.copy()
     positions[1001:1101] += 1.0
     assert shipped_arrays(replace(mesh, positions=positions), table, LAYOUT_ARRAY_NAMES) is None
@@ -57,4 +57,4 @@ def test_other_shapes_of_the_topology_have_no_tables(mesh: Mesh) -> None:
         shipped_arrays(replace(mesh, triangles=mesh.triangles[:, [1, 2, 0]]), table, LAYOUT_ARRAY_NAMES)
         is None
     )
-    assert shipped_arrays(mesh, layout_table(2 * GUTTER_MM), LAYOUT_ARRAY_NAMES) is None
+    assert shipped_arrays(mesh, layout_table_name(2 * GUTTER_MM), LAYOUT_ARRAY_NAMES) is None

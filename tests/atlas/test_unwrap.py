@@ -12,7 +12,7 @@ from dermis.atlas.raster import rasterise
 from dermis.atlas.unwrap.charts import (
     connected_pieces,
     grow_charts,
-    merge_strays,
+    merge_stray_pieces,
     neighbour_triangles,
     smooth_charts,
 )
@@ -240,7 +240,7 @@ def test_stray_triangles_join_the_surrounding_chart() -> None:
     low = int(height.argmin())
     stray = half.copy()
     stray[low] = 1
-    assert np.array_equal(merge_strays(stray, triangles), half)
+    assert np.array_equal(merge_stray_pieces(stray, triangles), half)
 
 
 def test_faults_are_found() -> None:

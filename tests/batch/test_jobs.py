@@ -54,7 +54,7 @@ def test_commands_work_with_the_variables_of_schedulers(kind: str) -> None:
     function, bound, _ = app.parse_args([*words[1:], "--dry-run"], exit_on_error=False, print_error=False)
     arguments = bound.arguments
     assert function is command.batch and arguments["dry_run"] and arguments["output"] == Path("/shared/faces")
-    index, count = command._parse_fraction("--shard", arguments["shard"])
+    index, count = command._parse_selection("--shard", arguments["shard"])
     assert (index, count) == ((1, 2) if kind == "skypilot" else (15, 16))
 
 

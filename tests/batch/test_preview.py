@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.apps.batch.preview import dry_run, parameter_rows, table_lines
+from dermis.apps.batch.preview import dry_run, parameter_rows, parameter_table_lines
 from dermis.apps.batch.spec import parse_spec
 
 ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
@@ -38,7 +38,7 @@ def test_rows_tell_what_is_drawn_and_what_comes_of_it() -> None:
     assert 500 < distance["min"] < 510 and 890 < distance["max"] < 900
     assert distance["mean"] == pytest.approx(700, abs=20) and len(distance["first"]) == 16
     assert sum(gaze["counts"].values()) == 400 and set(gaze["counts"]) == {"camera", "angles"}
-    lines = table_lines(list(rows.values()))
+    lines = parameter_table_lines(list(rows.values()))
     assert len(lines) == 4 and lines[0].split() == [
         "parameter",
         "distribution",

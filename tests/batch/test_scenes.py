@@ -114,7 +114,7 @@ def test_eyes_look_at_the_camera_or_in_the_sampled_direction() -> None:
     for drawn in (at_camera, at_angles):
         scene, _ = SceneBuilder(drawn).build(drawn.parameters(0))
         assert scene.head.eyes is not None and scene.motion is not None
-        frames = scene.head.eyes.frames(scene.head.control, scene.motion)
+        frames = scene.head.eyes.eye_matrices(scene.head.control, scene.motion)
         for frame in frames:
             if drawn is at_camera:
                 place = np.array(scene.camera.position) + scene.head.centre_mm

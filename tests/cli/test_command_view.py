@@ -157,7 +157,7 @@ def test_a_notebook_displays_the_same_viewer(folder: Path, monkeypatch: pytest.M
 
     for name in ("anywidget", "rendercanvas.anywidget"):
         monkeypatch.setitem(sys.modules, name, ModuleType(name))
-    monkeypatch.setattr("dermis.apps.viewer.windows._notebook_canvas", lambda backend: Canvas)
+    monkeypatch.setattr("dermis.apps.viewer.windows._notebook_canvas_class", lambda backend: Canvas)
     state = ViewerState(Scene(load_head(folder / "head.obj"))).with_settings(atlas=64, samples=1)
     widget = view(state, "cpu", (64, 48))
     assert widget._repr_mimebundle_() == {"text/plain": "shown"}

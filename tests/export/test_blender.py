@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 from small_head import write_head
 
-from dermis.apps.export.fitting import curve_error, fit_burley_width
+from dermis.apps.export.fitting import fit_burley_width, profile_error
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.target import get_numbers
-from dermis.apps.export.targets.blender.files import describe_scene, script_text
+from dermis.apps.export.targets.blender.files import blender_script_text, describe_scene
 from dermis.apps.export.targets.blender.target import (
     TARGET,
     burley_cdf,
     burley_shape_factor,
     hulst_albedo,
     legacy_albedo,
-    skin_path_ratio,
-    walk_cdf,
+    random_walk_cdf,
+    skin_mfp_per_radius,
 )
 from dermis.apps.truths.half_space import diffuse_albedo, directional_albedo
 from dermis.base.errors import DermisError
@@ -46,10 +46,10 @@ def skin1() -> Subject:
 
 def test_random_walk_albedo_matches_the_half_space() -> None:
     for alpha in (0.2, 0.41, 0.7, 0.9, 0.98):
-        total = float(walk_cdf(np.array([1e6]), alpha, "straight")[0])
+        total = float(random_walk_cdf(np.array([1e6]), alpha, "straight")[0])
         assert total == pytest.approx(float(directional_albedo(1.0, alpha)), abs=2e-3)
-    below = float(walk_cdf(np.array([1e6]), 0.1, "straight")[0])
-    assert below == pytest.approx(0.5 * float(walk_cdf(np.array([1e6]), 0.2, "straight")[0]))
+    below = float(random_walk_cdf(np.array([1e6]), 0.1, "straight")[0])
+    assert below == pytest.approx(0.5 * float(random_walk_cdf(np.array([1e6]), 0.2, "straight")[0]))
 
 
 @pytest.mark.parametrize(("formula", "tolerance"), [(hulst_albedo, 0.003), (legacy_albedo, 0.03)])
@@ -61,7 +61,7 @@ def test_random_walk_albedo_reproduces_the_colour(formula: Any, tolerance: float
 def test_published_diffuse_mean_free_paths_equal_the_skin_walk_radius() -> None:
     """[Jensen2001] tabulates the diffuse path of skin1; its coefficients give the mean free path."""
     (layer,) = published_media()["skin1"].layers
-    path = np.array([3.67, 1.37, 0.68]) * skin_path_ratio(np.array([0.44, 0.22, 0.13]), 1.3)
+    path = np.array([3.67, 1.37, 0.68]) * skin_mfp_per_radius(np.array([0.44, 0.22, 0.13]), 1.3)
     assert path == pytest.approx(layer.mean_free_path_mm, rel=0.06)
 
 
@@ -92,7 +92,7 @@ def test_radii_depend_on_the_subsurface_method(skin1: Subject) -> None:
 def test_fitted_parameters_beat_typed_values(skin1: Subject, variant: str) -> None:
     target = TARGET.with_variant(variant)
     errors = [
-        curve_error(skin1.curve, target.predicted_curve(rows(skin1, "5.2"), skin1, "5.2"))
+        profile_error(skin1.curve, target.predicted_profile(rows(skin1, "5.2"), skin1, "5.2"))
         for rows in (target.parameters, target.naive_parameters)
     ]
     assert errors[0].edge.max() < 0.016 < errors[1].edge.max()
@@ -136,7 +136,9 @@ def test_head_file_is_written_next_to_the_script(tmp_path: Path) -> None:
 
 
 def test_names_are_quoted_as_strings_in_the_script() -> None:
-    usual, hostile = (script_text({"name": name, "lights": [1.5, None]}) for name in ("head", HOSTILE))
+    usual, hostile = (
+        blender_script_text({"name": name, "lights": [1.5, None]}) for name in ("head", HOSTILE)
+    )
     assert export_in(hostile) == {"name": HOSTILE, "lights": [1.5, None]}
     trees = [ast.parse(text) for text in (usual, hostile)]
     for tree in trees:
@@ -154,7 +156,7 @@ def test_script_refuses_blender_versions_with_other_radius_meaning(monkeypatch: 
         monkeypatch.setitem(sys.modules, name, stub)
     for versions, refused in (([[4, 5], [5, 2]], True), ([[5, 2], None], False), ([[6, 0], None], True)):
         found: dict[str, Any] = {"__name__": "script"}
-        exec(compile(script_text({"versions": versions}), "script", "exec"), found)
+        exec(compile(blender_script_text({"versions": versions}), "script", "exec"), found)
         if refused:
             with pytest.raises(SystemExit, match=r"but 5\.2 runs it\. Export it again with --version 5\.2"):
                 found["check_version"]()

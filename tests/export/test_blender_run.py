@@ -20,7 +20,7 @@ from dermis.apps.validation.engines import blender
 from dermis.base.errors import DermisError
 
 PYTHON = os.environ.get(PYTHON_VARIABLE, "")
-MEASURING_SCRIPT = blender.SCRIPT
+MEASURING_SCRIPT = blender.BLENDER_SCRIPT
 QUERY = """
 import json, sys
 import bpy
@@ -90,7 +90,7 @@ def test_cycles_renders_the_predicted_edge_response(tmp_path: Path, version: str
     command = [PYTHON, "-I", str(MEASURING_SCRIPT), str(tmp_path)]
     subprocess.run(command, check=True, capture_output=True, timeout=300)
     (columns,) = json.loads((tmp_path / "done.json").read_text())["columns"]
-    predicted = target.predicted_curve(rows, subject, version)
+    predicted = target.predicted_profile(rows, subject, version)
     fine = predicted.edge_response(np.linspace(-4.0, 4.0, 8 * 32, endpoint=False) + 1 / 64)[:, 0]
     expected = fine.reshape(8, 32).mean(axis=1)
     assert np.pi * np.array(columns)[:, 0] == pytest.approx(expected * predicted.energy[0], abs=0.025)

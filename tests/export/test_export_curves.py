@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.apps.export.fitting import burley_curve, curve_error, fit_burley_width, fit_homogeneous_medium
+from dermis.apps.export.fitting import (
+    cumulative_burley_profile,
+    fit_burley_width,
+    fit_homogeneous_medium,
+    profile_error,
+)
 from dermis.apps.export.subject import Subject, load_subject
 from dermis.base.errors import DermisError
 from dermis.optics.cumulative_profile import CumulativeProfile
@@ -26,22 +31,22 @@ def test_edge_response_of_a_gaussian_is_the_error_function() -> None:
 
 def test_fit_of_a_lobe_finds_its_width() -> None:
     d = np.array([1.173, 0.461, 0.05])
-    np.testing.assert_allclose(fit_burley_width(burley_curve(d, WHITE)), d, rtol=1e-5)
+    np.testing.assert_allclose(fit_burley_width(cumulative_burley_profile(d, WHITE)), d, rtol=1e-5)
 
 
 def test_lobe_fit_is_a_minimum(dj3: Subject) -> None:
     d = fit_burley_width(dj3.curve)
-    best = curve_error(dj3.curve, burley_curve(d, WHITE)).cdf
+    best = profile_error(dj3.curve, cumulative_burley_profile(d, WHITE)).cdf
     for factor in (0.97, 1.03):
-        assert (curve_error(dj3.curve, burley_curve(factor * d, WHITE)).cdf > best).all()
+        assert (profile_error(dj3.curve, cumulative_burley_profile(factor * d, WHITE)).cdf > best).all()
 
 
 def test_deviation_is_zero_for_equal_profiles_and_grows_with_width() -> None:
-    one = burley_curve([1.0, 0.5, 0.2], [0.5, 0.4, 0.3])
-    none = curve_error(one, one)
+    one = cumulative_burley_profile([1.0, 0.5, 0.2], [0.5, 0.4, 0.3])
+    none = profile_error(one, one)
     assert not none.cdf.any() and not none.edge.any() and not none.energy.any()
-    wider = curve_error(one, burley_curve([1.2, 0.6, 0.24], [0.55, 0.4, 0.3]))
-    much = curve_error(one, burley_curve([2.0, 1.0, 0.4], [0.5, 0.4, 0.3]))
+    wider = profile_error(one, cumulative_burley_profile([1.2, 0.6, 0.24], [0.55, 0.4, 0.3]))
+    much = profile_error(one, cumulative_burley_profile([2.0, 1.0, 0.4], [0.5, 0.4, 0.3]))
     assert (wider.cdf > 0.03).all() and (much.cdf > wider.cdf).all() and (much.edge > wider.edge).all()
     np.testing.assert_allclose(wider.energy, [0.1, 0.0, 0.0], atol=1e-12)
 
@@ -79,7 +84,7 @@ def test_equivalent_medium_of_homogeneous_skin_is_unchanged(skin1: Subject) -> N
 
 
 def test_equivalent_medium_of_layers_keeps_energy_and_reports_its_error(dj3: Subject) -> None:
-    error = curve_error(dj3.curve, fit_homogeneous_medium(dj3.curve).curve)
+    error = profile_error(dj3.curve, fit_homogeneous_medium(dj3.curve).curve)
     assert np.abs(error.energy).max() < 1e-3
     assert 0.05 < error.cdf[0] < 0.2
 

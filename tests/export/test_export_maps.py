@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import load_subject
-from dermis.apps.export.targets.maps import check_side, orient_green, resample
+from dermis.apps.export.targets.maps import check_map_side, orient_normal_map, resample_map
 from dermis.base.errors import DermisError
 from dermis.frame.baking import BakedMaps, bake
 from dermis.frame.renderer import Renderer
@@ -138,20 +138,22 @@ def _decode_png(levels: NDArray[Any], info: dict[str, Any]) -> NDArray[Any]:
 
 def test_green_channel_is_inverted_for_directx() -> None:
     normal = np.array([[[0.1, 0.2, 0.97]]], np.float32)
-    np.testing.assert_array_equal(orient_green(normal, "up"), normal)
-    np.testing.assert_allclose(orient_green(normal, "down"), [[[0.1, -0.2, 0.97]]])
+    np.testing.assert_array_equal(orient_normal_map(normal, "up"), normal)
+    np.testing.assert_allclose(orient_normal_map(normal, "down"), [[[0.1, -0.2, 0.97]]])
 
 
 def test_resampling_keeps_ramps() -> None:
     ramp = np.tile((np.arange(64, dtype=np.float32) + 0.5) / 64, (64, 1))
-    np.testing.assert_allclose(resample(ramp, 16)[0], (np.arange(16) + 0.5) / 16, atol=1e-6)
-    np.testing.assert_allclose(resample(ramp, 128)[0, 8:-8], ((np.arange(128) + 0.5) / 128)[8:-8], atol=1e-6)
+    np.testing.assert_allclose(resample_map(ramp, 16)[0], (np.arange(16) + 0.5) / 16, atol=1e-6)
+    np.testing.assert_allclose(
+        resample_map(ramp, 128)[0, 8:-8], ((np.arange(128) + 0.5) / 128)[8:-8], atol=1e-6
+    )
 
 
 def test_odd_sizes_and_skins_without_a_head_are_refused(tmp_path: Path) -> None:
     for side in (0, 300, 2**20, True):
         with pytest.raises(DermisError, match="power of two"):
-            check_side(side)
+            check_map_side(side)
     with pytest.raises(DermisError, match="a head"):
         export_skin(load_subject("skin1"), "maps", tmp_path / "maps")
     assert not (tmp_path / "maps").exists()

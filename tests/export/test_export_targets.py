@@ -33,7 +33,7 @@ EVIL = '"; import os; os._exit(3) # \n'
 def test_parameters_reproduce_the_fitted_lobe_in_all_versions(name: str, skin1: Subject) -> None:
     target = TARGETS[name].with_variant(None)
     for version in target.versions:
-        predicted = target.predicted_curve(target.parameters(skin1, version), skin1, version)
+        predicted = target.predicted_profile(target.parameters(skin1, version), skin1, version)
         np.testing.assert_allclose(fit_burley_width(predicted), fit_burley_width(skin1.curve), rtol=1e-4)
 
 

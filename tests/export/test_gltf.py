@@ -12,7 +12,7 @@ import pytest
 from gltf_rules import check_rules, khronos_issues
 
 from dermis import Human, load_head
-from dermis.apps.export.fitting import curve_error
+from dermis.apps.export.fitting import profile_error
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.targets.gltf.target import DRAFT_NOTICE, SCATTER_VARIANT, TARGET, TRANSMISSION_VARIANT
@@ -22,8 +22,8 @@ from dermis.apps.export.targets.gltf.volume import (
     multiscatter_colour,
     multiscatter_for_reflectance,
     single_scattering_albedo,
-    volume_curve,
-    volume_from_paths,
+    volume_from_mean_free_paths,
+    volume_profile,
 )
 from dermis.human.person_file import write_person_glb
 from dermis.optics.tissue import load_tissue
@@ -74,7 +74,7 @@ def test_albedo_inversion_matches_van_de_hulst() -> None:
 def test_volume_keeps_the_mean_free_paths() -> None:
     """Colours stay within 0 and 1 for any ratio of the channels."""
     paths = np.array([1.3, 0.9, 0.05])
-    volume = volume_from_paths(paths, (0.6, 0.4, 0.2))
+    volume = volume_from_mean_free_paths(paths, (0.6, 0.4, 0.2))
     assert volume.distance_m == pytest.approx(1.3e-3) and ((volume.colour > 0) & (volume.colour < 1)).all()
     np.testing.assert_allclose(volume.mean_free_path_mm, paths, rtol=1e-6)
 
@@ -86,7 +86,7 @@ def test_homogeneous_skin_is_exported_unchanged(name: str) -> None:
     volume, layer = fit_volume(subject.curve), tissue.medium.layers[0]
     np.testing.assert_allclose(volume.mean_free_path_mm, layer.mean_free_path_mm, rtol=0.01)
     np.testing.assert_allclose(single_scattering_albedo(volume.multiscatter), layer.alpha_prime, atol=0.003)
-    found = curve_error(subject.curve, volume_curve(volume))
+    found = profile_error(subject.curve, volume_profile(volume))
     assert found.cdf.max() < 0.003 and found.edge.max() < 0.001 and np.abs(found.energy).max() < 0.005
 
 
@@ -94,8 +94,8 @@ def test_albedo_without_inversion_would_lose_light() -> None:
     """Below a refracting surface, half of the red light of skin1 would be lost, as the documentation says."""
     subject = load_subject("skin1")
     volume = fit_volume(subject.curve)
-    found = curve_error(
-        subject.curve, volume_curve(Volume(volume.distance_m, volume.colour, subject.curve.energy))
+    found = profile_error(
+        subject.curve, volume_profile(Volume(volume.distance_m, volume.colour, subject.curve.energy))
     )
     np.testing.assert_allclose(found.energy, [-0.50, -0.61, -0.64], atol=0.03)
     np.testing.assert_allclose(
@@ -108,7 +108,7 @@ def test_typed_values_have_larger_error(name: str) -> None:
     subject = load_subject(name)
     target = TARGET.with_variant(None)
     best, naive = (
-        curve_error(subject.curve, target.predicted_curve(rows, subject, "2.0"))
+        profile_error(subject.curve, target.predicted_profile(rows, subject, "2.0"))
         for rows in (target.parameters(subject, "2.0"), target.naive_parameters(subject, "2.0"))
     )
     assert np.abs(best.energy).max() < 0.005 < 0.3 < np.abs(naive.energy).min()
@@ -118,7 +118,7 @@ def test_typed_values_have_larger_error(name: str) -> None:
 def test_no_scattering_means_no_spread() -> None:
     subject, target = load_subject("skin1"), TARGET.with_variant(TRANSMISSION_VARIANT)
     rows = target.parameters(subject, "2.0")
-    found = curve_error(subject.curve, target.predicted_curve(rows, subject, "2.0"))
+    found = profile_error(subject.curve, target.predicted_profile(rows, subject, "2.0"))
     assert found.cdf.min() > 0.9 and found.edge.min() > 0.4
     values = {row.name.rpartition(".")[2]: row.value for row in rows}
     assert 0.0 < values["diffuseTransmissionFactor"] < 0.3

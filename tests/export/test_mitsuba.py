@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from dermis.apps.export.fitting import curve_error
+from dermis.apps.export.fitting import profile_error
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.target import get_numbers
@@ -50,7 +50,7 @@ def test_fitted_media_are_closer_than_typed_ones(boundary: str) -> None:
     subject, target = load_subject("skin1"), TARGET.with_variant(boundary)
     fit, naive = target.parameters(subject, "3"), target.naive_parameters(subject, "3")
     near, far = (
-        curve_error(subject.curve, target.predicted_curve(rows, subject, "3")) for rows in (fit, naive)
+        profile_error(subject.curve, target.predicted_profile(rows, subject, "3")) for rows in (fit, naive)
     )
     assert near.edge.max() < 0.015
     assert np.abs(near.energy).max() < 1e-3
@@ -148,6 +148,6 @@ def _edge_error(mi: Any, bench: Any, subject: Subject, rows: Any, boundary: str,
     sigma, albedo = (get_numbers(rows, name)[channel] for name in ("sigma_t", "albedo"))
     medium = bench.IsotropicMedium((sigma,) * 3, (albedo,) * 3)
     d = float(bench.fit_burley_width(subject.curve)[channel])
-    measured, _, _ = bench.measured_edge(mi, medium, boundary, d, 768)
+    measured, _, _ = bench.measured_edge_response(mi, medium, boundary, d, 768)
     curve: CumulativeProfile = subject.curve
-    return float(np.abs(measured - bench.pixel_averages(curve, channel, d)).max())
+    return float(np.abs(measured - bench.pixel_edge_response(curve, channel, d)).max())

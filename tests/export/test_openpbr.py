@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.apps.export.fitting import curve_error
+from dermis.apps.export.fitting import profile_error
 from dermis.apps.export.run import evaluate_export, export_skin
 from dermis.apps.export.subject import load_subject
 from dermis.apps.export.target import get_numbers
@@ -34,7 +34,7 @@ def test_random_walk_matches_homogeneous_skin_better_than_published_values() -> 
 def test_total_albedo_equals_the_formula() -> None:
     subject = load_subject("skin1")
     parameters = TARGET.parameters(subject, "1.1.1")
-    shown = TARGET.predicted_curve(parameters, subject, "1.1.1")
+    shown = TARGET.predicted_profile(parameters, subject, "1.1.1")
     exact = [diffuse_albedo(float(one)) for one in albedo_from_colour(subject.albedo)]
     np.testing.assert_allclose(shown.energy, exact, atol=0.003)
 
@@ -57,7 +57,7 @@ def test_profile_is_fitted_for_renderers_with_profiles() -> None:
     profile, walk = (TARGET.with_variant(one) for one in ("open-pbr-profile", "open-pbr"))
     assert evaluate_export(subject, profile, "1.1.1").error.edge.max() < EDGE
     radii = walk.parameters(subject, "1.1.1")
-    assert curve_error(subject.curve, profile.predicted_curve(radii, subject, "1.1.1")).edge.max() > 0.08
+    assert profile_error(subject.curve, profile.predicted_profile(radii, subject, "1.1.1")).edge.max() > 0.08
 
 
 @pytest.mark.parametrize("variant", TARGET.variants)

@@ -15,8 +15,8 @@ from dermis.apps.export.targets.openpbr.materials import (
     OPEN_PBR,
     STANDARD_SURFACE,
     OpenPbrMaterial,
-    opaque_material,
     skin_material,
+    untextured_part_material,
 )
 from dermis.mesh.mesh import Material
 from dermis.scene.skin import Skin
@@ -34,7 +34,7 @@ def materials(name: str = "skin") -> list[OpenPbrMaterial]:
     skin = skin_material(
         name, Skin(), RADIUS_M, (0.4, 0.2, 0.1), ["colour", "roughness", "specular", "normal"]
     )
-    return [skin, opaque_material(Material("left eye", "opaque"))]
+    return [skin, untextured_part_material(Material("left eye", "opaque"))]
 
 
 def read_back(document: Any) -> Any:

@@ -154,10 +154,10 @@ def test_only_needed_pictures_are_written(plain: Subject, tmp_path: Path) -> Non
 def test_parts_without_roughness_use_the_default() -> None:
     mesh = uv_sphere(100.0, 8, 4)
     colour, surface = np.ones((4, 4, 4), np.float32), np.zeros((4, 4, 4), np.float32)
-    pictures = PartPictures.of(Head("ball", mesh, Maps(parts=PartMaps(colour, surface))))
+    pictures = PartPictures.from_head(Head("ball", mesh, Maps(parts=PartMaps(colour, surface))))
     assert pictures is not None
-    assert pictures.roles(Material("hat", "opaque", has_maps=True)) == {"colour"}
-    assert pictures.roles(Material("hat", "opaque", roughness=0.2)) == set()
+    assert pictures.needed_roles(Material("hat", "opaque", has_maps=True)) == {"colour"}
+    assert pictures.needed_roles(Material("hat", "opaque", roughness=0.2)) == set()
 
 
 @pytest.mark.parametrize("name", ["out.glb", "out.usda"])

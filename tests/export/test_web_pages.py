@@ -15,13 +15,13 @@ from chromium_input import CHROMIUM
 from numpy.typing import NDArray
 from PIL import Image
 
-from dermis.apps.export.fitting import burley_curve, fit_burley_width
+from dermis.apps.export.fitting import cumulative_burley_profile, fit_burley_width
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.run import evaluate_export, export_skin
 from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.target import get_numbers
-from dermis.apps.export.targets.babylon.target import spiral_curve
-from dermis.apps.export.targets.pages.engine_page import page_camera
+from dermis.apps.export.targets.babylon.target import spiral_profile
+from dermis.apps.export.targets.pages.engine_page import page_camera_json
 from dermis.apps.export.targets.pages.html import csp_hash, escape_script
 from dermis.base.errors import DermisError
 
@@ -99,16 +99,23 @@ def test_babylon_parameters_compensate_its_two_errors(name: str) -> None:
     np.testing.assert_allclose(2.0 * max(colour) / metres, d.max())  # and the widest is drawn from
     report = evaluate_export(subject, babylon, babylon.versions[-1])
     # the lobes' own error, and half a step of the fortieth that samples make
-    own = np.abs(burley_curve(d, subject.curve.energy).fraction - subject.curve.fraction).max(axis=0)
+    own = np.abs(cumulative_burley_profile(d, subject.curve.energy).fraction - subject.curve.fraction).max(
+        axis=0
+    )
     assert (report.error.edge <= 0.5 * own + 0.025).all()
     assert (report.naive_error.edge > 2.0 * report.error.edge).all()
 
 
 def test_white_profile_is_a_lobe_and_grey_one_is_wider() -> None:
     x = np.linspace(-6.0, 6.0, 49)
-    white = spiral_curve([1.0, 1.0, 1.0], 2.0, np.ones(3))
-    assert np.abs(white.edge_response(x) - burley_curve(np.ones(3), np.ones(3)).edge_response(x)).max() < 0.01
-    grey = spiral_curve([0.5, 0.5, 0.5], 2.0, np.ones(3))
+    white = spiral_profile([1.0, 1.0, 1.0], 2.0, np.ones(3))
+    assert (
+        np.abs(
+            white.edge_response(x) - cumulative_burley_profile(np.ones(3), np.ones(3)).edge_response(x)
+        ).max()
+        < 0.01
+    )
+    grey = spiral_profile([0.5, 0.5, 0.5], 2.0, np.ones(3))
     assert (grey.radius_at_fraction(0.5) > white.radius_at_fraction(0.5)).all()
 
 
@@ -171,7 +178,7 @@ def test_camera_is_that_of_the_scene() -> None:
     """Cameras are placed relative to the centre of the head, which is not the origin of the file."""
     human = load_subject("human")
     assert human.scene is not None
-    exported = page_camera(human.scene, human.scene.head.centre_mm)
+    exported = page_camera_json(human.scene, human.scene.head.centre_mm)
     centre = 1e-3 * np.array(human.scene.head.centre_mm)
     assert np.linalg.norm(centre) > 0.03
     np.testing.assert_allclose(
@@ -179,4 +186,4 @@ def test_camera_is_that_of_the_scene() -> None:
     )
     babylon = TARGETS["babylon"].with_variant(None)
     rows = babylon.parameters(human, babylon.versions[-1])
-    assert babylon._page_settings(human, rows, babylon.versions[-1])["camera"] == exported  # type: ignore[attr-defined]
+    assert babylon._page_settings_json(human, rows, babylon.versions[-1])["camera"] == exported  # type: ignore[attr-defined]

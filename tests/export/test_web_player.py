@@ -23,7 +23,7 @@ from small_head import write_head
 import dermis
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.targets.pages.html import csp_hash
-from dermis.apps.export.targets.web.build import PageContent, PageRequest, build_content
+from dermis.apps.export.targets.web.build import PageContent, PageRequest, build_page_content
 from dermis.apps.export.targets.web.sliders import Slider, scene_sliders
 from dermis.apps.export.targets.web.target import PLAYER_MODULES, page_html, player_script
 from dermis.frame.renderer import Renderer
@@ -98,7 +98,7 @@ def capture_page(scene: dermis.Scene, adapter_kind: str, sliders: tuple[Slider, 
     request = PageRequest(
         scene, sliders, SETTINGS, {adapter_kind: (SIDE,)}, os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
     )
-    content = build_content(request, lambda renderer, *_: renderers.append(renderer))
+    content = build_page_content(request, lambda renderer, *_: renderers.append(renderer))
     return CapturedPage(content, scene, renderers[0], sliders)
 
 

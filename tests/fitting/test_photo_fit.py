@@ -14,7 +14,7 @@ from dermis import DermisError, DirectionalLight, Environment, Human, Renderer, 
 from dermis.apps.inverse.fitting import light_basis
 from dermis.apps.inverse.fitting.fit import InitialGuess, fit
 from dermis.apps.inverse.fitting.inputs import fit_subject, read_photograph
-from dermis.apps.inverse.fitting.light_basis import solve_strengths
+from dermis.apps.inverse.fitting.light_basis import solve_light_strengths
 from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult, save_fit
 from dermis.apps.inverse.fitting.solve import SYSTEMATIC_SD
@@ -103,8 +103,8 @@ def test_head_without_a_path_is_not_written_as_file(person: Human) -> None:
 def test_light_is_nonnegative_and_recovered() -> None:
     random = np.random.default_rng(3)
     A, light = random.uniform(size=(60, 10)), np.append(light_basis.lobe_mixtures()[0][:, 5], 0.7)
-    assert solve_strengths(A, A @ light) == pytest.approx(light, abs=1e-4)
-    dark = solve_strengths(A, -(A @ light))
+    assert solve_light_strengths(A, A @ light) == pytest.approx(light, abs=1e-4)
+    dark = solve_light_strengths(A, -(A @ light))
     assert np.abs(dark).max() < 1e-9
 
 

@@ -10,7 +10,7 @@ import pytest
 from icc_profiles import DISPLAY_P3, SRGB_CURVE, encoded, rgb_profile
 from numpy.typing import NDArray
 
-from dermis.apps.inverse.fitting.fit import note_residual
+from dermis.apps.inverse.fitting.fit import warn_of_poor_fit
 from dermis.apps.inverse.fitting.inputs import read_photograph
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.base.errors import DermisError, DermisWarning
@@ -117,9 +117,9 @@ def test_unmixed_maps_are_oriented_like_the_photograph(tmp_path: Path) -> None:
 
 
 def test_a_large_residual_is_explained() -> None:
-    note_residual("face.jpg", 0.05)
+    warn_of_poor_fit("face.jpg", 0.05)
     with pytest.warns(
         DermisWarning,
         match=r"face\.jpg: the fit differs from it by 25 %.*does not show the head in this place",
     ):
-        note_residual("face.jpg", 0.25)
+        warn_of_poor_fit("face.jpg", 0.25)

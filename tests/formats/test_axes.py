@@ -26,12 +26,13 @@ def test_up_becomes_y_and_the_front_z_without_a_reflection(up: Axis, front: Axis
 
 def test_chosen_axes_override_those_of_the_file() -> None:
     file = Axes("z", "x")
-    assert Axes().or_stated(file) == Axes("z").or_stated(file) == file
-    assert Axes(front="y").or_stated(file) == Axes("z", "y")
-    assert Axes("y").or_stated(file) == Axes("y") and Axes("y").or_stated(file).face == "z"
-    assert Axes("y").or_stated(Axes(front="-z")) == Axes("y", "-z")
-    assert Axes("-y").or_stated(Axes(front="-z")) == Axes("-y")
+    assert Axes().fill_unknown_from(file) == Axes("z").fill_unknown_from(file) == file
+    assert Axes(front="y").fill_unknown_from(file) == Axes("z", "y")
+    assert Axes("y").fill_unknown_from(file) == Axes("y")
+    assert Axes("y").front_or_default == "z"
+    assert Axes("y").fill_unknown_from(Axes(front="-z")) == Axes("y", "-z")
+    assert Axes("-y").fill_unknown_from(Axes(front="-z")) == Axes("-y")
 
 
 def test_default_front_is_minus_y_with_z_up_and_plus_z_otherwise() -> None:
-    assert [Axes(up).face for up in ("y", "-y", "x", "z", "-z")] == ["z", "z", "z", "-y", "-y"]
+    assert [Axes(up).front_or_default for up in ("y", "-y", "x", "z", "-z")] == ["z", "z", "z", "-y", "-y"]

@@ -11,7 +11,7 @@ from eyed_head import EYE_MM, write_head
 from small_figure import write_obj
 from vrm_file import VrmFile
 
-from dermis.formats.axes import Axes, Axis, file_axis, to_y_up
+from dermis.formats.axes import Axes, Axis, head_axis_in_file, to_y_up
 from dermis.formats.load import RiggedMesh, load_rigged
 from dermis.human.person import Human
 from dermis.mesh.mesh import Mesh, build_mesh
@@ -42,7 +42,7 @@ def found(rigged: RiggedMesh) -> list[str]:
 @AXES
 def test_scan_is_rotated_to_face_the_viewer(tmp_path: Path, up: Axis, front: Axis) -> None:
     path = write_obj(tmp_path / "a.obj", in_file(person(), up, front))
-    rigged, usual = load_rigged(path, up=up), Axes(up).face
+    rigged, usual = load_rigged(path, up=up), Axes(up).front_or_default
     np.testing.assert_allclose(np.ptp(rigged.mesh.positions, axis=0), person().size_mm, rtol=1e-4)
     np.testing.assert_allclose(rigged.mesh.positions[:, 2].max(), person().positions[:, 2].max(), rtol=1e-4)
     note = f"its face looks along {front} and is turned to the viewer; --front={usual} keeps it as it is"
@@ -83,5 +83,5 @@ def test_avatar_format_defines_the_front(
 @AXES
 def test_note_names_the_axis_of_the_file(up: Axis, front: Axis) -> None:
     axes = Axes(up, front)
-    assert [file_axis(one, axes) for one in ("y", "z")] == [up, front]
-    assert file_axis("-z", axes) == front.removeprefix("-") if "-" in front else f"-{front}"
+    assert [head_axis_in_file(one, axes) for one in ("y", "z")] == [up, front]
+    assert head_axis_in_file("-z", axes) == front.removeprefix("-") if "-" in front else f"-{front}"

@@ -135,7 +135,7 @@ def test_normals_change_with_targets(rigged: Head, tmp_path: Path) -> None:
 def test_four_bones_minimise_the_error() -> None:
     """Chosen bones are compared with the four largest weights, by squared distance over a few rotations."""
     points = DeformableMesh(Human().head())
-    rig, finer = points.rig, points.refinement
+    rig, finer = points.rig, points.subdivision_matrix
     assert finer is not None and rig.skeleton is not None
     bone, bone_weight = point_bone_influences(rig, finer)
     assert bone_weight.min() >= 0 and np.abs(bone_weight.sum(axis=1) - 1).max() < 1e-12

@@ -38,7 +38,7 @@ def targets_of(path: Path) -> MorphTargets:
 
 
 def displacements(targets: MorphTargets, name: str) -> np.ndarray:
-    dense, rows = np.zeros((1000, 3)), targets.rows(targets.names.index(name))
+    dense, rows = np.zeros((1000, 3)), targets.displacement_rows(targets.names.index(name))
     dense[targets.point[rows]] = targets.delta_mm[rows]
     return dense
 

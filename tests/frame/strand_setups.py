@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.human.hair.guides import bind_guides
-from dermis.human.hair.head_hair import PART_DTYPE
+from dermis.human.hair.head_hair import HAIR_PARAMETERS_DTYPE
 from dermis.mesh.geometry import split_quads
 from dermis.mesh.groom import GUIDE_KNOTS, Groom, StrandRoots
 from dermis.mesh.head import Head
@@ -75,7 +75,7 @@ def woolly(
         along_mm=np.zeros(count, np.float32),
         part=np.zeros(count, np.int32),
     )
-    part = np.zeros(1, PART_DTYPE)
+    part = np.zeros(1, HAIR_PARAMETERS_DTYPE)
     for name in ("density", "length_mm", "guide_mm", "clump_start_mm", "pitch_mm", "hairs_per_strand"):
         part[name] = 1.0
     part["radius_mm"], part["cover"], part["dark"] = radius_mm, cover, absorption

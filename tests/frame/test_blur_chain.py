@@ -12,7 +12,7 @@ from dermis.atlas.build import build_atlas
 from dermis.frame.features.atlas.textures import AtlasMip, _upload_coarser
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion import combine
-from dermis.frame.features.diffusion.kernels import add_intermediate_levels, chain_cost
+from dermis.frame.features.diffusion.kernels import add_intermediate_levels, blur_chain_cost
 from dermis.frame.features.diffusion.pyramid import Blur, choose_halvings, make_levels
 from dermis.frame.programs import FLOAT_TEXEL_FORMAT
 from dermis.gpu import CommandList, Device, download, make_texture, upload
@@ -26,9 +26,9 @@ SIX = load_profile("gpu-gems-3").variance_mm2[1:]
 @pytest.mark.parametrize("texels_per_mm", [1.5, 3.0, 6.0])
 def test_one_gaussian_costs_less_than_six(texels_per_mm: float) -> None:
     """Compare the number of texel reads; a single blur costs two to five times as much."""
-    six, at_once = (chain_cost(list(v), texels_per_mm, MOST) for v in (SIX, SIX[-1:]))
+    six, at_once = (blur_chain_cost(list(v), texels_per_mm, MOST) for v in (SIX, SIX[-1:]))
     led, steps = add_intermediate_levels(SIX[-1:], texels_per_mm, MOST)
-    assert chain_cost(list(led), texels_per_mm, MOST) < min(six, 0.5 * at_once)
+    assert blur_chain_cost(list(led), texels_per_mm, MOST) < min(six, 0.5 * at_once)
     assert led[-1] == SIX[-1] and steps == tuple(range(1, len(led)))
 
 

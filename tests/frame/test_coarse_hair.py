@@ -53,7 +53,7 @@ def test_brightness_does_not_depend_on_how_many_hairs_are_drawn(
     for share in (1, 4):
         monkeypatch.setattr(
             drawing,
-            "drawn_counts",
+            "drawn_strand_counts",
             lambda made, _, share=share: made.coarse._replace(hairs=made.coarse.hairs // share),
         )
         renderer.clear_cache()
@@ -68,13 +68,13 @@ def test_brightness_does_not_depend_on_how_many_hairs_are_drawn(
 def test_coarse_hairs_are_drawn_as_wide_as_pixels_are(renderer: Renderer) -> None:
     """Short hairs are drawn narrower, because few wide ones look like dots."""
     head, device = wool(20_000, 1.0), renderer.device
-    coarse, none = hairs.coarse_counts(device, head), hairs.StrandCounts(0, 2)
+    coarse, none = hairs.max_coarse_counts(device, head), hairs.StrandCounts(0, 2)
     capacity = hairs.strand_capacity(none, coarse)
     buffers = hairs.make_strand_buffers(device, capacity, capacity)
     tables = hairs.make_strand_tables(device, head, coarse, buffers, None)
-    near, far = (hairs.drawn_counts(tables, pixel_mm).hairs for pixel_mm in (0.01, 0.5))
+    near, far = (hairs.drawn_strand_counts(tables, pixel_mm).hairs for pixel_mm in (0.01, 0.5))
     assert near == far == 20_000
-    far = hairs.drawn_counts(replace(tables, length_mm=90.0, shortest_mm=90.0), 0.5).hairs
+    far = hairs.drawn_strand_counts(replace(tables, length_mm=90.0, shortest_mm=90.0), 0.5).hairs
     assert hairs._MIN_DRAWN_STRANDS <= far < 12_000
     assert tables.coarse == (20_000, 5) and tables.fine.hairs == 0
 

@@ -33,7 +33,7 @@ def blur(
 ) -> list[Floats]:
     """Return the blurred levels of (n, n, 3) light, or of (n, n, 4) light with its coverage."""
     size = len(source)
-    most = len(atlas.mips_for(edge.get("edge", "repeated"))) - 1
+    most = len(atlas.mips_for_blurs(edge.get("edge", "repeated"))) - 1
     halvings = choose_halvings(variances, atlas.median_texels_per_mm, most)
     space = make_levels(device, size, (halvings,), FLOAT_TEXEL_FORMAT)
     upload(device, space.stacks[0], np.dstack([source, np.ones((size, size))])[..., :4])

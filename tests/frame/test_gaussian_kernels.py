@@ -13,7 +13,7 @@ from dermis.frame.features.diffusion.kernels import (
     KERNEL_TRUNCATION_SIGMAS,
     MAX_TABLE_VARIANCE,
     ROWS_PER_UNIT_VARIANCE,
-    kernel_table,
+    kernel_ratio_table,
     taps_per_side,
 )
 
@@ -24,7 +24,7 @@ def kernel(variance: float) -> NDArray[np.float64]:
     """Return the (2 taps + 1,) normalised weights for a variance [step^2], as the shader finds them."""
     taps = taps_per_side(variance)
     row = variance * ROWS_PER_UNIT_VARIANCE
-    low, high = kernel_table().astype(np.float64)[[int(row), int(row) + 1], taps]
+    low, high = kernel_ratio_table().astype(np.float64)[[int(row), int(row) + 1], taps]
     n = np.arange(-taps, taps + 1)
     weights = (low + (high - low) * (row % 1.0)) ** (n**2)
     return np.asarray(weights / weights.sum())
@@ -59,7 +59,7 @@ def test_wide_kernel_matches_the_gaussian(variance: float) -> None:
 
 def test_table_covers_the_widest_kernel() -> None:
     """The last two rows of the table are read too, and each column used there holds a ratio in 0..1."""
-    table = kernel_table()
+    table = kernel_ratio_table()
     assert table.shape == (
         MAX_TABLE_VARIANCE * ROWS_PER_UNIT_VARIANCE + 2,
         taps_per_side(MAX_TABLE_VARIANCE) + 1,

@@ -10,7 +10,7 @@ from dermis.apps.validation.comparisons.person_views import VIEWS, view_scene
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.human.person import Human
-from dermis.mesh.strands import Roots, cover_of_points
+from dermis.mesh.strands import Roots, hair_cover_of_points
 from dermis.scene.environment import Environment
 from dermis.scene.settings import Settings
 
@@ -21,7 +21,7 @@ def test_cover_is_the_area_of_strands_per_area_of_skin() -> None:
     mesh = sheet()
     quads = len(mesh.quads)
     roots = Roots(np.arange(quads, dtype=np.int32), np.full((quads, 2), 0.5, np.float32))
-    cover = cover_of_points(mesh, roots, np.full(quads, 10.0))
+    cover = hair_cover_of_points(mesh, roots, np.full(quads, 10.0))
     area = 0.5 * 10.0  # half of the area from the side [mm2]
     assert cover.shape == (len(mesh.points_mm),)
     inner = np.abs(mesh.points_mm[:, :2]).max(axis=1) < 0.49 * SIDE_MM

@@ -151,7 +151,7 @@ def test_thickness_of_a_slab_and_a_ball_is_exact(renderer: Renderer) -> None:
 
 def test_thickness_ends_where_no_light_passes(renderer: Renderer) -> None:
     """The thickness of a wedge is exact up to the reach of the light."""
-    head = head_of(wedge(60.0, 1.0, 16.0, cells=8))
+    head = head_of(wedge(60.0, 1.0, 16.0, cells_per_side=8))
     scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=80.0))
     got = found(renderer, scene, "thickness", seams="stitch", atlas=256, size=(80, 80))["thickness"]
     row = got[40, 12:68].astype(float)

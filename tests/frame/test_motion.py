@@ -49,7 +49,7 @@ def atlas(head: Head) -> Atlas:
 def spread(device: Device, head: Head, atlas: Atlas, motion: MotionBytes, light: Floats) -> list[Floats]:
     """Return the levels of (n, n, 1) light on a head in motion, each at its resolution."""
     made, textures = make_shape(device, shape_tables(device, head)), upload_atlas(device, atlas)
-    most = len(textures.mips_for("repeated")) - 1
+    most = len(textures.mips_for_blurs("repeated")) - 1
     halvings = choose_halvings(BLURRED, textures.median_texels_per_mm, most)
     space = make_levels(device, SIDE, (halvings,), FLOAT_TEXEL_FORMAT)
     upload(device, space.stacks[0], np.dstack([light, light, light, atlas.lit[..., None]]))

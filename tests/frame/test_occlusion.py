@@ -14,7 +14,7 @@ from tolerances import LIT, OCCLUSION
 from twins import surface
 
 from dermis.atlas.build import build_atlas, cached_atlas
-from dermis.frame.features.occlusion.baked import bake_occlusion, fill_gaps
+from dermis.frame.features.occlusion.baked import bake_occlusion, fill_occlusion_gaps
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.mesh.geometry import fibonacci_sphere
@@ -79,7 +79,7 @@ def test_vertex_occlusion_agrees_with_the_atlas(renderer: Renderer) -> None:
 def test_the_map_has_no_gaps() -> None:
     rows = np.full((5, 4), np.nan, np.float32)
     rows[1, 1], rows[2, 3], rows[4] = 0.25, 0.75, [0.1, 0.2, 0.3, np.nan]
-    made = fill_gaps(rows, 4)
+    made = fill_occlusion_gaps(rows, 4)
     assert made.shape == (6, 4) and np.isfinite(made).all()
     assert made[0, 0] == made[1, 1] == np.float32(0.25) and made[3, 3] == np.float32(0.75)
     assert np.array_equal(made[3], made[4]) and np.allclose(made[5], [0.1, 0.2, 0.3, 1.0])

@@ -194,7 +194,7 @@ def test_the_finest_mesh_is_painted_as_the_coarsest(
     """The finest mesh has the largest number of triangles."""
     fine = Human().head(subdivide=3)
     finest = painted_surface(fine.mesh, fine.control.stencils)
-    assert finest.count == 16 * surface.count
+    assert finest.triangle_count == 16 * surface.triangle_count
     both = [painted(device, one).colour for one in (surface, finest)]
     assert both[0] is not None and both[1] is not None
     apart = np.abs(both[0] - both[1]).max(axis=-1)[covered(head)]
@@ -204,7 +204,7 @@ def test_the_finest_mesh_is_painted_as_the_coarsest(
 def test_more_triangles_than_have_numbers_are_refused(
     device: Device, surface: PaintedSurface, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(given, "_MAX_PAINTED_TRIANGLES", surface.count)
+    monkeypatch.setattr(given, "_MAX_PAINTED_TRIANGLES", surface.triangle_count)
     with pytest.raises(DermisError, match="Subdivide less"):
         painted(device, surface)
 

@@ -19,7 +19,7 @@ from dermis.frame.techniques.pre_integrated import (
     penumbra_width_mm,
     scattered_cosine,
     shadow_edge_row,
-    sphere_table,
+    sphere_irradiance_table,
 )
 from dermis.gpu import download
 from dermis.mesh.mesh import build_mesh
@@ -31,7 +31,7 @@ from dermis.scene.lights import DirectionalLight
 
 Floats = NDArray[np.float64]
 PROFILE = load_profile("gpu-gems-3")
-SPHERES = sphere_table(PROFILE)
+SPHERES = sphere_irradiance_table(PROFILE)
 COSINES = np.linspace(-1, 1, SPHERES.shape[1])
 CURVATURES = np.linspace(0, MAX_CURVATURE_PER_MM, len(SPHERES))
 
@@ -66,7 +66,7 @@ def test_flat_skin_is_unspread() -> None:
 def test_first_curved_row_follows_from_the_flat_one() -> None:
     """At the terminator it is a Gaussian average of a ramp: curvature times sigma / sqrt(2 pi)."""
     one = GaussianSum("one", np.array([1.0]), np.ones((1, 1)))
-    rows = sphere_table(one)[:4, COSINES == 0.0, 0].ravel()
+    rows = sphere_irradiance_table(one)[:4, COSINES == 0.0, 0].ravel()
     assert np.allclose(rows, CURVATURES[:4] / np.sqrt(2 * np.pi), rtol=0.01)
 
 

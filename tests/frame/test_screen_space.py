@@ -10,7 +10,12 @@ import pytest
 from numpy.typing import NDArray
 from tolerances import FLAT, TWIN
 
-from dermis.frame.techniques.screen_space import draw, kernel_table, make_kernel, make_subsurface_layers
+from dermis.frame.techniques.screen_space import (
+    draw,
+    kernel_integral_table,
+    make_kernel,
+    make_subsurface_layers,
+)
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.optics.fits.separable import SeparableKernel, preintegrated_kernel
 from dermis.optics.profiles import load_profile
@@ -19,7 +24,7 @@ from dermis.scene.camera import Window
 Floats = NDArray[np.float64]
 PROFILE = load_profile("gpu-gems-3")
 KERNEL = preintegrated_kernel(PROFILE)
-TABLE, REACH = kernel_table(KERNEL)
+TABLE, REACH = kernel_integral_table(KERNEL)
 TAPS, STEEPEST = 16, 4.0
 
 

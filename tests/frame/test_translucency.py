@@ -33,7 +33,7 @@ from dermis.frame.features.translucency import passes as translucency_weights
 from dermis.frame.features.translucency.build import (
     make_pair_buffers,
     make_translucency_buffers,
-    with_profile,
+    with_profile_weights,
 )
 from dermis.frame.features.translucency.pair_search.search import search_pairs
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
@@ -84,7 +84,7 @@ class Thin:
 @pytest.fixture(scope="module")
 def thin(device: Device) -> Thin:
     """Return the translucent pairs of a small wedge."""
-    mesh = wedge(12.0, 1.0, 4.0, cells=2)
+    mesh = wedge(12.0, 1.0, 4.0, cells_per_side=2)
     atlas = build_atlas(mesh, 64, "stitched")
     surface = surface_of(device, mesh, atlas)
     pairs = pairs_on(device, surface, atlas, divide_into_cells(atlas, SIGMA))
@@ -114,7 +114,7 @@ def thin(device: Device) -> Thin:
 
 def weighed(device: Device, pairs: PairBuffers, surface: dict[str, Any]) -> Translucency:
     """Return pairs on a surface with the weights of a profile."""
-    made = with_profile(
+    made = with_profile_weights(
         device, make_translucency_buffers(device, surface, pairs), BLURRED.variance_mm2, BLURRED.weight
     )
     frame = CommandList(device)
@@ -317,7 +317,7 @@ def test_light_of_several_sources_adds_up(renderer: Renderer) -> None:
 
 def test_a_wedge_fades_without_a_step(renderer: Renderer) -> None:
     """From 0.5 to 20 mm, light never increases with thickness and stays close to that of a slab."""
-    points, light = front(renderer, wedge(60.0, 0.5, 20.0, cells=8), atlas=256)
+    points, light = front(renderer, wedge(60.0, 0.5, 20.0, cells_per_side=8), atlas=256)
     middle = np.abs(points[:, 1]) < 15.0
     order = np.argsort(points[middle, 0])
     x, row = points[middle, 0][order] + 30.0, light[middle][order]
@@ -370,7 +370,7 @@ def test_a_rolled_rim_glows_evenly(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("angle", [10.0, 45.0])
 def test_wedge_transmits_light_along_straight_lines(renderer: Renderer, angle: float) -> None:
-    mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells=16)
+    mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells_per_side=16)
     points, normals, light = scattered(renderer, mesh, atlas=512)
     half = np.radians(angle / 2)
     dark = normals @ [-np.sin(half), 0.0, np.cos(half)] > 0.99

@@ -18,7 +18,7 @@ from dermis.frame import programs
 from dermis.frame.features.diffusion.pyramid import Blur, make_levels
 from dermis.frame.features.translucency import passes as translucency
 from dermis.frame.features.translucency import passes as translucency_weights
-from dermis.frame.features.translucency.build import make_translucency_buffers, with_profile
+from dermis.frame.features.translucency.build import make_translucency_buffers, with_profile_weights
 from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.programs import FLOAT_TEXEL_FORMAT
 from dermis.gpu import CommandList, Constants, Device, download, make_texture, upload
@@ -53,14 +53,14 @@ class Weighed:
 @pytest.fixture(scope="module")
 def weighed(device: Device) -> Weighed:
     """Return the pairs of a small wedge with their weights."""
-    return weighed_of(device, wedge(12.0, 1.0, 4.0, cells=2))
+    return weighed_of(device, wedge(12.0, 1.0, 4.0, cells_per_side=2))
 
 
 def weighed_of(device: Device, mesh: Mesh) -> Weighed:
     atlas = build_atlas(mesh, 64, "stitched")
     surface = surface_of(device, mesh, atlas)
     pairs = pairs_on(device, surface, atlas, divide_into_cells(atlas, float(np.sqrt(VARIANCE[-1]))))
-    thin = with_profile(device, make_translucency_buffers(device, surface, pairs), VARIANCE, WEIGHT)
+    thin = with_profile_weights(device, make_translucency_buffers(device, surface, pairs), VARIANCE, WEIGHT)
     frame = CommandList(device)
     translucency_weights.draw_weights(frame, thin)
     frame.submit()

@@ -80,7 +80,7 @@ def shown(layers: ViewLayers, renderer: Renderer, head: Head, camera: Camera, sa
     draw_layers(frame, "nearest", layers, inputs.camera_views, inputs.resources.head)
     frame.submit()
     made = [download(renderer.device, layers.texture, layer=k) for k in range(layers.count)]
-    return made, inputs.camera_views.matrices(SIZE)
+    return made, inputs.camera_views.sample_matrices(SIZE)
 
 
 SOUP = soup(600)
@@ -150,9 +150,11 @@ def test_depth_is_quantised_as_stated() -> None:
     seen, little = 3.0 * eye, 1e-3
     at_far, before = np.array([[1, 2, far - 5, 1], [1, 2, far - 5 - little, 1]])
     step = (seen[2] @ before) / (seen[3] @ before) - (seen[2] @ at_far) / (seen[3] @ at_far)
-    assert visibility_buffer._depth_range_mm(seen) == pytest.approx(little / step, rel=1e-4)
+    assert visibility_buffer._max_distance_per_depth_mm(seen) == pytest.approx(little / step, rel=1e-4)
     parallel = parallel_shadow_view(np.array([0.0, 0.6, -0.8]), BALL.mesh.outline, 64)
-    assert visibility_buffer._depth_range_mm(parallel.clip) == pytest.approx(parallel.far - parallel.near)
+    assert visibility_buffer._max_distance_per_depth_mm(parallel.clip) == pytest.approx(
+        parallel.far - parallel.near
+    )
 
 
 @pytest.mark.filterwarnings("ignore:camera. expected a position outside the head")

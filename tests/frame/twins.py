@@ -13,7 +13,7 @@ from dermis.frame.features.diffusion.kernels import (
     CHAINED_TRUNCATION_SIGMAS,
     MAX_TABLE_VARIANCE,
     ROWS_PER_UNIT_VARIANCE,
-    kernel_table,
+    kernel_ratio_table,
 )
 from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
@@ -35,7 +35,7 @@ def _table_ratio(relative: Floats) -> Floats:
     """Interpolate the kernel table between its rows."""
     taps = np.ceil(CHAINED_TRUNCATION_SIGMAS * np.sqrt(relative)).astype(int)
     row = relative * ROWS_PER_UNIT_VARIANCE
-    table = kernel_table().astype(np.float64)
+    table = kernel_ratio_table().astype(np.float64)
     low, high = table[row.astype(int), taps], table[row.astype(int) + 1, taps]
     return np.asarray(low + (high - low) * (row % 1))
 

@@ -16,7 +16,7 @@ from dermis.gpu.bind_groups import ResourceCache, resource_key
 from dermis.gpu.command_list import Timing
 from dermis.gpu.failures import converted_gpu_failures
 from dermis.gpu.textures import half_store_rounding, texture_from_array
-from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
+from dermis.gpu.uniforms import UNIFORM_CHUNK_BYTES, Uniforms
 
 SIZE = (37, 21)  # no multiple of a tile
 
@@ -122,7 +122,7 @@ def test_uniform_memory_is_reused(device: Device, scale: ComputeProgram) -> None
 
 
 def test_one_frame_may_have_more_uniforms_than_a_buffer_holds(device: Device, scale: ComputeProgram) -> None:
-    count = CHUNK_BYTES // 256 + 3
+    count = UNIFORM_CHUNK_BYTES // 256 + 3
     image = texture_from_array(device, np.ones((1, 1), np.float32), "r32float")
     frame, made = CommandList(device), [make_texture(device, (1, 1), "r32float") for _ in range(count)]
     for value, into in enumerate(made):

@@ -6,7 +6,7 @@ import cffi
 import pytest
 
 from dermis.gpu import adapters as native_types
-from dermis.gpu.adapters import register_types
+from dermis.gpu.adapters import register_c_types
 
 HEADER = """
 typedef enum Colour { Red, Green, Force = 0x7FFFFFFF } Colour;
@@ -34,7 +34,7 @@ def test_types_equal_those_of_cffi() -> None:
     told, plain = cffi.FFI(), cffi.FFI()
     for ffi in (told, plain):
         ffi.cdef(HEADER)
-    assert register_types(told) > len(ASKED)
+    assert register_c_types(told) > len(ASKED)
     assert set(ASKED) <= set(told._parsed_types)  # type: ignore[attr-defined]
     for name in ASKED:
         a, b = told.typeof(name), plain.typeof(name)
@@ -64,7 +64,7 @@ def test_wgpu_receives_the_types_it_requests() -> None:
             *native_types._callback_types(declared),
         )
     }
-    assert register_types(ffi) == len(told) and told <= set(ffi._parsed_types)
+    assert register_c_types(ffi) == len(told) and told <= set(ffi._parsed_types)
     assert {"WGPUBindGroupEntry *", "WGPUBindGroupEntry[]", "WGPUExtent3D *", "WGPUCommandBuffer[]"} <= told
     assert "void(WGPUDevice const *, WGPUErrorType, WGPUStringView, void *, void *)" in told
     assert "void(WGPUMapAsyncStatus, WGPUStringView, void *, void *)" in told
@@ -72,4 +72,4 @@ def test_wgpu_receives_the_types_it_requests() -> None:
 
 @pytest.mark.parametrize("broken", [object(), None])
 def test_other_cffi_instances_are_unchanged(broken: object) -> None:
-    assert register_types(broken) == 0
+    assert register_c_types(broken) == 0

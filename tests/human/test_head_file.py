@@ -126,7 +126,7 @@ def test_the_persons_own_eyes_stand_where_the_written_ones_are(tmp_path: Path) -
     back = load_head(written(tmp_path, head), subdivide=0)
     assert head.eyes is not None and back.eyes is not None and back.bones == head.bones
     for pose in (Pose(), Pose(bones={"eye.L": (4.0, 12.0, 0.0), "head": (5.0, 10.0, 0.0)})):
-        (own, found) = (one.eyes.frames(one.control, pose.motion(one.control)) for one in (head, back))
+        (own, found) = (one.eyes.eye_matrices(one.control, pose.motion(one.control)) for one in (head, back))
         places = np.linalg.inv(own)[:, :3, 3]
         np.testing.assert_allclose(np.linalg.inv(found)[:, :3, 3], places, atol=0.3)
         ways = [one[:, 2, :3] / np.linalg.norm(one[:, 2, :3], axis=1, keepdims=True) for one in (own, found)]

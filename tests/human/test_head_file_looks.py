@@ -20,7 +20,7 @@ from dermis.gpu import Device
 from dermis.human.hair.look import HairLook
 from dermis.human.person_file import write_person_glb
 from dermis.mesh.eye_look import EyeLook
-from dermis.mesh.eyeball import LIMBUS_MM, EyeTextures, eye_uv, profile_mm
+from dermis.mesh.eyeball import LIMBUS_MM, EyeTextures, eye_uv, surface_distance_mm
 
 LOOK = EyeLook(eumelanin=0.1, pupil_mm=2.5, redness=0.0, seed=3)
 PERSON = replace(Human.drawn(7), eyes=LOOK)
@@ -49,8 +49,8 @@ def primitive(document: Document, name: str) -> dict[str, Any]:
 def texel(picture: np.ndarray, off_mm: float, turn: float) -> np.ndarray:
     """Return the texel of an eye's picture at a distance from the axis."""
     angle = np.linspace(0.0, 0.5 * np.pi, 2000)
-    angle = np.interp(off_mm, profile_mm(angle) * np.sin(angle), angle)
-    place = profile_mm(angle) * np.array(
+    angle = np.interp(off_mm, surface_distance_mm(angle) * np.sin(angle), angle)
+    place = surface_distance_mm(angle) * np.array(
         [np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)]
     )
     u, v = (eye_uv(place[None])[0] * len(picture)).astype(int)
@@ -116,7 +116,7 @@ def test_hairs_are_as_light_as_their_pigment() -> None:
         head = Human(hair=look).head(subdivide=0)
         assert head.strands is not None
         return np.asarray(
-            FibreTubes.from_strands(head.strands, head.mesh, 5000, 5).colours()[0].mean(axis=(0, 1))
+            FibreTubes.from_strands(head.strands, head.mesh, 5000, 5).palette_and_uv()[0].mean(axis=(0, 1))
         )
 
     black, brown, blond = (colour(HairLook(eumelanin=e, pheomelanin=0.0)) for e in (8.0, 1.3, 0.3))

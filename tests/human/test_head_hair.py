@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis import Human, Pose
 from dermis.base.errors import DermisError
 from dermis.human.hair import density, groom
-from dermis.human.hair.head_hair import MAX_PER_CM2
+from dermis.human.hair.head_hair import MAX_HAIRS_PER_CM2
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.root_finder import RootFinder
 from dermis.human.hair.skin_surface import SkinSurface
@@ -83,7 +83,7 @@ def test_fewer_hairs_are_widened_to_represent_all(relative: float) -> None:
     inside = np.isin(strands.roots.quad, quads)
     area = density.quad_areas_cm2(head.mesh, quads.astype(np.int64)).sum()
     assert strands.radius_mm[inside, 0].sum() / area == pytest.approx(
-        0.034 * MAX_PER_CM2 * relative, rel=0.12
+        0.034 * MAX_HAIRS_PER_CM2 * relative, rel=0.12
     )
 
 
@@ -151,7 +151,7 @@ def test_brows_lie_on_all_skin(monkeypatch: pytest.MonkeyPatch, seed: int) -> No
         return np.arange(len(root_finder.subdivided_mesh.positions))
 
     some = Human.drawn(seed).head().strands
-    monkeypatch.setattr(groom, "skin_vertices_near_hair", every)
+    monkeypatch.setattr(groom, "skin_vertices_near_brows", every)
     whole = Human.drawn(seed).head().strands
     assert some is not None and whole is not None and np.array_equal(some.knots_mm, whole.knots_mm)
 

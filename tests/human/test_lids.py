@@ -56,7 +56,7 @@ def rings(seed: int | None, weights: Mapping[str, float]) -> tuple[Floats, Float
     assert head.eyes is not None
     motion = Pose(weights).motion(head.control)
     points = head.control.points_mm(motion)[lid_rings()[0]]
-    frame = head.eyes.frames(head.control, motion)[0]
+    frame = head.eyes.eye_matrices(head.control, motion)[0]
     own = points @ frame[:3, :3].T + frame[:3, 3]
     far, surface = radial_distances_mm(own, np.array([0.0, 0.0, 1.0]))
     return own, far - surface
@@ -132,7 +132,7 @@ def test_lids_fit_other_people() -> None:
     motion = Pose({"eyeBlinkLeft": 0.5}, positions_mm=other.positions_mm).motion(head.control)
     assert head.eyes is not None
     points = head.control.points_mm(motion)[lid_rings()[0]]
-    frame = head.eyes.frames(head.control, motion)[0]
+    frame = head.eyes.eye_matrices(head.control, motion)[0]
     far, surface = radial_distances_mm(points @ frame[:3, :3].T + frame[:3, 3], np.array([0.0, 0.0, 1.0]))
     assert (far - surface)[ON_BALL, CREST].min() > 0.0
 
@@ -144,7 +144,7 @@ def test_targets_are_corrected_wherever_they_move_a_lid() -> None:
     found, resting = fit_lid_targets(places, sockets), fit_lids(places, sockets)
     targets = expression_targets()
     for name in ("eyeBlinkLeft", "eyeLookOutRight", "eyeLookUpLeft", "eyeWideRight"):
-        part, moved = targets.rows(targets.index[name]), places.copy()
+        part, moved = targets.displacement_rows(targets.index[name]), places.copy()
         point = targets.point[part]
         moved[point] += targets.delta_mm[part]
         drawn = fit_lids(moved, sockets, "Blink" in name, gaze_axes().get(name, lids.REST_GAZE))

@@ -9,7 +9,7 @@ import pytest
 from tolerances import SITE_MEDIAN
 
 from dermis import DermisError, Human
-from dermis.apps.validation.people.drawn import DrawnPeople, draw_people
+from dermis.apps.validation.people.drawn import DrawnPeople, draw_random_people
 from dermis.apps.validation.people.inversion import model_lab
 from dermis.base.tables import Rows, read_rows
 from dermis.human.skin.colours import skin_colour_table
@@ -36,7 +36,7 @@ def cells() -> Rows:
 
 @pytest.fixture(scope="module")
 def drawn() -> dict[str, DrawnPeople]:
-    return {group: draw_people(group, range(120)) for group in ("caucasian", "south asian", "african")}
+    return {group: draw_random_people(group, range(120)) for group in ("caucasian", "south asian", "african")}
 
 
 def ita(person: Human) -> float:

@@ -209,4 +209,4 @@ def test_sizes_of_tables_are_theirs() -> None:
         "knots": folds.knots,
         "edges": face.hairline_heights(),
     }
-    assert face.table_sizes() == {name: len(table) for name, table in tables.items()}
+    assert face.paint_table_sizes() == {name: len(table) for name, table in tables.items()}

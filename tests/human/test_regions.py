@@ -23,7 +23,7 @@ from dermis.human.regions.average import (
     average_skin,
     classify_surface,
     landmark_indices,
-    part_quads,
+    quads_of_parts,
 )
 from dermis.human.regions.labels import average_landmarks, known_landmarks, label_texels, warp_to_average
 from dermis.human.regions.region_table import REGIONS, RegionTable, load_region_table
@@ -135,7 +135,7 @@ def test_landmarks_of_the_human_are_pairs_in_their_places() -> None:
 def test_landmarks_of_the_human_lie_on_its_outer_skin() -> None:
     mesh = average_head().mesh
     seen = np.flatnonzero(mesh.material == 0)
-    outer = seen[~np.isin(seen // 2, part_quads()["mouth"])]
+    outer = seen[~np.isin(seen // 2, quads_of_parts()["mouth"])]
     assert set(landmark_indices().values()) <= set(mesh.point[mesh.triangles[outer]].ravel().tolist())
 
 
@@ -184,9 +184,9 @@ def test_parts_are_what_the_tool_finds(sample_folder: Path, monkeypatch: pytest.
     import human_parts
 
     found = human_parts.parts(sample_folder / "heads" / "human" / "masks")
-    assert found.keys() == part_quads().keys()
+    assert found.keys() == quads_of_parts().keys()
     for name, quads in found.items():
-        np.testing.assert_array_equal(part_quads()[name], quads)
+        np.testing.assert_array_equal(quads_of_parts()[name], quads)
 
 
 def test_a_head_with_labels_keeps_them() -> None:

@@ -28,7 +28,12 @@ from dermis.base.errors import DermisWarning
 from dermis.formats.maps import load_maps
 from dermis.images.codecs import encode_png
 from dermis.images.colour import decode_srgb, encode_srgb, encode_srgb8
-from dermis.images.colour_spaces import adobe_rgb, coded_space, gamma_space, profile_space
+from dermis.images.colour_spaces import (
+    adobe_rgb,
+    coded_colour_space,
+    gamma_colour_space,
+    profile_colour_space,
+)
 from dermis.images.io import EmbeddedPicture, read_colours, read_image
 
 Levels = NDArray[Any]
@@ -42,7 +47,7 @@ def levels() -> Levels:
 
 def linear(path: Path) -> NDArray[np.float32]:
     pixels, space = read_colours(path)
-    return space.linear(pixels)
+    return space.to_linear(pixels)
 
 
 def by_littlecms(levels: Levels, profile: bytes) -> Levels:
@@ -99,30 +104,30 @@ def test_16_bits_with_a_profile_keep_their_depth(tmp_path: Path) -> None:
     with pytest.warns(DermisWarning, match="from Wide to sRGB$"):
         colours = load_maps(colour=path).colour
     assert colours is not None and len(np.unique(colours[..., 1])) == 64
-    expected = profile_space(rgb_profile("Wide", PROPHOTO, 1.8))
+    expected = profile_colour_space(rgb_profile("Wide", PROPHOTO, 1.8))
     assert expected is not None
-    np.testing.assert_allclose(colours, expected.linear(deep), rtol=1e-6)
+    np.testing.assert_allclose(colours, expected.to_linear(deep), rtol=1e-6)
 
 
 def test_neutral_stays_neutral_in_every_space(levels: Levels) -> None:
     spaces = [
         adobe_rgb(),
-        coded_space(12, 13),
-        coded_space(9, 1),
-        gamma_space("", None, (1, 0, 0, 1, 0, 0, 1 / 3, 1 / 3)),
+        coded_colour_space(12, 13),
+        coded_colour_space(9, 1),
+        gamma_colour_space("", None, (1, 0, 0, 1, 0, 0, 1 / 3, 1 / 3)),
     ]
     for space in spaces:
         assert space is not None and not space.is_default
-        grey = space.linear(np.full((1, 1, 3), 0.5, np.float32))
+        grey = space.to_linear(np.full((1, 1, 3), 0.5, np.float32))
         np.testing.assert_allclose(grey, 0.5, rtol=2e-4)
 
 
 def test_known_display_p3_colour_is_converted() -> None:
     """Check P3's red in linear sRGB: (1.2249, -0.0420, -0.0197), as CSS Color 4 converts it."""
-    space = coded_space(12, 13)
+    space = coded_colour_space(12, 13)
     assert space is not None and space.to_rec709 is not None
     np.testing.assert_allclose(space.to_rec709[:, 0], (1.2249, -0.0420, -0.0197), atol=2e-4)
-    np.testing.assert_array_equal(space.linear(np.uint8([[[255, 0, 0]]])), [[[1.0, 0.0, 0.0]]])
+    np.testing.assert_array_equal(space.to_linear(np.uint8([[[255, 0, 0]]])), [[[1.0, 0.0, 0.0]]])
 
 
 def test_grey_with_profile_is_converted(tmp_path: Path, levels: Levels) -> None:
@@ -253,6 +258,6 @@ def test_avif_states_code_points(tmp_path: Path) -> None:
 
 
 def test_srgb_levels_are_decoded_unchanged(levels: Levels) -> None:
-    space = gamma_space("", None, None)
+    space = gamma_colour_space("", None, None)
     assert space.is_default
-    np.testing.assert_allclose(encode_srgb(space.linear(levels)) * 255, levels, atol=1e-3)
+    np.testing.assert_allclose(encode_srgb(space.to_linear(levels)) * 255, levels, atol=1e-3)

@@ -36,11 +36,11 @@ INKS = np.random.default_rng(6).integers(0, 256, (16, 32, 4)).astype(np.uint8)
 
 def linear(path: Any) -> Any:
     pixels, space = read_colours(path)
-    return space.linear(pixels)
+    return space.to_linear(pixels)
 
 
 def photograph(path: Any) -> Any:
-    return read_colours(path, upright=True)[0]
+    return read_colours(path, apply_exif_orientation=True)[0]
 
 
 def embedded(path: Path) -> Any:

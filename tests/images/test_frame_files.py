@@ -38,7 +38,7 @@ def test_invalid_patterns_are_refused(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize("name", ["%03d.png", "%d.exr"])
 def test_complete_frames_of_the_same_run_are_kept(tmp_path: Path, name: str) -> None:
     files = _files(tmp_path, name)
-    files.start("a smile")
+    files.start_sequence("a smile")
     assert files.missing_frames(range(4), SIZE) == [0, 1, 2, 3]
     for k in range(4):
         if name.endswith("png"):
@@ -48,32 +48,32 @@ def test_complete_frames_of_the_same_run_are_kept(tmp_path: Path, name: str) -> 
     data = files.path(2).read_bytes()
     files.path(2).write_bytes(data[: 3 * len(data) // 4])
     files.path(0).write_bytes(b"")
-    files.start("a smile")
+    files.start_sequence("a smile")
     assert files.missing_frames(range(5), SIZE) == [0, 2, 4]
     assert files.missing_frames([1, 3], (4, 6)) == [1, 3]
 
 
 def test_frames_of_other_runs_are_drawn_again(tmp_path: Path) -> None:
     files = _files(tmp_path)
-    files.start("a smile")
+    files.start_sequence("a smile")
     for k in range(2):
         write_png(files.path(k), PICTURE)
         os.utime(files.path(k), (1e9, 1e9 + k))
     os.utime(files.pattern.with_name(".%03d.png.made-of"), (1e9, 1e9))
     assert files.missing_frames(range(2), SIZE) == []
-    files.start("a frown")
+    files.start_sequence("a frown")
     write_png(files.path(1), PICTURE)
-    files.start("a frown")
+    files.start_sequence("a frown")
     assert files.missing_frames(range(2), SIZE) == [0]
     os.utime(files.path(1), (1e9, 1e9))
-    files.start("a frown", force=True)
+    files.start_sequence("a frown", force=True)
     assert files.missing_frames(range(2), SIZE) == [0, 1]
 
 
 @pytest.mark.parametrize("damage", ["no text", "empty", "large", "a pipe"])
 def test_damaged_record_is_ignored(tmp_path: Path, damage: str) -> None:
     files = _files(tmp_path)
-    files.start("a smile")
+    files.start_sequence("a smile")
     write_png(files.path(0), PICTURE)
     record = files.pattern.with_name(".%03d.png.made-of")
     if damage == "a pipe":
@@ -81,7 +81,7 @@ def test_damaged_record_is_ignored(tmp_path: Path, damage: str) -> None:
         os.mkfifo(record)
     else:
         record.write_bytes({"no text": b"\xff\xfe", "empty": b"", "large": b"a smile" * 99}[damage])
-    files.start("a smile")
+    files.start_sequence("a smile")
     assert record.read_bytes() == b"a smile"
     os.utime(files.path(0), (1e9, 1e9))
     assert files.missing_frames([0], SIZE) == [0]
@@ -89,7 +89,7 @@ def test_damaged_record_is_ignored(tmp_path: Path, damage: str) -> None:
 
 def test_pipe_is_not_a_frame(tmp_path: Path) -> None:
     files = _files(tmp_path)
-    files.start("a smile")
+    files.start_sequence("a smile")
     os.mkfifo(files.path(0))
     assert files.missing_frames([0], SIZE) == [0]
 

@@ -15,7 +15,7 @@ from icc_profiles import encoded, ink_lab, table_profile
 from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError, DermisWarning
-from dermis.images.colour_spaces import coded_space
+from dermis.images.colour_spaces import coded_colour_space
 from dermis.images.io import EmbeddedPicture, read_colours, read_image, read_size
 from dermis.images.opening import picture_format
 
@@ -214,10 +214,10 @@ def test_exif_rotation_applies_to_photographs_only(tmp_path: Path, blocks: Bytes
     path = written(tmp_path / "a.png", data)
     expected = np.asarray(ImageOps.exif_transpose(Image.open(io.BytesIO(data))))
     if orientation == 1:
-        np.testing.assert_array_equal(read_colours(path, upright=True)[0], expected)
+        np.testing.assert_array_equal(read_colours(path, apply_exif_orientation=True)[0], expected)
         return
     with pytest.warns(DermisWarning, match=r"a\.png: it is turned upright as its EXIF says"):
-        np.testing.assert_array_equal(read_colours(path, upright=True)[0], expected)
+        np.testing.assert_array_equal(read_colours(path, apply_exif_orientation=True)[0], expected)
     with pytest.warns(DermisWarning, match=r"a\.png: it is not turned as its EXIF says"):
         np.testing.assert_array_equal(read_image(path), blocks)
 
@@ -228,7 +228,7 @@ def test_levels_for_hdr_displays_are_refused(tmp_path: Path, blocks: Bytes) -> N
     coded = data[:start] + struct.pack(">HH", 9, 16) + data[start + 4 :]
     with pytest.raises(DermisError, match=r"a\.avif: .*HDR displays \(PQ\)"):
         read_image(written(tmp_path / "a.avif", coded))
-    assert coded_space(77, 13) is None
+    assert coded_colour_space(77, 13) is None
 
 
 def test_avif_of_10_bits_is_reduced_with_a_note(tmp_path: Path) -> None:

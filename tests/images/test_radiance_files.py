@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError, DermisWarning
-from dermis.images.colour_spaces import gamma_space
+from dermis.images.colour_spaces import gamma_colour_space
 from dermis.images.io import read_colours, read_image, read_size, repair_radiance
 
 Floats = NDArray[np.float32]
@@ -132,7 +132,9 @@ def test_primaries_of_exr_files_are_converted(tmp_path: Path, header: dict[str, 
     path = exr(tmp_path / "a.exr", {"RGB": picture}, **header)
     with pytest.warns(DermisWarning, match="its colours are converted from its primaries to Rec. 709"):
         pixels, space = read_colours(path)
-    np.testing.assert_allclose(space.linear(pixels), gamma_space("", None, ACES).linear(picture), rtol=1e-4)
+    np.testing.assert_allclose(
+        space.to_linear(pixels), gamma_colour_space("", None, ACES).to_linear(picture), rtol=1e-4
+    )
     np.testing.assert_array_equal(read_image(path), picture)  # as numbers
 
 
@@ -186,13 +188,15 @@ def test_primaries_of_hdr_files_are_converted(tmp_path: Path) -> None:
     path.write_bytes(hdr(rgbe, "-Y 2 +X 3", f"PRIMARIES={primaries}"))
     with pytest.warns(DermisWarning, match="converted from its primaries"):
         pixels, space = read_colours(path)
-    np.testing.assert_allclose(space.linear(pixels), gamma_space("", None, ACES).linear(colours), rtol=1e-5)
+    np.testing.assert_allclose(
+        space.to_linear(pixels), gamma_colour_space("", None, ACES).to_linear(colours), rtol=1e-5
+    )
     path.write_bytes(hdr(rgbe, "-Y 2 +X 3", "PRIMARIES=0 0 0 0 0 0 0 0", "GAMMA=1"))  # as Photoshop
     assert read_colours(path)[1].is_default
     path.write_bytes(hdr(np.full((2, 3, 4), 128, np.uint8), "-Y 2 +X 3", kind="xyze"))
     with pytest.warns(DermisWarning, match="converted from its primaries"):
         pixels, space = read_colours(path)
-    np.testing.assert_allclose(space.linear(pixels), 0.5, rtol=1e-3)  # white stays white
+    np.testing.assert_allclose(space.to_linear(pixels), 0.5, rtol=1e-3)  # white stays white
 
 
 def test_unused_hdr_values_are_noted(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ def head(path: Path, **options: object) -> Head:
 def eyes_of(made: Head, pose: Pose | None = None) -> tuple[Floats, Floats, Floats]:
     """Return the centres of the balls [mm], their directions of gaze, and radii [mm]."""
     assert made.eyes is not None
-    frames = made.eyes.frames(made.control, (pose or Pose()).motion(made.control))
+    frames = made.eyes.eye_matrices(made.control, (pose or Pose()).motion(made.control))
     scale = np.linalg.norm(frames[:, 2, :3], axis=1)
     middle = np.column_stack([np.zeros((2, 2)), made.eyes.centre_offset_mm])
     inverse = np.linalg.inv(frames)

@@ -21,7 +21,7 @@ def _pose(rig: Rig, rng: np.random.Generator) -> Motion:
     if rig.skeleton is None:
         return rig.rest._replace(weights=weights)
     bones = [k for k in range(4) if rng.random() < 0.6]
-    turns = [rig.skeleton.bone_rotation(bone, rng.uniform(-45, 45, 3).tolist()) for bone in bones]
+    turns = [rig.skeleton.joint_rotation_matrix(bone, rng.uniform(-45, 45, 3).tolist()) for bone in bones]
     matrices = rig.skeleton.pose_matrices(bones, np.array(turns).reshape(-1, 4, 4))
     return Motion(weights, matrices, rig.positions_mm)
 

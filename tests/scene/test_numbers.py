@@ -19,7 +19,7 @@ from dermis.mesh.eye_look import EyeLook
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.scene import Environment, Skin
 from dermis.scene.camera import Camera
-from dermis.scene.field_errors import InvalidFieldsError, Reason, field_bounds, numeric_fields
+from dermis.scene.field_errors import BoundsReason, InvalidFieldsError, field_bounds, numeric_fields
 from dermis.scene.files import PoseTable
 from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.head_table import EyeTable, HeadTable
@@ -89,7 +89,7 @@ def test_each_number_of_a_model_has_a_documented_range(model: type[FrozenModel],
         info = FieldInfo.from_annotation(kind[-1])
     low, high = field_bounds(info)
     assert low is not None and high is not None and np.isfinite(np.float32([low, high])).all()
-    assert (low, high) == (0, 1) or any(isinstance(one, Reason) for one in info.metadata)
+    assert (low, high) == (0, 1) or any(isinstance(one, BoundsReason) for one in info.metadata)
     assert low <= 0 or np.float32(low) > 0
     if low > 0:
         with pytest.raises(InvalidFieldsError):

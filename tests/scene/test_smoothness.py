@@ -16,12 +16,12 @@ from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.camera import Camera, portrait
 from dermis.scene.smoothness import (
-    MAX_DEVIATION_PX,
+    MAX_SILHOUETTE_DEVIATION_PX,
     MAX_SMOOTH_TRIANGLES,
     Silhouette,
     SmoothIn,
     silhouette,
-    smooth_levels,
+    smooth_subdivision_levels,
 )
 
 RADIUS_MM, SIDES = 120.0, 24
@@ -66,11 +66,11 @@ def test_levels_grow_as_the_camera_comes_near() -> None:
 
 def test_fine_heads_are_unchanged_and_size_is_limited() -> None:
     assert SmoothIn()(ball(128)) == 0
-    assert smooth_levels(1e3, 1000) == 3
+    assert smooth_subdivision_levels(1e3, 1000) == 3
     for triangles in (5_000, 50_000, 80_000, 500_000):
-        levels = smooth_levels(1e3, triangles)
+        levels = smooth_subdivision_levels(1e3, triangles)
         assert levels == 0 or triangles * 4**levels <= MAX_SMOOTH_TRIANGLES
-    assert smooth_levels(1e3, 80_000) == 0
+    assert smooth_subdivision_levels(1e3, 80_000) == 0
 
 
 def test_coarse_outline_becomes_smooth(tmp_path: Path) -> None:
@@ -79,7 +79,7 @@ def test_coarse_outline_becomes_smooth(tmp_path: Path) -> None:
         seen(head, portrait(head), 1024)
         for head in (dermis.load_head(path, subdivide=0), dermis.load_head(path))
     )
-    assert coarse.typical_deviation_px > 2 * MAX_DEVIATION_PX > 2 * smooth.typical_deviation_px
+    assert coarse.typical_deviation_px > 2 * MAX_SILHOUETTE_DEVIATION_PX > 2 * smooth.typical_deviation_px
     assert coarse.length_px.max() > 70
     assert smooth.length_px.max() < 25
 

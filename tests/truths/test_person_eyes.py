@@ -70,8 +70,8 @@ def by_snell(positions: NDArray[np.float64], directions: NDArray[np.float64]) ->
     """Return where refracted rays meet the plane of the iris (n, n, 2) [mm]."""
     n = (positions - [0.0, 0.0, cornea_centre_mm()]) / CORNEA_MM
     cosine = -(directions * n).sum(axis=-1, keepdims=True)
-    inner = np.sqrt(1.0 - (1.0 - cosine**2) / eyes.CORNEA_INDEX**2)
-    bent = directions / eyes.CORNEA_INDEX + (cosine / eyes.CORNEA_INDEX - inner) * n
+    inner = np.sqrt(1.0 - (1.0 - cosine**2) / eyes.CORNEA_IOR**2)
+    bent = directions / eyes.CORNEA_IOR + (cosine / eyes.CORNEA_IOR - inner) * n
     far = (iris_plane_mm() - positions[..., 2:]) / bent[..., 2:]
     return np.asarray((positions + far * bent)[..., :2])
 

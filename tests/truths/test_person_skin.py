@@ -97,7 +97,7 @@ def test_the_coat_reflects_by_both_lobes() -> None:
     black, mi = ball(colour=(0.0, 0.0, 0.0), roughness=0.4, strength=0.5), load_mitsuba()
     matte = ball(colour=(0.0, 0.0, 0.0), strength=0.0)
     found = middle(black, lights=(light,), samples=512) - middle(matte, lights=(light,))
-    lobe = {"type": "roughconductor", "distribution": "beckmann", "eta": skin.COAT_INDEX, "k": 0.0}
+    lobe = {"type": "roughconductor", "distribution": "beckmann", "eta": skin.COAT_IOR, "k": 0.0}
     lobes = [
         lobe | {"alpha": factor * 0.4, "specular_reflectance": 0.5} for factor in (NARROW_FACTOR, WIDE_FACTOR)
     ]

@@ -13,7 +13,7 @@ from painted_ball import scene as ball_scene
 
 from dermis.apps.truths.path_traced import PathTraced
 from dermis.apps.truths.person import medium
-from dermis.apps.truths.person.path_traced import path_trace_person, person_key
+from dermis.apps.truths.person.path_traced import path_trace_person, person_cache_key
 from dermis.apps.truths.person.person import posed_person
 from dermis.base.errors import DermisError
 from dermis.human.person import Human
@@ -62,18 +62,18 @@ def test_cache_keys_depend_on_all_inputs() -> None:
     brows, *others = person.hairs
     thicker = replace(person, hairs=(replace(brows, radius_mm=2 * brows.radius_mm), *others))
     others = [
-        person_key(scene(), person, path, "form"),
-        person_key(scene(), person, MEDIUM.with_eta(1.4), "form"),
-        person_key(scene(), person, None, "form"),
-        person_key(scene(), replace(person, textures=paint(strength=0.5)), path, "form"),
-        person_key(scene(), person, path, "another"),
-        person_key(scene(), thicker, path, "form"),
-        person_key(scene(), replace(person, eyes=2 * person.eyes), path, "form"),
-        person_key(scene(), replace(person, textures=paint(colour=(0.4, 0.3, 0.2))), path, "form"),
-        person_key(replace(scene(), lights=()), person, path, "form"),
+        person_cache_key(scene(), person, path, "form"),
+        person_cache_key(scene(), person, MEDIUM.with_eta(1.4), "form"),
+        person_cache_key(scene(), person, None, "form"),
+        person_cache_key(scene(), replace(person, textures=paint(strength=0.5)), path, "form"),
+        person_cache_key(scene(), person, path, "another"),
+        person_cache_key(scene(), thicker, path, "form"),
+        person_cache_key(scene(), replace(person, eyes=2 * person.eyes), path, "form"),
+        person_cache_key(scene(), replace(person, textures=paint(colour=(0.4, 0.3, 0.2))), path, "form"),
+        person_cache_key(replace(scene(), lights=()), person, path, "form"),
     ]
     assert len(set(others)) == len(others)
-    assert others[0] == person_key(scene(), posed_person(scene(), paint()), path, "form")
+    assert others[0] == person_cache_key(scene(), posed_person(scene(), paint()), path, "form")
 
 
 def test_a_pose_moves_skin_eyes_and_hairs() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.apps.inverse.unmixing.profile_widths import PROFILE_CORNERS, profile_mixture, save_mixture
+from dermis.apps.inverse.unmixing.profile_widths import PROFILE_GRID_CORNERS, profile_mixture, save_mixture
 from dermis.apps.inverse.unmixing.skin_model import skin_model
 from dermis.apps.inverse.unmixing.unmix import unmix
 from dermis.base.errors import DermisError
@@ -24,7 +24,7 @@ def test_profiles_follow_melanin_and_blood(tmp_path: Path) -> None:
         np.testing.assert_allclose(blend.weights[corner], fraction, atol=0.02)
     written = save_mixture(tmp_path, blend)
     np.testing.assert_allclose(load_blend_weights(str(written[-1])), blend.weights, atol=1e-6)
-    evaluate = [load_profile(tmp_path / f"{name}.toml") for name in PROFILE_CORNERS]
+    evaluate = [load_profile(tmp_path / f"{name}.toml") for name in PROFILE_GRID_CORNERS]
     prior_sd = [(one.variance_mm2 @ (one.weight / one.albedo))[0] for one in evaluate]
     assert prior_sd[0] > prior_sd[1] > prior_sd[2]  # blood and melanin shorten the paths of red light
 

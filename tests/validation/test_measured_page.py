@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from figures_in_text import differences
 
-from dermis.apps.validation.accuracy.measured.page import PAGE, PEOPLE_FILE, RESULT_FILE, measured_parts
+from dermis.apps.validation.accuracy.measured.page import PAGE, PEOPLE_FILE, RESULT_FILE, measured_page_texts
 from dermis.apps.validation.accuracy.measured.probe import lit_fraction
 from dermis.apps.validation.pages import read_results, template_path
 
 
 def test_the_page_is_that_of_the_figures() -> None:
-    parts = measured_parts(read_results(RESULT_FILE)) | read_results(PEOPLE_FILE)
+    parts = measured_page_texts(read_results(RESULT_FILE)) | read_results(PEOPLE_FILE)
     text = template_path(PAGE).read_text("utf-8").format(**parts)
     assert differences(text, PAGE.read_text("utf-8")) == []
 

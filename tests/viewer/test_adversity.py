@@ -13,7 +13,7 @@ import wgpu
 from offscreen_input import InputDriver
 
 from dermis.apps.viewer.state import ATLAS_VIEW_NAME
-from dermis.apps.viewer.windows import _raise_failure
+from dermis.apps.viewer.windows import _raise_viewer_failure
 from dermis.base.errors import DermisError
 from dermis.frame import renderer as renderer_module
 from dermis.gpu import Device
@@ -190,7 +190,7 @@ def test_unavailable_device_closes_the_window_with_a_message(
     assert driver.canvas.get_closed()
     said = "lost twice" if how == "twice" else "expected it to open"
     with pytest.raises(DermisError, match=said):
-        _raise_failure(driver.viewer)
+        _raise_viewer_failure(driver.viewer)
 
 
 def test_state_over_the_memory_limit_keeps_the_last_picture(

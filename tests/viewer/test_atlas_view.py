@@ -33,7 +33,7 @@ def test_each_texel_is_drawn_as_a_square_with_its_light(state: ViewerState) -> N
     view_renderer = ViewRenderer(ADAPTER)
     shown = state.with_view(ATLAS_VIEW_NAME).with_atlas_view(AtlasView("irradiance", (0.5, 0.5), 1.0))
     image = view_renderer.render_image(shown, state.scene.camera, (2 * SIDE, 2 * SIDE), is_moving=True)
-    found = view_renderer.read(image).astype(float)
+    found = view_renderer.download_image(image).astype(float)
     assert np.array_equal(found[::2, ::2], found[1::2, 1::2])
     levels = view_renderer.renderer.prepare(
         state.scene, state.settings.model_copy(update={"size": (2 * SIDE, 2 * SIDE)})
@@ -50,7 +50,7 @@ def test_pixels_over_many_texels_show_their_mean(state: ViewerState) -> None:
     view_renderer = ViewRenderer(ADAPTER)
     shown = state.with_view(ATLAS_VIEW_NAME).with_atlas_view(AtlasView("irradiance", (0.5, 0.5), 1.0))
     fine, coarse = (
-        view_renderer.read(
+        view_renderer.download_image(
             view_renderer.render_image(shown, state.scene.camera, (side, side), is_moving=False)
         ).astype(float)
         for side in (SIDE, SIDE // 4)
@@ -62,13 +62,15 @@ def test_pixels_over_many_texels_show_their_mean(state: ViewerState) -> None:
 def test_changing_the_visible_atlas_part_draws_no_new_frame(state: ViewerState) -> None:
     view_renderer = ViewRenderer(ADAPTER)
     shown = state.with_view(ATLAS_VIEW_NAME)
-    first = view_renderer.read(
+    first = view_renderer.download_image(
         view_renderer.render_image(shown, state.scene.camera, (64, 64), is_moving=False)
     )
     rendered = view_renderer.rendered
     near = shown.with_atlas_view(AtlasView(span=0.2))
     assert (
-        view_renderer.read(view_renderer.render_image(near, state.scene.camera, (64, 64), is_moving=False))
+        view_renderer.download_image(
+            view_renderer.render_image(near, state.scene.camera, (64, 64), is_moving=False)
+        )
         != first
     ).any()
     assert view_renderer.rendered is rendered

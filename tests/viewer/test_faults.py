@@ -118,7 +118,7 @@ def test_failing_head_or_button_is_reported(calm: InputDriver, monkeypatch: pyte
     def fail(*_: Any) -> None:
         raise MemoryError("too large")
 
-    monkeypatch.setattr(session.heads, "take_loaded", fail)
+    monkeypatch.setattr(session.heads, "take_loaded_state", fail)
     calm.frame()
     assert session.message == "The head cannot be opened (MemoryError: too large)"
     monkeypatch.undo()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.apps.viewer.browser.request_filter import MAX_PAGES, RequestFilter, is_local
+from dermis.apps.viewer.browser.request_filter import MAX_PAGES, RequestFilter, is_local_host
 from dermis.apps.viewer.browser.server import Address, bind
 from dermis.base.errors import DermisError
 
@@ -152,7 +152,7 @@ def test_bad_messages_do_not_reach_the_canvas() -> None:
     ],
 )
 def test_only_loopback_addresses_are_local(host: str, local: bool) -> None:
-    assert is_local(host) is local
+    assert is_local_host(host) is local
 
 
 def test_remote_hosts_get_a_new_token_each_time() -> None:

@@ -14,7 +14,7 @@ from PIL import Image
 from rigged_head import write_rigged_head
 
 from dermis.apps.viewer.navigation import orbit
-from dermis.apps.viewer.session import apply_regions
+from dermis.apps.viewer.session import with_region_table
 from dermis.apps.viewer.state import ViewerState, load_state, save_state
 from dermis.apps.viewer.view_renderer import ViewRenderer
 from dermis.cli import main
@@ -42,7 +42,9 @@ def with_regions(state: ViewerState, folder: Path) -> ViewerState:
     Image.fromarray(labels).save(folder / "labels.png")
     rows = [f'"{name}" = {{ m = 0.3, rho_s = {0.1 + 0.05 * k:.2f} }}' for k, name in enumerate(REGIONS)]
     (folder / "regions.toml").write_text("\n".join(['labels = "labels.png"', *rows, ""]))
-    return apply_regions(state.with_skin(roughness=0.5), str(folder / "regions.toml")).with_skin(oiliness=0.7)
+    return with_region_table(state.with_skin(roughness=0.5), str(folder / "regions.toml")).with_skin(
+        oiliness=0.7
+    )
 
 
 def with_surface(state: ViewerState, folder: Path) -> ViewerState:

@@ -267,18 +267,18 @@ def test_level_views_show_light_of_the_live_state(
     view: str, view_renderer: ViewRenderer, state: ViewerState
 ) -> None:
     """Also after the light of another state was blurred in between, and after its profile is restored."""
-    plain = view_renderer.read(
+    plain = view_renderer.download_image(
         view_renderer.render_image(state.with_view(view), state.scene.camera, SIZE, False)
     ).astype(int)
     other = state.with_skin(profile="skin1", mix=1.0).with_light(0, irradiance=(0.1, 0.1, 0.1))
     both(view_renderer, state, other, moving=False)
-    again = view_renderer.read(
+    again = view_renderer.download_image(
         view_renderer.render_image(state.with_view(view), state.scene.camera, SIZE, False)
     ).astype(int)
     assert np.array_equal(plain, again)
     view_renderer.render_image(state.with_skin(profile="dj3"), state.scene.camera, SIZE, False)
     view_renderer.render_image(state, state.scene.camera, SIZE, False)
-    back = view_renderer.read(
+    back = view_renderer.download_image(
         view_renderer.render_image(state.with_view(view), state.scene.camera, SIZE, False)
     ).astype(int)
     assert np.array_equal(plain, back)

@@ -38,7 +38,9 @@ def fresh() -> Renderer:
 
 
 def image(view_renderer: ViewRenderer, state: ViewerState, moving: bool = False) -> Any:
-    return view_renderer.read(view_renderer.render_image(state, state.scene.camera, SIZE, moving)).astype(int)
+    return view_renderer.download_image(
+        view_renderer.render_image(state, state.scene.camera, SIZE, moving)
+    ).astype(int)
 
 
 def stages(view_renderer: ViewRenderer) -> set[str]:

@@ -40,7 +40,7 @@ def gate(head: Head, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 
 def wait(driver: InputDriver) -> None:
     end = time.monotonic() + PATIENCE_S
-    while driver.viewer.session.heads.note and time.monotonic() < end:
+    while driver.viewer.session.heads.loading_message and time.monotonic() < end:
         time.sleep(0.02)
         driver.frame()
 
@@ -50,7 +50,7 @@ def test_viewer_stays_responsive_while_a_person_loads(driver: InputDriver, gate:
     first = session.state
     driver.press("dice")
     (name,) = gate.asked
-    assert name.startswith("human:") and session.heads.note == f"opening {name} ..."
+    assert name.startswith("human:") and session.heads.loading_message == f"opening {name} ..."
     driver.drag((300.0, 200.0), (260.0, 200.0))
     turned = session.state.scene.camera
     assert turned != first.scene.camera and session.state.scene.head is first.scene.head
@@ -104,5 +104,5 @@ def test_pose_is_kept_for_equal_names(rigged: ViewerState, rigged_file: Path) ->
         opening.open(name)
         end, found = time.monotonic() + PATIENCE_S, None
         while found is None and time.monotonic() < end:
-            found = opening.take_loaded(posed)
+            found = opening.take_loaded_state(posed)
         assert found is not None and (found.scene.pose is not None) is kept

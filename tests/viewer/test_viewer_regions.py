@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from dermis.apps.viewer.session import apply_regions
+from dermis.apps.viewer.session import with_region_table
 from dermis.apps.viewer.state import ViewerState
 from dermis.base.errors import DermisError
 from dermis.human.regions.region_table import REGIONS
@@ -33,23 +33,23 @@ def _small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_table_adds_maps_and_none_removes_them(state: ViewerState, table: str) -> None:
-    found = apply_regions(state, table)
+    found = with_region_table(state, table)
     maps = found.scene.head.maps
     assert maps.specular is not None and np.ptp(maps.specular) > 0.05
     assert 0.1 < found.scene.skin.rho_s < 0.25 and found.head["regions"] == table
-    bare = apply_regions(found, AUTO)
+    bare = with_region_table(found, AUTO)
     assert bare.scene.head.maps.specular is None and "regions" not in bare.head
     assert bare.scene.skin.rho_s == Skin().rho_s
 
 
 def test_loaded_heads_are_not_rebuilt(state: ViewerState, table: str) -> None:
-    found = apply_regions(state, table)
-    assert apply_regions(found, AUTO, [state, found]).scene.head is state.scene.head
-    assert apply_regions(state, table, [state, found]).scene.head is found.scene.head
+    found = with_region_table(state, table)
+    assert with_region_table(found, AUTO, [state, found]).scene.head is state.scene.head
+    assert with_region_table(state, table, [state, found]).scene.head is found.scene.head
 
 
 def test_heads_without_known_regions_are_refused(state: ViewerState) -> None:
     with pytest.raises(DermisError):
-        apply_regions(state, "default")
+        with_region_table(state, "default")
     with pytest.raises(DermisError, match="created in memory"):
-        apply_regions(ViewerState(state.scene), "default")
+        with_region_table(ViewerState(state.scene), "default")

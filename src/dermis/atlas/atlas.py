@@ -27,8 +27,8 @@ class Atlas:
     stretch : (n, n, 2) float16 texels per mm along u and v; a texel outside its chart has the stretch of the
         chart's nearest edge [1/mm]
     shear : (n, n) float16 cosine of the angle between the directions of u and v on the surface
-    edge_distance : (n, n, 4) uint16 distances in the directions left, right, up and down at which the chart
-        or, if it has a gutter, its gutter ends [texel]
+    edge_distance : (n, n, 4) uint16 distances to the edge of the chart, including any gutter around it, to
+        the left, right, up and down [texel]
     corner_uv : (f, 3, 2) float32 uv of each triangle's corners in the atlas, v down
     gutter : (a, 2) uint16 gutter texels (x, y), into which the light of other texels is copied
     source : (a, 2) float32 position from which the light of each gutter texel is copied, integer at texel

@@ -30,7 +30,7 @@ _FORM_FACTOR_CACHE_VERSION = 5  # increment when `compute_form_factors` gives ot
 _MAX_TRACED_TRIANGLES = 300_000  # above this, points closer than _MERGE_DISTANCE_LINES are merged
 _MERGE_DISTANCE_LINES = 1.5  # distance below which points are merged, in spacings of adjacent lines
 _MIN_FORM_FACTOR = 1e-3  # smaller form factors are dropped, and the remaining ones of a cell scaled up
-_LINE_SEED = 20
+_LINE_RANDOM_SEED = 20
 _MAX_TRACING_THREADS = 8
 _TRIANGLES_PER_BATCH = 1 << 14  # limits the memory of each thread
 _LINE_INDEX_STRIDE = 4096  # stride of line indices: more than the lines along a bundle's side
@@ -74,11 +74,11 @@ class FormFactors:
 
 
 def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) -> FormFactors:
-    """Return the result of `compute_form_factors`, from the package or the cache on disk if possible."""
+    """Return the result of `compute_form_factors`, read from the package or the disk cache if possible."""
     names = [field.name for field in fields(FormFactors)]
-    if shipped := shipped_arrays(mesh, form_factor_table(mapped_triangles), names):
+    if shipped := shipped_arrays(mesh, form_factor_table_name(mapped_triangles), names):
         return FormFactors(**shipped)
-    cut_out = [np.packbits(mesh.cut_out)] if mesh.cut_out.any() else []
+    cut_out = [np.packbits(mesh.cut_out_mask)] if mesh.cut_out_mask.any() else []
     digest = hashlib.sha256(
         f"{_FORM_FACTOR_CACHE_VERSION} {CELLS_PER_SIDE} {SAMPLES_PER_PATCH} "
         f"{LINE_BUNDLE_COUNT} {LINES_PER_SIDE_RANGE} {_MIN_FORM_FACTOR}".encode()
@@ -94,8 +94,8 @@ def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) -
     return FormFactors(**load_or_make("interreflection", digest.hexdigest()[:40], names, make_arrays))
 
 
-def form_factor_table(mapped_triangles: Mask) -> str:
-    """Return the name of the table with the form factors of a mesh.
+def form_factor_table_name(mapped_triangles: Mask) -> str:
+    """Return the name under which the package stores the form factors of a mesh, for `shipped_arrays`.
 
     mapped_triangles : (f,) mask of triangles that have texels
     """
@@ -126,14 +126,15 @@ def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) 
 def _trace_lines(
     mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask, bundle_count: int, lines_per_side: int
 ) -> tuple[Index, Doubles]:
-    """Return pairs of cells (m, 2) that lines connect through the air, and line counts for all cells.
+    """Trace lines through the air between the cells of the uv square, see `FormFactors`.
 
-    The count of a cell is the number of lines that left it.
+    Returns the index pairs (m, 2) of cells that a line connects, one pair for each line and direction. Also
+    returns the number of lines that left each cell, (CELLS_PER_SIDE^2,).
 
     bundle_count : number of bundles of parallel lines, one per direction
     lines_per_side : number of lines along each side of a bundle
     """
-    blocks = ~mesh.cut_out
+    blocks = ~mesh.cut_out_mask
     corner_uv, mapped_triangles = corner_uv[blocks], mapped_triangles[blocks]
     used, corner = np.unique(mesh.triangles[blocks], return_inverse=True)
     vertices, corner = mesh.positions[used].astype(np.float64), corner.reshape(-1, 3)
@@ -144,7 +145,7 @@ def _trace_lines(
         proper = np.flatnonzero((corner != np.roll(corner, 1, axis=1)).all(axis=1))
         corner, corner_uv, mapped_triangles = corner[proper], corner_uv[proper], mapped_triangles[proper]
     x, y, z = np.ascontiguousarray(vertices.T)[:, :, None]
-    rng = np.random.default_rng(_LINE_SEED)
+    rng = np.random.default_rng(_LINE_RANDOM_SEED)
     bundle_axes = [
         (
             per_mm * _line_axes(direction, rng.uniform(0.0, 2.0 * np.pi)),
@@ -215,10 +216,13 @@ def _integer_range(corner_coordinates: Doubles) -> tuple[Doubles, Index]:
 
 
 def _facing_cells(line_index: Index, depth: Doubles, faces_forward: Mask, cell_index: Index) -> Index:
-    """Return pairs of cells (m, 2): the cell that a line leaves, and the cell that it meets next.
+    """Return index pairs (m, 2) of cells of the uv square: the cell that a line leaves and the next it meets.
 
-    Each line is followed in both directions; if it meets no other surface, there is no pair. The second cell
-    is -1 where the surface that the line meets has no texels.
+    Each line is followed in both directions. A line that meets no other surface gives no pair. The index is
+    -1 for a surface that has no texels.
+
+    line_index, depth, faces_forward : (n,) results of `intersect_lines`
+    cell_index : (n,) cell of each intersection, -1 if the surface has no texels
     """
     order = np.lexsort((depth, line_index))
     line_index, faces_forward, cell_index = line_index[order], faces_forward[order], cell_index[order]
@@ -257,9 +261,9 @@ def _line_axes(direction: Doubles, roll_angle: float) -> Doubles:
 def _form_factors(
     facing_cells: Index, line_counts: Doubles, mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask
 ) -> FormFactors:
-    """Return the form factors that follow from the number of lines between cells.
+    """Return the form factors that follow from the number of lines between cells of the uv square.
 
-    facing_cells : (m, 2) pairs of cells that lines connect, from `_trace_lines`
+    facing_cells : (m, 2) index pairs of cells that lines connect, from `_trace_lines`
     line_counts : (CELLS_PER_SIDE^2,) number of lines that left each cell
     """
     patch_of, triangle, weights = _divide_into_patches(mesh, corner_uv, mapped_triangles)
@@ -271,17 +275,20 @@ def _form_factors(
     usual = np.median(line_counts[line_counts > 0]) if (line_counts > 0).any() else 1.0
     known_patch = known & (patch >= 0)
     return FormFactors(
-        *_sparse_rows(cell[known], target[known], line_counts, count),
+        *_sparse_form_factors(cell[known], target[known], line_counts, count),
         _nearest_patch(patch_of),
         np.minimum(line_counts / usual, 1.0).astype(np.float32),
-        *_sparse_rows(patch[known_patch], target[known_patch], left_patch, count),
+        *_sparse_form_factors(patch[known_patch], target[known_patch], left_patch, count),
         triangle,
         weights,
     )
 
 
 def _nearest_patch(patch_of_cell: Index) -> Words:
-    """Return for each cell (CELLS_PER_SIDE^2,) the patch that contains it, or the nearest patch in uv."""
+    """Return the index of the patch that contains each cell of the uv square, or of the nearest patch in uv.
+
+    patch_of_cell : (CELLS_PER_SIDE^2,) index of the patch that contains each cell, -1 if there is none
+    """
     from scipy.ndimage import distance_transform_edt
 
     known = patch_of_cell.reshape(CELLS_PER_SIDE, CELLS_PER_SIDE)
@@ -291,10 +298,10 @@ def _nearest_patch(patch_of_cell: Index) -> Words:
     return np.asarray(known[tuple(nearest)].ravel(), np.uint32)
 
 
-def _sparse_rows(
+def _sparse_form_factors(
     row_index: Index, target_patch: Index, line_counts: Doubles, patch_count: int
 ) -> tuple[Words, Words, Floats]:
-    """Return form factors as rows of a sparse matrix: start of each row, patch indices, and factors.
+    """Return form factors as a sparse matrix: the start of each row, the patch indices and the factors.
 
     row_index : (m,) index of the cell or patch that each line left
     target_patch : (m,) index of the patch that the line met next
@@ -314,10 +321,10 @@ def _sparse_rows(
 
 
 def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) -> tuple[Index, Words, Words]:
-    """Return the patch of each cell, and the triangle and weights of each patch's sample points.
+    """Divide the uv square into patches, and choose the sample points of each patch.
 
-    The patch indices have the shape (CELLS_PER_SIDE^2,) and are -1 for cells without texels. The weights are
-    packed barycentric weights, as in `FormFactors`.
+    Returns the patch index of each cell (CELLS_PER_SIDE^2,), which is -1 for cells without texels. Also
+    returns the triangles and the packed weights of the sample points, as in `FormFactors`.
     """
     triangle, weights, rank = _sample_points(mesh, mapped_triangles)
     half, cell = CELLS_PER_SIDE // 2, _cell_index(corner_uv[triangle], weights)
@@ -338,7 +345,7 @@ def _sample_points(mesh: Mesh, mapped_triangles: Mask) -> tuple[Index, Doubles, 
     """Return random points on the triangles that have texels: triangle indices, weights and ranks.
 
     Each triangle has at least one point, so points are denser on small triangles. The ranks are random
-    numbers; any number of points with the lowest ranks is uniformly distributed over the surface.
+    numbers. Points that are chosen in order of rank are uniformly distributed over the surface.
     """
     a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     area = np.where(mapped_triangles, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), 0.0)
@@ -346,7 +353,7 @@ def _sample_points(mesh: Mesh, mapped_triangles: Mask) -> tuple[Index, Doubles, 
         CELLS_PER_SIDE * CELLS_PER_SIDE * SAMPLES_PER_PATCH * area / max(area.sum(), 1e-30)
     ).astype(np.int64)
     triangle = np.repeat(np.flatnonzero(mapped_triangles), each[mapped_triangles])
-    rng, count = np.random.default_rng(_LINE_SEED), each[triangle]
+    rng, count = np.random.default_rng(_LINE_RANDOM_SEED), each[triangle]
     u, v = np.sqrt(rng.random(len(triangle))), rng.random(len(triangle))
     weights = np.stack([1.0 - u, u * (1.0 - v), u * v], axis=1)
     return triangle, weights, rng.exponential(size=len(triangle)) * count / np.maximum(area[triangle], 1e-30)

@@ -104,11 +104,11 @@ def _integers_between(low: Doubles, high: Doubles, grid_side: int, margin: float
     return first, np.clip(np.floor(high - margin), -1, grid_side - 1).astype(np.int64)
 
 
-def _row_interval(corners: Doubles, triangle: Index, y: Index) -> tuple[Doubles, Doubles]:
+def _row_interval(corners: Doubles, row_triangle: Index, y: Index) -> tuple[Doubles, Doubles]:
     """Return the lowest and highest x at which each row y of texels intersects its triangle.
 
     corners : (t, 3, 2) corners of the triangles [texel]
-    triangle : (n,) index of the triangle that each row intersects
+    row_triangle : (n,) index of the triangle that each row intersects
     y : (n,) index of the row of texels
     """
     lowest = np.full(len(y), -np.inf)
@@ -121,7 +121,7 @@ def _row_interval(corners: Doubles, triangle: Index, y: Index) -> tuple[Doubles,
     slopes, across = -edge[..., 1] * sign, edge[..., 0] * sign
     offsets = edge[..., 1] * corners[..., 0] * sign - across * corners[..., 1]
     for k in range(3):
-        slope, offset = slopes[triangle, k], offsets[triangle, k] + across[triangle, k] * y
+        slope, offset = slopes[row_triangle, k], offsets[row_triangle, k] + across[row_triangle, k] * y
         crossing = -offset / np.where(slope == 0, 1.0, slope)
         np.maximum(lowest, crossing, out=lowest, where=slope > 0)
         np.minimum(highest, crossing, out=highest, where=slope < 0)
@@ -135,7 +135,7 @@ def build_mesh_layout(mesh: Mesh, atlas_side: int) -> Atlas:
     skin = np.array([material.kind == "skin" for material in mesh.materials])
     usable = usable_triangles(mesh, atlas_side) & skin[mesh.material]
     texel, triangle = rasterise(mesh, atlas_side, np.flatnonzero(usable))
-    mapped = usable & ~_overlapped_charts(chart, texel, triangle, atlas_side)
+    mapped = usable & ~_triangles_of_overlapped_charts(chart, texel, triangle, atlas_side)
     owner, hidden = _assign_texels(mesh, mapped, texel, triangle, atlas_side)
     mapped &= ~hidden
     for _ in range(GUTTER_TEXELS):
@@ -151,7 +151,7 @@ def build_mesh_layout(mesh: Mesh, atlas_side: int) -> Atlas:
         barycentric=barycentric,
         stretch=stretch,
         shear=shear,
-        edge_distance=_edge_distance(chart_map),
+        edge_distance=_chart_edge_distances(chart_map),
         corner_uv=corner_uv,
         gutter=none,
         source=none.astype(np.float32),
@@ -163,21 +163,25 @@ def build_mesh_layout(mesh: Mesh, atlas_side: int) -> Atlas:
     )
 
 
-def _overlapped_charts(
-    triangle_chart: NDArray[np.integer], texel: Index, triangle: Index, atlas_side: int
+def _triangles_of_overlapped_charts(
+    triangle_chart: NDArray[np.integer], covered_texel: Index, covering_triangle: Index, atlas_side: int
 ) -> Mask:
     """Return the mask (f,) of triangles in charts that a larger chart mostly covers in uv.
 
-    texel, triangle : (k,) flat texel index and triangle index of each covered texel centre
+    covered_texel : (k,) flat index of each covered texel, once for each triangle that covers its centre
+    covering_triangle : (k,) index of this triangle
     """
     count = int(triangle_chart.max()) + 1
-    area = np.bincount(triangle_chart[triangle], minlength=count)
+    area = np.bincount(triangle_chart[covering_triangle], minlength=count)
     order = np.argsort(
-        area[triangle_chart[triangle]], kind="stable"
+        area[triangle_chart[covering_triangle]], kind="stable"
     )  # the largest chart writes last and wins
     winner = np.full(atlas_side * atlas_side, -1, dtype=np.int64)
-    winner[texel[order]] = triangle_chart[triangle[order]]
-    own = np.bincount(triangle_chart[triangle][winner[texel] == triangle_chart[triangle]], minlength=count)
+    winner[covered_texel[order]] = triangle_chart[covering_triangle[order]]
+    own = np.bincount(
+        triangle_chart[covering_triangle][winner[covered_texel] == triangle_chart[covering_triangle]],
+        minlength=count,
+    )
     hidden: Mask = own < 0.5 * np.maximum(area, 1)
     return np.asarray(hidden[triangle_chart])
 
@@ -278,23 +282,23 @@ def _texel_metric(
     return stretch, shear
 
 
-def _edge_distance(texel_chart: Ints) -> NDArray[np.uint16]:
+def _chart_edge_distances(texel_chart: Ints) -> NDArray[np.uint16]:
     """Return the distances (n, n, 4) to the left, right, top and bottom edge of the chart [texel]."""
-    left, right = run_lengths(np.pad(texel_chart[:, 1:] == texel_chart[:, :-1], ((0, 0), (1, 0))))
-    up, down = run_lengths(np.pad(texel_chart.T[:, 1:] == texel_chart.T[:, :-1], ((0, 0), (1, 0))))
+    left, right = connected_run_lengths(np.pad(texel_chart[:, 1:] == texel_chart[:, :-1], ((0, 0), (1, 0))))
+    up, down = connected_run_lengths(np.pad(texel_chart.T[:, 1:] == texel_chart.T[:, :-1], ((0, 0), (1, 0))))
     return np.stack((left, right, up.T, down.T), axis=-1).astype(np.uint16)
 
 
-def run_lengths(connected_mask: Mask) -> tuple[Ints, Ints]:
+def connected_run_lengths(connected_mask: Mask) -> tuple[Ints, Ints]:
     """Return how many connected texels lie before and after each texel in its row, (h, w) each.
 
     connected_mask : (h, w) mask of texels that are connected to the texel before them in the row
     """
     after = np.zeros_like(connected_mask)
     after[:, :-1] = connected_mask[:, 1:]
-    return _run_length_before(connected_mask), _run_length_before(after[:, ::-1])[:, ::-1]
+    return _connected_texels_before(connected_mask), _connected_texels_before(after[:, ::-1])[:, ::-1]
 
 
-def _run_length_before(connected_mask: Mask) -> Ints:
+def _connected_texels_before(connected_mask: Mask) -> Ints:
     index = np.arange(connected_mask.shape[1], dtype=np.int32)
     return index - np.maximum.accumulate(np.where(connected_mask, 0, index), axis=1)

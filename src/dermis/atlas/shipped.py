@@ -20,10 +20,10 @@ _POSITION_TOLERANCE_MM = 1e-4  # processors differ in the last bits of a positio
 def shipped_arrays(mesh: Mesh, table_name: str, array_names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
     """Return the arrays of a table that the package contains for a mesh; None if there is no such table.
 
-    table_name : name of the table, which contains all parameters that affect the arrays, except the mesh
+    table_name : name of the table; this text contains all parameters that affect the arrays, except the mesh
     array_names : names of the arrays
     """
-    file = resources.files(__package__).joinpath("data", table_file(mesh))
+    file = resources.files(__package__).joinpath("data", table_file_name(mesh))
     if not file.is_file():
         return None
     with resources.as_file(file) as path, np.load(path) as stored:
@@ -36,12 +36,12 @@ def shipped_arrays(mesh: Mesh, table_name: str, array_names: Sequence[str]) -> d
         return {name: stored[member] for name, member in zip(array_names, members, strict=True)}
 
 
-def table_file(mesh: Mesh) -> str:
-    """Return the name of the file with the tables of a mesh."""
+def table_file_name(mesh: Mesh) -> str:
+    """Return the name of the package's file of precomputed tables for a mesh."""
     return f"{mesh.topology_key.hex()[:16]}.npz"
 
 
-def file_arrays(mesh: Mesh, tables: dict[str, dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+def table_file_arrays(mesh: Mesh, tables: dict[str, dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
     """Return the contents of a table file: a dictionary from the names of arrays in the file to the arrays.
 
     tables : dictionary from table names to the arrays of each table, as `shipped_arrays` returns them
@@ -51,9 +51,10 @@ def file_arrays(mesh: Mesh, tables: dict[str, dict[str, NDArray[Any]]]) -> dict[
 
 
 def position_fingerprint(mesh: Mesh) -> Doubles:
-    """Return mean and root mean square of the vertices, followed by some vertices, as one array [mm].
+    """Return an array of mean and root mean square of the vertex positions, then some of the positions [mm].
 
-    If some vertices of two heads with the same topology differ by a millimetre, their fingerprints differ.
+    If some vertices of two heads with the same topology differ by a millimetre, the heads have different
+    fingerprints.
     """
     positions = mesh.positions.astype(np.float64)
     sample = positions[:: max(len(positions) // _COMPARED_VERTEX_COUNT, 1)]

@@ -35,8 +35,8 @@ class PackedTextures:
 
     vertices : (n,) vertex indices in the mesh
     uv : (n, 2) uv of these vertices in the shared maps
-    maps : dictionary from each role, such as "colour", to the shared map (side, side, k), in which pictures
-        are multiplied by the factors of their materials
+    maps : dictionary from map roles, such as "colour", to the shared maps (side, side, k); these contain the
+        pictures, multiplied by the factors of their materials
     notes : sentences that tell users which detail was lost
     """
 
@@ -58,7 +58,7 @@ def pack_textures(
     surface : surface data of the mesh's file
     materials : materials of the mesh's file
     material_mask : (m,) mask of the mesh's materials that share the maps
-    required_roles : roles for which a map is baked even if no material has a picture for the role
+    required_roles : map roles, such as "colour", that get a map even if no material has a picture for them
     """
     tiles, side, scale = lay_out_tiles(mesh, surface, materials, material_mask)
     baker = _Baker(mesh, surface, materials, tiles, side)
@@ -82,12 +82,12 @@ class _Baker:
     side: int
 
     def roles(self, required_roles: Sequence[Role]) -> list[Role]:
-        """Return the required roles, and the roles for which a material has a picture."""
+        """Return the map roles, such as "colour", that are required or for which a material has a picture."""
         used = {role for tile in self.tiles for role in self._tile_material(tile).textures}
         return [role for role in _ROLE_DEFAULTS if role in used or role in required_roles]
 
     def bake(self, role: Role) -> Floats:
-        """Return the shared map (side, side, k) of a role."""
+        """Bake the shared map (side, side, k) of a map role, such as "colour"."""
         default = np.array(_ROLE_DEFAULTS[role], np.float32)
         channels = len(default) + (role == "colour")  # opacity
         baked = np.zeros((self.side, self.side, channels), np.float32)
@@ -110,7 +110,7 @@ class _Baker:
         return self.materials[tile.material] if tile.material >= 0 else FileMaterial()
 
     def _tile_map(self, tile: Tile, role: Role) -> Floats:
-        """Return a tile's map (h, w, k) of a role: the picture multiplied by the material's factors."""
+        """Return one tile (h, w, k) of a role's map: the material's picture multiplied by its factors."""
         material, (width, height) = self._tile_material(tile), tile.size
         texture = material.textures.get(role)
         factor = _material_factor(material, role, self.surface.colours is not None)
@@ -133,7 +133,7 @@ class _Baker:
         if "opacity" in material.textures:
             colour_map[..., 3:] *= self._sample_picture(tile, material.textures["opacity"], "opacity")
         is_opaque = material.alpha_mode == "opaque"
-        colour_map[..., 3] = 1.0 if is_opaque else colour_map[..., 3] + 0.5 - material.cutoff
+        colour_map[..., 3] = 1.0 if is_opaque else colour_map[..., 3] + 0.5 - material.opacity_cutoff
         if self.surface.colours is not None:
             colour_map[..., :3] *= self._interpolate_to_texels(tile, self.surface.colours[tile.vertices])
 
@@ -141,7 +141,7 @@ class _Baker:
         """Return a picture resampled to the texels of a tile, (h, w, k)."""
         picture = read_linear_picture(texture, role)
         base = base_texture(self._tile_material(tile))
-        if base is not None and base.mapping == texture.mapping:
+        if base is not None and base.uv_mapping == texture.uv_mapping:
             (width, height), span = tile.size, tile.high - tile.low
             u = tile.low[0] + (np.arange(width) + 0.5) / width * span[0]
             v = tile.low[1] + (np.arange(height) + 0.5) / height * span[1]
@@ -188,7 +188,7 @@ def _barycentric_coordinates(corners: Doubles, points: Doubles) -> Doubles:
 
 
 def _material_factor(material: FileMaterial, role: Role, has_vertex_colours: bool) -> Floats:
-    """Return the factor (k,) by which a material multiplies its picture of a role, such as its colour."""
+    """Return the factor (k,) by which a material multiplies its picture for a map role, such as "colour"."""
     has_colour = has_vertex_colours or "colour" in material.textures
     colour = material.colour or ((1.0, 1.0, 1.0) if has_colour else DEFAULT_COLOUR)
     factors: dict[Role, Sequence[float]] = {
@@ -202,7 +202,7 @@ def _material_factor(material: FileMaterial, role: Role, has_vertex_colours: boo
 
 
 def read_linear_picture(texture: Texture, role: Role) -> Floats:
-    """Return a texture's picture as linear values (H, W, k), converted as its role requires."""
+    """Return a texture's picture as linear values (H, W, k), converted for a map role such as "normal"."""
     if role == "normal":
         return slope_map(texture.picture, "up")
     if role in ("colour", "emission"):

@@ -57,7 +57,10 @@ class Tile:
 
 
 def base_texture(material: FileMaterial) -> Texture | None:
-    """Return the texture whose uv mapping a material's tile uses: colour, or else the first texture."""
+    """Return the texture that determines the uv mapping of a material's tile; None without textures.
+
+    This is the colour texture of the material or, if there is none, its first texture.
+    """
     return material.textures.get("colour") or next(iter(material.textures.values()), None)
 
 

@@ -62,18 +62,20 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
 
 
 @contextmanager
-def atomic_folder(path: str | Path, marker: str) -> Iterator[Path]:
+def atomic_folder(path: str | Path, marker_name: str) -> Iterator[Path]:
     """Yield a new empty folder, which replaces `path` on success and is deleted after an error.
 
-    marker : name of a file by which an existing folder is recognised as output of this package; only a folder
-        with this file, or an empty folder, is replaced
+    marker_name : name of a file by which an existing folder is recognised as output of this package; only a
+        folder with this file, or an empty folder, is replaced
 
     Raises DermisError for any other existing folder, and for paths that cannot be written.
     """
     try:
         target = Path(os.path.realpath(path))
-        if target.exists() and not (target.is_dir() and (_is_empty(target) or (target / marker).is_file())):
-            expected = f"a free name, or a folder that holds {marker}"
+        if target.exists() and not (
+            target.is_dir() and (_is_empty(target) or (target / marker_name).is_file())
+        ):
+            expected = f"a free name, or a folder that holds {marker_name}"
             refuse(path, expected, "something else is there", "Choose another name")
     except (OSError, ValueError) as fault:
         refuse_output(path, fault)

@@ -1,4 +1,4 @@
-"""Bibliography of the package: BibTeX entries with keys of author and year.
+"""Bibliography of the package: BibTeX entries with author-year keys, such as "Jensen2001".
 
 The original text of entries is kept; libraries that parse BibTeX would reformat the text.
 """
@@ -70,7 +70,7 @@ def _package_bibliography() -> dict[str, str]:
 def _bibtex_entries(bibtex_text: str, source_name: str) -> Iterator[str]:
     """Yield the text of each BibTeX entry, from the `@` to the closing brace.
 
-    Text between entries is a comment.
+    Text between entries is a comment, and is skipped.
     """
     depth, start = 0, -1
     for i, character in enumerate(bibtex_text):

@@ -1,4 +1,4 @@
-"""Framework of command-line programs: commands are functions; errors are one line and exit status 2."""
+"""Framework for command-line programs, whose commands are functions; errors print one line to stderr."""
 
 from __future__ import annotations
 
@@ -153,11 +153,11 @@ def _describe_error(error: CycloptsError, command: str) -> tuple[str, str, str]:
             return option, f"an option of {command}", "it has none of this name"
         case CoercionError():
             value = error.token.value if error.token else "something else"
-            return _option_name(error), _type_text(error.target_type), f"got {format_value(value)}"
+            return _invalid_option_name(error), _type_text(error.target_type), f"got {format_value(value)}"
         case MissingArgumentError():
-            return error.keyword or _option_name(error), "a value", "there is none"
+            return error.keyword or _invalid_option_name(error), "a value", "there is none"
         case RepeatArgumentError():
-            return _option_name(error), "one value", "it is given twice"
+            return _invalid_option_name(error), "one value", "it is given twice"
         case UnknownCommandError():
             return unused, f"a command of {command}", "it has none of this name"
         case UnusedCliTokensError():
@@ -165,7 +165,7 @@ def _describe_error(error: CycloptsError, command: str) -> tuple[str, str, str]:
     return command, "valid options", str(error).strip().rstrip(".")
 
 
-def _option_name(error: Any) -> str:
+def _invalid_option_name(error: Any) -> str:
     """Return the invalid option as the user wrote it, or the name of the invalid positional argument."""
     token = getattr(error, "token", None)
     return str((token and token.keyword) or (error.argument and error.argument.name) or "an option")

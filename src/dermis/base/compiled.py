@@ -20,9 +20,9 @@ from dermis.base.disk import load_arrays, try_save_arrays
 from dermis.base.extras import import_extra
 
 numba = import_extra("numba", "ground truth")
-caching = import_extra("numba.core.caching", "ground truth")
-compiler = import_extra("numba.core.compiler", "ground truth")
-serialize = import_extra("numba.core.serialize", "ground truth")
+numba_caching = import_extra("numba.core.caching", "ground truth")
+numba_compiler = import_extra("numba.core.compiler", "ground truth")
+numba_serialize = import_extra("numba.core.serialize", "ground truth")
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 _CACHE_FOLDER, _CODE_ARRAY_NAME = "machine-code", "code"
@@ -39,7 +39,7 @@ def compiled(function: Function) -> Function:
 _embeds_addresses = attrgetter("library.has_dynamic_globals")  # memory addresses, valid only in this process
 
 
-class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
+class _CodeCache(numba_caching.NullCache):  # type: ignore[misc, name-defined]
     """Disk cache of compiled functions; replaces numba's cache, which unpickles any file in its folder.
 
     Cached files are read only from private folders, and the hash of a file is checked before unpickling.
@@ -54,10 +54,10 @@ class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the cached machine code for a signature, or None if there is no cached code."""
         target_context.refresh()
-        found = load_arrays(_CACHE_FOLDER, self._key(sig, target_context.codegen()), [_CODE_ARRAY_NAME])
+        found = load_arrays(_CACHE_FOLDER, self._entry_key(sig, target_context.codegen()), [_CODE_ARRAY_NAME])
         if found is None:
             return None
-        return compiler.CompileResult._rebuild(
+        return numba_compiler.CompileResult._rebuild(
             target_context, *pickle.loads(found[_CODE_ARRAY_NAME].tobytes())
         )
 
@@ -65,10 +65,10 @@ class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
         """Cache the machine code for a signature, unless it contains addresses of this process."""
         if data.lifted or _embeds_addresses(data):
             return
-        code = np.frombuffer(serialize.dumps(data._reduce()), np.uint8)
-        try_save_arrays(_CACHE_FOLDER, self._key(sig, data.codegen), {_CODE_ARRAY_NAME: code})
+        code = np.frombuffer(numba_serialize.dumps(data._reduce()), np.uint8)
+        try_save_arrays(_CACHE_FOLDER, self._entry_key(sig, data.codegen), {_CODE_ARRAY_NAME: code})
 
-    def _key(self, signature: Any, codegen: Any) -> str:
+    def _entry_key(self, signature: Any, codegen: Any) -> str:
         text = f"{self._source_key} {signature} {codegen.magic_tuple()}"
         return hashlib.sha256(text.encode()).hexdigest()[:40]
 

@@ -18,14 +18,14 @@ SHOW_STEP_AFTER_S = 2.0
 
 def print_json(json_value: Any) -> None:
     """Print a value as JSON to stdout; numbers that JSON cannot represent, such as NaN, become null."""
-    print_lines(json.dumps(_with_null_for_nonfinite(json_value), indent=2, allow_nan=False))
+    print_lines(json.dumps(_replace_nonfinite_by_null(json_value), indent=2, allow_nan=False))
 
 
-def _with_null_for_nonfinite(value: Any) -> Any:
+def _replace_nonfinite_by_null(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return {key: _with_null_for_nonfinite(item) for key, item in value.items()}
+        return {key: _replace_nonfinite_by_null(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_with_null_for_nonfinite(item) for item in value]
+        return [_replace_nonfinite_by_null(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -35,16 +35,16 @@ def print_lines(*lines: str) -> None:
     sys.stdout.flush()
 
 
-def print_report(as_json: bool, report: object, lines: Callable[[], Iterable[str]]) -> None:
+def print_report(as_json: bool, report: object, make_lines: Callable[[], Iterable[str]]) -> None:
     """Print the result of a command as JSON or as text.
 
     as_json : whether to print `report` as JSON
-    lines : function that returns the lines of the text; called only if the text is printed
+    make_lines : function that returns the lines of the text; called only if the text is printed
     """
     if as_json:
         print_json(report)
     else:
-        print_lines(*lines())
+        print_lines(*make_lines())
 
 
 def note(note_text: str) -> None:

@@ -40,46 +40,53 @@ _MIN_THREADED_BYTES = 4 << 20
 _MAX_THREADS = 4
 
 
-def cached_array(sources: Array | Sequence[Array], parameters: str, compute: Callable[[], Array]) -> Array:
-    """Return the array that `compute` computes from `sources`; use the disk cache if it has the array.
+def cached_array(
+    source_arrays: Array | Sequence[Array], parameters: str, compute: Callable[[], Array]
+) -> Array:
+    """Return the result of `compute`, which depends on `source_arrays`, from the disk cache if possible.
 
-    parameters : text with everything besides `sources` on which the result depends; part of the cache key
+    parameters : text with all other inputs on which the result depends; part of the cache key
     """
-    return cached_arrays(sources, parameters, ["array"], lambda: {"array": compute()})["array"]
+    return cached_arrays(source_arrays, parameters, ["array"], lambda: {"array": compute()})["array"]
 
 
 def cached_arrays(
-    sources: Array | Sequence[Array], parameters: str, names: list[str], compute: Callable[[], Arrays]
+    source_arrays: Array | Sequence[Array],
+    parameters: str,
+    array_names: list[str],
+    compute: Callable[[], Arrays],
 ) -> Arrays:
-    """Return the arrays that `compute` computes from `sources`; use the disk cache if it has the arrays.
+    """Return the results of `compute`, which depend on `source_arrays`, from the disk cache if possible.
 
-    parameters : text with everything besides `sources` on which the result depends; part of the cache key
-    names : names of the arrays in the result
+    parameters : text with all other inputs on which the result depends; part of the cache key
+    array_names : names of the arrays in the result
     """
-    sources = [sources] if isinstance(sources, np.ndarray) else sources
-    return load_or_make("arrays", array_key(sources, parameters), names, compute)
+    source_arrays = [source_arrays] if isinstance(source_arrays, np.ndarray) else source_arrays
+    return load_or_make("arrays", array_key(source_arrays, parameters), array_names, compute)
 
 
-def array_key(sources: Sequence[Array], parameters: str) -> str:
+def array_key(source_arrays: Sequence[Array], parameters: str) -> str:
     """Return the cache key of a result that is computed from arrays.
 
-    sources : arrays from which the result is computed
+    source_arrays : arrays from which the result is computed
     parameters : text with all other inputs on which the result depends
     """
     digest = hashlib.sha256(parameters.encode())
-    for source in sources:
+    for source in source_arrays:
         digest.update(f" {source.shape} {source.dtype}".encode())
         digest.update(np.ascontiguousarray(source).data)
     return digest.hexdigest()[:40]
 
 
-def load_or_make(folder: str, cache_key: str, names: list[str], compute: Callable[[], Arrays]) -> Arrays:
+def load_or_make(
+    folder: str, cache_key: str, array_names: list[str], compute: Callable[[], Arrays]
+) -> Arrays:
     """Return arrays from the disk cache; if there is no valid entry, compute the arrays and cache them.
 
     folder : name of a folder inside the cache folder
-    names : names of the arrays in the result
+    array_names : names of the arrays in the result
     """
-    arrays = load_arrays(folder, cache_key, names)
+    arrays = load_arrays(folder, cache_key, array_names)
     if arrays is None:
         arrays = compute()
         try_save_arrays(folder, cache_key, arrays)
@@ -95,8 +102,8 @@ def try_save_arrays(folder: str, cache_key: str, arrays: Arrays) -> None:
             _prune_folder(path)
 
 
-def load_arrays(folder: str, cache_key: str, names: Sequence[str]) -> Arrays | None:
-    """Return arrays from the disk cache; None if the entry is missing or damaged, or lacks one of `names`."""
+def load_arrays(folder: str, cache_key: str, array_names: Sequence[str]) -> Arrays | None:
+    """Return the named arrays from the disk cache; None if the entry is missing, damaged or incomplete."""
     path = cache_folder() / folder / f"{cache_key}{_CACHE_FILE_SUFFIX}"
     with contextlib.suppress(OSError, MemoryError):
         if not _is_trusted(path.parent):
@@ -108,7 +115,7 @@ def load_arrays(folder: str, cache_key: str, names: Sequence[str]) -> Arrays | N
             return None
         with contextlib.suppress(OSError):  # a read-only folder
             os.utime(path)
-        return {name: arrays[name] for name in names} if arrays.keys() >= set(names) else None
+        return {name: arrays[name] for name in array_names} if arrays.keys() >= set(array_names) else None
     return None
 
 
@@ -212,17 +219,17 @@ def _byte_count(dtype: np.dtype[Any], array_shape: Sequence[int]) -> int:
     return math.prod(array_shape) * dtype.itemsize
 
 
-def _read_block(path: Path, block: memoryview, offset: int) -> str:
+def _read_block(path: Path, buffer: memoryview, offset: int) -> str:
     """Read a block of bytes of a file into memory, and return the SHA-256 of the block.
 
-    block : memory to be filled
+    buffer : memory to be filled
     offset : position of the block in the file [bytes]
     """
     with open_private_file(path) as file:
         file.seek(offset)
-        if file.readinto(block) != len(block):  # uninitialised memory may hold the right bytes
+        if file.readinto(buffer) != len(buffer):  # uninitialised memory may hold the right bytes
             raise ValueError(path)
-    return hashlib.sha256(block).hexdigest()
+    return hashlib.sha256(buffer).hexdigest()
 
 
 def _byte_blocks(arrays: Iterable[Array]) -> list[memoryview]:

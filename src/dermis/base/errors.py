@@ -88,6 +88,6 @@ def error_text(error: Exception) -> str:
 
 
 def shorten(text: str, max_length: int) -> str:
-    """Return a text for a message; if the text is longer than `max_length`, its middle is left out."""
+    """Return a text, without its middle part if it is longer than `max_length` characters."""
     half = (max_length - 5) // 2
     return text if len(text) <= max_length else f"{text[:half]} ... {text[-half:]}"

@@ -14,11 +14,11 @@ Treatment = Literal["drawn", "drawn with a note", "noted", "refused", "no effect
 class FileProperty:
     """Property of a file, and what the reader does with this property.
 
-    treatment : "drawn" if the scene follows the property; "drawn with a note" if a note is also printed;
+    treatment : "drawn" if the property affects the picture; "drawn with a note" if a note is also printed;
         "noted" if the property is ignored and a note says so; "no effect" if it is ignored without a note;
         "refused" if the reader raises an error
     name : property as the documentation shows it, in Markdown
-    detail : how the property is drawn, or why it is not drawn, in Markdown
+    detail : how the property affects the picture, or why it does not, in Markdown
     keys : words by which the reader recognises the property, such as statements or extensions
     other_parts : treatment in materials of parts that are not skin; None if it is the same as in skin
     """
@@ -29,12 +29,12 @@ class FileProperty:
     keys: tuple[str, ...] = ()
     other_parts: Treatment | None = None
 
-    def cells(self, is_material: bool) -> list[str]:
+    def documentation_cells(self, has_parts_column: bool) -> list[str]:
         """Return the cells of the row for this property in a table of the documentation.
 
-        is_material : whether the table has separate columns for the treatment in skin and in other parts
+        has_parts_column : whether the table has separate columns for the treatment in skin and in other parts
         """
-        others = [self.other_parts or self.treatment] if is_material else []
+        others = [self.other_parts or self.treatment] if has_parts_column else []
         return [self.name, self.treatment, *others, self.detail]
 
 
@@ -57,11 +57,11 @@ no_effect = partial(_file_property, "no effect")
 
 
 def keys_of(properties: Iterable[FileProperty], *treatments: Treatment) -> tuple[str, ...]:
-    """Return the keys of the properties with one of the given treatments; by default of all properties."""
+    """Return the keys of all properties, or only of those that have one of the given treatments."""
     chosen = (item for item in properties if not treatments or item.treatment in treatments)
     return tuple(dict.fromkeys(key for item in chosen for key in item.keys))
 
 
-def markdown_code(keys: Iterable[str]) -> str:
+def markdown_code(words: Iterable[str]) -> str:
     """Return words formatted as code in Markdown, separated by commas."""
-    return ", ".join(f"`{key}`" for key in keys)
+    return ", ".join(f"`{key}`" for key in words)

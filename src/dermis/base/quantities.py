@@ -97,7 +97,8 @@ def _number_in_range(value: object, low: float, high: float) -> int | float | No
 def _has_text(values: Any, dimension_count: int) -> bool:
     """Return whether nested lists or arrays contain text or booleans, which NumPy would convert to numbers.
 
-    dimension_count : number of dimensions of the expected array; more deeply nested lists are treated as text
+    dimension_count : number of dimensions of the expected array; the result is True for more deeply nested
+        lists
     """
     import numpy as np
 

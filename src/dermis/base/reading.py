@@ -45,7 +45,7 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
     """
     culprit = path if name is None else name
     try:
-        with os.fdopen(_open_regular(path, culprit, expected), "rb") as file:
+        with os.fdopen(_open_regular_descriptor(path, culprit, expected), "rb") as file:
             size = os.fstat(file.fileno()).st_size
             limit = min(
                 max_bytes, max(size, _MIN_READ_BYTES)
@@ -75,7 +75,7 @@ def open_regular_file(path: str | Path, expected: str) -> Iterator[BinaryIO]:
     Raises DermisError when the file is missing, not regular or unreadable.
     """
     try:
-        descriptor = _open_regular(path, path, expected)
+        descriptor = _open_regular_descriptor(path, path, expected)
     except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
         refuse(path, expected, f"it cannot be read ({error_text(fault)})", "Check its name")
     try:
@@ -115,7 +115,7 @@ def read_toml(path: str | Path, expected: str = "a TOML file") -> dict[str, Any]
         if _LONG_KEY_PATTERN.search(text):
             raise ValueError(f"a key has more than {_MAX_KEY_PARTS} parts with dots between them")
         tables = tomllib.loads(text)
-        _check_integers(tables)
+        _check_toml_integers(tables)
     return tables
 
 
@@ -127,7 +127,7 @@ def parse_json(json_text: str | bytes, culprit: object, expected: str) -> Any:
     with parsing(culprit, expected):
         return json.loads(
             json_text,
-            parse_constant=_refuse_constant,
+            parse_constant=_refuse_json_constant,
             parse_float=_parse_finite_float,
             parse_int=_parse_bounded_int,
         )
@@ -167,7 +167,7 @@ def parsing(culprit: object, expected: str, *errors: type[Exception]) -> Iterato
         refuse(culprit, expected, f"it cannot be understood ({_short_error(fault)})", "Check its contents")
 
 
-def _open_regular(path: str | Path, culprit: object, expected: str) -> int:
+def _open_regular_descriptor(path: str | Path, culprit: object, expected: str) -> int:
     """Open a regular file and return its descriptor; pipes and devices are refused without blocking."""
     descriptor = os.open(path, os.O_RDONLY | _OPEN_FLAGS)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
@@ -176,22 +176,22 @@ def _open_regular(path: str | Path, culprit: object, expected: str) -> int:
     return descriptor
 
 
-def _parse_finite_float(text: str) -> float:
-    number = float(text)
+def _parse_finite_float(number_text: str) -> float:
+    number = float(number_text)
     if not math.isfinite(number):
-        raise ValueError(f"{text[:20]} is too large for a number")
+        raise ValueError(f"{number_text[:20]} is too large for a number")
     return number
 
 
-def _parse_bounded_int(text: str) -> int:
-    number = int(text)
+def _parse_bounded_int(number_text: str) -> int:
+    number = int(number_text)
     if number.bit_length() > _MAX_INTEGER_BITS:
-        raise ValueError(f"{text[:20]}... is too large for a whole number")
+        raise ValueError(f"{number_text[:20]}... is too large for a whole number")
     return number
 
 
-def _check_integers(tables: dict[str, Any]) -> None:
-    pending: list[Any] = [tables]
+def _check_toml_integers(toml_tables: dict[str, Any]) -> None:
+    pending: list[Any] = [toml_tables]
     while pending:
         value = pending.pop()
         if isinstance(value, dict):
@@ -202,8 +202,8 @@ def _check_integers(tables: dict[str, Any]) -> None:
             raise ValueError(f"a whole number has {value.bit_length()} bits, more than {_MAX_INTEGER_BITS}")
 
 
-def _refuse_constant(text: str) -> NoReturn:
-    raise ValueError(f"{text} is not a number")
+def _refuse_json_constant(constant_name: str) -> NoReturn:
+    raise ValueError(f"{constant_name} is not a number")
 
 
 def _format_megabytes(byte_count: int) -> str:

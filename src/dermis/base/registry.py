@@ -96,7 +96,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return [f"{name}: {summary}" for name, summary in self._summaries.items()]
 
     def __getitem__(self, name: str) -> T:
-        """Return the object of an entry, importing the object on first use if the entry is text.
+        """Return the object of an entry; an object given as "module:attribute" is imported on first use.
 
         Raises DermisError for a name that is not registered.
         """

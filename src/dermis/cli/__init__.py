@@ -18,7 +18,7 @@ COMMANDS = {
     "fit": "Estimate the light and the skin in a photograph of a head.",
     "lights": "Print a lighting rig as a TOML file to start from.",
     "compare": "Compare techniques with a reference, or the specular models.",
-    "gallery": "Render the comparisons of the 2007 talk and a page that explains them.",
+    "gallery": 'Render the comparisons of the talk "Advanced Skin Rendering" (2007), with explanations.',
     "bench": "Measure the frame times on this machine.",
     "doctor": "Report what this machine supports and render a test frame.",
     "cite": "Print the BibTeX entries of the works behind a picture.",

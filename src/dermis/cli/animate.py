@@ -188,7 +188,7 @@ def _render_frames(
 
 
 def _common_exposure(animated_scene: _AnimatedScene, renderer: Renderer) -> float:
-    """Return the exposure of all frames: the value of --exposure, or the metered exposure of the first."""
+    """Return the exposure of all frames: the value of --exposure, or else as metered on the first frame."""
     if animated_scene.settings.exposure != "auto":
         return animated_scene.settings.exposure
     (scene,) = animated_scene.scenes([animated_scene.first])
@@ -197,23 +197,28 @@ def _common_exposure(animated_scene: _AnimatedScene, renderer: Renderer) -> floa
     return exposure
 
 
-def _frame_digest(animation: _AnimatedScene, options: SceneOptions, *files: str) -> str:
+def _frame_digest(animated_scene: _AnimatedScene, options: SceneOptions, *files: str) -> str:
     """Return a hash of everything that determines the frames; images from runs with an equal hash are reused.
 
     files : head and motion as named on the command line; the hash includes the size and modification time of
         each file
     """
-    scene = animation.scene
-    names = [*files, scene.head.name, *map(str, options.head.values()), animation.clip.name]
-    metered_at = animation.first if animation.settings.exposure == "auto" else None
+    scene = animated_scene.scene
+    names = [*files, scene.head.name, *map(str, options.head.values()), animated_scene.clip.name]
+    metered_at = animated_scene.first if animated_scene.settings.exposure == "auto" else None
     scene_values = scene.lights, scene.camera, scene.skin, scene.environment
-    frame_values = *scene_values, animation.settings, animation.rate, metered_at
+    frame_values = *scene_values, animated_scene.settings, animated_scene.rate, metered_at
     option_values = options.head, options.eye, options.pose, options.bone, options.look_at
-    parts = [*map(_file_state, names), *map(repr, option_values), repr(frame_values), str(scene.head.levels)]
+    parts = [
+        *map(_file_fingerprint, names),
+        *map(repr, option_values),
+        repr(frame_values),
+        str(scene.head.levels),
+    ]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
-def _file_state(file_name: str) -> str:
+def _file_fingerprint(file_name: str) -> str:
     """Return the path, size and modification time of a file as text; for a name without a file, the name."""
     path = Path(file_name.partition("#")[0])
     if not path.exists():
@@ -316,7 +321,7 @@ def motion_file(head_or_scene: str, motion: str | None) -> str:
 
 
 def load_clip(
-    head_or_scene: str, head: Head, motion: str, clip: str | None, head_options: Options, span: TimeSpan
+    head_or_scene: str, head: Head, motion: str, clip: str | None, head_options: Options, time_span: TimeSpan
 ) -> Clip:
     """Load the clip that animates a head from a motion file.
 
@@ -324,21 +329,21 @@ def load_clip(
     motion : motion file
     clip : name of a clip in the motion file; None for the only clip
     head_options : options of the head; `unit_mm`, `up` and `front` also apply to mesh sequences
-    span : time span; only the frame rates are used
+    time_span : time span; only the frame rates are used
     """
     from dermis.formats.motion.sequence import is_sequence
     from dermis.scene.motion import load_motion
 
-    rate = span.motion_rate
-    if rate is None and span.rate and is_sequence(Path(motion)):  # one file per frame
-        rate = float(span.rate)
+    rate = time_span.motion_rate
+    if rate is None and time_span.rate and is_sequence(Path(motion)):  # one file per frame
+        rate = float(time_span.rate)
     fields = {**_head_table(head_or_scene), **head_options}
     units = {key: fields[key] for key in ("unit_mm", "up", "front") if key in fields}
     return load_motion(motion, head, clip=clip, fps=rate, **units)
 
 
 def animatable_names(head_or_scene: str, head: Head) -> dict[str, tuple[str, ...]]:
-    """Return a dictionary from kinds (morph targets, bones, and clips in the head's file) to names."""
+    """Return the names of the morph targets, the bones, and the clips in the head's file, by kind."""
     from dermis.formats.gltf.animations import clip_names
     from dermis.formats.parts import is_gltf
 
@@ -348,7 +353,7 @@ def animatable_names(head_or_scene: str, head: Head) -> dict[str, tuple[str, ...
 
 
 def _head_table(head_or_scene: str) -> Options:
-    """Return the [head] table of a scene file; an empty table for any other head name."""
+    """Return the [head] table of a scene file, or an empty table if the argument is not a scene file."""
     from dermis.scene.files import head_table
 
     return head_table(Path(head_or_scene)) if Path(head_or_scene).suffix.lower() == ".toml" else {}

@@ -122,7 +122,7 @@ def batch(
     if example:
         print_lines(example_toml().rstrip("\n"))
         return 0
-    shards, parts = _parse_fraction("--shard", shard), _parse_fraction("--part", part)
+    shards, parts = _parse_selection("--shard", shard), _parse_selection("--part", part)
     if spec is None:
         refuse("SPEC", "a file", "it is missing", "Print an example spec with --example")
     overrides = drop_none(count=count, size=size and parse_size(size), seed=seed, format=format)
@@ -140,7 +140,7 @@ def batch(
         pool: WorkerPool = _dask_cluster(scheduler, cluster, adapter, local_options)
         encoder_count = _check_count("--encoders", encoders, 0)
     else:
-        pool, encoder_count = _local_processes(adapter, adapters, workers, workers_per_gpu, encoders)
+        pool, encoder_count = _local_process_pool(adapter, adapters, workers, workers_per_gpu, encoders)
     work = RunOptions(loaded_spec, output, encoder_count or 0, keep_going)
     with image_progress() as report_progress:
         report = run(work, pool, shards, parts, report_progress)
@@ -148,7 +148,7 @@ def batch(
     return 0
 
 
-def _parse_fraction(option: str, option_value: str) -> tuple[int, int]:
+def _parse_selection(option: str, option_value: str) -> tuple[int, int]:
     """Return the integers I and N of an option's value "I/N"."""
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", option_value)
     if not match or int(match[1]) >= int(match[2]):
@@ -162,7 +162,7 @@ def _check_count(option_name: str, option_value: int | None, minimum: int) -> in
     return option_value
 
 
-def _local_processes(
+def _local_process_pool(
     adapter: str, adapters: str | None, workers: int | None, workers_per_gpu: int | None, encoders: int | None
 ) -> tuple[WorkerPool, int]:
     """Return a pool of worker processes on this machine, and the number of encoder processes per worker."""
@@ -220,18 +220,27 @@ def _print_report(report: RunReport, folder: Path, as_json: bool) -> None:
     print_lines(*lines)
 
 
-def _dry_run(spec: Spec, adapter: str, contact_sheet: Path, as_json: bool) -> int:
-    from dermis.apps.batch.preview import dry_run, estimate_line, table_lines
+def _dry_run(spec: Spec, adapter: str, contact_sheet_path: Path, as_json: bool) -> int:
+    from dermis.apps.batch.preview import dry_run, estimate_line, parameter_table_lines
     from dermis.images.io import check_output, write_png
 
-    check_output(contact_sheet)
-    if contact_sheet.suffix.lower() != ".png":
-        refuse(contact_sheet, "a name that ends in .png", "it does not", "Name the contact sheet, or omit -o")
+    check_output(contact_sheet_path)
+    if contact_sheet_path.suffix.lower() != ".png":
+        refuse(
+            contact_sheet_path,
+            "a name that ends in .png",
+            "it does not",
+            "Name the contact sheet, or omit -o",
+        )
     with spinner("rendering a contact sheet"):
         rows, picture, estimate = dry_run(spec, adapter)
-    write_png(contact_sheet, picture)
-    report = {"sheet": str(contact_sheet), "parameters": rows, "estimate": estimate}
-    print_report(as_json, report, lambda: [*table_lines(rows), estimate_line(estimate), str(contact_sheet)])
+    write_png(contact_sheet_path, picture)
+    report = {"sheet": str(contact_sheet_path), "parameters": rows, "estimate": estimate}
+    print_report(
+        as_json,
+        report,
+        lambda: [*parameter_table_lines(rows), estimate_line(estimate), str(contact_sheet_path)],
+    )
     return 0
 
 
@@ -265,12 +274,12 @@ def image_progress() -> Iterator[Callable[[Progress], None]]:
         task = bar.add_task("rendering images", rate="", total=None)
         image_rate = ImageRate()
 
-        def report(state: Progress) -> None:
-            if state.images < state.total or not state.to_verify:
-                what, done, total = "rendering images", state.images, state.total
+        def report(progress: Progress) -> None:
+            if progress.images < progress.total or not progress.to_verify:
+                what, done, total = "rendering images", progress.images, progress.total
                 rate = f"{image_rate.update(done):.3g} images/s"
             else:
-                what, done, total, rate = "verifying shards", state.verified, state.to_verify, ""
+                what, done, total, rate = "verifying shards", progress.verified, progress.to_verify, ""
             bar.update(task, description=what, completed=done, total=total, rate=rate)
 
         yield report
@@ -299,23 +308,25 @@ class ImageRate:
 class ProgressLog:
     """Writer of progress messages to log files, at most one message every 30 seconds.
 
-    write : function that writes one line to the log
+    write_line : function that writes one line to the log
     clock : function that returns the current time [s]
     """
 
-    def __init__(self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
-        self._write, self._clock = write, clock
+    def __init__(
+        self, write_line: Callable[[str], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._write, self._clock = write_line, clock
         self._rate, self._last = ImageRate(clock), clock()
 
-    def report(self, state: Progress) -> None:
+    def report(self, progress: Progress) -> None:
         """Log the number of finished images and the remaining time, unless the last message is too recent."""
-        done, total = state.images, state.total
+        done, total = progress.images, progress.total
         rate, now = self._rate.update(done), self._clock()
         if now - self._last < _LOG_INTERVAL_S:
             return
         self._last = now
-        if done >= total and state.to_verify:
-            self._write(f"{state.verified:,} of {state.to_verify:,} shards verified")
+        if done >= total and progress.to_verify:
+            self._write(f"{progress.verified:,} of {progress.to_verify:,} shards verified")
             return
         remaining = f"{(total - done) / rate / 60:.0f} min left" if rate else "time left unknown"
         self._write(f"{done:,} of {total:,} images, {rate:.3g} images/s, {remaining}")

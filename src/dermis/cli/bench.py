@@ -87,7 +87,7 @@ def _report_lines(benchmark: Benchmark) -> list[str]:
     rows = _align_columns([report.COLUMNS, *map(report.row_cells, benchmark.rows)])
     stages = _align_columns(report.stage_table(benchmark))
     default_lines = ["", "the default frame:", *stages] if stages else []
-    published_lines = ["", text] if (text := report.published_text(benchmark)) else []
+    published_lines = ["", text] if (text := report.gpu_gems_3_text(benchmark)) else []
     table_lines = [*rows, *report.skipped_lines(benchmark)]
     return [report.summary_line(benchmark), "", *table_lines, *default_lines, *published_lines]
 

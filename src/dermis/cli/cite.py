@@ -65,11 +65,11 @@ def cite(
     return 0
 
 
-def _comparison_sources(against: str, technique: str | None) -> tuple[str, ...]:
+def _comparison_sources(reference_solution: str, technique: str | None) -> tuple[str, ...]:
     from dermis.apps.validation.comparisons.compare import comparison_sources
     from dermis.scene.techniques import TECHNIQUES
 
-    return comparison_sources(against, [technique] if technique else TECHNIQUES)
+    return comparison_sources(reference_solution, [technique] if technique else TECHNIQUES)
 
 
 def _picture_sources(scene_file: Path | None, settings: Options, skin: Options) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from dermis.base.atomic_write import atomic_file, refuse_output
 from dermis.base.console import print_report, spinner
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
-from dermis.cli.head_options import ShapeOptions, check_head_options, note_eyes
+from dermis.cli.head_options import ShapeOptions, check_head_options, note_kept_eyeballs
 from dermis.cli.options import (
     NO_OPTIONS,
     AdapterOption,
@@ -148,16 +148,16 @@ def _refuse_unused_options(compared_subject: str, options: Options) -> None:
             refuse(option_name(name), "no such option here", f"it is given, and {reason}", "Remove it")
 
 
-def _comparison_arguments(options: Options, sizes: Options) -> Options:
+def _comparison_arguments(options: Options, size_options: Options) -> Options:
     """Return the keyword arguments of `dermis.apps.validation.comparisons.compare` for the command line.
 
     options : options given on the command line, by name
-    sizes : picture and atlas sizes given on the command line
+    size_options : picture and atlas sizes given on the command line
     """
     from dermis.apps.validation.comparisons.scenes import default_region
 
     names = [name.strip() for name in options.get("techniques", ",".join(TECHNIQUES)).split(",")]
-    size_settings = {**_DEFAULT_SIZE_SETTINGS, **sizes}
+    size_settings = {**_DEFAULT_SIZE_SETTINGS, **size_options}
     for name in names:
         check_fields(Settings, {**size_settings, "technique": name}, {"technique": "techniques"})
     light = options.get("light", "front")
@@ -175,26 +175,28 @@ def _comparison_arguments(options: Options, sizes: Options) -> Options:
 
 
 def _compare_techniques(
-    head: str, shape: Options, arguments: Options, output: Path | None, as_json: bool
+    head: str, shape_options: Options, comparison_arguments: Options, output: Path | None, as_json: bool
 ) -> None:
     """Compare techniques with a reference solution on a head, print the errors and write an HTML report.
 
-    shape : options of the head that affect its mesh
-    arguments : keyword arguments of the comparison
+    shape_options : options of the head that affect its mesh
+    comparison_arguments : keyword arguments of the comparison
     """
     from dermis.apps.validation.comparisons import compare as comparison
     from dermis.apps.validation.comparisons.report import write_report
     from dermis.base.atomic_write import check_output
     from dermis.scene.heads import load_head
 
-    check_head_options(head, shape)
-    comparison.check_names(*(arguments[option] for option in ("against", "light", "region", "medium")))
+    check_head_options(head, shape_options)
+    comparison.check_names(
+        *(comparison_arguments[option] for option in ("against", "light", "region", "medium"))
+    )
     if output is not None:
         check_output(output, (".html",), "Choose such a name")
     with spinner("comparing"):
-        loaded_head = load_head(head, subdivide=0, **shape)
-        note_eyes(loaded_head, shape.get("eyes"))
-        result = comparison.compare(loaded_head, **arguments)
+        loaded_head = load_head(head, subdivide=0, **shape_options)
+        note_kept_eyeballs(loaded_head, shape_options.get("eyes"))
+        result = comparison.compare(loaded_head, **comparison_arguments)
     if output is not None:
         write_report(output, result)
     report = {
@@ -252,7 +254,7 @@ def _specular_report(adapter: str) -> Options:
     """Return albedos, reciprocity errors and GPU costs of all specular models, for JSON."""
     from dermis.apps.validation.benchmarks.lobe_cost import lobe_cost_ns
     from dermis.gpu.failures import run_on_device
-    from dermis.specular.comparison import albedo_rows, reciprocity_error
+    from dermis.specular.comparison import directional_albedo_rows, reciprocity_error
     from dermis.specular.fresnel import FRESNEL, hemispherical_reflectance
 
     name, cost = run_on_device(adapter, lambda device: (device.adapter.name, lobe_cost_ns(device)))
@@ -263,7 +265,7 @@ def _specular_report(adapter: str) -> Options:
             name: {
                 "note": model.note,
                 "reciprocal": model.reciprocal,
-                "albedo": albedo_rows(name),
+                "albedo": directional_albedo_rows(name),
                 "reciprocity_error": reciprocity_error(name),
                 "gpu_ns": cost[name, "schlick"],
                 "gpu_ns_exact_fresnel": cost[name, "exact"],
@@ -313,8 +315,8 @@ def _draw_lobes_and_albedo(folder: Path, roughness: float) -> None:
     _save_figure(_albedo_figure(roughness), folder / "albedo.png")
 
 
-def _distinct_models() -> list[str]:
-    """Return the names of the specular models except "kelemen-direct", which has the lobe of "kelemen"."""
+def _distinct_model_names() -> list[str]:
+    """Return the names of the specular models, except "kelemen-direct", whose lobe is that of "kelemen"."""
     return [name for name in MODELS if name != _DUPLICATE_MODEL]
 
 
@@ -324,7 +326,9 @@ def _lobe_figure(roughness: float) -> Figure:
     roughness : Beckmann roughness [-]
     """
     peak = _lobe_intensity("kelemen", roughness).max(axis=1, keepdims=True)
-    curves_by_model = {name: np.sqrt(_lobe_intensity(name, roughness) / peak) for name in _distinct_models()}
+    curves_by_model = {
+        name: np.sqrt(_lobe_intensity(name, roughness) / peak) for name in _distinct_model_names()
+    }
     radius = max(_MIN_PLOT_RADIUS, 1.05 * float(np.max(list(curves_by_model.values()))))
     rows = -(-len(curves_by_model) // _PLOT_COLUMN_COUNT)
     figure = _empty_figure(3.0 * _PLOT_COLUMN_COUNT, 2.4 * rows)
@@ -379,7 +383,7 @@ def _albedo_figure(roughness: float) -> Figure:
     figure = _empty_figure(7.2, 4.6)
     axes = figure.subplots()
     degrees = np.linspace(0.0, 89.0, 180)
-    for name in _distinct_models():
+    for name in _distinct_model_names():
         rho = directional_albedo(np.cos(np.radians(degrees)), roughness, MODELS[name].lobe)
         axes.plot(degrees, rho, linewidth=1.4, label=name)
     axes.set(xlabel="angle from the normal [°]", ylabel="directional albedo, ρ_s = 1", xlim=(0, 90))

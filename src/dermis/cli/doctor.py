@@ -17,7 +17,9 @@ _REPORTED_PACKAGES = ("dermis", "wgpu", "numpy", "scipy", "pydantic", "OpenEXR",
 
 
 def doctor(*, adapter: AdapterOption = "auto", as_json: JsonOption = False) -> int:
-    """List adapters, versions and sample data, report which adapter is used and why, and render a test frame.
+    """List graphics adapters, versions and sample data, and render a test frame.
+
+    The command also reports which adapter is used, and why.
 
     The exit status is 0 if everything works, otherwise 2.
 

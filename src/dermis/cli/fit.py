@@ -92,8 +92,8 @@ def fit(
     return 0
 
 
-def _print_report(fit_result: FitResult, written: list[Path], as_json: bool) -> None:
-    summary = fit_result.summary() | {"files": [str(path) for path in written]}
+def _print_report(fit_result: FitResult, written_files: list[Path], as_json: bool) -> None:
+    summary = fit_result.summary() | {"files": [str(path) for path in written_files]}
     if as_json:
         print_json(summary)
         return
@@ -112,4 +112,4 @@ def _print_report(fit_result: FitResult, written: list[Path], as_json: bool) -> 
     for row in summary["not_told_apart"]:
         lines.append(f"  not separable: {' and '.join(row['pair'])} (correlation {row['correlation']:.2f})")
     lines += [f"  prior: {prior}" for prior in summary["priors"]]
-    print_lines(*lines, *(f"  {path}" for path in written))
+    print_lines(*lines, *(f"  {path}" for path in written_files))

@@ -1,4 +1,4 @@
-"""The command `dermis gallery`: the comparisons of the 2007 talk as pictures on one page."""
+"""The command `dermis gallery`: a page with the comparisons of the talk "Advanced Skin Rendering" (2007)."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ def gallery(
     adapter: AdapterOption = "auto",
     as_json: JsonOption = False,
 ) -> int:
-    """Render the comparisons of the 2007 talk and a page that explains them.
+    """Render the comparisons of the talk "Advanced Skin Rendering" (2007), with explanations.
 
-    Writes the pictures, and index.html, a page that contains all pictures and works offline.
+    The command writes the pictures, and index.html, a page that contains and explains all pictures and works
+    offline.
 
     Examples:
 

@@ -166,9 +166,9 @@ def head(
     person = _build_person(seed, numbers, tone, parse_weights(target or [], TARGET_OPTION))
     person = replace(
         person,
-        skin=_with_values(person.look, skin, "--skin"),
-        eyes=_with_values(person.iris, eye, "--eye"),
-        hair=_with_hair_values(person.hairdo, hair),
+        skin=_look_with_values(person.look, skin, "--skin"),
+        eyes=_look_with_values(person.iris, eye, "--eye"),
+        hair=_hair_look_with_values(person.hairdo, hair),
     )
     report: Options = {"head": str(output), "person": person_parameters(person)}
     if output.suffix.lower() == ".json":
@@ -177,7 +177,9 @@ def head(
         return 0
     with spinner("creating the head"):
         person_head = person.head(layout=layout, **drop_none(subdivide=subdivide))
-        person_head = _with_maps(person_head, drop_none(colour=colour, normal=normal, roughness=roughness))
+        person_head = _head_with_maps(
+            person_head, drop_none(colour=colour, normal=normal, roughness=roughness)
+        )
         person_head, eyes = run_on_device(adapter, lambda device: paint_head(device, person_head, size))
         byte_count = _write_glb(output, person, person_head, rest_weights, eyes)
     seconds, mesh = round(time.perf_counter() - started, 3), person_head.mesh
@@ -188,23 +190,25 @@ def head(
     return 0
 
 
-def _build_person(seed: int | None, numbers: Options, tone: Options, targets: dict[str, float]) -> Human:
+def _build_person(
+    seed: int | None, field_values: Options, skin_tone: Options, target_weights: dict[str, float]
+) -> Human:
     """Return the average person, or the random person of a seed, with some parameters and targets replaced.
 
-    numbers : dictionary from fields of `Human` to their new values
-    tone : skin ancestry and ITA (individual typology angle), which determine the person's skin
-    targets : dictionary from MakeHuman shape targets to weights
+    field_values : dictionary from fields of `Human` to their new values
+    skin_tone : skin ancestry and ITA (individual typology angle), which determine the person's skin
+    target_weights : dictionary from MakeHuman shape targets to weights
     """
     from dermis.human.person import Human
 
-    base = Human(**tone) if seed is None else Human.drawn(seed, **tone)
-    return replace(base, **numbers, targets={**base.targets, **targets})
+    base = Human(**skin_tone) if seed is None else Human.drawn(seed, **skin_tone)
+    return replace(base, **field_values, targets={**base.targets, **target_weights})
 
 
-def _with_values(look: Look, option_values: list[str] | None, option_name: str) -> Look:
+def _look_with_values(look: Look, option_values: list[str] | None, option_name: str) -> Look:
     """Return a copy of a skin, eye or hair look with the fields set on the command line.
 
-    option_values : texts "NAME=NUMBER,..." of the option, such as --skin
+    option_values : values "NAME=NUMBER,..." of an option such as --skin
     """
     from dermis.human.skin.look import SITES_FIELD
 
@@ -219,21 +223,23 @@ def _with_values(look: Look, option_values: list[str] | None, option_name: str) 
     return replace(look, **numbers)
 
 
-def _with_hair_values(look: HairLook, option_values: list[str] | None) -> HairLook:
+def _hair_look_with_values(look: HairLook, option_values: list[str] | None) -> HairLook:
     """Return a copy of a hair look with the fields set by --hair: a style, and numbers for other fields."""
     pairs = [pair for pair in ",".join(option_values or []).split(",") if pair]
     styles = [pair.removeprefix("style=") for pair in pairs if pair.startswith("style=")]
     numbers = [pair for pair in pairs if not pair.startswith("style=")]
     style: Options = {"style": styles[-1]} if styles else {}
-    return replace(_with_values(look, numbers, "--hair"), **style)
+    return replace(_look_with_values(look, numbers, "--hair"), **style)
 
 
-def _with_maps(head: Head, files: Options) -> Head:
+def _head_with_maps(head: Head, map_files: Options) -> Head:
     """Return a copy of the head with maps loaded from files; a normal map also removes the height map."""
     from dermis.formats.maps import load_maps
 
-    loaded = load_maps(**files)
-    maps = {role: getattr(loaded, role) for role in files} | ({"height": None} if "normal" in files else {})
+    loaded = load_maps(**map_files)
+    maps = {role: getattr(loaded, role) for role in map_files} | (
+        {"height": None} if "normal" in map_files else {}
+    )
     return replace(head, maps=replace(head.maps, **maps))
 
 
@@ -245,4 +251,6 @@ def _write_glb(
     from dermis.scene.skin import Skin
 
     Pose(expression).motion(head.control, EXPRESSION_OPTION)  # raises for unknown names and invalid weights
-    return write_person_glb(output, person, head, roughness=Skin().roughness, weights=expression, eyes=eyes)
+    return write_person_glb(
+        output, person, head, roughness=Skin().roughness, expression_weights=expression, eyes=eyes
+    )

@@ -59,7 +59,7 @@ EyeOptions = Annotated[
 ]
 
 
-def note_eyes(head: Head, eyes_option: str | None) -> None:
+def note_kept_eyeballs(head: Head, eyes_option: str | None) -> None:
     """Print a note on stderr if a mesh file kept its eyeballs instead of getting the package's eyes.
 
     eyes_option : value of the option --eyes
@@ -106,22 +106,22 @@ def parse_weights(option_values: Sequence[str], option_name: str = POSE_OPTION) 
     """Return a dictionary from names to weights for option values such as "jawOpen=0.6,mouthSmileLeft=1"."""
     expected = "NAME=WEIGHT,..., such as jawOpen=0.6,mouthSmileLeft=1"
     parts = (part for text in option_values for part in text.split(","))
-    return {name: weight for name, (weight,) in _parse_pairs(parts, 1, option_name, expected)}
+    return {name: weight for name, (weight,) in _parse_named_numbers(parts, 1, option_name, expected)}
 
 
 def parse_bone_angles(option_values: Sequence[str]) -> dict[str, list[float]]:
     """Return a dictionary from bones to angles about x, y and z [degrees].
 
-    option_values : texts such as "head=0,25,0"
+    option_values : values of the option --bone, such as "head=0,25,0"
     """
     return dict(
-        _parse_pairs(
+        _parse_named_numbers(
             option_values, 3, BONE_OPTION, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"
         )
     )
 
 
-def _parse_pairs(
+def _parse_named_numbers(
     option_values: Iterable[str], number_count: int, option_name: str, expected: str
 ) -> Iterator[tuple[str, list[float]]]:
     """Yield the name and the numbers of each option value "NAME=NUMBER,...".
@@ -139,11 +139,14 @@ def _parse_pairs(
 
 
 def pose_from_options(
-    weights: Mapping[str, float], bone_angles: Mapping[str, Sequence[float]], head: Head, head_name: str
+    target_weights: Mapping[str, float],
+    bone_angles: Mapping[str, Sequence[float]],
+    head: Head,
+    head_name: str,
 ) -> Pose:
     """Return the pose that the options --pose and --bone describe.
 
-    weights : dictionary from morph targets to weights [-]
+    target_weights : dictionary from morph targets to weights [-]
     bone_angles : dictionary from bones to rotation angles about x, y and z [degrees]
     head_name : head as named on the command line, for error messages
 
@@ -151,7 +154,7 @@ def pose_from_options(
     """
     from dermis.mesh.pose import Pose
 
-    parts = {POSE_OPTION: Pose(weights), BONE_OPTION: Pose(bones=bone_angles)}
+    parts = {POSE_OPTION: Pose(target_weights), BONE_OPTION: Pose(bones=bone_angles)}
     for option, part in parts.items():
         try:
             part.motion(head.control, option)
@@ -159,7 +162,7 @@ def pose_from_options(
             if not (head.targets or head.bones):
                 raise
             raise DermisError(f"{fault} All names: dermis animate {head_name} --names.") from None
-    return Pose(weights, bone_angles)
+    return Pose(target_weights, bone_angles)
 
 
 def pose_with_gaze(option_value: str, scene: Scene) -> Pose:
@@ -177,7 +180,7 @@ def pose_with_gaze(option_value: str, scene: Scene) -> Pose:
 
 
 def _parse_numbers(option_value: str) -> list[float] | None:
-    """Return the numbers of a comma-separated text; None if a part is not a number or is beyond 1e10."""
+    """Return comma-separated numbers; None if an element is not a number, or exceeds 1e10 in magnitude."""
     try:
         numbers = [float(part) for part in option_value.split(",")]
     except ValueError:

@@ -1,4 +1,4 @@
-"""Options generated from pydantic models, option types that commands share, and parsers of option values."""
+"""Command line options generated from pydantic models, shared option types, and parsers of option values."""
 
 from __future__ import annotations
 

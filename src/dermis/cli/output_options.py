@@ -86,7 +86,7 @@ class FrameOutputs:
             write_output(path, name, output_values[name])
 
     @property
-    def report(self) -> dict[str, str]:
+    def written_paths(self) -> dict[str, str]:
         """Return a dictionary from output names to paths of the written files, for JSON reports."""
         return {name: str(path) for name, path in self.paths.items()}
 
@@ -114,9 +114,9 @@ class FrameLandmarks:
         self.names: tuple[str, ...] = ()
         self.path = image_path.with_name(f"{image_path.stem}.landmarks.json")
         if option_value is not None:
-            from dermis.frame.features.outputs.landmarks import checked_landmarks
+            from dermis.frame.features.outputs.landmarks import checked_landmark_sets
 
-            self.names = checked_landmarks(_split_names(option_value))
+            self.names = checked_landmark_sets(_split_names(option_value))
             check_output(self.path, (self.path.suffix,))
 
     def check(self, head: Head) -> None:
@@ -211,14 +211,14 @@ class AnimationOutput:
         if not self.is_numbered:
             return frame_numbers
         files = FrameFiles(self.path)
-        files.start(frame_digest, force=self.overwrite)
+        files.start_sequence(frame_digest, force=self.overwrite)
         return files.missing_frames(frame_numbers, frame_size)
 
     @contextmanager
-    def open_writer(self, frame_size: tuple[int, int], rate: Fraction) -> Iterator[WriteFrame]:
+    def open_writer(self, frame_size: tuple[int, int], frame_rate: Fraction) -> Iterator[WriteFrame]:
         """Yield a function that queues a frame for writing; the with block ends after all frames are written.
 
-        rate : frame rate of a movie [1/s]
+        frame_rate : frame rate of a movie [1/s]
         """
         from dermis.images.movie import DEFAULT_CRF, MovieWriter
         from dermis.images.writer import FrameFiles, ImageWriter
@@ -228,5 +228,7 @@ class AnimationOutput:
             with ImageWriter() as writer:
                 yield lambda number, picture: writer.write(files.path(number), picture)
             return
-        with MovieWriter(self.path, frame_size, rate, DEFAULT_CRF if self.crf is None else self.crf) as movie:
+        with MovieWriter(
+            self.path, frame_size, frame_rate, DEFAULT_CRF if self.crf is None else self.crf
+        ) as movie:
             yield lambda _, picture: movie.write(cast("Bytes", picture))

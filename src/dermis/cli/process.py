@@ -71,13 +71,13 @@ class StandardStreams:
             if raw.descriptor == 1:
                 raw.fault = raw.fault or BrokenPipeError()
 
-    def _guarded_stream(self, original: TextIO | None, descriptor: int) -> TextIO:
-        inner: Any = original.buffer if original else io.FileIO(descriptor, "w", closefd=False)
+    def _guarded_stream(self, original_stream: TextIO | None, descriptor: int) -> TextIO:
+        inner: Any = original_stream.buffer if original_stream else io.FileIO(descriptor, "w", closefd=False)
         raw = _GuardedStream(getattr(inner, "raw", inner), descriptor)
         self._raw.append(raw)
         return io.TextIOWrapper(
             io.BufferedWriter(raw),
-            encoding=original.encoding if original else "utf-8",
+            encoding=original_stream.encoding if original_stream else "utf-8",
             errors="backslashreplace",  # for characters outside the encoding, and undecodable file names
             line_buffering=descriptor == 2 or raw.isatty(),
         )

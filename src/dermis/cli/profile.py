@@ -27,8 +27,8 @@ from dermis.scene.skin import Pigments
 _PIGMENT_OPTION_NAMES = {"structure": "skin"}
 
 
-def _default_pigments() -> dict[str, str]:
-    """Return the default of each pigment option as help text, with the values of named skins that differ."""
+def _pigment_default_texts() -> dict[str, str]:
+    """Return the help text of each pigment option: its default, and the differing values of named skins."""
     defaults: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
     for field in Pigments.model_fields.keys() - defaults.keys():
         default = getattr(DEFAULT_SKIN, field)
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     PigmentOptions = Options
 else:
     PigmentOptions = model_options(
-        Pigments, option_names=_PIGMENT_OPTION_NAMES, shown_defaults=_default_pigments()
+        Pigments, option_names=_PIGMENT_OPTION_NAMES, shown_defaults=_pigment_default_texts()
     )
 
 Clamp = Literal["layer", "none"]
@@ -95,12 +95,13 @@ def profile(
     ----------
     name:
         Medium (dj3, skin1, skin2, marble ...), pigmented skin (spectral, light, medium, dark), the published
-        table gpu-gems-3, or a .toml file that has [[layers]] or a table [skin], or that -o has written.
+        table gpu-gems-3, or a .toml file: with [[layers]], with a table [skin], or written by -o.
     model:
         Model of the profile. counted: tabulated photon counts, the default for one semi-infinite layer of
         index 1 or 1.4; layered: layered diffusion, the default for all other media; layered-point: layered
         with a finite value at r = 0; dipole, better-dipole: for one semi-infinite layer; multipole: the model
-        of the 2007 talk; montecarlo: the reference, for which photons are traced now.
+        of the talk "Advanced Skin Rendering" (2007); montecarlo: the reference, for which photons are traced
+        now.
     clamp:
         Source depth of the multipole in layers thinner than one mean free path: layer (moved inside the
         layer), or none (below the layer, as published).
@@ -180,14 +181,14 @@ def profile(
     return 0
 
 
-def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
+def _check_outputs(profile_path: Path | None, plot_path: Path | None, adds_monte_carlo: bool) -> None:
     from dermis.base.atomic_write import check_output
 
-    if output is not None:
-        check_output(output, (".toml",), "Give it the suffix .toml")
-    if plot is not None:
-        check_output(plot, (".png", ".svg", ".pdf"))
-    elif check:
+    if profile_path is not None:
+        check_output(profile_path, (".toml",), "Give it the suffix .toml")
+    if plot_path is not None:
+        check_output(plot_path, (".png", ".svg", ".pdf"))
+    elif adds_monte_carlo:
         refuse("--check", "the option --plot", "it is missing", "Add --plot picture.png")
 
 
@@ -227,18 +228,20 @@ def _load_tissue(medium_name: str, options: Options, eta: float | None) -> Tissu
     return tissue if eta is None else replace(tissue, medium=tissue.medium.with_eta(eta))
 
 
-def _reflectance_spectrum(tissue: Tissue, model: ProfileModelName | None, clamp: Clamp) -> Floats | None:
-    if model is None or model == "counted" or model == "montecarlo":
-        return tissue.spectrum(clamp=clamp)
-    return tissue.spectrum(model, clamp)
+def _reflectance_spectrum(
+    tissue: Tissue, model_name: ProfileModelName | None, source_clamp: Clamp
+) -> Floats | None:
+    if model_name is None or model_name == "counted" or model_name == "montecarlo":
+        return tissue.spectrum(clamp=source_clamp)
+    return tissue.spectrum(model_name, source_clamp)
 
 
 def _compute_profile(
-    tissue: Tissue, model: ProfileModelName | None, clamp: Clamp, tracing: Options
+    tissue: Tissue, model_name: ProfileModelName | None, source_clamp: Clamp, tracing_options: Options
 ) -> RadialProfile:
-    if model != "montecarlo":
-        return tissue.profile(model, clamp)
+    if model_name != "montecarlo":
+        return tissue.profile(model_name, source_clamp)
     from dermis.apps.truths.slab_mc import monte_carlo_profile
 
     with progress_bar("tracing photons") as report:
-        return monte_carlo_profile(tissue.medium, tissue.rgb, progress=report, **tracing)
+        return monte_carlo_profile(tissue.medium, tissue.rgb, progress=report, **tracing_options)

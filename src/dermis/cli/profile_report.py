@@ -48,7 +48,7 @@ def _to_lists(nested_arrays: object) -> object:
 def gaussian_fit(
     radial_profile: RadialProfile,
     published_gaussians: GaussianSum | None,
-    term_count: int,
+    gaussian_count: int,
     *,
     shared_variances: bool,
     keep_energy: bool,
@@ -56,7 +56,7 @@ def gaussian_fit(
     """Return the Gaussians fitted to a diffusion profile; if there are published Gaussians, return these.
 
     published_gaussians : Gaussians to return unchanged; None to fit the profile
-    term_count : number of Gaussians to fit
+    gaussian_count : number of Gaussians to fit
     shared_variances : whether all colour channels have the same variances
     keep_energy : whether the weights must sum to the total reflectance
     """
@@ -64,7 +64,11 @@ def gaussian_fit(
         return GaussianFit(published_gaussians, np.zeros(3), np.zeros(3), "pointwise", shared=True)
     target = radial_profile.points() if radial_profile.finite_at_centre else radial_profile.rings()
     return fit_gaussians(
-        target, term_count, shared=shared_variances, keep_energy=keep_energy, profile_name=radial_profile.name
+        target,
+        gaussian_count,
+        shared=shared_variances,
+        keep_energy=keep_energy,
+        profile_name=radial_profile.name,
     )
 
 
@@ -164,14 +168,14 @@ class ProfileReport:
         kind = "R(r)" if fit.kind == "pointwise" else "rings"
         lines.append(f"error      {_format_row(fit.error)}  of {kind}, relative")
         lines.append(f"energy     {_format_row(fit.energy_error)}  relative error of the total")
-        lines += self._model_lines() + self._other_fit_lines()
+        lines += self._model_error_lines() + self._other_fit_lines()
         for method, colours in self._transmitted_colours().items():
             for thickness, colour in zip(self.through_mm, colours, strict=True):
                 lines.append(f"through    {_format_row(colour)}  {thickness:g} mm, by {method}")
         lines += [f"note: {note}" for note in (self.tissue.medium.notes if self.tissue else ())]
         return lines
 
-    def _model_lines(self) -> list[str]:
+    def _model_error_lines(self) -> list[str]:
         """Return lines with the error of the diffusion model relative to Monte Carlo; empty if unknown."""
         error = self.model_error
         if error is None:
@@ -266,11 +270,11 @@ _DATELESS_METADATA: dict[str, dict[str, str | None]] = {"svg": {"Date": None}, "
 _MAX_PLOTTED_RELATIVE_ERROR = 0.3  # relative standard error above which a point is not plotted
 
 
-def draw_plot(path: Path, report: ProfileReport, monte_carlo: RadialProfile | None) -> None:
+def draw_plot(path: Path, report: ProfileReport, monte_carlo_profile: RadialProfile | None) -> None:
     """Plot r R(r) of each colour channel: the model, its fits, and Monte Carlo results with error bars.
 
     path : file to write, .png, .svg or .pdf
-    monte_carlo : profile traced for comparison; None for no comparison
+    monte_carlo_profile : profile traced for comparison; None for no comparison
     """
     rc_context = import_extra("matplotlib", "plots").rc_context
     spectral = report.spectrum is not None
@@ -280,8 +284,8 @@ def draw_plot(path: Path, report: ProfileReport, monte_carlo: RadialProfile | No
     for panel in lower:
         _plot_spectra(panel, report)
     peak = _plot_curves(axes, report)
-    if monte_carlo is not None:
-        peak = max(peak, _plot_photons(axes, monte_carlo))
+    if monte_carlo_profile is not None:
+        peak = max(peak, _plot_photons(axes, monte_carlo_profile))
     axes.set(xscale="log", yscale="log", xlabel="r [mm]", ylabel="r R(r) [1/mm]")
     axes.set(xlim=(1e-3, 30.0), ylim=(_MIN_PLOTTED_FRACTION * peak, 2.0 * peak))
     axes.set_title(_plot_title(report), fontsize=10, loc="left")
@@ -342,12 +346,16 @@ def _plot_curves(axes: Axes, report: ProfileReport) -> float:
     return peak
 
 
-def _plot_photons(axes: Axes, profile: RadialProfile) -> float:
+def _plot_photons(axes: Axes, monte_carlo_profile: RadialProfile) -> float:
     """Plot r R(r) of a Monte Carlo profile as points with error bars; return the maximum [1/mm]."""
-    r, peak = profile.radius_mm, 0.0
-    error: Floats = profile.standard_error if profile.standard_error is not None else np.zeros((len(r), 3))
+    r, peak = monte_carlo_profile.radius_mm, 0.0
+    error: Floats = (
+        monte_carlo_profile.standard_error
+        if monte_carlo_profile.standard_error is not None
+        else np.zeros((len(r), 3))
+    )
     for channel, colour in enumerate(_CHANNEL_COLOURS):
-        R, se = profile.reflectance[:, channel], error[:, channel]
+        R, se = monte_carlo_profile.reflectance[:, channel], error[:, channel]
         precise = (R > 0.0) & (se < _MAX_PLOTTED_RELATIVE_ERROR * np.abs(R)) & (r > 1e-3)
         peak = max(peak, float((r * R)[precise].max(initial=0.0)))
         label = f"{_CHANNEL_NAMES[channel]}, Monte Carlo"

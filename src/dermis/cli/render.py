@@ -94,7 +94,7 @@ def render(
     from dermis.gpu.memory import check_driver_address_space
 
     check_driver_address_space()  # before the head is loaded, which needs memory too
-    with _gc_disabled(), ThreadPoolExecutor(1) as pool:
+    with _disable_garbage_collection(), ThreadPoolExecutor(1) as pool:
         future = pool.submit(Renderer, adapter)  # the driver starts and compiles while the head is loaded
         with spinner("loading"):
             loaded_scene, settings = assemble_scene(head, scene)
@@ -108,13 +108,13 @@ def render(
             setup_ms = rendered.setup_ms
             if as_json:  # time a second frame, because the first one fills the caches
                 rendered = renderer.draw_warm(loaded_scene, settings)
-        _note_light(loaded_scene, settings, rendered)
+        _note_lighting_problems(loaded_scene, settings, rendered)
         _write_images(rendered, output, frame_outputs, values)
-        _note_clipped(rendered)
+        _note_overexposure(rendered)
         landmark_output.write(renderer, loaded_scene, settings)
     report = {
         "image": str(output),
-        **({"outputs": frame_outputs.report} if frame_outputs.names else {}),
+        **({"outputs": frame_outputs.written_paths} if frame_outputs.names else {}),
         **({"landmarks": str(landmark_output.path)} if landmark_output.names else {}),
         "adapter": renderer.device.adapter.name,
         "size": list(settings.size),
@@ -133,7 +133,7 @@ def render(
 
 
 @contextlib.contextmanager
-def _gc_disabled() -> Iterator[None]:
+def _disable_garbage_collection() -> Iterator[None]:
     """Disable garbage collection in a with block, as it frees little memory while one picture is rendered."""
     was_enabled = gc.isenabled()
     gc.disable()
@@ -145,7 +145,10 @@ def _gc_disabled() -> Iterator[None]:
 
 
 def _write_images(
-    rendered: RenderedFrame, output: Path, outputs: FrameOutputs, output_values: Mapping[str, PlaneArray]
+    rendered_frame: RenderedFrame,
+    output: Path,
+    frame_outputs: FrameOutputs,
+    output_values: Mapping[str, PlaneArray],
 ) -> None:
     """Write the image file and the requested outputs, which may share the image's EXR file.
 
@@ -153,30 +156,30 @@ def _write_images(
     """
     from dermis.images.io import write_image, write_png
 
-    linear, with_alpha = None, rendered.settings.background == "none"
+    linear, with_alpha = None, rendered_frame.settings.background == "none"
     if output.suffix.lower() == ".png":
-        write_png(output, rendered.rgba8() if with_alpha else rendered.srgb8())
+        write_png(output, rendered_frame.rgba8() if with_alpha else rendered_frame.srgb8())
     else:
-        linear = rendered.linear_rgba() if with_alpha else rendered.linear()
-        if not (outputs.names and outputs.in_image_file):
+        linear = rendered_frame.linear_rgba() if with_alpha else rendered_frame.linear()
+        if not (frame_outputs.names and frame_outputs.in_image_file):
             write_image(output, linear)
-    if outputs.names:
-        outputs.write(linear, output_values)
+    if frame_outputs.names:
+        frame_outputs.write(linear, output_values)
 
 
-def _note_light(scene: Scene, settings: Settings, rendered: RenderedFrame) -> None:
+def _note_lighting_problems(scene: Scene, settings: Settings, rendered_frame: RenderedFrame) -> None:
     """Print notes on stderr about lighting that may surprise users.
 
     The notes concern skin triangles that are lit without scattering, sun-like peaks of the environment, and
     the setting gamma "wrong".
     """
-    technique, suns = TECHNIQUES[settings.technique], rendered.suns
+    technique, suns = TECHNIQUES[settings.technique], rendered_frame.suns
     if (
         technique.uses_atlas
         and technique.stitches_seams
-        and rendered.unscattered_fraction > _MAX_UNSCATTERED_FRACTION
+        and rendered_frame.unscattered_fraction > _MAX_UNSCATTERED_FRACTION
     ):
-        fraction = f"{rendered.unscattered_fraction:.0%} of the skin's triangles"
+        fraction = f"{rendered_frame.unscattered_fraction:.0%} of the skin's triangles"
         reason = "their uv is collapsed, mirrored onto other skin, or thinner than a texel of the atlas"
         note(f"note: {fraction} are lit without scattering: {reason}")
     if suns and scene.environment:
@@ -187,7 +190,7 @@ def _note_light(scene: Scene, settings: Settings, rendered: RenderedFrame) -> No
         note("note: --gamma wrong computes light with encoded colours, an error, for comparison only")
 
 
-def _note_clipped(rendered: RenderedFrame) -> None:
-    if (fraction := rendered.clipped()) > _MAX_CLIPPED_FRACTION:
-        advice = f"use less than --exposure {rendered.exposure:.3g}, or --tone neutral"
+def _note_overexposure(rendered_frame: RenderedFrame) -> None:
+    if (fraction := rendered_frame.clipped()) > _MAX_CLIPPED_FRACTION:
+        advice = f"use less than --exposure {rendered_frame.exposure:.3g}, or --tone neutral"
         note(f"note: {fraction:.0%} of the head is overexposed: {advice}")

@@ -20,7 +20,7 @@ from dermis.cli.head_options import (
     LookAtOption,
     WeightsOption,
     check_head_options,
-    note_eyes,
+    note_kept_eyeballs,
     parse_bone_angles,
     parse_weights,
     pose_from_options,
@@ -115,7 +115,7 @@ def assemble_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Se
         )
     _check_values(head_or_scene, options)
     scene, settings = _base_scene(head_or_scene, options)
-    note_eyes(scene.head, options.head.get("eyes"))
+    note_kept_eyeballs(scene.head, options.head.get("eyes"))
     if weights or bone_angles:
         from dermis.mesh.pose import merge_poses
 
@@ -164,12 +164,12 @@ def note_subdivision(head_or_scene: str, options: SceneOptions, head: Head) -> N
     head_or_scene : head or scene file as named on the command line
     """
     from dermis.scene.files import head_table
-    from dermis.scene.heads import MIN_HUMAN_LEVELS, is_person_name
+    from dermis.scene.heads import MIN_HUMAN_SUBDIVISION_LEVELS, is_person_name
 
     head_options = (
         head_table(Path(head_or_scene)) if Path(head_or_scene).suffix.lower() == ".toml" else options.head
     )
-    min_levels = MIN_HUMAN_LEVELS if is_person_name(head.name) else 0
+    min_levels = MIN_HUMAN_SUBDIVISION_LEVELS if is_person_name(head.name) else 0
     if head_options.get("subdivide", AUTO) == AUTO and head.levels > min_levels:
         count = f"{len(head.mesh.triangles):,} triangles"
         note(f"note: --subdivide {head.levels} for a smooth outline in this picture: {count}")

@@ -39,10 +39,10 @@ def unmix(
 ) -> int:
     """Estimate melanin and blood of each texel of a skin colour map, and recolour it.
 
-    The command writes melanin.exr and blood.exr (volume fractions, as in `dermis profile`), their standard
-    deviations melanin_sd.exr and blood_sd.exr, and residual.exr, the colour map divided by the
-    colour of the estimated pigments. The residual contains what pigments cannot explain, such as paint and
-    hair.
+    The command writes melanin.exr and blood.exr (volume fractions, as in `dermis profile`), and their
+    standard deviations melanin_sd.exr and blood_sd.exr. It also writes residual.exr, the colour map divided
+    by the colour of the estimated pigments. The residual contains what pigments cannot explain, such as paint
+    and hair.
 
     With --spectra, the command instead prints the pigments for each measured reflectance spectrum in a table.
 
@@ -135,13 +135,17 @@ def unmix(
 
 
 def _unmix_spectra(
-    path: Path, find: Literal["none", "oxygen", "all"], skin: SkinParameters, surface: float, as_json: bool
+    path: Path,
+    quantities_to_find: Literal["none", "oxygen", "all"],
+    skin_parameters: SkinParameters,
+    surface_reflectance: float,
+    as_json: bool,
 ) -> int:
     """Print the pigments and residuals of each spectrum of a table."""
     from dermis.apps.inverse.unmixing.spectra_file import unmix_spectra
     from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 
-    found = unmix_spectra(path, find, skin, surface)
+    found = unmix_spectra(path, quantities_to_find, skin_parameters, surface_reflectance)
     summary = found.summary()
     if as_json:
         wavelengths = {"wavelength_nm": WAVELENGTHS_NM.tolist()}
@@ -173,13 +177,18 @@ def _parse_pigment_change(
     return PigmentChange(**values) if values else None
 
 
-def _print_report(unmixed: UnmixResult, written: list[Path], seconds: float, as_json: bool) -> None:
-    summary = unmixed.summary() | {"files": [str(path) for path in written], "seconds": round(seconds, 3)}
+def _print_report(
+    unmixing_result: UnmixResult, written_files: list[Path], duration_s: float, as_json: bool
+) -> None:
+    summary = unmixing_result.summary() | {
+        "files": [str(path) for path in written_files],
+        "seconds": round(duration_s, 3),
+    }
     if as_json:
         print_json(summary)
         return
-    height, width = unmixed.melanin.shape
-    lines = [f"{width} x {height} texels, {100.0 * summary['skin']:.0f} % of them skin ({seconds:.1f} s)"]
+    height, width = unmixing_result.melanin.shape
+    lines = [f"{width} x {height} texels, {100.0 * summary['skin']:.0f} % of them skin ({duration_s:.1f} s)"]
     if "melanin" in summary:
         for name in ("melanin", "blood"):
             values = summary[name]
@@ -196,4 +205,4 @@ def _print_report(unmixed: UnmixResult, written: list[Path], seconds: float, as_
             f"{tone['ita_degrees']:.0f}°, nearest Monk {tone['monk']}, Fitzpatrick {tone['fitzpatrick']}"
         )
         lines.append(f"  ({tone['statement']})")
-    print_lines(*lines, *(f"  {path}" for path in written))
+    print_lines(*lines, *(f"  {path}" for path in written_files))

@@ -112,20 +112,20 @@ def _initial_state(head_or_scene: str, options: SceneOptions, adapter: str) -> V
     return initial_state(scene, settings, table, rig if options.lights is None else options.lights)
 
 
-def _load_motion(motion_path: str | None, fps: float | None, state: ViewerState) -> MotionFile | None:
+def _load_motion(motion_path: str | None, fps: float | None, viewer_state: ViewerState) -> MotionFile | None:
     """Load the motion file for the head, before the window opens; return None if no file is named."""
     if motion_path is None:
         return None
     from dermis.apps.viewer.player import MotionFile
 
     motion = MotionFile(motion_path, fps)
-    if text := motion.load_clip(state.scene.head).note:
+    if text := motion.load_clip(viewer_state.scene.head).note:
         note(text)
     return motion
 
 
-def _print_url(url: str, is_exposed: bool) -> None:
-    if is_exposed:
+def _print_url(url: str, is_reachable_by_others: bool) -> None:
+    if is_reachable_by_others:
         note("warning: other machines can reach this page; whoever knows its URL controls the viewer")
         note("warning: the connection is not encrypted: use a trusted network or a tunnel")
     print_lines(f"{url}  (Ctrl+C to stop)")

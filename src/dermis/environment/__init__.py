@@ -1,1 +1,1 @@
-"""Environment light: panoramas of radiance, extraction of suns, and prefiltering by lobes."""
+"""Environment light: panoramas of radiance, extraction of suns, and prefiltering for reflections."""

@@ -72,18 +72,20 @@ def zonal_factors(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
     return np.asarray(_kernel_polynomials(degree) @ (kernel(theta) * measure))
 
 
-def synthesise_panoramas(coefficients: list[Complex], factors: Floats, height: int) -> Floats:
-    """Return k panoramas (k, height, 2 height, c) whose harmonic coefficients are multiplied by factors.
+def synthesise_panoramas(coefficients: list[Complex], degree_factors: Floats, height: int) -> Floats:
+    """Return k panoramas (k, height, 2 height, c) from harmonic coefficients and k sets of factors.
+
+    In each panorama, the coefficients of each degree are multiplied by the factor of this degree.
 
     coefficients : coefficients of the spherical harmonics, see `analyse_panorama`
-    factors : (k, degree + 1) factor for each panorama and degree, see `zonal_factors`
+    degree_factors : (k, degree + 1) factor for each panorama and degree, see `zonal_factors`
     """
     width, channels = 2 * height, coefficients[0].shape[1]
-    count, degree = factors.shape[0], factors.shape[1] - 1
+    count, degree = degree_factors.shape[0], degree_factors.shape[1] - 1
     table = _legendre_table(height, degree)
     around = np.zeros((height, width // 2 + 1, count, channels), complex)
     for m in range(min(degree, width // 2 - 1) + 1):
-        scaled = (coefficients[m][:, None] * factors.T[m:, :, None]).reshape(-1, count * channels)
+        scaled = (coefficients[m][:, None] * degree_factors.T[m:, :, None]).reshape(-1, count * channels)
         rows = _complex_product(table[m].T, scaled) * np.exp(1j * m * _first_column_azimuth(width))
         around[:, m] = rows.reshape(height, count, channels)
     return np.moveaxis(np.fft.irfft(around, width, axis=1) * width, 2, 0)

@@ -1,8 +1,8 @@
 """Least-squares fits of sums of isotropic lobes to specular lobes.
 
-At each node of a table over roughness and view angle, five isotropic lobes approximate the specular lobe.
-Each isotropic lobe has four parameters, which are fitted relative to the mean direction and the standard
-deviations of the specular lobe.
+A table has an entry for each of several roughnesses and view angles. In each entry, five isotropic lobes
+approximate the specular lobe. Each isotropic lobe has four parameters, which are fitted relative to the mean
+direction and the standard deviations of the specular lobe.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dermis.environment.lobe_harmonics import (
     IsotropicLobes,
     LobeTarget,
     harmonic_terms,
-    isotropic_sum,
+    isotropic_sum_harmonics,
     lobe_target,
 )
 from dermis.environment.prefilter import MAX_LAYER_ROUGHNESS, MIN_LAYER_ROUGHNESS
@@ -25,7 +25,7 @@ from dermis.optics.fits.variable_projection import qr_factor
 from dermis.specular.models import Lobe
 
 Floats = NDArray[np.float64]
-TableNode = tuple[int, int]
+TableIndices = tuple[int, int]
 ROUGHNESS_COUNT, VIEW_COUNT, LOBE_COUNT = 12, 16, 5
 LOBE_TABLE_ROUGHNESSES = np.geomspace(0.05, 1.0, ROUGHNESS_COUNT)
 """Roughnesses of the rows of the table."""
@@ -62,33 +62,33 @@ def fit_isotropic_lobes(lobe: Lobe) -> Floats:
     in the plane of incidence; elsewhere, they are mirror images on opposite sides of this plane.
 
     The fit minimises the expected difference between two reflections of a random environment: by the specular
-    lobe, and by the sum of the isotropic lobes. Table nodes are fitted one after another, from rough surfaces
-    and grazing views to smooth surfaces and views along the normal. Each fit starts at the mean parameters of
-    the adjacent nodes that are already fitted, so that lobes vary smoothly over the table.
+    lobe, and by the sum of the isotropic lobes. Table entries are fitted one after another, from rough
+    surfaces and grazing views to smooth surfaces and views along the normal. Each fit starts at the mean
+    parameters of the adjacent entries that are already fitted. Lobes thus vary smoothly over the table.
     """
-    found: dict[TableNode, Floats] = {}
+    found: dict[TableIndices, Floats] = {}
     cosines, roughnesses = LOBE_TABLE_COSINES.tolist(), LOBE_TABLE_ROUGHNESSES.tolist()
-    targets = {(i, j): lobe_target(lobe, cosines[j], roughnesses[i]) for i, j in _table_nodes()}
+    targets = {(i, j): lobe_target(lobe, cosines[j], roughnesses[i]) for i, j in _table_entries()}
     for _ in range(_FIT_PASS_COUNT):
-        for i, j in _table_nodes():
+        for i, j in _table_entries():
             adjacent = (i, j - 1), (i + 1, j), (i, j + 1), (i - 1, j)
             neighbours = [found[node] for node in adjacent if node in found]
             mean = np.mean(neighbours, axis=0) if neighbours else _INITIAL_LOBES
             found[i, j] = _fit_parameters(targets[i, j], j, found.get((i, j), mean), mean)
     table = np.empty((ROUGHNESS_COUNT, VIEW_COUNT, LOBE_COUNT, 4))
-    for i, j in _table_nodes():
+    for i, j in _table_entries():
         lobes = _to_isotropic_lobes(found[i, j], targets[i, j], _active_lobes(j))
         columns = [lobes.angle, lobes.out_of_plane, np.exp(lobes.log_roughness), lobes.weight]
         table[i, j] = np.stack(columns, axis=-1)
     return table
 
 
-def _table_nodes() -> Iterator[TableNode]:
+def _table_entries() -> Iterator[TableIndices]:
     return ((i, j) for i in reversed(range(ROUGHNESS_COUNT)) for j in range(VIEW_COUNT))
 
 
 def _active_lobes(view_index: int) -> NDArray[np.bool_]:
-    """Return the mask (5,) of lobes that have weight for a view.
+    """Return the mask (5,) of the lobes whose weight is not 0 for a view.
 
     view_index : index of the view in LOBE_TABLE_COSINES
     """
@@ -96,10 +96,10 @@ def _active_lobes(view_index: int) -> NDArray[np.bool_]:
 
 
 def _parameter_direction(parameter_kind: int, *lobe_amounts: tuple[int, float]) -> Floats:
-    """Return a direction (20,) in the space of lobe parameters that changes one parameter of some lobes.
+    """Return a direction (20,) in the space of all lobe parameters: a change of one parameter of some lobes.
 
-    parameter_kind : parameter that changes, such as `_IN_PLANE_POSITION`
-    lobe_amounts : pairs of a lobe index and the amount by which the parameter of this lobe changes
+    parameter_kind : index of the parameter that changes, such as `_IN_PLANE_POSITION`
+    lobe_amounts : index of each lobe that changes, and the amount by which its parameter changes
     """
     change = np.zeros((4, LOBE_COUNT))
     for lobe, amount in lobe_amounts:
@@ -107,12 +107,12 @@ def _parameter_direction(parameter_kind: int, *lobe_amounts: tuple[int, float]) 
     return change.ravel()
 
 
-def _free_directions(target: LobeTarget, view_index: int) -> Floats:
-    """Return the directions (20, k) in parameter space along which a fit moves the lobes.
+def _free_directions(target_lobe: LobeTarget, view_index: int) -> Floats:
+    """Return the k directions (20, k) in the space of all lobe parameters along which a fit may move.
 
-    Directions that move the lobes in the plane of incidence come first, then directions that move the pair of
-    lobes (see `fit_isotropic_lobes`). The two lobes of the pair either both stay in the plane, or remain
-    mirror images of each other.
+    Directions for the lobes in the plane of incidence come first, then directions for the pair of lobes (see
+    `fit_isotropic_lobes`). The two lobes of the pair either both stay in the plane, or remain mirror images
+    of each other.
 
     view_index : index of the view in LOBE_TABLE_COSINES
     """
@@ -126,7 +126,7 @@ def _free_directions(target: LobeTarget, view_index: int) -> Floats:
         for k in range(_IN_PLANE_LOBE_COUNTS[view_index])
         for kind in kinds
     ]
-    if _is_elongated(target):
+    if _is_elongated(target_lobe):
         pair = [_parameter_direction(kind, one) for one in (left, right) for kind in kinds]
     else:
         pair = [_parameter_direction(kind, left, right) for kind in kinds]
@@ -134,11 +134,11 @@ def _free_directions(target: LobeTarget, view_index: int) -> Floats:
     return np.stack([*in_plane, *pair], axis=1)
 
 
-def _is_elongated(target: LobeTarget) -> bool:
-    return target.along_deviation > _MIN_LOBE_ELONGATION * target.across_deviation
+def _is_elongated(target_lobe: LobeTarget) -> bool:
+    return target_lobe.along_deviation > _MIN_LOBE_ELONGATION * target_lobe.across_deviation
 
 
-def _arrange_pair(initial_parameters: Floats, target: LobeTarget, view_index: int) -> Floats:
+def _arrange_lobe_pair(initial_parameters: Floats, target_lobe: LobeTarget, view_index: int) -> Floats:
     """Return initial parameters (4, 5) of a fit, with the last two lobes ("the pair") placed as follows.
 
     If the specular lobe is elongated, both lobes of the pair are placed in the plane of incidence. Otherwise
@@ -149,14 +149,17 @@ def _arrange_pair(initial_parameters: Floats, target: LobeTarget, view_index: in
     """
     lobes = initial_parameters.copy()
     separation = lobes[_IN_PLANE_POSITION, -1] - lobes[_IN_PLANE_POSITION, -2]
-    if _is_elongated(target) and abs(separation) < _PAIR_SEPARATION_DEVIATIONS:
+    if _is_elongated(target_lobe) and abs(separation) < _PAIR_SEPARATION_DEVIATIONS:
         lobes[_IN_PLANE_POSITION, -2:] = (
             lobes[_IN_PLANE_POSITION, -2:].mean() + np.array([-0.5, 0.5]) * _PAIR_SEPARATION_DEVIATIONS
         )
-    if not _is_elongated(target) and abs(lobes[_OUT_OF_PLANE_POSITION, -2]) < _PAIR_SEPARATION_DEVIATIONS:
+    if (
+        not _is_elongated(target_lobe)
+        and abs(lobes[_OUT_OF_PLANE_POSITION, -2]) < _PAIR_SEPARATION_DEVIATIONS
+    ):
         lobes[_OUT_OF_PLANE_POSITION, -2:] = _PAIR_SEPARATION_DEVIATIONS, -_PAIR_SEPARATION_DEVIATIONS
     lobes[_OUT_OF_PLANE_POSITION, :-2] = 0.0
-    if _is_elongated(target) or view_index == VIEW_COUNT - 1:
+    if _is_elongated(target_lobe) or view_index == VIEW_COUNT - 1:
         lobes[_OUT_OF_PLANE_POSITION] = 0.0
     if view_index == VIEW_COUNT - 1:
         lobes[_IN_PLANE_POSITION] = 0.0
@@ -164,7 +167,7 @@ def _arrange_pair(initial_parameters: Floats, target: LobeTarget, view_index: in
 
 
 def _fit_parameters(
-    target: LobeTarget, view_index: int, initial_parameters: Floats, neighbour_mean: Floats
+    target_lobe: LobeTarget, view_index: int, initial_parameters: Floats, neighbour_mean: Floats
 ) -> Floats:
     """Fit five isotropic lobes to a specular lobe and return their parameters (4, 5).
 
@@ -174,71 +177,76 @@ def _fit_parameters(
 
     view_index : index of the view in LOBE_TABLE_COSINES
     initial_parameters : initial parameters (4, 5)
-    neighbour_mean : mean parameters (4, 5) of adjacent table nodes; regularisation pulls the fit towards
-        these
+    neighbour_mean : mean parameters (4, 5) of adjacent table entries; regularisation pulls the fit towards
+        this mean
     """
     from scipy.optimize import least_squares
 
-    scale, active = harmonic_terms(target.degree)[2], _active_lobes(view_index)
-    free = _free_directions(target, view_index)
+    scale, active = harmonic_terms(target_lobe.degree)[2], _active_lobes(view_index)
+    free = _free_directions(target_lobe, view_index)
     lengths = (free**2).sum(axis=0)
     initial_parameters, neighbour_mean = (
-        _arrange_pair(one, target, view_index).ravel() for one in (initial_parameters, neighbour_mean)
+        _arrange_lobe_pair(one, target_lobe, view_index).ravel()
+        for one in (initial_parameters, neighbour_mean)
     )
     first, mean = (free.T @ one / lengths for one in (initial_parameters, neighbour_mean))
     fixed = np.where(free.any(axis=1), 0.0, initial_parameters)
     kinds = np.abs(free).argmax(axis=0) // LOBE_COUNT
-    low, high = _parameter_bounds(target, kinds)
+    low, high = _parameter_bounds(target_lobe, kinds)
     regularisation = _REGULARISATION_WEIGHT * np.where(kinds == _LOG_WEIGHT, 0.5, 1.0)
 
     @lru_cache(maxsize=2)
-    def reduced_system(vector: bytes) -> Floats:
+    def reduced_system(parameter_bytes: bytes) -> Floats:
         """Return the Jacobian and the residuals, reduced by QR decomposition to as many rows as columns.
 
-        vector : parameters along the free directions, as bytes of float64
+        parameter_bytes : parameters along the free directions, as bytes of float64
         """
-        x = np.frombuffer(vector)
+        x = np.frombuffer(parameter_bytes)
         parameters = (fixed + free @ x).reshape(4, LOBE_COUNT)
-        total, slopes = isotropic_sum(_to_isotropic_lobes(parameters, target, active), target.degree)
-        slopes[:, _IN_PLANE_POSITION] *= target.along_deviation
-        slopes[:, _OUT_OF_PLANE_POSITION] *= target.across_deviation
-        residuals = np.append((total - target.coefficients) * scale, regularisation * (x - mean))
+        total, slopes = isotropic_sum_harmonics(
+            _to_isotropic_lobes(parameters, target_lobe, active), target_lobe.degree
+        )
+        slopes[:, _IN_PLANE_POSITION] *= target_lobe.along_deviation
+        slopes[:, _OUT_OF_PLANE_POSITION] *= target_lobe.across_deviation
+        residuals = np.append((total - target_lobe.coefficients) * scale, regularisation * (x - mean))
         jacobian = np.einsum("nk,kj->nj", slopes.reshape(len(slopes), -1), free) * scale[:, None]
         system = np.column_stack([np.vstack([jacobian, np.diag(regularisation)]), residuals])
         return qr_factor(np.vstack([system.real, system.imag]))
 
-    def residual(vector: Floats) -> Floats:
-        return reduced_system(vector.tobytes())[:, -1]
+    def residuals_at(free_parameters: Floats) -> Floats:
+        return reduced_system(free_parameters.tobytes())[:, -1]
 
-    def jacobian_at(vector: Floats) -> Floats:
-        return reduced_system(vector.tobytes())[:, :-1]
+    def jacobian_at(free_parameters: Floats) -> Floats:
+        return reduced_system(free_parameters.tobytes())[:, :-1]
 
     inside = np.clip(first, low + 1e-4, high - 1e-4)
     solution = least_squares(
-        residual, inside, jacobian_at, (low, high), ftol=1e-4, xtol=1e-5, max_nfev=_MAX_FIT_EVALUATIONS
+        residuals_at, inside, jacobian_at, (low, high), ftol=1e-4, xtol=1e-5, max_nfev=_MAX_FIT_EVALUATIONS
     )
     return np.asarray(fixed + free @ solution.x).reshape(4, LOBE_COUNT)
 
 
-def _parameter_bounds(target: LobeTarget, parameter_kinds: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    smoothest, roughest = np.log([MIN_LAYER_ROUGHNESS, MAX_LAYER_ROUGHNESS]) - np.log(target.across_deviation)
+def _parameter_bounds(target_lobe: LobeTarget, parameter_kinds: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    smoothest, roughest = np.log([MIN_LAYER_ROUGHNESS, MAX_LAYER_ROUGHNESS]) - np.log(
+        target_lobe.across_deviation
+    )
     low, high = (np.full(4, side * _MAX_LOBE_OFFSET_DEVIATIONS) for side in (-1.0, 1.0))
     low[_OUT_OF_PLANE_POSITION], high[_OUT_OF_PLANE_POSITION] = (
         0.0,
-        min(_MAX_LOBE_OFFSET_DEVIATIONS, 0.45 * np.pi / target.across_deviation),
+        min(_MAX_LOBE_OFFSET_DEVIATIONS, 0.45 * np.pi / target_lobe.across_deviation),
     )
     low[_LOG_WIDTH], high[_LOG_WIDTH] = smoothest, max(roughest, smoothest + 0.1)
     return low[parameter_kinds], high[parameter_kinds]
 
 
 def _to_isotropic_lobes(
-    parameters: Floats, target: LobeTarget, active_lobes: NDArray[np.bool_]
+    parameters: Floats, target_lobe: LobeTarget, active_lobes: NDArray[np.bool_]
 ) -> IsotropicLobes:
     position, out_of_plane, log_width, log_weight = parameters
     weight = np.where(active_lobes, np.exp(log_weight - log_weight[active_lobes].max()), 0.0)
     return IsotropicLobes(
-        target.mean_angle + position * target.along_deviation,
-        out_of_plane * target.across_deviation,
-        np.log(target.across_deviation) + log_width,
+        target_lobe.mean_angle + position * target_lobe.along_deviation,
+        out_of_plane * target_lobe.across_deviation,
+        np.log(target_lobe.across_deviation) + log_width,
         weight / weight.sum(),
     )

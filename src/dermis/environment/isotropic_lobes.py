@@ -56,7 +56,7 @@ def isotropic_lobe_table(model: str = "kelemen") -> Floats:
         f"{name}_{k}" for k in range(LOBE_COUNT) for name in ("angle", "beside", "roughness", "weight")
     ]
     shape = ROUGHNESS_COUNT, VIEW_COUNT, LOBE_COUNT, 4
-    fits = float_columns(rows, " ".join(columns)).reshape(shape) if rows else _fit_model(model)
+    fits = float_columns(rows, " ".join(columns)).reshape(shape) if rows else _fit_lobe_table(model)
     angle, out_of_plane, roughness, weight = np.moveaxis(fits, -1, 0)
     weight = weight / weight.sum(axis=-1, keepdims=True)
     offset = angle - np.arccos(LOBE_TABLE_COSINES)[:, None]
@@ -66,5 +66,5 @@ def isotropic_lobe_table(model: str = "kelemen") -> Floats:
 
 
 @logged_step("finding what the surface reflects of the environment")
-def _fit_model(model: str) -> Floats:
+def _fit_lobe_table(model: str) -> Floats:
     return fit_isotropic_lobes(MODELS[model].lobe)

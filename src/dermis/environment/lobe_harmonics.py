@@ -63,25 +63,30 @@ class IsotropicLobes(NamedTuple):
     weight: Floats
 
 
-def lobe_target(lobe: Lobe, view_cosine: float, m: float) -> LobeTarget:
+def lobe_target(lobe: Lobe, view_cosine: float, roughness: float) -> LobeTarget:
     """Expand a specular lobe in spherical harmonics, to which isotropic lobes are then fitted.
 
     view_cosine : cosine of the angle between view direction and surface normal
-    m : roughness [-]
+    roughness : roughness m of the surface [-]
 
     The quadrature covers one side of the plane of incidence, as the lobe is symmetric about this plane.
     """
     t = (np.arange(_NODES_ACROSS_INCIDENCE) + 0.5) / _NODES_ACROSS_INCIDENCE
-    widest = min(10.0 * m + 0.05, 0.5 * np.pi)
+    widest = min(10.0 * roughness + 0.05, 0.5 * np.pi)
     out_of_plane, steps = widest * t**2, 2.0 * widest * t / _NODES_ACROSS_INCIDENCE  # denser near the plane
-    mirror, reach = np.arccos(view_cosine), 12.0 * m + 0.1
+    mirror, reach = np.arccos(view_cosine), 12.0 * roughness + 0.1
     low, high = max(mirror - reach, -0.5 * np.pi), min(mirror + reach, 0.5 * np.pi)
     angles = low + (high - low) * (np.arange(_NODES_ALONG_INCIDENCE) + 0.5) / _NODES_ALONG_INCIDENCE
     a, y = np.meshgrid(angles, out_of_plane, indexing="ij")
     light = np.stack([np.sin(a) * np.cos(y), np.sin(y), np.cos(a) * np.cos(y)], axis=-1)
     view = np.array([-np.sqrt(1.0 - view_cosine**2), 0.0, view_cosine])
     with np.errstate(under="ignore"):
-        weight = lobe(cosines(np.array([0.0, 0.0, 1.0]), light, view), m) * light[..., 2] * np.cos(y) * steps
+        weight = (
+            lobe(cosines(np.array([0.0, 0.0, 1.0]), light, view), roughness)
+            * light[..., 2]
+            * np.cos(y)
+            * steps
+        )
     weight = weight / weight.sum()
     mean_angle = np.arctan2((weight * light[..., 0]).sum(), (weight * light[..., 2]).sum())
     along, across = (float(np.sqrt((weight * x**2).sum())) for x in (a - mean_angle, light[..., 1]))
@@ -90,7 +95,7 @@ def lobe_target(lobe: Lobe, view_cosine: float, m: float) -> LobeTarget:
     )
     around = np.exp(-1j * np.outer(np.arange(degree + 1), angles)) @ weight
     order = harmonic_terms(degree)[1]
-    coefficients = (around[order] * _legendre_at_nodes(m, degree)).sum(axis=1)
+    coefficients = (around[order] * _legendre_at_quadrature_angles(roughness, degree)).sum(axis=1)
     return LobeTarget(degree, coefficients, float(mean_angle), along, across)
 
 
@@ -108,7 +113,7 @@ def harmonic_terms(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Flo
     return degrees, orders, weight
 
 
-def isotropic_sum(lobes: IsotropicLobes, degree: int) -> tuple[Complex, Complex]:
+def isotropic_sum_harmonics(lobes: IsotropicLobes, degree: int) -> tuple[Complex, Complex]:
     """Return the harmonic coefficients (n,) of a sum of isotropic lobes, and their derivatives (n, 4, 5).
 
     Each lobe is averaged with its mirror image in the plane of incidence. The four derivatives for each lobe
@@ -143,7 +148,7 @@ def _symmetric_legendre_functions(sine: Floats, degree: int) -> Floats:
 
 
 @cache
-def _legendre_at_nodes(roughness: float, degree: int) -> Floats:
+def _legendre_at_quadrature_angles(roughness: float, degree: int) -> Floats:
     """Return the associated Legendre functions (n, k) at k quadrature angles from the plane of incidence.
 
     roughness : roughness of the lobe, which determines the largest angle
@@ -173,10 +178,10 @@ def _interpolate_legendre(degree: int, plane_angles: Floats) -> tuple[Floats, Fl
 
 
 def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
-    """Return the factors (first row) by which a lobe multiplies harmonics, and their derivatives, (2, n).
+    """Return the factors by which convolution with a lobe multiplies n harmonic coefficients, (2, n).
 
-    The factors are interpolated between two layers of the prefiltered panorama, as in the shader. The
-    derivatives are with respect to the logarithm of the roughness.
+    The first row contains the factors, interpolated between two layers of the prefiltered panorama as in the
+    shader. The second row contains their derivatives with respect to the logarithm of the roughness.
 
     log_roughness : logarithm of the roughness
     """
@@ -190,9 +195,10 @@ def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
 
 @cache
 def _layer_factor_table() -> Floats:
-    """Return the convolution factor of each reflection layer of a prefiltered panorama, (layers, degrees).
+    """Return the convolution factors of the reflection layers of a prefiltered panorama, (layers, degrees).
 
-    Factors for degrees above the highest harmonic degree of the panorama are 0.
+    Each layer has a factor for each degree of the spherical harmonics. Factors for degrees above the highest
+    degree of the panorama are 0.
     """
     kernels = np.stack([isotropic_lobe_factors(float(m)) for m in LAYER_ROUGHNESSES])
     return np.pad(kernels, ((0, 0), (0, max(_FIT_DEGREES[-1] + 1 - kernels.shape[1], 0))))

@@ -45,7 +45,7 @@ def load_panorama(panorama_name: str, max_rows: int = _MAX_PANORAMA_ROWS) -> Flo
     if image.dtype != np.float32:
         actual, advice = f"it is a picture of {image.dtype.name}", "Take its .hdr or .exr version"
         refuse(panorama_name, "a picture of radiance (.hdr, .exr)", actual, advice)
-    rgb = space.linear(repair_radiance(panorama_name, np.asarray(image[..., :3], np.float32)))
+    rgb = space.to_linear(repair_radiance(panorama_name, np.asarray(image[..., :3], np.float32)))
     if (highest := float(rgb.max())) > _MAX_RADIANCE:
         refuse(
             panorama_name, f"radiance up to {_MAX_RADIANCE:g}", f"it is up to {highest:g}", "Export it again"

@@ -1,4 +1,4 @@
-"""Prefiltering of a panorama: irradiance by normal, and reflected radiance by roughness."""
+"""Prefiltering of a panorama to irradiance for each normal, and reflected radiance for each roughness."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ LAYER_HEIGHT = 192
 _MAX_HARMONIC_DEGREE = 160  # the factor of the smoothest lobe is 2e-4 here, so there is little ringing
 
 
-def isotropic_lobe(theta: Floats, m: float) -> Floats:
+def isotropic_lobe(theta: Floats, roughness: float) -> Floats:
     """Return the weight of light at an angle to the mirror direction, for a view along the normal.
 
     theta : angle from the mirror direction [rad], 0 to pi / 2
-    m : roughness [-]
+    roughness : roughness m of the Beckmann distribution [-]
 
     The weight is the Kelemen lobe times cos(theta), up to a constant factor. Normal, view and mirror
     direction are assumed to be equal [Karis2013], so the half vector is at the angle theta / 2 from the
@@ -32,7 +32,7 @@ def isotropic_lobe(theta: Floats, m: float) -> Floats:
     """
     half = np.cos(0.5 * theta)
     with np.errstate(under="ignore"):
-        return np.asarray(beckmann(half, m) * np.cos(theta) / half**2)
+        return np.asarray(beckmann(half, roughness) * np.cos(theta) / half**2)
 
 
 def reflection_constants() -> dict[str, float]:
@@ -45,7 +45,7 @@ def reflection_constants() -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Prefiltered:
+class PrefilteredPanorama:
     """Panorama convolved with a cosine and with lobes of several roughnesses, for lookups by the shader.
 
     layers : (14, h, 2 h, 3) panoramas: first the irradiance by normal direction, then, for each of
@@ -58,7 +58,7 @@ class Prefiltered:
 
 
 @logged_step("filtering the environment")
-def prefilter(panorama_name: str) -> Prefiltered:
+def prefilter(panorama_name: str) -> PrefilteredPanorama:
     """Load a panorama, separate its suns, and convolve the remainder with isotropic kernels.
 
     panorama_name : see `load_panorama`
@@ -75,13 +75,15 @@ def prefilter(panorama_name: str) -> Prefiltered:
         *(isotropic_lobe_factors(float(m)) for m in LAYER_ROUGHNESSES),
     ]
     layers = synthesise_panoramas(coefficients, np.stack(kernels), LAYER_HEIGHT)
-    return Prefiltered(np.maximum(layers, 0.0).astype(np.float32), tuple(suns))
+    return PrefilteredPanorama(np.maximum(layers, 0.0).astype(np.float32), tuple(suns))
 
 
-def isotropic_lobe_factors(m: float) -> Floats:
-    """Return the factors (161,) by which convolution with a lobe of roughness m multiplies each degree.
+def isotropic_lobe_factors(roughness: float) -> Floats:
+    """Return the factors by which convolution with an isotropic lobe multiplies harmonic coefficients.
 
-    The lobe is normalised to unit integral.
+    There is one factor for each degree of the spherical harmonics, (161,). The lobe has unit integral.
+
+    roughness : roughness m of the lobe [-]
     """
-    factors = zonal_factors(lambda theta: isotropic_lobe(theta, m), _MAX_HARMONIC_DEGREE)
+    factors = zonal_factors(lambda theta: isotropic_lobe(theta, roughness), _MAX_HARMONIC_DEGREE)
     return np.asarray(factors / factors[0])

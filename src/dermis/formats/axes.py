@@ -26,26 +26,26 @@ class Axes(NamedTuple):
     front: Front = "auto"
 
     @property
-    def top(self) -> Axis:
+    def up_or_default(self) -> Axis:
         """Return the axis that points upwards: `up`, or Y if `up` is None."""
         return self.up or "y"
 
     @property
-    def face(self) -> Axis:
-        """Return the axis along which the face looks, or the assumed axis if `front` is "auto"."""
+    def front_or_default(self) -> Axis:
+        """Return the axis along which the face looks: `front`, or the axis assumed for "auto", see `Axes`."""
         if self.front != "auto":
             return self.front
         return "-y" if self.up in ("z", "-z") else "z"
 
-    def or_stated(self, stated_axes: Axes) -> Axes:
-        """Return these axes, with unknown axes replaced by the axes that a file states.
+    def fill_unknown_from(self, stated_axes: Axes) -> Axes:
+        """Return a copy of these axes in which the axes stated by a file replace unknown axes.
+
+        The file's front replaces an unknown front only if the file's up axis equals that of the result.
 
         stated_axes : axes that the file states
-
-        An unknown front is replaced only if the up axis of the result is the up axis of the file.
         """
         chosen = self._replace(up=self.up or stated_axes.up)
-        same = chosen.front == "auto" and chosen.top == stated_axes.top
+        same = chosen.front == "auto" and chosen.up_or_default == stated_axes.up_or_default
         return chosen._replace(front=stated_axes.front) if same else chosen
 
 
@@ -56,11 +56,11 @@ def to_y_up(vectors: Doubles, file_axes: Axes) -> Doubles:
     """Rotate vectors (v, 3) of a file so that the file's up axis becomes +Y and its front becomes +Z."""
     import numpy as np
 
-    if (file_axes.top, file_axes.face) == ("y", "z"):
+    if (file_axes.up_or_default, file_axes.front_or_default) == ("y", "z"):
         return vectors
     (up, up_sign), (front, front_sign) = (
-        _axis_index_and_sign(file_axes.top),
-        _axis_index_and_sign(file_axes.face),
+        _axis_index_and_sign(file_axes.up_or_default),
+        _axis_index_and_sign(file_axes.front_or_default),
     )
     side = 3 - up - front
     side_sign = up_sign * front_sign * (1 if (up + 1) % 3 == front else -1)
@@ -68,16 +68,16 @@ def to_y_up(vectors: Doubles, file_axes: Axes) -> Doubles:
     return np.column_stack([vectors[:, k] if sign > 0 else -vectors[:, k] for k, sign in columns])
 
 
-def file_axis(direction: Axis, axes: Axes) -> Axis:
-    """Return the axis of a file that `to_y_up` turns into the axis `direction` of the head.
+def head_axis_in_file(head_axis: Axis, file_axes: Axes) -> Axis:
+    """Return the axis of a file that becomes a given axis of the head when `to_y_up` rotates the file.
 
-    direction : axis of the head
-    axes : axes of the file
+    head_axis : the given axis of the head
+    file_axes : up axis and front axis of the file
     """
     import numpy as np
 
-    index, sign = _axis_index_and_sign(direction)
-    along = sign * to_y_up(np.eye(3), axes)[:, index]
+    index, sign = _axis_index_and_sign(head_axis)
+    along = sign * to_y_up(np.eye(3), file_axes)[:, index]
     names: tuple[Axis, ...] = ("x", "y", "z", "-x", "-y", "-z")
     return names[int(np.concatenate((along, -along)).argmax())]
 

@@ -1,7 +1,7 @@
 """Deformation data of exported meshes: morph targets and bone weights of every vertex.
 
-Export formats allow four bones per vertex. The bones and weights of a subdivided mesh are fitted: its skinned
-vertices are as close as possible to the vertices that subdivision of the skinned control mesh would give.
+Export formats allow four bones per vertex. For a subdivided mesh, the bones and weights of each vertex are
+fitted. They move the vertex as closely as possible to its position on the subdivided, skinned control mesh.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class DeformableMesh:
         return self.head.control
 
     @cached_property
-    def refinement(self) -> csr_array | None:
+    def subdivision_matrix(self) -> csr_array | None:
         """Return the subdivision matrix (q, p) from control to mesh points; None without subdivision."""
         from scipy.sparse import csr_array
 
@@ -75,7 +75,7 @@ class DeformableMesh:
         displacement = np.zeros((len(self.rig.positions_mm), 3))
         for number, weight in enumerate(rest.tolist()):
             displacement += weight * self._control_displacements(number)
-        return (mesh.positions - self._refine_vectors(displacement)[mesh.point]).astype(np.float32)
+        return (mesh.positions - self._subdivide_vectors(displacement)[mesh.point]).astype(np.float32)
 
     @cached_property
     def normals(self) -> Floats:
@@ -88,10 +88,10 @@ class DeformableMesh:
         return vertex_normals(self.positions_mm, mesh.point, mesh.triangles)
 
     def targets(self) -> Iterator[VertexTarget]:
-        """Yield the morph targets in the order of the rig."""
+        """Yield the morph targets in the order in which the rig lists them."""
         mesh = self.head.mesh
         for number in range(len(self.rig.targets.names)):
-            delta = self._refine_vectors(self._control_displacements(number))
+            delta = self._subdivide_vectors(self._control_displacements(number))
             delta[np.abs(delta).max(axis=1) < _MIN_DISPLACEMENT_MM] = 0.0
             delta_mm = delta[mesh.point].astype(np.float32)
             normal = self._normal_changes(delta_mm)
@@ -122,7 +122,7 @@ class DeformableMesh:
     @cached_property
     def bone_influences(self) -> tuple[Numbers, Floats]:
         """Return the indices and the weights of four bones for each vertex, (v, 4) each."""
-        bone, weight = point_bone_influences(self.rig, self.refinement)
+        bone, weight = point_bone_influences(self.rig, self.subdivision_matrix)
         dtype = np.uint8 if bone.max() < 256 else np.uint16
         point = self.head.mesh.point
         return bone[point].astype(dtype), weight[point].astype(np.float32)
@@ -130,19 +130,23 @@ class DeformableMesh:
     def _control_displacements(self, target_index: int) -> Doubles:
         """Return the displacements (p, 3) of the control points by a morph target at weight 1 [mm]."""
         targets, displacement = self.rig.targets, np.zeros((len(self.rig.positions_mm), 3))
-        part = targets.rows(target_index)
+        part = targets.displacement_rows(target_index)
         displacement[targets.point[part]] = targets.delta_mm[part]
         return displacement
 
-    def _refine_vectors(self, control_vectors: Doubles) -> Doubles:
+    def _subdivide_vectors(self, control_vectors: Doubles) -> Doubles:
         """Interpolate vectors at control points (p, 3) to the points of the subdivided mesh, (q, 3)."""
-        return control_vectors if self.refinement is None else np.asarray(self.refinement @ control_vectors)
+        return (
+            control_vectors
+            if self.subdivision_matrix is None
+            else np.asarray(self.subdivision_matrix @ control_vectors)
+        )
 
 
-def point_bone_influences(rig: Rig, refinement: csr_array | None) -> tuple[Index, Doubles]:
+def point_bone_influences(rig: Rig, subdivision_matrix: csr_array | None) -> tuple[Index, Doubles]:
     """Return four bone indices and weights for each of q mesh points, (q, 4) each; weights sum to 1.
 
-    refinement : (q, p) subdivision matrix from control points to mesh points; None without subdivision
+    subdivision_matrix : (q, p) matrix from control points to mesh points; None without subdivision
 
     Without subdivision, the weights of the rig are kept. With subdivision, four bones and their weights are
     fitted. The fit minimises the squared distance between the skinned mesh point and the point that
@@ -151,8 +155,10 @@ def point_bone_influences(rig: Rig, refinement: csr_array | None) -> tuple[Index
     skeleton = rig.skeleton
     assert skeleton is not None
     weights = _bone_weights(skeleton)
-    if refinement is not None:
-        weights = _fit_bone_weights(rig.positions_mm.astype(np.float64), skeleton, weights, refinement)
+    if subdivision_matrix is not None:
+        weights = _fit_bone_weights(
+            rig.positions_mm.astype(np.float64), skeleton, weights, subdivision_matrix
+        )
     bone = np.argsort(-weights, axis=1, kind="stable")[:, :BONES_PER_POINT]
     bone = np.pad(bone, ((0, 0), (0, BONES_PER_POINT - bone.shape[1])))
     weight = np.take_along_axis(weights, bone, axis=1)
@@ -170,14 +176,14 @@ def _bone_weights(skeleton: Skeleton) -> Doubles:
 
 
 def _fit_bone_weights(
-    positions_mm: Doubles, skeleton: Skeleton, control_weights: Doubles, refinement: csr_array
+    positions_mm: Doubles, skeleton: Skeleton, control_weights: Doubles, subdivision_matrix: csr_array
 ) -> Doubles:
-    """Return bone weights (q, b) of subdivided points, at most four of them above 0 for each point.
+    """Return bone weights (q, b) for the points of a subdivided mesh, at most four above 0 for each point.
 
     control_weights : (p, b) bone weights of the control points
-    refinement : (q, p) subdivision matrix from control points to mesh points
+    subdivision_matrix : (q, p) subdivision matrix from control points to mesh points
     """
-    weights = np.asarray(refinement @ control_weights)
+    weights = np.asarray(subdivision_matrix @ control_weights)
     weights[weights < _MIN_BONE_WEIGHT] = 0.0
     descendants = _descendant_matrix(skeleton)
     patterns, pattern = np.unique(weights > 0, axis=0, return_inverse=True)
@@ -193,7 +199,7 @@ def _fit_bone_weights(
                 positions_mm,
                 skeleton,
                 control_weights @ descendants.T,
-                refinement[rows],
+                subdivision_matrix[rows],
                 descendants[:, bones],
             )
             hessian += _INTERPOLATED_WEIGHTS_PENALTY_MM2 * np.eye(len(bones))
@@ -216,7 +222,7 @@ def _quadratic_error(
     positions_mm: Doubles,
     skeleton: Skeleton,
     descendant_weights: Doubles,
-    refinement: csr_array,
+    subdivision_matrix: csr_array,
     descendant_matrix: Doubles,
 ) -> tuple[Doubles, Doubles]:
     """Return the error of n skinned points as a quadratic function of their bone weights.
@@ -224,17 +230,21 @@ def _quadratic_error(
     The function is w H w - 2 g w [mm²], up to a constant. The vector w (u,) contains the weights of u
     candidate bones. The result is the matrices H (n, u, u) and the vectors g (n, u) of all points.
 
-    descendant_weights : (p, b) sum of a control point's weights for each bone and the descendants of the bone
-    refinement : (n, p) subdivision matrix from control points to the n points
-    descendant_matrix : (b, u) 1 where candidate bone u is bone b or one of its descendants, else 0
+    descendant_weights : (p, b) for each control point and bone, the sum of the weights of the bone and of
+        its descendants
+    subdivision_matrix : (n, p) subdivision matrix from control points to the n points
+    descendant_matrix : (b, u) element (i, j) is 1 where candidate bone j is bone i or a descendant of it,
+        else 0
     """
-    points = np.asarray(refinement @ positions_mm)
+    points = np.asarray(subdivision_matrix @ positions_mm)
     hessian = np.zeros((len(points), descendant_matrix.shape[1], descendant_matrix.shape[1]))
     gradient = np.zeros(hessian.shape[:2])
     for bone in np.flatnonzero(descendant_matrix.any(axis=1)):
-        origin, moves = np.array(skeleton.origin_mm[bone]), descendant_matrix[bone]
+        origin, moves = np.array(skeleton.joint_positions_mm[bone]), descendant_matrix[bone]
         arm = points - origin
-        target = np.asarray(refinement @ (descendant_weights[:, bone, None] * (positions_mm - origin)))
+        target = np.asarray(
+            subdivision_matrix @ (descendant_weights[:, bone, None] * (positions_mm - origin))
+        )
         hessian += (arm**2).sum(axis=1)[:, None, None] * np.outer(moves, moves)
         gradient += (arm * target).sum(axis=1)[:, None] * moves
     return hessian, gradient

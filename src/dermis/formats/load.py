@@ -19,7 +19,7 @@ from dermis.base.disk import Arrays, load_or_make
 from dermis.base.errors import refuse
 from dermis.base.progress import logged_step
 from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, parsing, read_file
-from dermis.formats.axes import Axes, Axis, Front, file_axis, to_y_up
+from dermis.formats.axes import Axes, Axis, Front, head_axis_in_file, to_y_up
 from dermis.formats.materials import FileMaterial
 from dermis.formats.mesh_checks import UV_TOLERANCE, check_arrays, check_mesh, check_rig
 from dermis.formats.mesh_repair import RawMesh, repair_mesh
@@ -27,7 +27,7 @@ from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart, default_unit
 from dermis.formats.read import Origin, join_parts, read_mesh_file, select_vertices
 from dermis.formats.rig_from_file import build_rig, split_points
 from dermis.formats.size_limits import MAX_FILE_BYTES
-from dermis.formats.skin_groups import choose_skin, describe_choice
+from dermis.formats.skin_groups import choose_skin, describe_skin_groups
 from dermis.formats.text_files import list_names
 from dermis.mesh.face_direction import face_direction
 from dermis.mesh.file_vertices import FileVertices
@@ -77,7 +77,8 @@ def load_rigged(
     """Load the mesh and the rig of a file in one of `MESH_FORMATS`, in millimetres, with Y up and v down.
 
     `choose_skin` finds the groups (materials, glTF meshes or OBJ `g`) that are skin; all other groups are
-    opaque. The mesh is checked by `check_mesh`; its size is not checked.
+    opaque. The mesh is checked by `check_mesh`. This function does not check whether the mesh is as large
+    as a human head.
 
     unit_mm : length of the file's unit [mm]; None for the unit stated by the file or its format
         (`default_unit_mm`)
@@ -121,7 +122,7 @@ def _load_uncached(
         counts = [len(part.triangles) for part in mesh_file.parts]
         material = np.repeat(np.array(assigned.of_part, np.int32), counts)
         axes, turned = _find_front(
-            _resolve_axes(axes, mesh_file.axes, mesh_path), mesh_file, part, assigned.skin[material]
+            _resolve_axes(axes, mesh_file.axes, mesh_path), mesh_file, part, assigned.is_skin[material]
         )
         assert part.uv is not None and part.normals is not None
         to_head[:3, :3] = to_y_up(unit * np.eye(3), axes).T
@@ -136,9 +137,9 @@ def _load_uncached(
             point = split_points(point, vertices, to_head[:3, :3], mesh_path)
         arrays = positions[used], normals[used], uv[used], point, corners, material, part.quads, vertices
         in_file = [mesh_file.materials[index] if index >= 0 else None for index in assigned.in_file]
-        raw, repairs = repair_mesh(RawMesh(*arrays, np.arange(len(used))), in_file, assigned.skin)
+        raw, repairs = repair_mesh(RawMesh(*arrays, np.arange(len(used))), in_file, assigned.is_skin)
         raw, assigned, emptied = _without_empty_materials(raw, assigned)
-        mesh, vertices, point = raw.build(assigned.materials), raw.vertices, raw.point
+        mesh, vertices, point = raw.build_mesh(assigned.materials), raw.vertices, raw.point
         has_pictures = any(one.textures for one in mesh_file.materials)
         check_mesh(mesh, mesh_path, has_pictures=has_pictures)
         rig = build_rig(
@@ -161,9 +162,9 @@ def _resolve_axes(user_axes: Axes, file_axes: Axes, mesh_path: Path) -> Axes:
 
     Raises DermisError if the front is parallel to the up axis.
     """
-    axes = user_axes.or_stated(file_axes)
-    if axes.face[-1] == axes.top[-1]:
-        actual = f"front is {axes.front}, and up is {axes.top} in the file"
+    axes = user_axes.fill_unknown_from(file_axes)
+    if axes.front_or_default[-1] == axes.up_or_default[-1]:
+        actual = f"front is {axes.front}, and up is {axes.up_or_default} in the file"
         refuse(mesh_path, "a front across the up axis of the file", actual, "Choose another front")
     return axes
 
@@ -191,8 +192,9 @@ def _find_front(
     direction = face_direction(positions, joined_part.triangles[skin_triangles], points)
     if direction is None or direction == "z":
         return axes, ""
-    front = file_axis(direction, axes)
-    note = f"its face looks along {front} and is turned to the viewer; --front={axes.face} keeps it as it is"
+    front = head_axis_in_file(direction, axes)
+    advice = f"--front={axes.front_or_default} keeps it as it is"
+    note = f"its face looks along {front} and is turned to the viewer; {advice}"
     return axes._replace(front=front), note
 
 
@@ -223,7 +225,7 @@ class _AssignedMaterials(NamedTuple):
     has_uv: tuple[bool, ...]
 
     @property
-    def skin(self) -> Mask:
+    def is_skin(self) -> Mask:
         """Return the mask (m,) of the materials that are skin."""
         return np.array([one.kind == "skin" for one in self.materials])
 
@@ -264,26 +266,26 @@ def _assign_materials(
         key = material, group.material, part.uv is not None
         of_part.append(index.setdefault(key, len(index)))
     materials, in_file, has_uv = zip(*index, strict=True)
-    return _AssignedMaterials(materials, of_part, in_file, has_uv), "" if stated else describe_choice(
+    return _AssignedMaterials(materials, of_part, in_file, has_uv), "" if stated else describe_skin_groups(
         groups, is_skin
     )
 
 
 def _without_empty_materials(
-    mesh: RawMesh, assigned: _AssignedMaterials
+    mesh: RawMesh, assigned_materials: _AssignedMaterials
 ) -> tuple[RawMesh, _AssignedMaterials, tuple[str, ...]]:
     """Remove materials without triangles; return mesh, materials, and a note if any were removed."""
-    kept = np.bincount(mesh.material, minlength=len(assigned.materials)) > 0
-    if kept.all() or not kept[assigned.skin].any():
-        return mesh, assigned, ()
-    names = list_names([one.name for one in compress(assigned.materials, ~kept)])
-    assigned = assigned._replace(
-        materials=tuple(compress(assigned.materials, kept)),
-        in_file=tuple(compress(assigned.in_file, kept)),
-        has_uv=tuple(compress(assigned.has_uv, kept)),
+    kept = np.bincount(mesh.material, minlength=len(assigned_materials.materials)) > 0
+    if kept.all() or not kept[assigned_materials.is_skin].any():
+        return mesh, assigned_materials, ()
+    names = list_names([one.name for one in compress(assigned_materials.materials, ~kept)])
+    assigned_materials = assigned_materials._replace(
+        materials=tuple(compress(assigned_materials.materials, kept)),
+        in_file=tuple(compress(assigned_materials.in_file, kept)),
+        has_uv=tuple(compress(assigned_materials.has_uv, kept)),
     )
     mesh = replace(mesh, material=(np.cumsum(kept) - 1)[mesh.material].astype(np.int32))
-    return mesh, assigned, (f"nothing remains of these groups: {names}",)
+    return mesh, assigned_materials, (f"nothing remains of these groups: {names}",)
 
 
 def _match_groups(
@@ -344,21 +346,25 @@ class RiggedMesh(NamedTuple):
     file_vertices: FileVertices | None = None
 
 
-def cached_rigged(file_bytes: bytes, options_text: str, load: Callable[[], RiggedMesh]) -> RiggedMesh:
+def cached_rigged(
+    file_bytes: bytes, options_text: str, load_from_file: Callable[[], RiggedMesh]
+) -> RiggedMesh:
     """Return mesh and rig of a file from the disk cache; load and cache both if the cache lacks them.
 
     file_bytes : bytes of the file; the mesh must not depend on other files
     options_text : text with all options that influence the result, part of the cache key
-    load : function that reads the file
+    load_from_file : function that reads the file
     """
     digest = hashlib.sha256(f"{_CACHE_VERSION} {options_text}".encode())
     digest.update(file_bytes)
-    return _from_arrays(
-        load_or_make("meshes", digest.hexdigest()[:40], _ARRAY_NAMES, lambda: _to_arrays(load()))
+    return _rigged_from_arrays(
+        load_or_make(
+            "meshes", digest.hexdigest()[:40], _ARRAY_NAMES, lambda: _rigged_to_arrays(load_from_file())
+        )
     )
 
 
-def _to_arrays(rigged: RiggedMesh) -> Arrays:
+def _rigged_to_arrays(rigged: RiggedMesh) -> Arrays:
     """Return mesh and rig as arrays by name for the disk cache; absent fields are empty arrays."""
     mesh, rig, notes, surface = rigged[:4]
     assert rigged.file_vertices is not None
@@ -387,7 +393,7 @@ def _prefixed_fields(instance: MorphTargets | Skeleton, prefix: str, field_names
     return {name: _ABSENT_FIELD if array is None else array for name, array in arrays.items()}
 
 
-def _from_arrays(arrays: Arrays) -> RiggedMesh:
+def _rigged_from_arrays(arrays: Arrays) -> RiggedMesh:
     metadata = json.loads(arrays["metadata"].tobytes())
     triples = ("colour", "emission")
     materials = [

@@ -60,16 +60,16 @@ def _convert_in_strips(
     return converted
 
 
-def colour_map(path: PathLike, upright: bool = False) -> Floats:
+def colour_map(path: PathLike, apply_exif_orientation: bool = False) -> Floats:
     """Read a colour map (H, W, 3), linear Rec. 709; grey is repeated in all channels.
 
-    upright : whether to rotate the picture as its EXIF orientation states, as for photographs
+    apply_exif_orientation : whether to rotate the picture as its EXIF orientation states, as for photographs
     """
-    _check_side(path, "a colour map")
-    image, space = read_colours(path, upright)
+    _check_map_side(path, "a colour map")
+    image, space = read_colours(path, apply_exif_orientation)
     if image.dtype == np.float32:
-        return _check_unit_range(path, "a colour map", space.linear(check_finite(path, image)))
-    return _convert_in_strips(image, (3,), space.linear)
+        return _check_unit_range(path, "a colour map", space.to_linear(check_finite(path, image)))
+    return _convert_in_strips(image, (3,), space.to_linear)
 
 
 def height_map(path: PathLike, relief_mm: np.float32) -> Floats:
@@ -100,12 +100,14 @@ def mixture_map(path: PathLike) -> Floats:
     return np.asarray(fractions / np.maximum(fractions.sum(axis=-1, keepdims=True), 1.0))
 
 
-def scalar_map(path: PathLike, role: str) -> Floats:
+def scalar_map(path: PathLike, map_description: str) -> Floats:
     """Read a grey map (H, W) of values from 0 to 1, without sRGB conversion [-].
 
-    role : description of the map for error messages
+    map_description : description of the map for error messages
     """
-    return _check_unit_range(path, role, _grey_levels(path, role, _read_picture(path, role)))
+    return _check_unit_range(
+        path, map_description, _grey_levels(path, map_description, _read_picture(path, map_description))
+    )
 
 
 def label_map(path: PathLike) -> Bytes:
@@ -170,7 +172,7 @@ def _check_normals(
         refuse(path, "a tangent-space normal map, which looks light blue", actual, "Check which map this is")
 
 
-def _check_side(path: PathLike, role: str) -> None:
+def _check_map_side(path: PathLike, role: str) -> None:
     width, height = read_size(path)
     if max(width, height) > MAX_MAP_SIDE:
         expected = f"{role} of at most {MAX_MAP_SIDE} texels a side"
@@ -178,7 +180,7 @@ def _check_side(path: PathLike, role: str) -> None:
 
 
 def _read_picture(path: PathLike, role: str) -> Pixels:
-    _check_side(path, role)
+    _check_map_side(path, role)
     image = read_image(path)
     return check_finite(path, image) if image.dtype == np.float32 else image
 
@@ -228,10 +230,10 @@ def load_maps(
         is ignored
     normal : tangent-space normals, red towards +u, green as given by `normal_y`
     height : grey, white outwards; requires `height_mm`
-    height_mm : height difference of one grey level of an 8-bit map, or of 1/255 of the full scale of any map
-        [mm]
+    height_mm : height difference between white and black, divided by 255: for an 8-bit map, the height of
+        one grey level [mm]
     specular, roughness : grey, linear values without sRGB conversion
-    region : 8-bit grey labels
+    region : 8-bit grey labels of the regions of the face
     normal_y : "up" if green points towards row 0 (OpenGL, Blender), "down" if away from row 0 (DirectX)
 
     Raises DermisError for a file that does not fit its role; the message names the file.
@@ -247,8 +249,8 @@ def load_maps(
         "height": (height, f"height {relief_mm!r}", partial(height_map, relief_mm=relief_mm)),
         "colour": (colour, "glTF" if isinstance(colour, EmbeddedPicture) else "colour", colour_map),
         "normal": (normal, f"normal {normal_y}", partial(slope_map, normal_y=normal_y)),
-        "specular": (specular, "grey", partial(scalar_map, role="a specular map")),
-        "roughness": (roughness, "grey", partial(scalar_map, role="a roughness map")),
+        "specular": (specular, "grey", partial(scalar_map, map_description="a specular map")),
+        "roughness": (roughness, "grey", partial(scalar_map, map_description="a roughness map")),
         "region": (region, "labels", label_map),
     }
     files = [path for path, _, _ in roles.values() if path is not None]
@@ -269,21 +271,21 @@ def _texel_count(path: PathLike) -> int:
     return width * height
 
 
-def _cached_map(path: PathLike | None, cache_key_text: str, load: MapLoader) -> Any:
+def _cached_map(path: PathLike | None, cache_key_text: str, load_from_file: MapLoader) -> Any:
     """Return the map of a picture file, from the disk cache if the file is large; None without a file.
 
     cache_key_text : text of the map's role and options, which is part of the cache key
-    load : function that reads the map from the file
+    load_from_file : function that reads the map from the file
     """
     if path is None:
         return None
     data = read_bytes(path)
     if len(data) < _MIN_CACHED_BYTES:
-        return check_finite(path, load(path))
+        return check_finite(path, load_from_file(path))
     from dermis.base.disk import cached_array
 
-    note_properties(path, read_as_colours=load is colour_map)
+    note_properties(path, read_as_colours=load_from_file is colour_map)
     source = np.frombuffer(data, np.uint8)
     return cached_array(
-        source, f"map {_CACHE_VERSION} {cache_key_text}", lambda: check_finite(path, load(path))
+        source, f"map {_CACHE_VERSION} {cache_key_text}", lambda: check_finite(path, load_from_file(path))
     )

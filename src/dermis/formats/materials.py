@@ -1,4 +1,4 @@
-"""Materials of mesh files: pictures with their mapping to the surface, and factors."""
+"""Materials of mesh files: their pictures, the mapping of pictures to the surface, and constant values."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Texture:
     channel: int | None = None
 
     @property
-    def mapping(self) -> tuple[int, UvTransform]:
+    def uv_mapping(self) -> tuple[int, UvTransform]:
         """Return the uv set and the transform, which determine the texture coordinates."""
         return self.uv_set, self.transform
 
@@ -65,7 +65,8 @@ class FileMaterial:
     emission : glTF's emissiveFactor
     normal_scale : glTF's normalTexture.scale
     scatters : whether the file states that light scatters below the surface
-    maps : keyword arguments of `load_maps` that files of this package store; they replace `textures`
+    maps : keyword arguments of `load_maps`, stored only in files that this package wrote; they replace
+        `textures`; None for other files
     skin_only : names of properties that have an effect only on skin
     missing : dictionary from role to a sentence on the missing picture
     unused : names of properties that have no effect in this package, for a note to the user
@@ -93,12 +94,12 @@ class FileMaterial:
         return 1.0 if self.stated_metalness is None else self.stated_metalness
 
     @property
-    def cutoff(self) -> float:
-        """Return the opacity below which the surface is cut away, also for materials with blending."""
+    def opacity_cutoff(self) -> float:
+        """Return the opacity below which the surface is cut away; blended materials are also cut."""
         return self.alpha_cutoff if self.alpha_mode == "mask" else _BLENDED_OPACITY_CUTOFF
 
     def skin_pictures(self) -> dict[str, object]:
-        """Return the pictures as keyword arguments of `load_maps`, for skin in the uv layout of the file."""
+        """Return the pictures of a skin material as keyword arguments of `load_maps`."""
         if self.maps is not None:
             return dict(self.maps)
         return {role: self.textures[role].picture for role in ("colour", "normal") if role in self.textures}

@@ -38,7 +38,7 @@ def check_mesh(mesh: Mesh, culprit: object, *, has_pictures: bool = False) -> No
         _check_finite(name, getattr(mesh, name), culprit)
     _check_areas(mesh, culprit)
     _check_manifold(mesh, culprit)
-    _check_skin(mesh, culprit)
+    _check_has_skin(mesh, culprit)
     if not has_pictures:
         check_uv_range(mesh, culprit)
 
@@ -147,7 +147,7 @@ def _check_manifold(mesh: Mesh, culprit: object) -> None:
         refuse(culprit, "a surface of one sheet, two triangles to an edge", actual, advice)
 
 
-def _check_skin(mesh: Mesh, culprit: object) -> None:
+def _check_has_skin(mesh: Mesh, culprit: object) -> None:
     if mesh.material.min() < 0 or mesh.material.max() >= len(mesh.materials):
         actual = f"they run from {mesh.material.min()} to {mesh.material.max()}"
         refuse(culprit, f"material indices below {len(mesh.materials)}", actual, "Build the mesh again")

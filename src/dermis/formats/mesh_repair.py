@@ -63,7 +63,7 @@ class RawMesh:
     triangles : (f, 3) vertex indices
     material : (f,) material index of each triangle
     quads : (q, 2) pairs of triangles that are the halves of a quad
-    vertices : the same vertices in the file's space, with their morph targets and bones
+    vertices : mesh part with the same vertices in the file's space, with their morph targets and bones
     file_vertex : (v,) index of each vertex among the vertices that the file's triangles use
     """
 
@@ -77,20 +77,20 @@ class RawMesh:
     vertices: MeshPart
     file_vertex: Index
 
-    def build(self, materials: tuple[Material, ...]) -> Mesh:
+    def build_mesh(self, materials: tuple[Material, ...]) -> Mesh:
         """Build the `Mesh`, with points and normals."""
         arrays = self.positions, self.uv, self.triangles, self.material
         return build_mesh(*arrays, materials, self.normals, self.point, self.quads)
 
     @cached_property
-    def corners(self) -> Index:
+    def corner_points(self) -> Index:
         """Return the point index at each corner of the triangles, (f, 3)."""
         return self.point[self.triangles].astype(np.int64)
 
     @cached_property
     def sides(self) -> _Sides:
         """Return the sides of the triangles, grouped by edge."""
-        return _group_sides(self.corners)
+        return _group_sides(self.corner_points)
 
     def with_triangles(self, triangle_mask: Mask) -> RawMesh:
         """Return the mesh with the triangles that a mask (f,) selects."""
@@ -99,8 +99,10 @@ class RawMesh:
             self, triangles=self.triangles[triangle_mask], material=self.material[triangle_mask], quads=quads
         )
 
-    def with_corners(self, corner_points: Index) -> RawMesh:
-        """Return the mesh with new point indices at corners; vertices with several points are duplicated.
+    def with_corner_points(self, corner_points: Index) -> RawMesh:
+        """Return the mesh with new point indices at the corners of triangles.
+
+        A vertex whose corners lie at several points is duplicated, once for each of these points.
 
         corner_points : (f, 3) new point index at each corner
         """
@@ -112,8 +114,11 @@ class RawMesh:
         point = np.concatenate((self.point, copies % stride)).astype(np.int32)
         return replace(self._select_vertices(source), point=point, triangles=triangles)
 
-    def compact(self) -> RawMesh:
-        """Return the mesh without unused vertices and points, and without quads that were split apart."""
+    def without_unused(self) -> RawMesh:
+        """Return the mesh without unused vertices and points.
+
+        Pairs of triangles that no longer share two vertices are removed from `quads`.
+        """
         used, triangles = compact_vertices(self.triangles)
         point = np.unique(self.point[used], return_inverse=True)[1].reshape(-1).astype(np.int32)
         first, second = triangles[self.quads[:, 0]], triangles[self.quads[:, 1]]
@@ -151,7 +156,9 @@ def repair_mesh(
     if flat.mean() > _MAX_FLAT_FRACTION:
         return mesh, ()
     repaired = _turn_outwards(_separate_sheets(_drop_triangles(mesh, flat, is_skin, notes), notes), notes)
-    return _move_uv(repaired if repaired is mesh else repaired.compact(), materials, notes), tuple(notes)
+    return _move_uv_charts(
+        repaired if repaired is mesh else repaired.without_unused(), materials, notes
+    ), tuple(notes)
 
 
 def _count_with_noun(item_count: int, noun: str) -> str:
@@ -169,7 +176,7 @@ def _drop_triangles(mesh: RawMesh, flat_mask: Mask, is_skin: Mask, notes: list[s
     if flat_mask.any():
         notes.append(f"left out {_count_with_noun(int(flat_mask.sum()), 'triangle')} without area")
         mesh = mesh.with_triangles(~flat_mask)
-    key = triangle_keys(mesh.corners, int(mesh.point.max()) + 1)
+    key = triangle_keys(mesh.corner_points, int(mesh.point.max()) + 1)
     ordered = np.sort(key)
     if (ordered[1:] == ordered[:-1]).any():
         order = np.lexsort((np.arange(len(key)), mesh.material, key))
@@ -218,7 +225,7 @@ class _Sides(NamedTuple):
     end: Index
 
     @property
-    def pairs(self) -> Index:
+    def manifold_pairs(self) -> Index:
         """Return the two sides of each edge that has exactly two triangles, (n, 2)."""
         first = self.first[self.counts == 2]
         return np.column_stack((self.side[first], self.side[first + 1]))
@@ -255,25 +262,27 @@ def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
     notes.append(
         f"separated the sheets that meet at {_count_with_noun(count, 'edge')} of more than two triangles"
     )
-    links = np.vstack((mesh.sides.pairs, _pair_continuing_sides(mesh)))
-    mesh = mesh.with_corners(_split_points(mesh, links))
+    links = np.vstack((mesh.sides.manifold_pairs, _pair_continuing_sides(mesh)))
+    mesh = mesh.with_corner_points(_split_points(mesh, links))
     sides = mesh.sides
     if (sides.counts > 2).any():  # sheets that are also connected around both ends of an edge
         kept = np.zeros(len(sides.side), bool)
         kept[sides.side[sides.first[sides.counts == 1]]] = True
-        kept[np.concatenate((sides.pairs, _pair_continuing_sides(mesh, max_pairs_per_edge=1)))] = True
-        apart, corners = ~kept.reshape(-1, 3).all(axis=1), mesh.corners.copy()
+        kept[np.concatenate((sides.manifold_pairs, _pair_continuing_sides(mesh, max_pairs_per_edge=1)))] = (
+            True
+        )
+        apart, corners = ~kept.reshape(-1, 3).all(axis=1), mesh.corner_points.copy()
         corners[apart] = corners.max() + 1 + np.arange(3 * int(apart.sum())).reshape(-1, 3)
-        mesh = mesh.with_corners(corners)
+        mesh = mesh.with_corner_points(corners)
     return mesh
 
 
 def _pair_continuing_sides(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGLES_PER_EDGE // 2) -> Index:
-    """Return pairs of triangle sides (n, 2) that connect the sheets of a surface at non-manifold edges.
+    """Return pairs of triangle sides (n, 2) across which a surface continues at non-manifold edges.
 
-    The pairs of an edge are chosen one after another. Pairs of the same material are preferred, then pairs
-    that run in opposite directions, then pairs whose two triangles are closest to a flat surface.
-    All pairs of an edge except the first must run in opposite directions.
+    The pairs of an edge are chosen one after another. Two sides of the same material are preferred, then two
+    sides that run in opposite directions, then two sides whose triangles are closest to a common plane.
+    The sides of all pairs of an edge except the first must run in opposite directions.
 
     max_pairs_per_edge : largest number of pairs at an edge
     """
@@ -286,7 +295,10 @@ def _pair_continuing_sides(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGL
     )
     table = -np.sort(-table, axis=1)
     inwards = _directions_from_sides(mesh, table)
-    forward, piece = sides.start < sides.end, _label_components(len(mesh.triangles), sides.pairs // 3)
+    forward, component = (
+        sides.start < sides.end,
+        _label_components(len(mesh.triangles), sides.manifold_pairs // 3),
+    )
     found = [np.empty((0, 2), np.int64)]
     for turn in range(max_pairs_per_edge):
         best, chosen = np.full(len(table), np.inf), np.zeros((len(table), 2), np.int64)
@@ -294,7 +306,7 @@ def _pair_continuing_sides(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGL
             row = np.flatnonzero((table[:, a] >= 0) & (table[:, b] >= 0))
             one, two = table[row, a], table[row, b]
             cost = (inwards[row, a] * inwards[row, b]).sum(axis=1)
-            cost += 0.5 * (piece[one // 3] != piece[two // 3]) + 8 * (
+            cost += 0.5 * (component[one // 3] != component[two // 3]) + 8 * (
                 material[one // 3] != material[two // 3]
             )
             cost += np.where(forward[one] == forward[two], np.inf if turn else 4, 0)
@@ -326,7 +338,7 @@ def _split_points(mesh: RawMesh, side_pairs: Index) -> Index:
 
     side_pairs : (n, 2) pairs of triangle sides that stay connected
     """
-    sides, flat = mesh.sides, mesh.corners.ravel()
+    sides, flat = mesh.sides, mesh.corner_points.ravel()
     crowded = sides.side[sides.first[sides.counts > 2]]
     busy = np.zeros(int(flat.max()) + 1, bool)
     busy[sides.start[crowded]] = busy[sides.end[crowded]] = True
@@ -353,25 +365,25 @@ def _split_points(mesh: RawMesh, side_pairs: Index) -> Index:
 
 def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
     """Return the mesh with consistently wound triangles and outward normals."""
-    piece, reverse = _find_pieces(mesh)
+    component, reverse = _components_and_reversals(mesh)
     x = np.ascontiguousarray(mesh.positions.T, np.float64)
     a, b, c = (x.take(one, axis=1) for one in np.ascontiguousarray(mesh.triangles.T))
     area = cross_columns(b - a, c - a) * np.where(reverse, -1.0, 1.0)
-    surface = _PieceSurface(piece, area, np.stack((a, b, c)))
+    surface = _ComponentSurface(component, area, np.stack((a, b, c)))
     agreement = surface.mean_cosine(_corner_normal_sums(mesh))
     doubtful = (surface.mean_cosine(surface.outward_directions()) < _MIN_MEAN_CONVEXITY_COSINE) | (
         agreement < _MAX_COSINE_OF_OPPOSITE_NORMALS
     )
     if doubtful.any():
-        turned = _inside_out_pieces(surface, doubtful, agreement)
-        reverse ^= turned[piece]
+        turned = _inside_out_components(surface, doubtful, agreement)
+        reverse ^= turned[component]
         agreement[turned] *= -1
     if reverse.any():
         count = _count_with_noun(int(reverse.sum()), "triangle")
         notes.append(f"reversed {count} of {len(reverse):,} that are wound inside out")
         triangles = np.where(reverse[:, None], mesh.triangles[:, ::-1], mesh.triangles)
         mesh = replace(mesh, triangles=triangles)
-    inwards = np.unique(mesh.triangles[(agreement < _MAX_COSINE_OF_OPPOSITE_NORMALS)[piece]])
+    inwards = np.unique(mesh.triangles[(agreement < _MAX_COSINE_OF_OPPOSITE_NORMALS)[component]])
     if len(inwards):
         notes.append(f"turned {_count_with_noun(len(inwards), 'normal')} outwards")
         normals = mesh.normals.copy()
@@ -380,13 +392,13 @@ def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
     return mesh
 
 
-def _find_pieces(mesh: RawMesh) -> tuple[Index, Mask]:
+def _components_and_reversals(mesh: RawMesh) -> tuple[Index, Mask]:
     """Return each triangle's connected component (f,), and the mask (f,) of triangles to reverse.
 
     After reversal of these triangles, the winding of each component is consistent, and the same as before on
     most of its area. A component that cannot be wound consistently, such as a Moebius strip, is unchanged.
     """
-    count, pairs = len(mesh.triangles), mesh.sides.pairs
+    count, pairs = len(mesh.triangles), mesh.sides.manifold_pairs
     forward = mesh.sides.start < mesh.sides.end
     links = pairs // 3
     conflict = forward[pairs[:, 0]] == forward[pairs[:, 1]]
@@ -397,11 +409,11 @@ def _find_pieces(mesh: RawMesh) -> tuple[Index, Mask]:
     first, second = np.concatenate((one, one + count)), np.concatenate((two, two + count))
     second = np.where(np.tile(conflict, 2), (second + count) % (2 * count), second)
     kept, reversed_ = _label_components(2 * count, np.column_stack((first, second))).reshape(2, -1)
-    piece = np.unique(np.minimum(kept, reversed_), return_inverse=True)[1].reshape(-1)
+    component = np.unique(np.minimum(kept, reversed_), return_inverse=True)[1].reshape(-1)
     reverse = kept > reversed_
     size = triangle_areas(mesh.positions[mesh.triangles])
-    balance = np.bincount(piece, np.where(reverse, size, -size))
-    return piece, reverse ^ ((balance > 0)[piece] & (kept != reversed_))
+    balance = np.bincount(component, np.where(reverse, size, -size))
+    return component, reverse ^ ((balance > 0)[component] & (kept != reversed_))
 
 
 def _corner_normal_sums(mesh: RawMesh) -> Doubles:
@@ -411,15 +423,15 @@ def _corner_normal_sums(mesh: RawMesh) -> Doubles:
 
 
 @dataclass(frozen=True)
-class _PieceSurface:
-    """Triangles, and the connected component ("piece") of each.
+class _ComponentSurface:
+    """Triangles, and the connected component of each.
 
-    piece : (f,) index of each triangle's component
+    component : (f,) index of each triangle's component
     area_normals : (3, f) normals with twice the triangle's area as their length [mm²]
     corners : (3, 3, f) positions of the corners; axes: corner, coordinate, triangle [mm]
     """
 
-    piece: Index
+    component: Index
     area_normals: Doubles
     corners: Doubles
 
@@ -431,36 +443,40 @@ class _PieceSurface:
     def outward_directions(self) -> Doubles:
         """Return the vector (3, f) to each triangle from the centroid of its component."""
         centre = self.corners.mean(axis=0)
-        total = np.maximum(np.bincount(self.piece, self.double_area), np.finfo(np.float64).tiny)
+        total = np.maximum(np.bincount(self.component, self.double_area), np.finfo(np.float64).tiny)
         for axis in centre:
-            axis -= (np.bincount(self.piece, axis * self.double_area) / total)[self.piece]
+            axis -= (np.bincount(self.component, axis * self.double_area) / total)[self.component]
         centre[np.abs(centre) < 1e-6 * np.sqrt(self.double_area)] = 0  # rounding errors of single triangles
         return np.asarray(centre)
 
     def mean_cosine(self, direction: Doubles) -> Doubles:
-        """Return the mean cosine between normals and directions for each component.
+        """Return, for each component, the mean cosine of the angle between its normals and given directions.
 
         direction : (3, f) direction for each triangle; a component whose directions are all zero gets 0
         """
-        length = np.bincount(self.piece, self.double_area * np.sqrt(dot_columns(direction, direction)))
-        total = np.bincount(self.piece, dot_columns(self.area_normals, direction))
+        length = np.bincount(self.component, self.double_area * np.sqrt(dot_columns(direction, direction)))
+        total = np.bincount(self.component, dot_columns(self.area_normals, direction))
         return total / np.where(length > 0, length, 1)
 
-    def visible_sides(self, doubtful_pieces: Mask) -> tuple[Doubles, bool]:
-        """Return which side of each component is visible from outside, and whether most samples show backs.
+    def visible_sides(self, doubtful_components: Mask) -> tuple[Doubles, bool]:
+        """Return which side of each connected component is visible from outside, and whether backs prevail.
 
-        The side is a number for each component: 1 if only its front is visible, -1 if only its back is
-        visible, values between if both are, and 0 if hardly any part is visible. The second result is whether
-        more than two thirds of the visible samples of the whole mesh show the back of a triangle.
+        The first result is a number for each component: 1 if only its front is visible, -1 if only its back
+        is visible, a number between -1 and 1 if both are visible, and 0 if hardly any of it is visible. The
+        second result is whether backs of triangles are visible at more than two thirds of the sample points
+        on the mesh that are visible at all.
 
-        doubtful_pieces : mask of components that get additional samples, because they may be small
+        doubtful_components : mask of components that may be inside out; they get additional sample points
         """
-        component_area = np.bincount(self.piece, self.double_area)
-        more = _DOUBTFUL_SAMPLE_FRACTION * doubtful_pieces / (component_area * doubtful_pieces.sum())
+        component_area = np.bincount(self.component, self.double_area)
+        more = _DOUBTFUL_SAMPLE_FRACTION * doubtful_components / (component_area * doubtful_components.sum())
         triangle, sample = self._draw_samples(
-            self.double_area * ((1 - _DOUBTFUL_SAMPLE_FRACTION) / component_area.sum() + more[self.piece])
+            self.double_area * ((1 - _DOUBTFUL_SAMPLE_FRACTION) / component_area.sum() + more[self.component])
         )
-        normal, piece = self.area_normals[:, triangle] / self.double_area[triangle], self.piece[triangle]
+        normal, component = (
+            self.area_normals[:, triangle] / self.double_area[triangle],
+            self.component[triangle],
+        )
         radius, seen = (
             float(np.sqrt(dot_columns(sample, sample).max())),
             np.zeros((2, len(component_area)), np.int64),
@@ -477,11 +493,11 @@ class _PieceSurface:
             cosine = view @ normal[:, visible]
             facings = cosine > _MIN_VIEW_COSINE, cosine < -_MIN_VIEW_COSINE
             for side, facing in zip(seen, facings, strict=True):
-                side += np.bincount(piece[visible[facing]], minlength=len(component_area))
+                side += np.bincount(component[visible[facing]], minlength=len(component_area))
         cells = (
             component_area / 8 * (_CELLS_PER_VIEW_SIDE / 2 / radius) ** 2
         )  # that a convex component would cover alone
-        alone = _VIEW_COUNT * np.minimum(cells, np.bincount(piece, minlength=len(component_area)) / 2)
+        alone = _VIEW_COUNT * np.minimum(cells, np.bincount(component, minlength=len(component_area)) / 2)
         front, back = seen
         is_seen = front + back >= np.maximum(_MIN_VISIBLE_FRACTION * alone, _MIN_VISIBLE_SAMPLES)
         balance = np.where(is_seen, (front - back) / np.maximum(front + back, 1), 0)
@@ -504,23 +520,31 @@ class _PieceSurface:
         return triangle, points - self.corners.mean(axis=(0, 2))[:, None]
 
 
-def _inside_out_pieces(surface: _PieceSurface, doubtful_pieces: Mask, normals_cosine: Doubles) -> Mask:
+def _inside_out_components(
+    surface: _ComponentSurface, doubtful_components: Mask, normals_cosine: Doubles
+) -> Mask:
     """Return the mask of connected components that are wound inside out.
 
-    A component is inside out if mainly its back is visible from outside. If both sides or neither side is
-    visible, the component is inside out if the normals of the file say so. If neither side is visible, it is
-    also inside out if the whole mesh mainly shows the backs of triangles.
+    A component is inside out in any of these cases:
 
-    doubtful_pieces : mask of components that may be inside out
+    1. Mainly its back is visible from outside.
+    2. Its front is not the side that is mainly visible, and the file's normals are opposite to those of the
+       triangles.
+    3. Neither side is visible, and the visible triangles of the whole mesh mainly show their backs.
+
+    doubtful_components : mask of components that may be inside out
     normals_cosine : for each component, the mean cosine between the file's normals and the triangles' normals
     """
-    balance, backs_prevail = surface.visible_sides(doubtful_pieces)
+    balance, backs_prevail = surface.visible_sides(doubtful_components)
     opposed = (normals_cosine < _MAX_COSINE_OF_OPPOSITE_NORMALS) & (balance <= _MIN_VISIBILITY_BALANCE)
     return np.asarray((balance < -_MIN_VISIBILITY_BALANCE) | opposed | ((balance == 0) & backs_prevail))
 
 
-def _move_uv(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: list[str]) -> RawMesh:
-    """Return the mesh with uv charts moved by whole tiles and clamped, if they then fit into [0, 1]."""
+def _move_uv_charts(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: list[str]) -> RawMesh:
+    """Return the mesh with uv charts moved by whole tiles to [0, 1]; charts that do not fit stay in place.
+
+    The uv of charts that fit are clamped to [0, 1].
+    """
     if mesh.uv.min() >= -UV_TOLERANCE and mesh.uv.max() <= 1 + UV_TOLERANCE:
         return mesh
     place = weld(np.column_stack((mesh.point, mesh.uv)))
@@ -553,7 +577,7 @@ def _uv_periods(material: FileMaterial | None) -> tuple[float, float]:
     """Return the number of tiles along u and v after which a material's pictures repeat."""
     periods = [(1.0, 1.0)]
     for texture in material.textures.values() if material else ():
-        if texture.mapping == (0, IDENTITY_UV_TRANSFORM):
+        if texture.uv_mapping == (0, IDENTITY_UV_TRANSFORM):
             periods.append((_UV_PERIOD_OF_WRAP[texture.wrap[0]], _UV_PERIOD_OF_WRAP[texture.wrap[1]]))
         elif texture.uv_set == 0:
             periods.append((_UNLIMITED_UV_PERIOD, _UNLIMITED_UV_PERIOD))

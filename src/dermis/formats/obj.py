@@ -1,4 +1,4 @@
-"""OBJ files as mesh parts, and the maps of their materials."""
+"""Reading of OBJ files as mesh parts, and of the maps of their materials."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dermis.base.reading import parsing, read_file
 from dermis.formats import size_limits as limits
 from dermis.formats.maps import check_finite, load_maps
 from dermis.formats.obj_geometry import parse_geometry
-from dermis.formats.obj_materials import MtlTexture, picture_name, read_library, with_materials
+from dermis.formats.obj_materials import MtlTexture, picture_file_name, read_library, with_materials
 from dermis.formats.parts import DEFAULT_COLOUR, MaterialGroup, MeshFile, MeshPart
 from dermis.formats.referenced_files import find_referenced_file
 from dermis.formats.text_files import decode_text
@@ -37,7 +37,7 @@ def read_obj_text(path: Path) -> str:
 
 
 def read_obj(path: Path) -> MeshFile:
-    """Read a .obj file, one mesh part per pair of `usemtl` and `g`.
+    """Read a .obj file; polygons with the same `usemtl` and the same `g` form one mesh part.
 
     The colour of a part is the value Kd of its material in the .mtl file, taken as linear.
     """
@@ -45,7 +45,7 @@ def read_obj(path: Path) -> MeshFile:
 
 
 def parse_obj(path: Path, obj_text: str) -> MeshFile:
-    """Parse the text of a .obj file, one mesh part per pair of `usemtl` and `g`.
+    """Parse the text of a .obj file; polygons with the same `usemtl` and the same `g` form one mesh part.
 
     path : path of the file, for errors and to find the .mtl file
     """
@@ -55,7 +55,7 @@ def parse_obj(path: Path, obj_text: str) -> MeshFile:
     known = [library.materials.get(pair[0]) for pair in geometry.pairs]
     colours = [DEFAULT_COLOUR if own is None else own.colour or DEFAULT_COLOUR for own in known]
     groups = [MaterialGroup(name, colour) for name, colour in zip(names, colours, strict=True)]
-    parts = geometry.polygons.parts(groups, geometry.pair, "by polygon")
+    parts = geometry.polygons.mesh_parts(groups, geometry.pair, "by polygon")
     used, none = {part.group for part in parts}, np.empty((0, 3))
     empty = [MeshPart(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in used]
     assigned, materials, notes = with_materials(path, [*parts, *empty], library)
@@ -64,7 +64,7 @@ def parse_obj(path: Path, obj_text: str) -> MeshFile:
 
 def obj_maps(
     path: Path,
-    material: str,
+    material_name: str,
     *,
     overridden_roles: Collection[str] = (),
     height_mm: float | None = None,
@@ -77,12 +77,12 @@ def obj_maps(
     them, or heights, which require `height_mm`. Normals and heights are scaled by the option -bm. map_Pr
     contains the square root of the roughness m.
 
-    material : name of the material in the .mtl files
+    material_name : name of the material in the .mtl files
     overridden_roles : roles of the maps that the caller sets by other means, and that are not read from the
         file
     height_mm, normal_y : see `load_maps`
     """
-    textures = read_library(path, read_obj_text(path)).materials[material].textures
+    textures = read_library(path, read_obj_text(path)).materials[material_name].textures
     maps, faults = Maps(), list[str]()
     roles = [role for role in ("colour", "specular", "roughness") if role not in overridden_roles]
     if not set(_RELIEF_MAP_ROLES) & set(overridden_roles):
@@ -90,7 +90,7 @@ def obj_maps(
     remaining = MAX_TOTAL_PIXELS
     for role in (one for one in roles if one in textures):
         texture = textures[role]
-        file = find_referenced_file(path, picture_name(texture))
+        file = find_referenced_file(path, picture_file_name(texture))
         if file is None:
             continue
         try:

@@ -124,7 +124,7 @@ def parse_geometry(path: Path, obj_text: str) -> ObjGeometry:
     Raises DermisError for invalid numbers and indices; the message names the line.
     """
     limits.check_limit(path, obj_text.count("\n"), _MAX_LINES, "lines", limits.DECIMATE_ADVICE)
-    rows, others, unread = _split_statements(path, _plain_text(obj_text))
+    rows, others, unread = _split_statements(path, _join_and_strip_lines(obj_text))
     positions, colours, notes = _parse_vertices(path, rows["v"])
     uv, normals = (
         _parse_number_table(path, rows["vt"], "vt")[0],
@@ -154,7 +154,7 @@ def parse_geometry(path: Path, obj_text: str) -> ObjGeometry:
     return ObjGeometry(polygons, pairs, pair[kept], statements, notes)
 
 
-def _plain_text(obj_text: str) -> str:
+def _join_and_strip_lines(obj_text: str) -> str:
     """Join continued lines; remove leading blanks, and comments at the ends of lines.
 
     The number of lines is unchanged, as empty lines take the place of joined lines.
@@ -178,7 +178,7 @@ def _split_statements(
     start = np.concatenate([[0], end[:-1] + 1])
     length = end - start + 1
     first, second, third = (data[np.minimum(start + k, end)] for k in range(3))
-    _check_lines(path, length, first == ord("v"))
+    _check_line_limits(path, length, first == ord("v"))
     masks = {key: (first == ord(key)) & (second <= _SPACE) for key in ("v", "f")}
     for key in ("vt", "vn"):
         masks[key] = (first == ord("v")) & (second == ord(key[1])) & (third <= _SPACE)
@@ -204,7 +204,7 @@ def _split_statements(
     return rows, used, unread
 
 
-def _check_lines(path: Path, line_lengths: Index, is_vertex_line: Mask) -> None:
+def _check_line_limits(path: Path, line_lengths: Index, is_vertex_line: Mask) -> None:
     if (
         line_lengths.max() > _MAX_LINE_LENGTH
         or line_lengths[is_vertex_line].max(initial=0) > _MAX_VERTEX_LINE_LENGTH
@@ -274,7 +274,10 @@ def _parse_polypaint(hex_digits: str, vertex_count: int) -> tuple[Doubles | None
 def _parse_number_table(
     path: Path, statement_rows: _StatementRows, statement_key: str
 ) -> tuple[Doubles, Index]:
-    """Return the first six numbers of n statements, padded with NaN, (n, 6), and how many each has, (n,)."""
+    """Return the numbers of n statements, (n, 6), and the count of numbers in each statement, (n,).
+
+    Only the first six numbers of a statement are returned; shorter statements are padded with NaN.
+    """
     words = run_starts(statement_rows.text > _SPACE)
     first = np.searchsorted(words, statement_rows.start)
     counts = np.diff(first, append=len(words))
@@ -347,7 +350,7 @@ def _parse_faces(path: Path, rows_of_statement: Mapping[str, _StatementRows]) ->
 def _face_groups(
     path: Path, statements: Sequence[_Statement], face_line: Index
 ) -> tuple[list[tuple[str, str]], Index]:
-    """Return the combinations of `usemtl` and `g` names, and the index of the combination of each face.
+    """Return the combinations of `usemtl` and `g` names, and for each face the index of its combination.
 
     face_line : (n,) line number of each face
 

@@ -118,7 +118,7 @@ class MtlTexture:
 
     @property
     def transform(self) -> UvTransform:
-        """Return the transform for uv coordinates with v down."""
+        """Return the transform that the options -s and -o state, for uv coordinates with v down."""
         (scale_u, scale_v), (u, v) = self.scale, self.offset
         if (self.scale, self.offset) == ((1.0, 1.0), (0.0, 0.0)):
             return IDENTITY_UV_TRANSFORM
@@ -158,7 +158,7 @@ def read_library(path: Path, obj_text: str) -> MaterialLibrary:
     path, obj_text : path and text of the OBJ file
     """
     library, remaining = MaterialLibrary(), limits.MAX_MTL_BYTES
-    for listed in library_names(obj_text)[: limits.MAX_MTL_FILES]:
+    for listed in library_file_names(obj_text)[: limits.MAX_MTL_FILES]:
         found = find_referenced_file(path, listed)
         names = [listed] if found else listed.split(".mtl ")[: limits.MAX_MTL_FILES]
         for name in names:
@@ -173,7 +173,7 @@ def read_library(path: Path, obj_text: str) -> MaterialLibrary:
     return library
 
 
-def library_names(obj_text: str) -> list[str]:
+def library_file_names(obj_text: str) -> list[str]:
     """Return the .mtl file names in the `mtllib` lines of an OBJ text, without duplicates."""
     names = (line[1].strip() for line in _LIBRARY_LINE.finditer(obj_text))
     return [name for name in dict.fromkeys(names) if name]
@@ -199,7 +199,7 @@ def _parse_mtl(mtl_text: str) -> dict[str, MtlMaterial]:
     return materials
 
 
-def picture_name(texture: MtlTexture, udim_tile: int = _FIRST_UDIM) -> str:
+def picture_file_name(texture: MtlTexture, udim_tile: int = _FIRST_UDIM) -> str:
     """Return the file name of a texture's picture; for UDIM tiles, the file name of the tile `udim_tile`."""
     return _UDIM_PATTERN.sub(str(udim_tile), texture.name)
 
@@ -299,7 +299,7 @@ def _file_material(path: Path, material_name: str, material: MtlMaterial, udim_t
     skin_only = list[str]()
     row, column = divmod(udim_tile - _FIRST_UDIM, _UDIM_COLUMNS)
     for role, texture in material.textures.items():
-        written = picture_name(texture, udim_tile)
+        written = picture_file_name(texture, udim_tile)
         file = find_referenced_file(path, written)
         if file is None:
             missing[role] = f"{texture.key}: {written} is not in its folder. {_MISSING_FILE_ADVICE}"

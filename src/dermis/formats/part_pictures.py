@@ -34,12 +34,12 @@ class PartPictures:
     maps: PartMaps
 
     @classmethod
-    def of(cls, head: Head) -> PartPictures | None:
+    def from_head(cls, head: Head) -> PartPictures | None:
         """Return the pictures of a head's parts that are not skin; None for a head without maps of parts."""
         return None if head.maps.parts is None else cls(head.mesh, head.maps.parts)
 
-    def roles(self, material: Material) -> set[PartRole]:
-        """Return the roles of the pictures that a part needs."""
+    def needed_roles(self, material: Material) -> set[PartRole]:
+        """Return the roles of the pictures that a part with a given material needs."""
         is_cut, is_metal = material.opacity_cutoff > 0.0, material.metalness > 0.0
         is_rough = material.roughness is not None
         needed: dict[PartRole, bool] = {
@@ -56,14 +56,14 @@ class PartPictures:
         return {role for role, used in needed.items() if used} if material.has_maps else set()
 
     def encode(self, roles: Iterable[PartRole]) -> dict[PartRole, bytes]:
-        """Return 8-bit PNG files by role; roles that no part needs are left out."""
+        """Return the pictures as 8-bit PNG files by role; roles that no part needs are left out."""
         parts = [self.mesh.materials[index] for index in np.unique(self.mesh.material)]
-        used = set[PartRole]().union(*map(self.roles, parts))
+        used = set[PartRole]().union(*map(self.needed_roles, parts))
         levels = {role: _ENCODER_OF_ROLE[role](self.maps) for role in roles if role in used}
         with ThreadPoolExecutor() as pool:  # compression releases the interpreter lock
             return dict(zip(levels, pool.map(encode_png, levels.values()), strict=True))
 
-    def emission(self, material: Material) -> tuple[float, tuple[float, ...]]:
+    def emission_strength_and_colour(self, material: Material) -> tuple[float, tuple[float, ...]]:
         """Return the emission of a part as a strength and a colour; their product is a radiance.
 
         With an emission map, the strength is the largest radiance in the map and the colour is white. Without
@@ -79,41 +79,41 @@ class PartPictures:
         return bool(self.maps.surface[..., :2].any())
 
 
-def normal_levels(surface_slopes: Floats) -> Bytes:
+def encode_normals8(surface_slopes: Floats) -> Bytes:
     """Return the tangent-space normal map (h, w, 3) of slopes (h, w, 2) as 8-bit levels, green up."""
     normal = np.concatenate([-surface_slopes, np.ones_like(surface_slopes[..., :1])], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    return linear_levels(0.5 * normal + 0.5)
+    return encode_linear8(0.5 * normal + 0.5)
 
 
-def linear_levels(linear_values: Numbers) -> Bytes:
+def encode_linear8(linear_values: Numbers) -> Bytes:
     """Return values from 0 to 1, of any shape, as 8-bit levels without sRGB encoding."""
     return np.asarray(np.rint(np.clip(linear_values, 0, 1) * 255), np.uint8)
 
 
-def _colour_levels(maps: PartMaps) -> Bytes:
+def _encode_colours8(maps: PartMaps) -> Bytes:
     return encode_srgb8(maps.colour[..., :3])
 
 
-def _surface_levels(maps: PartMaps) -> Bytes:
-    return np.pad(linear_levels(maps.surface[..., 2:]), ((0, 0), (0, 0), (1, 0)))
+def _encode_surface8(maps: PartMaps) -> Bytes:
+    return np.pad(encode_linear8(maps.surface[..., 2:]), ((0, 0), (0, 0), (1, 0)))
 
 
-def _emission_levels(maps: PartMaps) -> Bytes:
+def _encode_emission8(maps: PartMaps) -> Bytes:
     assert maps.emission is not None
     return encode_srgb8(maps.emission / maps.emission.max())
 
 
 _ENCODER_OF_ROLE: Mapping[PartRole, Callable[[PartMaps], Bytes]] = {
-    "colour": _colour_levels,
+    "colour": _encode_colours8,
     "cutout": lambda maps: np.concatenate(
-        [_colour_levels(maps), linear_levels(maps.colour[..., 3:])], axis=2
+        [_encode_colours8(maps), encode_linear8(maps.colour[..., 3:])], axis=2
     ),
     "opacity": lambda maps: np.uint8(255) * (maps.colour[..., 3:] >= 0.5),
-    "roughness": lambda maps: linear_levels(maps.surface[..., 2:3]),
-    "alpha": lambda maps: linear_levels(maps.surface[..., 2:3] ** 2),
-    "metalness": lambda maps: linear_levels(maps.surface[..., 3:]),
-    "surface": _surface_levels,
-    "normal": lambda maps: normal_levels(maps.surface[..., :2]),
-    "emission": _emission_levels,
+    "roughness": lambda maps: encode_linear8(maps.surface[..., 2:3]),
+    "alpha": lambda maps: encode_linear8(maps.surface[..., 2:3] ** 2),
+    "metalness": lambda maps: encode_linear8(maps.surface[..., 3:]),
+    "surface": _encode_surface8,
+    "normal": lambda maps: encode_normals8(maps.surface[..., :2]),
+    "emission": _encode_emission8,
 }

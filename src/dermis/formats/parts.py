@@ -1,4 +1,4 @@
-"""Parts of mesh files: groups of triangles, with the length unit and the uv of the file."""
+"""Parts of mesh files: groups of triangles, whose lengths and uv are as in the file."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ DEFAULT_COLOUR: Colour = (0.8, 0.8, 0.8)
 
 
 def is_gltf(path: str | Path) -> bool:
-    """Return whether a file has a suffix of glTF: .glb, .gltf or .vrm."""
+    """Return whether a file name has one of the suffixes of glTF files: .glb, .gltf or .vrm."""
     return is_binary_gltf(path) or Path(path).suffix.lower() == ".gltf"
 
 
 def is_binary_gltf(path: str | Path) -> bool:
-    """Return whether a file has a suffix of binary glTF: .glb, or .vrm for avatars."""
+    """Return whether a file name has one of the suffixes of binary glTF files: .glb, or .vrm for avatars."""
     return Path(path).suffix.lower() in (".glb", ".vrm")
 
 
@@ -43,7 +43,7 @@ def default_unit_mm(path: str | Path) -> float:
 class MaterialGroup:
     """Names and colour of a group of triangles.
 
-    names : name of the group's material, if the material has a name, then name of the mesh or OBJ group
+    names : name of the group's material (unless it has none), followed by the name of the mesh or OBJ group
     colour : diffuse reflectance, linear [-]
     material : index of the file's material, -1 if there is none
     """
@@ -59,7 +59,7 @@ class MaterialGroup:
 
 @dataclass(frozen=True)
 class MeshPart:
-    """Triangles of one group in the rest pose, with the length unit and the v direction of the file.
+    """Triangles of one group in the rest pose; the length unit and the v direction are those of the file.
 
     positions : (v, 3) vertex positions
     uv : (v, 2) uv of the vertices, or None

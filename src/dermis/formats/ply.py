@@ -1,4 +1,4 @@
-"""PLY files: elements as arrays of columns, and the mesh that they describe."""
+"""Reading of PLY files: the columns of their elements, and the mesh that the elements describe."""
 
 from __future__ import annotations
 
@@ -139,13 +139,13 @@ class _Header(NamedTuple):
 
 
 class _Columns(dict[str, "Numbers | _ListColumn"]):
-    """Columns of an element by property name; `take` and similar methods record which columns are used."""
+    """Columns of an element by property name; methods that return columns record that these are used."""
 
     def __init__(self) -> None:
         super().__init__()
         self.used: set[str] = set()
 
-    def take(self, property_names: Sequence[str]) -> Numbers | None:
+    def take_properties(self, property_names: Sequence[str]) -> Numbers | None:
         """Return k scalar properties as columns of an array (n, k); None unless all of them exist."""
         columns = [column for name in property_names if isinstance(column := self.get(name), np.ndarray)]
         if not columns or len(columns) < len(property_names):
@@ -153,9 +153,11 @@ class _Columns(dict[str, "Numbers | _ListColumn"]):
         self.used.update(property_names)
         return np.column_stack(columns)
 
-    def take_first(self, property_choices: Sequence[Sequence[str]]) -> Numbers | None:
+    def take_first_complete_set(self, property_choices: Sequence[Sequence[str]]) -> Numbers | None:
         """Return the first set of properties that exists, as an array (n, k); None if no set exists."""
-        return next((one for names in property_choices if (one := self.take(names)) is not None), None)
+        return next(
+            (one for names in property_choices if (one := self.take_properties(names)) is not None), None
+        )
 
     def take_list(self, list_names: Sequence[str]) -> _ListColumn | None:
         """Return the first list property in `list_names` that exists; None if no such property exists."""
@@ -175,12 +177,12 @@ def read_ply(path: Path) -> MeshFile:
     header = _read_header(path, data)
     tables = _read_elements(path, header, np.frombuffer(data, np.uint8, offset=header.size))
     vertices, faces, strips = (tables.get(name, _Columns()) for name in ("vertex", "face", "tristrips"))
-    positions = vertices.take("xyz")
+    positions = vertices.take_properties("xyz")
     if positions is None:
         refuse(path, "vertices with x, y and z", f"they have {list_names(vertices)}", limits.DAMAGED_ADVICE)
     counts, index = _polygon_corners(path, faces, strips, len(positions))
     uv, uv_index = _corner_uv(path, vertices, faces, counts, index)
-    normals = vertices.take(("nx", "ny", "nz"))
+    normals = vertices.take_properties(("nx", "ny", "nz"))
     colours, notes = _vertex_colours(vertices)
     corners = np.column_stack((index, uv_index, np.full_like(index, -1) if normals is None else index))
     counts, corners, _, faults = without_small_polygons(counts, corners)
@@ -188,7 +190,7 @@ def read_ply(path: Path) -> MeshFile:
         refuse_without_faces(path, len(positions))
     directions = np.empty((0, 3)) if normals is None else to_floats(normals)
     polygons = Polygons(counts, corners, np.asarray(positions, np.float64), uv, directions, colours)
-    picture, unused = _main_picture(header.pictures, faces.take(("texnumber",)))
+    picture, unused = _main_picture(header.pictures, faces.take_properties(("texnumber",)))
     notes += [*faults, *missing_uv_notes(polygons), *unused, *_unread_notes(tables)]
     materials: tuple[FileMaterial, ...] = ()
     if picture is not None and (file := find_referenced_file(path, picture)) is not None:
@@ -196,7 +198,7 @@ def read_ply(path: Path) -> MeshFile:
     elif picture is not None:
         notes.append(f"its picture {picture} is not in its folder. Put it there, or set it with --colour")
     group = MaterialGroup((path.stem,), material=0 if materials else -1)
-    parts = polygons.parts([group], np.zeros_like(counts), "by kind")
+    parts = polygons.mesh_parts([group], np.zeros_like(counts), "by kind")
     return MeshFile(parts, materials=materials, notes=tuple(notes))
 
 
@@ -221,9 +223,9 @@ def _read_header(path: Path, ply_bytes: bytes) -> _Header:
             case ["format", name, *_] if name in _BYTE_ORDERS:
                 header = header._replace(order=_BYTE_ORDERS[name])
             case ["element", *declared]:
-                header.elements.append(_declared_element(path, declared, len(ply_bytes) - size))
+                header.elements.append(_parse_element(path, declared, len(ply_bytes) - size))
             case ["property", *declared] if header.elements:
-                header.elements[-1].properties.append(_declared_property(path, declared))
+                header.elements[-1].properties.append(_parse_property(path, declared))
             case ["comment", key, _, *_] if key.lower() == "texturefile":
                 header.pictures.append(text.split(None, 2)[2].strip())
     if not header.order:
@@ -233,7 +235,7 @@ def _read_header(path: Path, ply_bytes: bytes) -> _Header:
     return header
 
 
-def _declared_element(path: Path, header_words: Sequence[str], remaining_bytes: int) -> _Element:
+def _parse_element(path: Path, header_words: Sequence[str], remaining_bytes: int) -> _Element:
     """Return an element that has no properties yet; refuse a count too large for a mesh or for the file.
 
     header_words : words after "element"
@@ -247,7 +249,7 @@ def _declared_element(path: Path, header_words: Sequence[str], remaining_bytes: 
     return _Element(name, int(count), [])
 
 
-def _declared_property(path: Path, header_words: Sequence[str]) -> _Property:
+def _parse_property(path: Path, header_words: Sequence[str]) -> _Property:
     """Return the property that a line of the header declares.
 
     header_words : words after "property"
@@ -309,7 +311,7 @@ class _ElementReader:
             self.path, len(lists), _MAX_LISTS_PER_ELEMENT, "lists of an element", limits.DAMAGED_ADVICE
         )
         lengths = dict(zip(lists, self._list_lengths(byte_position), strict=True))
-        size = np.full(self.element.count, self._fixed_size(properties), np.int64)
+        size = np.full(self.element.count, self._row_bytes_without_items(properties), np.int64)
         for one, length in lengths.items():
             size += length * self._dtype(one.dtype).itemsize
         start = byte_position + np.cumsum(size) - size
@@ -326,7 +328,7 @@ class _ElementReader:
     def _dtype(self, type_name: str) -> np.dtype[Any]:
         return np.dtype(np.float64 if self.is_text else self.order + type_name)
 
-    def _fixed_size(self, properties: Sequence[_Property]) -> int:
+    def _row_bytes_without_items(self, properties: Sequence[_Property]) -> int:
         """Return the size of a row without the items of its lists [bytes]."""
         return sum(self._dtype(one.length_dtype or one.dtype).itemsize for one in properties)
 
@@ -355,23 +357,23 @@ class _ElementReader:
         return np.asarray(values.astype(type_name))
 
     def _list_lengths(self, byte_position: int) -> list[Index]:
-        """Return the lengths (n,) of each list property in the n rows."""
+        """Return for each list property the lengths (n,) of its lists in the n rows."""
         steps, skipped = list[_ListStep](), list[_Property]()
         for one in self.element.properties:
             skipped.append(one)
             if one.length_dtype:
-                size = self._fixed_size(skipped[:-1])
+                size = self._row_bytes_without_items(skipped[:-1])
                 steps.append(_ListStep(size, self._dtype(one.length_dtype), self._dtype(one.dtype).itemsize))
                 skipped = []
         if not steps:
             return []
-        trailing_bytes, count = self._fixed_size(skipped), self.element.count
+        trailing_bytes, count = self._row_bytes_without_items(skipped), self.element.count
         lengths, end = self._read_rows(byte_position, steps, trailing_bytes, 1)
-        if not self._is_uniform(byte_position, end - byte_position, steps, lengths[0]):
+        if not self._lists_have_equal_lengths(byte_position, end - byte_position, steps, lengths[0]):
             lengths, _ = self._read_rows(byte_position, steps, trailing_bytes, count)
         return list(np.broadcast_to(lengths, (count, len(steps))).T)
 
-    def _is_uniform(
+    def _lists_have_equal_lengths(
         self, byte_position: int, row_bytes: int, list_steps: Sequence[_ListStep], list_lengths: Index
     ) -> bool:
         """Return whether the lists of all rows are as long as in the first row.
@@ -393,7 +395,9 @@ class _ElementReader:
     def _read_rows(
         self, byte_position: int, list_steps: Sequence[_ListStep], trailing_bytes: int, row_count: int
     ) -> tuple[Index, int]:
-        """Read rows in sequence; return the lengths (row_count, lists) of lists, and the position of the end.
+        """Read rows one after another; return the lengths of their lists, and the position of the end.
+
+        The lengths have the shape (row_count, number of list properties).
 
         trailing_bytes : size of the properties after the last list [bytes]
         """
@@ -430,19 +434,28 @@ class _ListStep(NamedTuple):
     item_size: int
 
 
-def _polygon_corners(path: Path, faces: _Columns, strips: _Columns, vertex_count: int) -> tuple[Index, Index]:
+def _polygon_corners(
+    path: Path, face_columns: _Columns, strip_columns: _Columns, vertex_count: int
+) -> tuple[Index, Index]:
     """Return the number of corners of each face and strip triangle, and the vertex index of each corner.
 
     vertex_count : number of vertices in the file
     """
-    own, counts, index = faces.take_list(_FACE_LIST_NAMES), np.empty(0, np.int64), np.empty(0, np.int64)
-    if faces and own is None:
+    own, counts, index = (
+        face_columns.take_list(_FACE_LIST_NAMES),
+        np.empty(0, np.int64),
+        np.empty(0, np.int64),
+    )
+    if face_columns and own is None:
         refuse(
-            path, f"faces with {_FACE_LIST_NAMES[0]}", f"they have {list_names(faces)}", limits.DAMAGED_ADVICE
+            path,
+            f"faces with {_FACE_LIST_NAMES[0]}",
+            f"they have {list_names(face_columns)}",
+            limits.DAMAGED_ADVICE,
         )
     if own is not None:
         counts, index = own.lengths, own.items.astype(np.int64)
-    if (strip := strips.take_list(_FACE_LIST_NAMES)) is not None:
+    if (strip := strip_columns.take_list(_FACE_LIST_NAMES)) is not None:
         triangles = _strip_triangles(strip)
         counts = np.concatenate([counts, np.full(len(triangles), 3)])
         index = np.concatenate([index, triangles.ravel()])
@@ -468,14 +481,14 @@ def _strip_triangles(strip_lists: _ListColumn) -> Index:
 def _corner_uv(
     path: Path, vertex_columns: _Columns, face_columns: _Columns, corner_counts: Index, corner_vertex: Index
 ) -> tuple[Doubles, Index]:
-    """Return uv coordinates (t, 2), and the index of the uv of each corner, -1 for a corner without uv.
+    """Return uv coordinates (t, 2), and for each corner the index of its uv, -1 for a corner without uv.
 
     corner_counts : number of corners of each polygon
     corner_vertex : index of the vertex at each corner
     """
     wedges = face_columns.take_list(("texcoord",))
     if wedges is None:
-        uv = vertex_columns.take_first(UV_NAMES)
+        uv = vertex_columns.take_first_complete_set(UV_NAMES)
         none = np.empty((0, 2)), np.full_like(corner_vertex, -1)
         return none if uv is None else (to_floats(uv), corner_vertex)
     given, expected = wedges.lengths > 0, corner_counts[: len(wedges.lengths)]
@@ -492,7 +505,10 @@ def _corner_uv(
 
 def _vertex_colours(vertex_columns: _Columns) -> tuple[Doubles | None, list[str]]:
     """Return the linear colours (n, 3) of vertices, or None, and notes for the user on them."""
-    values, alpha = vertex_columns.take_first(COLOUR_NAMES), vertex_columns.take_first(_ALPHA_NAMES)
+    values, alpha = (
+        vertex_columns.take_first_complete_set(COLOUR_NAMES),
+        vertex_columns.take_first_complete_set(_ALPHA_NAMES),
+    )
     notes = []
     if alpha is not None and len(np.unique(alpha)) > 1:
         notes.append("the transparency of vertices (alpha) is left out")
@@ -521,7 +537,7 @@ def _main_picture(
 
 
 def _unread_notes(element_columns: Mapping[str, _Columns]) -> list[str]:
-    """Return a note on elements and properties that have no effect."""
+    """Return a list with a note on the elements and properties without effect; empty if there are none."""
     ignored = [name for name, columns in element_columns.items() if not columns.used]
     ignored += [
         f"{element} {name}"

@@ -42,7 +42,7 @@ class Polygons:
         """Return the mask (n,) of polygons whose corners all have uv."""
         return np.minimum.reduceat(self.corners[:, 1], np.cumsum(self.counts) - self.counts) >= 0
 
-    def parts(
+    def mesh_parts(
         self, groups: Sequence[MaterialGroup], group_index: Index, triangle_order: TriangleOrder
     ) -> list[MeshPart]:
         """Return a mesh part for each group that has polygons, in the order of the groups' first polygons.
@@ -144,7 +144,7 @@ def triangulate(corner_counts: Index, triangle_order: TriangleOrder) -> tuple[In
 
     corner_counts : (n,) number of corners of each polygon; corners are numbered consecutively
     triangle_order : "by polygon", or "by kind": all triangles first, then the first halves of all quads, then
-        the second halves, then all other polygons; polygons that are all quads are always ordered by kind
+        the second halves, then all other polygons; if all polygons are quads, "by kind" is always used
     """
     sizes = corner_counts - 2
     polygon, step = expand_runs(np.zeros_like(sizes), sizes)

@@ -78,11 +78,12 @@ def _joined_uv(mesh_parts: list[MeshPart], uv_set: int) -> Doubles:
 
 
 def select_vertices(mesh_part: MeshPart, vertices: Index) -> MeshPart:
-    """Return a mesh part with selected vertices, including their morph targets, bones and colours.
+    """Return a mesh part with selected vertices.
 
-    vertices : (n,) indices of the vertices, possibly repeated
+    Their positions, morph targets, bones, colours and additional uv sets are selected. The fields
+    `triangles`, `uv` and `normals` are unchanged and thus still refer to the vertices of `mesh_part`.
 
-    Only data of vertices are selected; `triangles`, `uv` and `normals` remain those of `mesh_part`.
+    vertices : (n,) indices of the selected vertices, possibly repeated
     """
     order, count = (
         np.argsort(vertices, kind="stable"),

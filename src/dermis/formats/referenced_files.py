@@ -22,7 +22,7 @@ def find_referenced_file(path: Path, file_name: str) -> Path | None:
     """
     named = PureWindowsPath(file_name.strip().strip('"'))
     for candidate in (named, PureWindowsPath(named.name)):
-        file = _resolve_below(path.parent, candidate)
+        file = _resolve_in_folder(path.parent, candidate)
         if file is not None and is_file(file):
             return file
     return None
@@ -34,7 +34,7 @@ def resolve_uri(path: Path, uri: str) -> Path:
     Raises DermisError for a file outside the folder of the glTF file, even if a link inside the folder leads
     to it.
     """
-    file = _resolve_below(path.parent, PureWindowsPath(unquote(uri)))
+    file = _resolve_in_folder(path.parent, PureWindowsPath(unquote(uri)))
     if file is None or ":" in uri.partition("/")[0]:
         shortened = uri if len(uri) <= 80 else f"{uri[:77]}..."
         advice = "Move it into that folder and change the reference, or export one .glb file"
@@ -42,7 +42,7 @@ def resolve_uri(path: Path, uri: str) -> Path:
     return file
 
 
-def _resolve_below(folder: Path, file_name: PureWindowsPath) -> Path | None:
+def _resolve_in_folder(folder: Path, file_name: PureWindowsPath) -> Path | None:
     """Return the resolved path of a name relative to a folder; None for a path outside the folder."""
     if len(str(file_name)) > _MAX_PATH_LENGTH:
         return None

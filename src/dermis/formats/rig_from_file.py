@@ -20,29 +20,31 @@ _BONE_WEIGHT_TOLERANCE = 0.004  # one step of 8-bit weights
 _MIN_DISPLACEMENT_MM = 1e-4  # smaller displacements are rounding errors and count as 0
 
 
-def split_points(point: Ints, mesh_part: MeshPart, linear_to_head: Doubles, culprit: object) -> Ints:
-    """Return point indices (v,) such that coincident vertices that move differently are separate points.
+def split_points(
+    point_of_vertex: Ints, mesh_part: MeshPart, linear_to_head: Doubles, culprit: object
+) -> Ints:
+    """Return point indices (v,) in which coincident vertices that move differently have different points.
 
-    point : (v,) index of the point of each vertex, welded by position
+    point_of_vertex : (v,) index of the point of each vertex, welded by position
     mesh_part : vertices with their morph targets and bone weights
     linear_to_head : (3, 3) matrix from the space of the file to that of the head [mm]
 
     Raises DermisError if too many vertices at one position move differently.
     """
-    remaining = np.flatnonzero(np.bincount(point)[point] > 1)
-    copy, number = np.zeros(len(point), np.int64), 0
+    remaining = np.flatnonzero(np.bincount(point_of_vertex)[point_of_vertex] > 1)
+    copy, number = np.zeros(len(point_of_vertex), np.int64), 0
     while len(remaining):
         if number > _MAX_COINCIDENT_VERTICES:
             actual = f"{number} of them move differently"
             refuse(culprit, "a few coincident vertices", actual, DAMAGED_ADVICE)
-        groups, first = np.unique(point[remaining], return_index=True)
-        other = remaining[first[np.searchsorted(groups, point[remaining])]]
+        groups, first = np.unique(point_of_vertex[remaining], return_index=True)
+        other = remaining[first[np.searchsorted(groups, point_of_vertex[remaining])]]
         apart = _targets_differ(mesh_part, remaining, other, linear_to_head) | _weights_differ(
             mesh_part, remaining, other
         )
         copy[remaining[~apart]] = number
         remaining, number = remaining[apart], number + 1
-    _, split = np.unique(point * np.int64(number + 1) + copy, return_inverse=True)
+    _, split = np.unique(point_of_vertex * np.int64(number + 1) + copy, return_inverse=True)
     return np.asarray(split.reshape(-1), np.int32)
 
 
@@ -77,7 +79,7 @@ def _weights_differ(mesh_part: MeshPart, first_vertex: Index, second_vertex: Ind
 
 def build_rig(
     positions_mm: Floats,
-    point: Ints,
+    point_of_vertex: Ints,
     mesh_part: MeshPart,
     bones: Bones | None,
     weights: Mapping[str, float],
@@ -87,7 +89,7 @@ def build_rig(
     """Return the rig that moves a mesh's points; None for a file without morph targets and bones.
 
     positions_mm : (v, 3) vertices in the head's space
-    point : (v,) index of the point of each vertex
+    point_of_vertex : (v,) index of the point of each vertex
     mesh_part : the same vertices with their morph targets and bone weights, in the file's space
     weights : default weights of morph targets by name
     to_head : (4, 4) matrix from the space of the file to that of the head [mm]
@@ -96,31 +98,35 @@ def build_rig(
     """
     if not mesh_part.targets and bones is None:
         return None
-    _, first = np.unique(point, return_index=True)
+    _, first = np.unique(point_of_vertex, return_index=True)
     point_positions = np.ascontiguousarray(positions_mm[first])
     skeleton = None if bones is None else _point_skeleton(mesh_part, bones, first, to_head, culprit)
-    return Rig(point_positions, _point_targets(mesh_part, point, first, weights, to_head), skeleton)
+    return Rig(point_positions, _point_targets(mesh_part, point_of_vertex, first, weights, to_head), skeleton)
 
 
 def _point_targets(
-    mesh_part: MeshPart, point: Ints, first_vertex: Index, weights: Mapping[str, float], to_head: Doubles
+    mesh_part: MeshPart,
+    point_of_vertex: Ints,
+    first_vertex: Index,
+    weights: Mapping[str, float],
+    to_head: Doubles,
 ) -> MorphTargets:
     """Return the morph targets of the p points of a mesh.
 
-    point : (v,) index of the point of each vertex
+    point_of_vertex : (v,) index of the point of each vertex
     first_vertex : (p,) first vertex of each point, whose displacement the point gets
     weights : default weights by target name
     """
     if not mesh_part.targets:
         return no_targets()
-    is_first = np.zeros(len(point), bool)
+    is_first = np.zeros(len(point_of_vertex), bool)
     is_first[first_vertex] = True
     points, deltas = [], []
     for vertex, delta in mesh_part.targets.values():
         delta_mm = (delta @ to_head[:3, :3].T).astype(np.float32)
         used = np.flatnonzero(is_first[vertex] & (np.abs(delta_mm) > _MIN_DISPLACEMENT_MM).any(axis=1))
-        used = used[np.argsort(point[vertex[used]])]
-        points.append(point[vertex[used]])
+        used = used[np.argsort(point_of_vertex[vertex[used]])]
+        points.append(point_of_vertex[vertex[used]])
         deltas.append(delta_mm[used])
     start = np.cumsum([0, *map(len, points)]).astype(np.int32)
     rest = np.array([weights.get(name, 0.0) for name in mesh_part.targets], np.float32)

@@ -40,7 +40,7 @@ class Sample:
     attribution : authors to credit
     unit_mm : length of one unit of the mesh [mm]
     v_origin : edge of the maps where v = 0, "top" or "bottom"
-    height_mm : relief of one grey level of the 8-bit height map [mm]
+    height_mm : height difference of one grey level of the 8-bit height map [mm]
     """
 
     name: str
@@ -127,7 +127,7 @@ def _has_expected_hash(path: Path, sample_file: SampleFile) -> bool:
 
 @lru_cache(maxsize=256)
 def _file_sha256(path: Path, byte_count: int, mtime_ns: int) -> str:
-    """Return the SHA-256 of a file, cached while the size and modification time are unchanged."""
+    """Return the SHA-256 of a file, from a cache if its size and modification time are unchanged."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -1,4 +1,7 @@
-"""Size limits of mesh files: above the size of any head, but small enough to load quickly within 2 GB."""
+"""Size limits of mesh files.
+
+Any usual head is within these limits, and a file within these limits loads quickly in 2 GB of memory.
+"""
 
 from __future__ import annotations
 

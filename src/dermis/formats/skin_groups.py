@@ -60,7 +60,7 @@ _MIN_HEAD_AREA_FRACTION = 0.1  # smallest fraction of the head's area that a par
 
 
 def choose_skin(
-    mesh_parts: Sequence[MeshPart], groups: Sequence[MaterialGroup], scatters: Sequence[bool]
+    mesh_parts: Sequence[MeshPart], groups: Sequence[MaterialGroup], is_scattering: Sequence[bool]
 ) -> list[bool]:
     """Return whether each mesh part is skin.
 
@@ -73,13 +73,13 @@ def choose_skin(
     4. The part covers at least a tenth of the head, and no name contains a word of `NON_SKIN_WORDS`.
 
     groups : groups with the names of the parts
-    scatters : for each part, whether the file states that light scatters below the surface
+    is_scattering : for each part, whether the file states that light scatters below the surface
     """
     words = [_group_words(group) for group in groups]
     is_other = [bool(own & set(NON_SKIN_WORDS)) for own in words]
     named = [_has_skin_word(own) for own in words]
     body = [bool(own & set(BODY_WORDS)) and not other for own, other in zip(words, is_other, strict=True)]
-    for rule in (list(scatters), named, body):
+    for rule in (list(is_scattering), named, body):
         if any(rule):
             return rule
     covering = _covers_head(mesh_parts, is_other)
@@ -108,8 +108,8 @@ def _covers_head(mesh_parts: Sequence[MeshPart], is_not_skin: Sequence[bool]) ->
     return [bool(own >= _MIN_HEAD_AREA_FRACTION * area.sum() > 0.0) for own in area]
 
 
-def describe_choice(groups: Sequence[MaterialGroup], is_skin: Sequence[bool]) -> str:
-    """Return a note on the groups that are skin and the option to change them; "" if all groups are skin."""
+def describe_skin_groups(groups: Sequence[MaterialGroup], is_skin: Sequence[bool]) -> str:
+    """Return a note that says which groups are skin, and how to choose others; "" if all groups are skin."""
     names = [group.names[0] for group in groups]
     skin = list(dict.fromkeys(name for name, own in zip(names, is_skin, strict=True) if own))
     other = [name for name in dict.fromkeys(names) if name not in skin]

@@ -18,7 +18,7 @@ from dermis.frame.features.interreflection.interreflection import (
 from dermis.frame.features.occlusion.baked import cached_occlusion_map, placeholder_occlusion
 from dermis.frame.features.occlusion.moving import (
     VertexSkyVisibility,
-    make_moving_map,
+    make_moving_occlusion_map,
     make_vertex_sky_visibility,
 )
 from dermis.frame.features.shading.shade import shade_program
@@ -27,7 +27,7 @@ from dermis.frame.features.shadows.shadows import ShadowMaps, make_shadow_maps
 from dermis.frame.features.shape.curvature import placeholder_curvature
 from dermis.frame.features.shape.mesh import HeadGeometry, rest_geometry, upload_geometry
 from dermis.frame.features.shape.shape import Shape
-from dermis.frame.features.surface.maps import detail_bindings, has_parts, upload_maps
+from dermis.frame.features.surface.maps import detail_bindings, has_part_materials, upload_maps
 from dermis.frame.features.surface.record import skin_record, surface_constants
 from dermis.frame.features.surface.texels import make_surface_texture
 from dermis.frame.features.translucency.build import make_translucency, thin_part_tables
@@ -49,7 +49,7 @@ LayoutAtlas = tuple[Atlas, AtlasTextures]
 
 
 def make_resources(memo: Memo, device: Device, request: FrameRequest, technique: Technique) -> Resources:
-    """Return the textures, buffers and records that a request needs, from the cache if nothing has changed.
+    """Return the textures, buffers and records that a frame needs, from a cache if they are still valid.
 
     Raises DermisError for sizes that exceed the limits of the device.
     """
@@ -59,8 +59,8 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
     map_inputs = device, request.head, *map_options, request.has_animated_maps
     maps = memo.submit(device.executor, upload_maps, *map_inputs)  # in the background, as files load slowly
     shadow_maps = _shadow_maps(memo, device, request)
-    shapes = shape.make(memo, device, request)
-    strands = hair.make(memo, device, request)
+    shapes = shape.make_resources(memo, device, request)
+    strands = hair.make_resources(memo, device, request)
     bindings = _shared_bindings(memo, device, request, shadow_maps, shapes, strands)
     atlases = [
         _layout_atlas(memo, device, request, name, k) for k, name in enumerate(request.atlas_plan.layouts)
@@ -82,7 +82,9 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         expression_maps=uploaded.expression_maps,
         layouts=layouts,
         shadow_maps=shadow_maps,
-        diffusion=diffusion.make(memo, device, request, technique, [textures for _, textures in atlases]),
+        diffusion=diffusion.make_resources(
+            memo, device, request, technique, [textures for _, textures in atlases]
+        ),
         scattered=scattered,
         technique=resources,
         output_layers=technique.make_subsurface_layers(memo, device, settings) if needs_layers else None,
@@ -93,8 +95,8 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         visibility=cached(_visibility_layers, device, settings.size, settings.samples),
         view=_shade_record(device, request, technique, resources),
         constants=surface_constants(request.skin) + _shade_constants(request) + technique.shade_constants,
-        post=post.make(memo, device, request),
-        outputs=outputs.make(memo, device, request, shapes.tables, thin),
+        post=post.make_resources(memo, device, request),
+        outputs=outputs.make_resources(memo, device, request, shapes.tables, thin),
         suns=len(request.environment_map.suns),
         gaussians=len(request.profile.variance_mm2),
         unscattered_fraction=cached(atlases[0][0].unscattered_fraction, request.topology.mesh),
@@ -109,7 +111,7 @@ def _shade_constants(request: FrameRequest) -> Constants:
     """
     eyes = request.head.eyes is not None
     used = {"DETAIL": request.has_fine_relief, "EYES": eyes, "MIXED": request.mixes_profiles}
-    used["PARTS"] = has_parts(request.head)
+    used["PARTS"] = has_part_materials(request.head)
     return tuple((name, 1) for name, value in used.items() if value)
 
 
@@ -142,7 +144,7 @@ def _shared_bindings(
     shape_resources: shape.Resources,
     strands: hair.Resources | None,
 ) -> MutableBindings:
-    """Return the shader resources that all atlas layouts share, apart from maps and lights."""
+    """Return the shader resources that all atlas layouts share, except the maps and the lights."""
     skin, program = request.skin, shade_program(device)
     environment, total = request.environment, request.split.total
     curvature, light_count = shape_resources.curvature, sum(request.light_part_counts)
@@ -193,7 +195,7 @@ def _make_layout(
     shared_bindings: Bindings,
     layout_index: int,
 ) -> AtlasLayout:
-    """Return the resources of one atlas layout; each frame adds the uniform record of its lights.
+    """Return the resources of one atlas layout, except the record of the lights, which each frame adds.
 
     layout_atlas : the atlas, and its textures on the device
     shared_bindings : result of `_shared_bindings`, to which the maps of the head have been added
@@ -229,7 +231,9 @@ def _make_layout(
         occlusion = placeholder_occlusion(device)
     moving_occlusion = translucency = None
     if request.occlusion_follows_shape:
-        occlusion, moving_occlusion = cached(make_moving_map, device, occlusion, caller_name=layout_key)
+        occlusion, moving_occlusion = cached(
+            make_moving_occlusion_map, device, occlusion, caller_name=layout_key
+        )
     bindings["occlusion_map"] = occlusion
     if request.blur_count and settings.transmission == "thin" and request.technique.supports_translucency:
         searched = at_rest(pair_positions_mm(memo, request), layout_index)

@@ -1,4 +1,4 @@
-"""Baking of maps of the skin: its properties and its light, at the texels of the uv layout."""
+"""Baking of skin maps: properties and light of the skin at the texels of the uv layout."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ _ABSENCE_REASONS_OF_OUTPUTS = {
 class BakedMaps:
     """Maps of the skin of a head in its uv layout, row 0 at the top.
 
-    covered : (n, n) mask of texels whose centre is on skin; all other texels copy the nearest texel in the
-        mask
+    covered : (n, n) mask of texels whose centre is on skin; any other texel is a copy of the nearest texel in
+        the mask
     maps : dictionary from a name in `features.shading.bake.BAKED_CHANNELS` to an (n, n) or (n, n, c) map
     absent : dictionary from the name of each missing map to the reason why it is missing
     """
@@ -57,7 +57,7 @@ class BakedMaps:
 def bake(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) -> BakedMaps:
     """Compute maps of a head's skin: properties of the surface, and light before and after scattering.
 
-    settings : settings of the lighting; `size`, `samples`, `technique` and `strands` are ignored
+    settings : settings of the frame; `size`, `samples`, `technique` and `strands` are ignored
     map_side : side of the maps, a power of two [texels]
 
     The maps are evaluated at the centres of texels, with a filter as wide as a texel.
@@ -72,28 +72,31 @@ def bake(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) ->
         for names in _ABSENCE_REASONS_OF_OUTPUTS
         for name in _available_outputs(renderer, scene, settings, names, absent)
     )
-    texel, points = layout_points(scene.head.mesh, map_side)
+    texel, points = texel_surface_points(scene.head.mesh, map_side)
     job = partial(_bake_points, renderer, scene, settings, outputs, points, map_side)
     return _arrange_as_maps(map_side, texel, renderer.reopening_device.run(job), absent)
 
 
 def bake_albedo(
-    renderer: Renderer, scene: Scene, triangle: NDArray[np.integer], weights: NDArray[np.floating]
+    renderer: Renderer,
+    scene: Scene,
+    triangle_index: NDArray[np.integer],
+    barycentric_weights: NDArray[np.floating],
 ) -> Floats:
     """Return the (n, 3) linear Rec. 709 albedo at surface points of skin, eyes or mouth [-].
 
-    triangle : (n,) indices of the triangles on which the points lie
-    weights : (n, 2) barycentric weights of the second and third corner
+    triangle_index : (n,) indices of the triangles on which the points lie
+    barycentric_weights : (n, 2) barycentric weights of the second and third corner
     """
     settings = Settings(size=_DISCARDED_PICTURE_SIZE, samples=1, atlas=_ALBEDO_ATLAS_SIDE, strands=False)
-    points = baking_pass.point_words(triangle, weights)
+    points = baking_pass.bake_point_words(triangle_index, barycentric_weights)
     job = partial(_bake_points, renderer, scene, settings, (), points, _ALBEDO_MAP_SIDE)
     values = renderer.reopening_device.run(job)
     return np.ascontiguousarray(values[:, : BAKED_CHANNELS["albedo"]])
 
 
-def layout_points(mesh: Mesh, map_side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
-    """Return the indices of texels whose centres are on skin, and their surface points packed for bake.wgsl.
+def texel_surface_points(mesh: Mesh, map_side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
+    """Return the indices of texels whose centres are on skin, and these surface points packed for bake.wgsl.
 
     Where triangles overlap in uv, a triangle that is not mirrored takes precedence over a mirrored triangle,
     and a later triangle over an earlier triangle.
@@ -104,7 +107,7 @@ def layout_points(mesh: Mesh, map_side: int) -> tuple[NDArray[np.int64], NDArray
     owner = np.full(map_side * map_side, -1, np.int64)
     owner[texel[order]] = triangle[order]
     covered = np.flatnonzero(owner >= 0)
-    return covered, baking_pass.point_words(
+    return covered, baking_pass.bake_point_words(
         owner[covered], _texel_weights(mesh, map_side, covered, owner[covered])
     )
 
@@ -155,10 +158,12 @@ def _bake_points(
     packed_points: NDArray[np.uint32],
     map_side: int,
 ) -> Floats:
-    """Render a frame, which lights the atlas; return (n, BAKED_CHANNEL_COUNT) values at surface points.
+    """Compute (n, BAKED_CHANNEL_COUNT) properties and light of the skin at n surface points.
+
+    A frame is rendered first, because it computes the light in the atlas.
 
     output_names : names of outputs whose resources bake.wgsl needs
-    packed_points : (n, 4) surface points, packed by `features.shading.bake.point_words`
+    packed_points : (n, 4) surface points, packed by `features.shading.bake.bake_point_words`
     map_side : side of the maps, which sets the width of filters [texels]
     """
     renderer.draw(scene, settings, timed=False, outputs=output_names)
@@ -192,10 +197,10 @@ def _bake_bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> Mut
 def _arrange_as_maps(
     map_side: int, texel_index: NDArray[np.int64], texel_values: Floats, absence_reasons: dict[str, str]
 ) -> BakedMaps:
-    """Arrange the channels of skin texels as maps, and fill all other texels from the nearest skin texel.
+    """Arrange the channels of skin texels as maps, and fill any other texel from the nearest skin texel.
 
     texel_index : (n,) indices of the skin texels, counted row by row
-    texel_values : (n, BAKED_CHANNEL_COUNT) values at these texels, in the channels of `BAKED_CHANNELS`
+    texel_values : (n, BAKED_CHANNEL_COUNT) values of these texels; `BAKED_CHANNELS` names the columns
     """
     covered = np.zeros(map_side * map_side, np.bool_)
     covered[texel_index] = True
@@ -217,7 +222,7 @@ def _arrange_as_maps(
 
 
 def _nearest_covered_texels(covered_mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return, for each texel outside the mask, row by row, the flat index of the nearest texel inside it."""
+    """Return, for each texel outside a mask, the flat index of the nearest texel inside the mask."""
     from scipy.ndimage import distance_transform_edt
 
     y, x = distance_transform_edt(~covered_mask, return_distances=False, return_indices=True)

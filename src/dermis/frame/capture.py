@@ -24,7 +24,7 @@ def capture_renderer(device_kind: str, adapter: str) -> Renderer:
     """Return a renderer that records passes for GPUs or for software adapters.
 
     device_kind : kind of adapter on which the passes will be replayed, "gpu" or "software"
-    adapter : selector of the adapter on which the renderer runs, which need not be of that kind
+    adapter : selector of the adapter on which the passes are recorded, which may be of another kind
     """
     renderer = Renderer(adapter, cache_size=_RENDERER_CACHE_SIZE, cache_ttl=1000)
     if renderer.device.adapter.kind != ADAPTER_KINDS[device_kind]:
@@ -34,16 +34,16 @@ def capture_renderer(device_kind: str, adapter: str) -> Renderer:
     return renderer
 
 
-def capture_frame(capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
+def capture_frame(frame_capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
     """Record the passes of a frame, with their resources, without running them."""
     technique = TECHNIQUES[inputs.settings.technique]
-    return capture.capture(lambda graph: draw_frame(graph, inputs, technique))
+    return frame_capture.capture(lambda graph: draw_frame(graph, inputs, technique))
 
 
 def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFrame:
     """Return a captured frame with fewer but wider strands of scalp hair and beard, of the same total area.
 
-    hair_divisor : number of strands before, divided by the number after; 0 keeps all strands
+    hair_divisor : number by which the number of strands is divided; 0 keeps all strands
     """
     for _, record in (one for one in captured_frame.records if one[0] == "StrandView" and hair_divisor > 1):
         count = int(record["coarse"]) // hair_divisor
@@ -52,15 +52,15 @@ def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFra
     return captured_frame
 
 
-def capture_mips(capture: FrameCapture, texture: Texture) -> CapturedFrame:
+def capture_mips(frame_capture: FrameCapture, texture: Texture) -> CapturedFrame:
     """Record the passes that compute the coarser mip levels of a map from its finest level."""
-    return capture.capture(lambda graph: map_mips.fill_mips(graph, map_mips.with_mip_views(texture)))
+    return frame_capture.capture(lambda graph: map_mips.fill_mips(graph, map_mips.with_mip_views(texture)))
 
 
 def update_map(renderer: Renderer, texture: Texture, mip_levels: list[NDArray[np.float16]]) -> None:
     """Replace the texels of a map; if only the finest mip level is given, the other levels are computed.
 
-    mip_levels : (l, h, w, c) texels of each mip level, the finest first, where l is the number of array
+    mip_levels : for each mip level, the finest first, its (l, h, w, c) texels, where l is the number of array
         layers
     """
     for mip, layers in enumerate(mip_levels):

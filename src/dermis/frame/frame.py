@@ -25,7 +25,7 @@ from dermis.gpu import Graph, Texture
 def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
     """Declare all passes of a frame: pose, shadows, light in the skin, shading, post-processing and outputs.
 
-    The graph runs only stale passes.
+    The graph runs only the passes whose inputs have changed.
     """
     resources, bindings, view = inputs.resources, inputs.bindings, inputs.view
     shape.draw(graph, resources.shape.shape, inputs.motion)
@@ -53,15 +53,17 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
     stage_inputs = _stage_inputs(graph, inputs, technique, scattered)
     shared, triangles = (bindings, view, inputs.light_constants), resources.visibility.texture
     if resources.hair:
-        labels = outputs.hair_labels(graph, resources.outputs, stage_inputs)
+        labels = outputs.hair_label_bindings(graph, resources.outputs, stage_inputs)
         geometry = resources.shape.shape, resources.head
         radiance = hair.draw(graph, resources.hair, geometry, shared, triangles, radiance, labels)
     post.draw(graph, resources.post, inputs.settings, radiance, *shared, triangles)
     outputs.draw(graph, resources.outputs, stage_inputs)
 
 
-def _stage_inputs(graph: Graph, inputs: FrameInputs, technique: Technique, scattered: Texture) -> StageInputs:
-    """Collect the inputs of the passes that compute outputs: shading, geometry, picture and technique."""
+def _stage_inputs(
+    graph: Graph, inputs: FrameInputs, technique: Technique, scattered_light: Texture
+) -> StageInputs:
+    """Collect the inputs of the shader stages that compute outputs."""
     resources, diffused = inputs.resources, None
     layers = technique.subsurface_layers(resources.output_layers)
     if layers is not None:
@@ -71,7 +73,7 @@ def _stage_inputs(graph: Graph, inputs: FrameInputs, technique: Technique, scatt
         view=inputs.view,
         centre_mm=inputs.centre_mm,
         constants=inputs.constants,
-        scattered=scattered,
+        scattered=scattered_light,
         camera=inputs.camera_views,
         head=resources.head,
         visibility=resources.visibility,

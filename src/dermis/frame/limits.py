@@ -91,7 +91,7 @@ def suggest_settings(request: FrameRequest, budget_bytes: float) -> str:
 
 
 def frame_bytes(request: FrameRequest) -> dict[str, float]:
-    """Return the memory that each size setting requires [bytes], without the head and its maps."""
+    """Return the memory that a frame needs for each size setting, without the head and its maps [bytes]."""
     technique, settings, atlases = request.technique, request.settings, request.atlas_plan
     width, height = settings.size
     pixel = _PICTURE_PIXEL_BYTES + _BYTES_PER_SAMPLE * settings.samples + technique.pixel_bytes
@@ -120,7 +120,7 @@ def _mixing_texel_bytes(request: FrameRequest) -> float:
 
 
 def _halved_settings(settings: Settings, option_name: str) -> Settings | None:
-    """Return settings with half the value of a size option, None if this value would be too small.
+    """Return settings with half the value of a size setting, None if this value would be too small.
 
     For "size", the samples per pixel are halved first.
     """
@@ -142,7 +142,7 @@ def _command_line_options(settings: Settings, option_name: str) -> dict[str, str
 def atlas_texel_bytes(technique: TechniqueTraits, blur_count: int, layout_count: int) -> float:
     """Return the memory per atlas texel on a software adapter [bytes].
 
-    The memory covers geometry, pyramid levels, temporary textures of light, and the sum of the levels.
+    It covers geometry, blur pyramid, temporary textures of light, and the weighted sum of the blurred levels.
 
     blur_count : number of Gaussians that blur light
     layout_count : number of atlas layouts

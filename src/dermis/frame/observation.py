@@ -1,4 +1,4 @@
-"""Picture of a scene with its ground truth."""
+"""Observation: picture of a scene with its ground truth."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def observation_jobs(
     previous: Scene | Iterable[Scene | None] | None,
     settings: Iterable[Settings],
 ) -> Iterator[tuple[Callable[[], Readback], Callable[[Readback], Observation]]]:
-    """Yield two functions for each scene: one submits a frame, the other reads its observation.
+    """Yield two functions for each scene: one submits a frame, the other reads the frame as an observation.
 
     submit_frame : function that submits a frame, given a scene, the previous scene and `settings`
     previous : previous scenes for motion vectors, see `pair_with_previous`
@@ -97,11 +97,11 @@ def observation_jobs(
 def _read_observation(scene: Scene, settings: Settings, readback: Readback) -> Observation:
     picture, outputs, landmark_sets = readback.image_and_outputs()
     camera = scene.camera.to_opencv(settings.size)
-    landmarks = {name: _landmarks(camera, *rows) for name, rows in landmark_sets.items()}
+    landmarks = {name: _project_landmarks(camera, *rows) for name, rows in landmark_sets.items()}
     return Observation(picture, outputs, camera, landmarks, head_pose(scene), gaze_directions(scene))
 
 
-def _landmarks(
+def _project_landmarks(
     camera: OpenCvCamera, landmark_names: tuple[str, ...], landmark_rows: NDArray[np.float32]
 ) -> Landmarks:
     projected = (landmark_rows[:, :3].astype(np.float64) @ camera.R.T + camera.t) @ camera.K.T
@@ -113,11 +113,11 @@ def _landmarks(
 def pair_with_previous(
     scenes: Iterable[Scene], previous: Scene | Iterable[Scene | None] | None
 ) -> Iterator[tuple[Scene, Scene | None]]:
-    """Yield each scene with its previous scene, from which motion is measured, or with None.
+    """Yield each scene with its previous scene, from which motion vectors are computed, or with None.
 
-    previous : an iterable gives the previous scene (or None) of each scene. A single scene (or None) is the
-        previous scene of the first scene only; each later scene is paired with the scene before it, or with
-        None if the head changes
+    previous : the previous scenes. An iterable gives one for each scene (or None). A single scene (or None)
+        is the previous scene of the first scene only. Each later scene is then paired with the scene before
+        it, or with None if that shows another head
     """
     if isinstance(previous, Iterable):
         for one, before in zip_longest(scenes, previous, fillvalue=_NO_PREVIOUS_SCENE):

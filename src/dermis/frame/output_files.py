@@ -34,7 +34,7 @@ def check_formats(output_names: Iterable[str], file_format: Format) -> None:
 
 
 def output_path(picture_path: Path, output_name: str, file_format: Format) -> Path:
-    """Return the path of an output's file beside a picture, such as face.depth.exr beside face.png."""
+    """Return the path of the file of an output, beside the picture: face.depth.exr beside face.png."""
     return picture_path.with_name(f"{picture_path.stem}.{output_name}.{file_format}")
 
 
@@ -92,30 +92,30 @@ def _named_channels(output: Output, output_array: PlaneArray) -> dict[str, Plane
     return {f"{output.name}.{name}": channels[..., k] for k, name in enumerate(names)}
 
 
-def _as_exr(output_name: str, output_array: PlaneArray) -> bytes:
+def _encode_exr(output_name: str, output_array: PlaneArray) -> bytes:
     return encode_exr_parts(
-        {output_name: _named_channels(OUTPUTS[output_name], output_array)}, run_length=True
+        {output_name: _named_channels(OUTPUTS[output_name], output_array)}, use_run_length_encoding=True
     )
 
 
-def _as_png(output_name: str, output_array: PlaneArray) -> bytes:
+def _encode_png(output_name: str, output_array: PlaneArray) -> bytes:
     words = quantise(output_name, output_array)
     return encode_png(words[..., None] if words.ndim == 2 else words, 6)
 
 
-def _as_npy(output_name: str, output_array: PlaneArray) -> bytes:
+def _encode_npy(output_name: str, output_array: PlaneArray) -> bytes:
     stream = io.BytesIO()
     np.save(stream, output_array, allow_pickle=False)
     return stream.getvalue()
 
 
 _ENCODERS: Mapping[Format, Callable[[str, PlaneArray], bytes]] = {
-    "exr": _as_exr,
-    "png": _as_png,
-    "npy": _as_npy,
+    "exr": _encode_exr,
+    "png": _encode_png,
+    "npy": _encode_npy,
 }
 
 
-def _write_atomically(path: Path, content: bytes) -> None:
+def _write_atomically(path: Path, file_bytes: bytes) -> None:
     with files.atomic_file(path) as temporary:
-        temporary.write_bytes(content)
+        temporary.write_bytes(file_bytes)

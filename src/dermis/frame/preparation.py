@@ -17,9 +17,9 @@ from dermis.frame.features.occlusion.moving import (
     RotationAnchors,
     SkyViews,
     head_rotation,
-    make_anchors,
-    sky_record,
+    make_rotation_anchors,
     sky_views,
+    sky_views_record,
 )
 from dermis.frame.features.outputs.stage_inputs import PreviousScene
 from dermis.frame.features.shading.shade import shade_program
@@ -52,7 +52,7 @@ RequestedNames = tuple[str, ...]
 
 
 class HeadState(NamedTuple):
-    """Current state of a head: its pose, the outline of its shape, and the poses of its eyes."""
+    """Current state of a head: its pose, the outline of the posed shape, and the poses of its eyes."""
 
     motion: MotionBytes
     outline: Outline
@@ -84,26 +84,28 @@ class Preparation:
         Resources are taken from the cache where nothing has changed; cached resources that are no longer used
         are released.
 
-        view : name of the scene, for callers that draw several scenes in turn
+        view : name of the scene, which tells apart the cached lights of scenes that are drawn in turn
         outputs : names of outputs besides the picture
         previous : scene of the same head for motion vectors; without it, motion is 0
         landmarks : names of landmark sets
 
         Raises DermisError for sizes that exceed the limits of the device.
         """
-        inputs = self._inputs(scene, settings, TECHNIQUES[settings.technique], view, (outputs, landmarks))
+        inputs = self._prepare_inputs(
+            scene, settings, TECHNIQUES[settings.technique], view, (outputs, landmarks)
+        )
         if "motion" in outputs:
             inputs = replace(inputs, previous=self._previous_scene(scene, previous or scene, inputs))
         self.memo.end_frame()
         return inputs
 
-    def _inputs(
+    def _prepare_inputs(
         self,
         scene: Scene,
         settings: Settings,
         technique: Technique,
         view: str,
-        requested: tuple[RequestedNames, RequestedNames],
+        requested_names: tuple[RequestedNames, RequestedNames],
     ) -> FrameInputs:
         cached, device, head, environment = self.memo.get, self.device, scene.head.bare, scene.environment
         (profile, *others), blend_weights = self._profiles(scene.skin, technique)
@@ -128,8 +130,8 @@ class Preparation:
             view_name=view,
             other_profiles=tuple(others),
             blend_weights=blend_weights,
-            outputs=requested[0],
-            landmarks=requested[1],
+            outputs=requested_names[0],
+            landmarks=requested_names[1],
         )
         try:
             resources = cached(make_resources, self.memo, device, request, technique)
@@ -160,9 +162,9 @@ class Preparation:
         )
 
     def _profiles(self, skin: Skin, technique: Technique) -> ProfileMix:
-        """Return the profiles of the skin and their blend weights.
+        """Return the diffusion profiles of the skin and their blend weights.
 
-        For techniques that cannot blend profiles, the result is the first profile alone, with None as
+        For techniques that cannot blend profiles, the result is the first profile alone, and None for the
         weights.
         """
         if technique.mixes_profiles:
@@ -172,8 +174,8 @@ class Preparation:
     def _sky_view(
         self, head: Head, motion: Motion | None, outline: Outline
     ) -> tuple[SkyViews, UniformRecord]:
-        """Return views of the posed head from all directions of the sky, and their uniform record."""
-        anchors, motion = self.memo.get(make_anchors, head.topology), motion or head.control.rest
+        """Return the views of the posed head that ambient occlusion needs, and their uniform record."""
+        anchors, motion = self.memo.get(make_rotation_anchors, head.topology), motion or head.control.rest
         return self.memo.get(_sky_view, outline, untracked=(motion, self.device, head, anchors))
 
     def _previous_scene(self, scene: Scene, previous: Scene, inputs: FrameInputs) -> PreviousScene:
@@ -185,7 +187,7 @@ class Preparation:
         if not are_equal(previous.head.bare, head):
             actual, advice = f"got {previous.head.name!r}", "Leave it out when the head changes"
             refuse("previous", "a scene of the same head", actual, advice)
-        motion = self.memo.get(_rest_motion, head)
+        motion = self.memo.get(_rest_motion_bytes, head)
         if previous.motion is not None:
             motion = self.memo.get(_motion_bytes, head, previous.motion, motion, caller_name="before")
         camera = pinhole(previous.camera, head, inputs.settings)
@@ -194,7 +196,7 @@ class Preparation:
 
     def _head_state(self, head: Head, motion: Motion | None) -> HeadState:
         """Return the pose, outline and eyes of a head; if `motion` is None, the head is at rest."""
-        at_rest = self.memo.get(_rest_motion, head)
+        at_rest = self.memo.get(_rest_motion_bytes, head)
         return self.memo.get(_posed_state, head, motion or head.control.rest, at_rest)
 
 
@@ -214,7 +216,7 @@ def _motion_bytes(head: Head, motion: Motion, rest_bytes: MotionBytes) -> Motion
 
 
 def _rest_positions_mm(scene: Scene) -> NDArray[np.float32] | None:
-    """Return the person's (p, 3) control points at rest [mm], None if they are those of the shared mesh."""
+    """Return the (p, 3) control points of the person at rest [mm], None if they are those of the mesh."""
     motion = scene.motion or scene.head.control.rest
     positions_mm = motion.positions_mm
     return None if positions_mm is scene.head.topology.control.positions_mm else positions_mm
@@ -225,7 +227,7 @@ def _face_movements(head: Head, motion: Motion | None) -> NDArray[np.float32]:
     return movement_weights(head.targets, motion.weights)
 
 
-def _rest_motion(head: Head) -> MotionBytes:
+def _rest_motion_bytes(head: Head) -> MotionBytes:
     return rest_motion(head.control)
 
 
@@ -234,12 +236,12 @@ def _eye_poses(head: Head, motion: Motion) -> EyePoses | None:
         return None
     rig = head.control
     edges = None if rig.contact is None else rig.lid_edges_mm(motion)
-    return EyePoses(head.eyes.frames(rig, motion), edges)
+    return EyePoses(head.eyes.eye_matrices(rig, motion), edges)
 
 
-def _posed_state(head: Head, motion: Motion, at_rest: MotionBytes) -> HeadState:
-    rig, posed = head.control, _motion_bytes(head, motion, at_rest)
-    if posed == at_rest:  # the outline of the mesh is exact
+def _posed_state(head: Head, motion: Motion, rest_bytes: MotionBytes) -> HeadState:
+    rig, posed = head.control, _motion_bytes(head, motion, rest_bytes)
+    if posed == rest_bytes:  # the outline of the mesh is exact
         return HeadState(posed, head.mesh.outline, _eye_poses(head, motion))
     return HeadState(posed, Outline(rig.outline_mm(motion), _OUTLINE_MARGIN_MM), _eye_poses(head, motion))
 
@@ -248,7 +250,7 @@ def _sky_view(
     outline: Outline, motion: Motion, device: Device, head: Head, anchors: RotationAnchors
 ) -> tuple[SkyViews, UniformRecord]:
     views = sky_views(outline, head_rotation(anchors, motion))
-    return views, sky_record(device, views, len(head.mesh.positions))
+    return views, sky_views_record(device, views, len(head.mesh.positions))
 
 
 def with_lights(layout: AtlasLayout, lights_record: UniformRecord) -> AtlasLayout:

@@ -67,9 +67,10 @@ def shader_folders(*option_names: str) -> tuple[Folder, ...]:
 
 @lru_cache(maxsize=1)
 def _feature_definitions(_: int) -> tuple[dict[str, ListMembers], dict[str, float]]:
-    """Return the lists and constants of all features.
+    """Return the shader lists and shader constants of all features.
 
-    The parameter, from `registry_version`, only serves as a cache key."""
+    The parameter, from `registry_version`, only serves as a cache key.
+    """
     constants = light_shader_constants() | isotropic_lobe_constants() | reflection_constants()
     lists: dict[str, ListMembers] = {"lights": light_shaders}
     for feature in _feature_packages():
@@ -88,9 +89,9 @@ def program(
     device: Device,
     path: str | Path,
     constants: Constants = (),
-    source: str = FLOAT_TEXEL_FORMAT,
-    store: str = FLOAT_TEXEL_FORMAT,
-    labels: bool = False,
+    source_format: str = FLOAT_TEXEL_FORMAT,
+    store_format: str = FLOAT_TEXEL_FORMAT,
+    with_labels: bool = False,
 ) -> ComputeProgram:
     """Return the compiled program of a shader; programs are cached per device.
 
@@ -98,11 +99,11 @@ def program(
 
     path : "FEATURE/NAME.wgsl", or the path of any other file
     constants : pipeline constants
-    source : format of the texture from which the shader reads light
-    store : format of the texture to which the shader writes light
-    labels : whether a hair pass stores labels besides the picture
+    source_format : format of the texture from which the shader reads light
+    store_format : format of the texture to which the shader writes light
+    with_labels : whether the shader, a hair pass, stores labels besides the picture
     """
-    active = shader_options(source, store, labels, constants)
+    active = shader_options(source_format, store_format, with_labels, constants)
 
     def compile_program() -> ComputeProgram:
         file, folders = FEATURES_FOLDER / path, shader_folders(*active)
@@ -111,12 +112,14 @@ def program(
     return cached_program(device, (path, active, registry_version()), constants, compile_program)
 
 
-def shader_options(source: str, store: str, labels: bool, constants: Constants = ()) -> tuple[str, ...]:
+def shader_options(
+    source_format: str, store_format: str, with_labels: bool, constants: Constants = ()
+) -> tuple[str, ...]:
     """Return the names of the `//#if` conditions that hold for the options of `program`."""
     values = {
-        "FILTERED_SOURCE": source == HALF_TEXEL_FORMAT,
-        "STORED_HALVES": store == HALF_TEXEL_FORMAT,
-        "HAIR_LABELS": labels,
+        "FILTERED_SOURCE": source_format == HALF_TEXEL_FORMAT,
+        "STORED_HALVES": store_format == HALF_TEXEL_FORMAT,
+        "HAIR_LABELS": with_labels,
     }
     options = [name for name, value in values.items() if value]
     return (*options, *(name for name, value in constants if name in OPTIONAL_BINDING_CONSTANTS and value))
@@ -125,14 +128,14 @@ def shader_options(source: str, store: str, labels: bool, constants: Constants =
 def program_constants(
     device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
 ) -> dict[str, float]:
-    """Return a dictionary of `constants` and of the `device_constants` that the shader declares."""
+    """Return a dictionary of `constants`, and of those `device_constants` that the shader declares."""
     return used_constants(path, folders, device_constants(device)) | dict(constants)
 
 
 def workgroup_grid(entry_count: int, workgroup_size: int = WORKGROUP_SIZE) -> tuple[int, int, int]:
-    """Return the grid of workgroups for a shader with one invocation per list entry, see each.wgsl.
+    """Return the grid of workgroups for a shader that processes a list, with one invocation per entry.
 
-    entry_count : number of entries
+    entry_count : number of entries of the list
     workgroup_size : entries per workgroup
     """
     groups = max(1, -(-entry_count // workgroup_size))
@@ -150,9 +153,9 @@ def registry_version() -> int:
 def device_constants(device: Device) -> Constants:
     """Return the values of pipeline constants with which shaders run fastest on the device.
 
-    GPUs read buffers faster. Software adapters read textures faster, skip lights behind each point's surface,
-    shade columns of pixels and take longer steps along hairs that cast shadows; see geometry.wgsl,
-    lighting.wgsl, shade.wgsl and strands_shadow.wgsl.
+    GPUs read buffers faster than textures, software adapters read textures faster. Shaders on software
+    adapters also skip lights behind the surface, shade columns of pixels, and take longer steps along hairs
+    that cast shadows.
     """
     if device.adapter.kind == "CPU":
         return (("SKIPS_UNLIT", 1), ("STRIP", _PIXELS_PER_COLUMN), ("SPLAT_STEP", _HAIR_SHADOW_STEP_TEXELS))
@@ -160,9 +163,9 @@ def device_constants(device: Device) -> Constants:
 
 
 def pixel_column_constants(device: Device, sample_count: int) -> Constants:
-    """Return the pipeline constant that lets an invocation shade fewer pixels, if a pixel has many samples.
+    """Return the pipeline constant that shortens the column of pixels that a shader invocation shades.
 
-    On software adapters, an invocation shades a column of pixels, and the driver limits the number of loop
+    It is needed on software adapters for many samples per pixel, because the driver limits the number of loop
     iterations per invocation. The result is empty if this limit is not reached.
     """
     strip = max(1, _MAX_SAMPLES_PER_INVOCATION // sample_count)
@@ -179,7 +182,7 @@ def warm_up(device: Device) -> None:
     for name in _COMMON_SHADERS:
         program(device, name)
     texel = level_format(device)
-    program(device, "atlas/stitch_gather.wgsl", source=texel)
-    program(device, "diffusion/diffuse_halve.wgsl", source=texel, store=texel)
+    program(device, "atlas/stitch_gather.wgsl", source_format=texel)
+    program(device, "diffusion/diffuse_halve.wgsl", source_format=texel, store_format=texel)
     for name in ("atlas/stitch_place.wgsl", "irradiance/irradiance.wgsl"):
-        program(device, name, store=texel)
+        program(device, name, store_format=texel)

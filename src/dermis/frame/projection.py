@@ -30,7 +30,7 @@ PIXEL_CENTRE = np.full((1, 2), 0.5)
 
 
 class Views(NamedTuple):
-    """Projections for the layers of a texture array; each sample position of each view has one layer.
+    """Projections for the layers of a texture array: one layer for each sample position of each view.
 
     clips : (k, 4, 4) matrices from world to clip space
     sample_positions : (n, 2) positions of the samples in a pixel, from 0 to 1 to the right and down [pixels]
@@ -39,8 +39,10 @@ class Views(NamedTuple):
     clips: Matrix
     sample_positions: Matrix
 
-    def matrices(self, layer_size: tuple[int, int]) -> Matrix:
-        """Return (k n, 4, 4) matrices to clip space, shifted so that pixel centres fall on sample positions.
+    def sample_matrices(self, layer_size: tuple[int, int]) -> Matrix:
+        """Return (k n, 4, 4) matrices from world to clip space, one for each of n samples of k views.
+
+        They are shifted so that pixel centres fall on sample positions.
 
         layer_size : (width, height) of a layer [pixels]
         """
@@ -70,7 +72,7 @@ class ShadowView(NamedTuple):
 
 
 def shadow_map_views(views: Sequence[ShadowView | None]) -> Views:
-    """Return the projections of all shadow maps, sampled at pixel centres; None entries are skipped."""
+    """Return the projections of all shadow maps, sampled at pixel centres; None in `views` is skipped."""
     return Views(np.array([view.clip for view in views if view]).reshape(-1, 4, 4), PIXEL_CENTRE)
 
 
@@ -134,30 +136,33 @@ def view_rows(eye: Triple, axes: Axes) -> Rows:
     return (*right, -_dot(right, eye)), (*up, -_dot(up, eye)), (*forward, -_dot(forward, eye))
 
 
-def perspective_rows(rows: Rows, window: Window, near: float, far: float) -> list[Sequence[float]]:
-    """Return the rows of the matrix to clip space for a window on the image plane, with reversed depth.
+def perspective_rows(
+    view_matrix_rows: Rows, window: Window, near: float, far: float
+) -> list[Sequence[float]]:
+    """Return the rows of the matrix from world to clip space for a window on the image plane.
 
-    rows : upper three rows of the view matrix
+    Depth is reversed, which gives a similar precision at all distances, because floats are densest near 0.
+
+    view_matrix_rows : upper three rows of the view matrix
     near, far : distances at which depth is 1 and 0 [mm]
-
-    Reversed depth has a similar precision at all distances, because floats are densest near 0.
     """
     scale = -near / (far - near)
-    depth = [scale * c for c in rows[2]]
+    depth = [scale * c for c in view_matrix_rows[2]]
     depth[3] -= far * scale
-    lateral = zip(rows, window.half, window.shift, strict=False)
+    lateral = zip(view_matrix_rows, window.half, window.shift, strict=False)
     across = [
-        [c / half - shift * w for c, w in zip(row, rows[2], strict=True)] for row, half, shift in lateral
+        [c / half - shift * w for c, w in zip(row, view_matrix_rows[2], strict=True)]
+        for row, half, shift in lateral
     ]
-    return [*across, depth, rows[2]]
+    return [*across, depth, view_matrix_rows[2]]
 
 
-def depth_range(outline: Outline, rows: Rows) -> tuple[float, float]:
+def depth_range(outline: Outline, view_matrix_rows: Rows) -> tuple[float, float]:
     """Return the nearest and farthest depth of a shape in view space, with a small margin [mm].
 
-    rows : upper three rows of the view matrix
+    view_matrix_rows : upper three rows of the view matrix
     """
-    z = np.array(rows[2], np.float32) @ outline.homogeneous
+    z = np.array(view_matrix_rows[2], np.float32) @ outline.homogeneous_points
     near, far = float(z.min()) - outline.margin_mm, float(z.max()) + outline.margin_mm
     return max(near - 1.0, 0.5, 1e-3 * far), max(far + 1.0, 2.0)
 
@@ -167,12 +172,10 @@ def point_shadow_views(
 ) -> list[ShadowView]:
     """Return, for each point light, the narrowest view from the light that contains the whole mesh.
 
-    lights : lights, each preceded by its name in error messages
+    lights : name of each light in error messages, and the light
     centre : centre of the head, the origin of light positions [mm]
     outline : outline of the head's shape
     map_side : side of the shadow maps [texels]
-
-    All views are computed at once.
 
     Raises DermisError if a light is inside the bounds of the mesh, because one shadow map cannot cover all
     directions.
@@ -183,7 +186,7 @@ def point_shadow_views(
     axes = [view_axes(vector_between(eye, outline.centre_mm)) for eye in eyes]
     rows = [view_rows(*one) for one in zip(eyes, axes, strict=True)]
     stacked = np.array(list(zip(*rows, strict=True)), np.float32).reshape(-1, 4)
-    view_points = (stacked @ outline.homogeneous).reshape(3, len(rows), -1)
+    view_points = (stacked @ outline.homogeneous_points).reshape(3, len(rows), -1)
     depth = view_points[2]
     near, far = depth.min(axis=1).tolist(), depth.max(axis=1).tolist()
     _check_lights_outside(lights, [one > _MIN_LIGHT_DISTANCE_MM for one in near])
@@ -214,7 +217,7 @@ def _check_lights_outside(lights: Sequence[tuple[str, PointLight]], outside_flag
 def _largest_tangents(side_coordinates: NDArray[np.floating], depth: NDArray[np.floating]) -> list[float]:
     """Return, for each view, the tangent of half the field of view that contains all points [-].
 
-    side_coordinates : (2, k, n) x and y of points in k views; the array is overwritten to avoid allocations
+    side_coordinates : (2, k, n) x and y of n points in k views; overwritten to avoid allocations
     depth : (k, n) depths of the points
     """
     for side in side_coordinates:

@@ -26,7 +26,7 @@ _MAX_BYTE_LEVEL = 255  # largest byte of a picture
 
 @dataclass(eq=False)
 class FrameTextures:
-    """Device, textures and buffers of a frame; all are replaced if a lost device is opened again.
+    """Device, textures and buffers of a frame; if the device is lost and opened again, all are replaced.
 
     meter : exposure meter, None for a fixed exposure
     outputs : resources of the outputs besides the picture, None if none are requested
@@ -70,12 +70,12 @@ class RenderedFrame(ShortRepr):
 
     @property
     def picture(self) -> Picture:
-        """Return the textures of the final picture: radiance, exposed picture, and readback buffers."""
+        """Return the textures of the final picture: radiance, linear light after exposure, and sRGB bytes."""
         return self.textures.picture
 
     @property
     def exposure(self) -> float:
-        """Return the factor from radiance to linear light in the picture, as set or as metered [-]."""
+        """Return the factor from radiance to linear light in the picture, whether fixed or metered [-]."""
         if self.settings.exposure != "auto":
             return float(self.settings.exposure)
         return self._read(lambda frame: read_meter(frame.device, frame.meter) if frame.meter else 1.0)
@@ -137,4 +137,4 @@ def _read_output(frame: FrameTextures, name: str) -> PlaneArray:
     planes = frame.outputs.planes_of_output(name)
     start, size = planes.byte_range(name)
     raw = frame.device.handle.queue.read_buffer(planes.buffer, start, size)
-    return planes.array(name, np.frombuffer(raw, np.uint8).copy())
+    return planes.decode_output(name, np.frombuffer(raw, np.uint8).copy())

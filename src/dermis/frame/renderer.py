@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_integer
 from dermis.base.renamed import renamed_keywords
-from dermis.frame.features.outputs.landmarks import checked_landmarks
+from dermis.frame.features.outputs.landmarks import checked_landmark_sets
 from dermis.frame.features.outputs.readback import Readback, start_readback
 from dermis.frame.features.post.picture import Picture
 from dermis.frame.frame import draw_frame
@@ -41,7 +41,7 @@ FRAMES_IN_FLIGHT = 3
 Submit = Callable[[], Readback]
 Receive = Callable[[Readback], T]
 _MAX_CACHE_SIZE = 1000
-_WARM_UP_FRAMES = 100
+_WARM_UP_FRAME_COUNT = 100
 
 
 def pipeline_frames(
@@ -49,7 +49,7 @@ def pipeline_frames(
     current_device: Callable[[], Device],
     frames: Iterable[tuple[Submit, Receive[T]]],
 ) -> Iterator[T]:
-    """Yield the result of each frame in order, while later frames are already submitted.
+    """Yield the results of frames in order; while one is read back, later frames are already submitted.
 
     A frame whose device is lost is submitted again.
 
@@ -150,9 +150,11 @@ class Renderer:
         force: bool,
         read_back: Callable[[Graph, Picture], T] | None = None,
     ) -> tuple[CommandList, T | None]:
-        """Declare the passes of a frame, run the stale passes, and start a readback in the same submission.
+        """Declare the passes of a frame, run those whose inputs have changed, and start a readback.
 
-        force : whether to run all passes
+        All passes are in one submission.
+
+        force : whether to run all passes, changed or not
         read_back : function that starts the readback of the picture, None for no readback
         """
         if force:
@@ -290,7 +292,7 @@ class Renderer:
         )
 
     def _run_on_device(self, textures: FrameTextures, redraw: Callable[[], None], job: Callable[[], T]) -> T:
-        """Return the result of a job that reads a frame; if the device was lost, draw the frame again first.
+        """Run a job that reads a frame; return its result. If the device was lost, redraw the frame first.
 
         textures : textures of the frame, which `redraw` replaces
         redraw : function that draws the frame again
@@ -319,7 +321,7 @@ class Renderer:
         rendered = self.draw(scene, settings, force=True)
         if self.device.adapter.kind == "CPU":
             return rendered
-        for _ in range(_WARM_UP_FRAMES):
+        for _ in range(_WARM_UP_FRAME_COUNT):
             self.draw(scene, settings, force=True, timed=False)
         self.device.wait()
         return self.draw(scene, settings, force=True)
@@ -425,7 +427,7 @@ class Renderer:
         """
         if settings is None or isinstance(settings, Settings | Mapping):
             settings = repeat(as_model(Settings, settings or {}, "settings", "size=(512, 512)"))
-        names, sets = check_outputs(outputs), checked_landmarks(landmarks)
+        names, sets = check_outputs(outputs), checked_landmark_sets(landmarks)
         submit = partial(self._submit_readback, linear=linear, alpha=alpha, outputs=names, landmarks=sets)
         jobs = observation_jobs(submit, scenes, previous, settings)
         return pipeline_frames(self.reopening_device, lambda: self.device, jobs)

@@ -1,4 +1,4 @@
-"""Request of a frame: everything on which its cached resources depend."""
+"""Request of a frame: everything that determines its cached resources."""
 
 from __future__ import annotations
 
@@ -22,11 +22,10 @@ from dermis.scene.skin import Skin
 
 @dataclass(frozen=True)
 class FrameRequest:
-    """Everything on which the cached resources of a frame depend.
+    """Everything that determines the cached resources of a frame.
 
-    profile : diffusion profile of the skin, the first profile if a map blends several profiles
-    rest_positions_mm : (p, 3) control points of the person at rest [mm], None if they are those of
-        `topology`, the head without hair and maps
+    profile : diffusion profile of the skin; if a map blends several profiles, the first of them
+    rest_positions_mm : (p, 3) control points of the person at rest [mm], None if they are those of the mesh
     environment_map : prefiltered map of `environment`
     light_part_counts : number of parts into which each light is divided, suns of the environment last
     shadow_layers : number of shadow maps
@@ -57,12 +56,12 @@ class FrameRequest:
 
     @property
     def topology(self) -> Head:
-        """Return the head without hair and maps; all people of a template share its mesh."""
+        """Return the head without hair and maps; people made from the same template share its mesh."""
         return self.head.topology
 
     @property
     def is_shared(self) -> bool:
-        """Return whether several people share the topology, and thus also the atlas and other resources."""
+        """Return whether several people share the mesh, and thus also the atlas and other resources."""
         return self.topology is not self.head.bare
 
     @property
@@ -72,14 +71,14 @@ class FrameRequest:
 
     @property
     def light_key(self) -> str:
-        """Return the cache key of resources that hold light, from view name and shadow map size."""
+        """Return the cache key of resources that hold light; it consists of view name and shadow map size."""
         return f"{self.view_name} {self.settings.shadow_size}"
 
     @cached_property
     def split(self) -> ProfileSplit:
-        """Return the profile and any other profiles, each split by how its Gaussians are evaluated.
+        """Return the profile, split into Gaussians that are blurred and one that is evaluated per pixel.
 
-        The narrowest Gaussian may be evaluated per pixel (relit); the others blur the atlas.
+        The result includes the splits of any other profiles that a map blends.
         """
         profiles = self.profile, *self.other_profiles
         first, *others = (self.technique.split(profile, self.albedo_from_map) for profile in profiles)
@@ -93,12 +92,12 @@ class FrameRequest:
 
     @cached_property
     def has_occlusion(self) -> bool:
-        """Return whether the head occludes its environment."""
+        """Return whether the head hides parts of the environment from its own skin."""
         return self.environment is not None and self.settings.occlusion != "none"
 
     @property
     def has_interreflection(self) -> bool:
-        """Return whether interreflection is computed; under an environment it requires occlusion."""
+        """Return whether interreflection is computed; scenes with an environment also require occlusion."""
         return self.settings.interreflection and (self.has_occlusion or self.environment is None)
 
     @property
@@ -135,7 +134,7 @@ class FrameRequest:
 
     @property
     def blur_count(self) -> int:
-        """Return the number of Gaussians that blur light over the atlas."""
+        """Return the number of Gaussians with which light is blurred over the atlas."""
         return len(self.split.blurred_mm2)
 
     @property
@@ -145,5 +144,5 @@ class FrameRequest:
 
     @cached_property
     def atlas_plan(self) -> AtlasPlan:
-        """Return the names of the atlas layouts, and the side that all atlases have."""
+        """Return the names of the atlas layouts, and the side of each atlas."""
         return plan_atlases(self.seam_method, self.settings, self.blur_count, self.has_occlusion)

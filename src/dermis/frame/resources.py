@@ -19,9 +19,9 @@ from dermis.gpu import Constants, Texture, UniformRecord
 
 @dataclass(frozen=True, eq=False)
 class AtlasLayout(LitAtlas):
-    """Layout of the atlas in which light is diffused, with its resources.
+    """Atlas layout in which light is diffused, with its resources.
 
-    translucency : resources of the light through thin parts, None if no light crosses thin parts
+    translucency : resources of the light through thin parts of the head, None if the scene has no such light
     occlusion : resources that update the occlusion map, None if occlusion does not follow the shape
     interreflection : resources of interreflection, None if there is no interreflection
     """
@@ -37,13 +37,13 @@ class Resources:
 
     expression_maps : painted maps that expressions change, None if no map changes
     layouts : atlas layouts in which light is diffused; the picture is shaded from the first layout
-    scattered : texture of the exitance of light that scattered below the surface
+    scattered : texture over the atlas of the exitance by subsurface scattering
     technique : tables and textures of the technique; None if the technique needs none
     output_layers : textures in which the technique diffuses subsurface light for outputs, apart from the
         picture's textures; None if the technique needs none
     sky : visible fraction of the sky at the vertices, None if occlusion does not follow the shape
     hair : resources of the hair, None if no hair is drawn
-    visibility : texture of the triangle at each sample of the picture
+    visibility : texture with the index of the triangle that covers each sample of the picture
     view : uniform record of the shading pass, without the camera
     constants : pipeline constants of the shading pass
     outputs : resources of the outputs besides the picture, None if none are requested

@@ -1,4 +1,4 @@
-"""Ways to treat the seams of the atlas: stitching, and the methods of the 2007 talk [Dudash2007]."""
+"""Methods of treating the seams of the atlas: stitching, and those of the 2007 talk [Dudash2007]."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FEATHER_WIDTH_MM = 3.0  # width over which an edited stretch map narrows the blu
 
 @dataclass(frozen=True)
 class SeamMethod:
-    """How seams are treated: the layouts of the atlases, and the texels that blurs read beyond a chart.
+    """Method of treating seams: the layouts of the atlases, and how blurs treat the edges of charts.
 
     layouts : names of the layouts: "stitched", "mesh" (the uv layout of the mesh) or "unwrapped" (a layout
         with other seams)
@@ -39,7 +39,7 @@ SEAM_METHODS = {
 
 
 def seam_method(method_name: str, can_stitch: bool) -> SeamMethod:
-    """Return the seam method `method_name`; if it is "stitch" and cannot be used, return "clear-colour".
+    """Return the seam method of a name; "clear-colour" replaces "stitch" if the technique cannot stitch.
 
     can_stitch : whether the technique can carry light across seams
     """
@@ -54,7 +54,7 @@ class AtlasPlan(NamedTuple):
 
 
 def plan_atlases(method: SeamMethod, settings: Settings, blur_count: int, has_occlusion: bool) -> AtlasPlan:
-    """Return the layouts and the side of the atlases; an atlas that stores nothing has the smallest side.
+    """Return the layouts and the side of the atlases; if the atlas is not used, it has the smallest side.
 
     blur_count : number of Gaussians that blur light over the atlas
     has_occlusion : whether the atlas stores occlusion of the environment

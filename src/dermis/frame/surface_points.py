@@ -1,4 +1,4 @@
-"""Surface points at pixel centres, and the irradiance at points of the surface."""
+"""Surface points that are visible at pixel centres, and the irradiance at given surface points."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class SurfacePoints:
     """Surface points of the head that are visible at the centres of pixels.
 
     mask : (h, w) mask of the pixels that show the head
-    triangle : (n,) indices of the triangles in these pixels, row by row
-    barycentric : (n, 3) barycentric weights in these triangles [-]
+    triangle : (n,) indices of the triangles that the n pixels of the mask show, row by row
+    barycentric : (n, 3) barycentric weights of the points in these triangles [-]
     """
 
     mask: NDArray[np.bool_]
@@ -41,7 +41,7 @@ class SurfacePoints:
 
 
 def surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> SurfacePoints:
-    """Return the surface points that a picture with one sample per pixel shows.
+    """Return the surface points at the pixel centres of a picture.
 
     settings : settings of the picture; technique and samples are ignored
     """
@@ -64,11 +64,11 @@ def _find_surface_points(renderer: Renderer, scene: Scene, settings: Settings) -
 
 
 def _barycentric_weights(
-    scene: Scene, view: NDArray[np.void], triangle_index: Index, head_mask: NDArray[np.bool_]
+    scene: Scene, shade_record: NDArray[np.void], triangle_index: Index, head_mask: NDArray[np.bool_]
 ) -> Floats:
     """Return (n, 3) barycentric weights of the points where camera rays meet the triangles, see shade.wgsl.
 
-    view : uniform record of the shading pass
+    shade_record : uniform record of the shading pass
     triangle_index : (n,) indices of the triangles in the pixels of the mask
     head_mask : (h, w) mask of the pixels that show the head
     """
@@ -76,7 +76,7 @@ def _barycentric_weights(
     rows, columns = np.nonzero(head_mask)
     x, y = 2.0 * (columns + 0.5) / width - 1.0, 1.0 - 2.0 * (rows + 0.5) / height
     names = ("forward", "right", "up", "eye", "shift")
-    forward, right, up, eye, shift = (view[name].astype(np.float64) for name in names)
+    forward, right, up, eye, shift = (shade_record[name].astype(np.float64) for name in names)
     x, y = x + shift[0], y + shift[1]
     ray = forward + x[:, None] * right + y[:, None] * up
     mesh, motion = scene.head.mesh, scene.motion
@@ -90,32 +90,34 @@ def _barycentric_weights(
 
 
 def irradiance_at(
-    renderer: Renderer, scene: Scene, settings: Settings, triangle: Index, barycentric: Floats
+    renderer: Renderer, scene: Scene, settings: Settings, triangle_index: Index, barycentric_weights: Floats
 ) -> Floats:
-    """Return (n, 3) irradiance at points of the surface, times the skin colour applied before scattering [-].
+    """Return the (n, 3) irradiance at surface points, times the skin colour [-].
+
+    The skin colour is the part of the albedo that is applied before the light scatters.
 
     scene : scene without maps and environment, because the positions of the points in the atlas are unknown;
         interreflection is ignored
-    triangle : (n,) indices of the triangles on which the points lie
-    barycentric : (n, 3) barycentric weights of the points
+    triangle_index : (n,) indices of the triangles on which the points lie
+    barycentric_weights : (n, 3) barycentric weights of the points
     """
-    side = max(1, int(np.ceil(np.sqrt(len(triangle)))))
+    side = max(1, int(np.ceil(np.sqrt(len(triangle_index)))))
     triangles = np.full(side * side, -1, np.int64)
-    triangles[: len(triangle)] = triangle
+    triangles[: len(triangle_index)] = triangle_index
     weights = np.zeros((side * side, 2))
-    weights[: len(triangle)] = barycentric[:, 1:]
+    weights[: len(triangle_index)] = barycentric_weights[:, 1:]
     records = pack_surface_points(
         triangles.reshape(side, side), np.rint(65535 * weights).reshape(side, side, 2)
     )
     return renderer.reopening_device.run(partial(_compute_irradiance, renderer, scene, settings, records))[
-        : len(triangle)
+        : len(triangle_index)
     ]
 
 
 def _compute_irradiance(
     renderer: Renderer, scene: Scene, settings: Settings, packed_points: NDArray[np.uint32]
 ) -> Floats:
-    """Return the (n * n, 3) irradiance at surface points, one in each texel of an n x n atlas [-].
+    """Return the (n * n, 3) irradiance at surface points, which are the texels of an n x n atlas [-].
 
     packed_points : (n, n, 2) packed surface points
     """

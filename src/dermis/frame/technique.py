@@ -17,14 +17,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ProfileSplit:
-    """Profile split into a narrow Gaussian that is relit per pixel, and Gaussians that blur the atlas.
+    """Split of a profile into a narrow Gaussian that is relit, and Gaussians with which the atlas is blurred.
 
-    Relit means that light at each pixel is evaluated directly, instead of being blurred by the Gaussian.
+    The relit Gaussian is so narrow that light is not blurred with it, but evaluated at each pixel.
 
     relit : (3,) weights of the relit Gaussian [-]
     total : (3,) sums of the weights of all Gaussians [-]
-    blurred_mm2 : (k,) variances of the Gaussians that blur [mm^2]
-    weight : (k, 3) weights of the Gaussians that blur [-]
+    blurred_mm2 : (k,) variances of the blurred Gaussians [mm^2]
+    weight : (k, 3) weights of the blurred Gaussians [-]
     others : splits of the other profiles that a map blends with this profile; all have the same Gaussians
     fine : members of the shader struct Fine, which corrects light that varies within a texel; empty for no
         correction
@@ -39,12 +39,12 @@ class ProfileSplit:
 
     @property
     def relit_changes(self) -> Floats:
-        """Return the relit weights of the o other profiles minus those of this profile, (o, 3) [-]."""
+        """Return, for each of n other profiles, its `relit` minus the `relit` of this profile, (n, 3) [-]."""
         return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
 
     @property
     def weight_changes(self) -> tuple[Floats, ...]:
-        """Return, for each other profile, its (k, 3) blur weights minus those of this profile [-]."""
+        """Return, for each other profile, its (k, 3) `weight` minus the `weight` of this profile [-]."""
         return tuple(one.weight - self.weight for one in self.others)
 
 
@@ -59,7 +59,7 @@ class TechniqueTraits:
     uses_atlas : whether light is diffused over the atlas
     mixes_profiles : whether a map can blend several profiles
     stitches_seams : whether light can cross the seams of the atlas
-    supports_translucency : whether light can cross thin parts
+    supports_translucency : whether light can pass through thin parts of the head
     needs_curvature : whether the shading pass reads the curvature of the surface
     shade_constants : pipeline constants of the shading pass
     pixel_bytes : memory per pixel besides the picture [bytes]
@@ -77,7 +77,9 @@ class TechniqueTraits:
     subsurface_layer_bytes: ClassVar[int] = 0
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Split a profile into a relit Gaussian and Gaussians that blur; in this class, none blurs.
+        """Split a profile into a Gaussian evaluated at each pixel (relit), and Gaussians that are blurred.
+
+        In this class, none is blurred.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
@@ -98,7 +100,8 @@ class TechniqueTraits:
 
 
 def channel_weights(profile: GaussianSum, normalise_weights: bool) -> Floats:
-    """Return the (k, 3) weights of the Gaussians [-].
+    """Return the (k, 3) weights of a profile's Gaussians for red, green and blue [-].
 
-    normalise_weights : whether to scale the weights of each channel to a sum of 1"""
+    normalise_weights : whether to scale the weights of each channel to a sum of 1
+    """
     return profile.weight / profile.albedo if normalise_weights else profile.weight

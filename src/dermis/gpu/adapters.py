@@ -1,7 +1,7 @@
 """Graphics adapters of this machine, their limits, and a faster start of wgpu.
 
-In a first frame, wgpu looks up 75 C types by name. Parsing a name takes cffi about ten milliseconds, as it
-parses all typedefs of the header as well. The types are therefore registered in advance.
+During the first frame, wgpu looks up 75 C types by name. For each name, cffi parses all typedefs of wgpu's
+header again, which takes about ten milliseconds. The types are therefore registered in advance.
 """
 
 from __future__ import annotations
@@ -68,10 +68,10 @@ def register_wgpu_types() -> None:
     with contextlib.suppress(ImportError):  # other builds of wgpu need no registration
         from wgpu.backends.wgpu_native import ffi
 
-        register_types(ffi)
+        register_c_types(ffi)
 
 
-def register_types(ffi: Any) -> int:
+def register_c_types(ffi: Any) -> int:
     """Register the C types of pointers, arrays and callbacks with cffi, and return their number.
 
     This uses cffi's internals. If these have changed, nothing is registered and the first frame takes longer.
@@ -238,17 +238,17 @@ def check_limits(adapter_name: str, adapter_limits: Mapping[str, int]) -> None:
             refuse(f"adapter {adapter_name}", expected, f"it has {adapter_limits[name]}", advice)
 
 
-def device_limits(adapter_limits: Mapping[str, int], full_limits: Sequence[str]) -> dict[str, int]:
+def device_limits(adapter_limits: Mapping[str, int], full_limit_names: Sequence[str]) -> dict[str, int]:
     """Return the limits to request for a device: WebGPU's defaults, or less where the adapter offers less.
 
     adapter_limits : dictionary from the name of a limit to its value on the adapter
-    full_limits : names of the limits that are requested at the full value that the adapter offers
+    full_limit_names : limits that are requested at the full value that the adapter offers
     """
     limits = {
         name: (max if name.startswith("min-") else min)(default, adapter_limits.get(name, default))
         for name, default in DEFAULT_LIMITS.items()
     }
-    return limits | {name: adapter_limits[name] for name in full_limits}
+    return limits | {name: adapter_limits[name] for name in full_limit_names}
 
 
 def _describe_adapter(wgpu_adapter: Untyped) -> Adapter:

@@ -1,4 +1,4 @@
-"""Bind groups, created by direct calls of the native library, which is faster than through wgpu's Python."""
+"""Bind groups. They are created by direct calls of wgpu's native library, as wgpu's Python code is slower."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def make_bind_group(
 
 
 class ResourceCache(Generic[T]):
-    """Cache keyed by the identity of resources; an entry is dropped when one of its resources is released.
+    """Cache keyed by the identity of resources; an object is dropped when one of its resources is released.
 
     A cached bind group keeps the memory of its resources allocated. The cache therefore drops a bind group as
     soon as one of its resources is no longer used elsewhere.
@@ -84,7 +84,7 @@ class ResourceCache(Generic[T]):
         self._keys: dict[int, tuple[weakref.ref[object], set[ResourceKey]]] = {}
 
     def __len__(self) -> int:
-        """Return the number of cached entries."""
+        """Return the number of cached objects."""
         return len(self._entries)
 
     @property
@@ -93,16 +93,16 @@ class ResourceCache(Generic[T]):
         return len(self._keys)
 
     def find(self, cache_key: ResourceKey) -> T | None:
-        """Return the cached entry for a key from `resource_key`; None without an entry."""
+        """Return the cached object for a key from `resource_key`; None if there is no such object."""
         return self._entries.get(cache_key)
 
     def add(self, cache_key: ResourceKey, resources: Sequence[object], cached_object: T) -> None:
-        """Add an entry that is kept until one of its resources is released."""
+        """Cache an object until one of its resources is released."""
         self._entries[cache_key] = cached_object
         for resource in resources:
-            self._keys_of(resource).add(cache_key)
+            self._cache_keys_of(resource).add(cache_key)
 
-    def _keys_of(self, resource: object) -> set[ResourceKey]:
+    def _cache_keys_of(self, resource: object) -> set[ResourceKey]:
         """Return the cache keys that contain a resource; if it is new, start to watch for its release."""
         identity = id(resource)
         if identity not in self._keys:
@@ -111,12 +111,12 @@ class ResourceCache(Generic[T]):
             def on_release(_: object) -> None:
                 cache = this()
                 if cache is not None:
-                    cache._drop_entries(identity)
+                    cache._drop_objects_with(identity)
 
             self._keys[identity] = weakref.ref(resource, on_release), set()
         return self._keys[identity][1]
 
-    def _drop_entries(self, resource_id: int) -> None:
+    def _drop_objects_with(self, resource_id: int) -> None:
         _, keys = self._keys.pop(resource_id)
         for key in keys:
             self._entries.pop(key, None)
@@ -132,7 +132,7 @@ def resource_key(resources: Sequence[object]) -> ResourceKey:
 def _view_handle(device: Device, texture_or_view: TextureOrView, texture_layout: LayoutEntry) -> object:
     """Return the native handle of a view; for a texture, the handle of its default view, which is cached.
 
-    texture_layout : layout entry of the binding, which contains the view dimension
+    texture_layout : bind group layout entry of the texture; it contains the view dimension
     """
     if is_texture(texture_or_view):
         return _default_view(device, texture_or_view, texture_layout["view_dimension"])

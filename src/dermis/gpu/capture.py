@@ -53,8 +53,8 @@ class CapturedPass:
     raster : for a render pass, the layer, the depth to which it clears, and the resource indices of index
         buffer, depth view and colour target, each -1 if there is none; None for other passes
     written : for a write from the host, the index of the buffer and the bytes; None for other passes
-    unit : index of the unit to which the pass belongs, a recording or a single pass; passes of a unit run or
-        are skipped together
+    unit : index of the unit to which the pass belongs; a unit is a recording or a single pass, and its passes
+        are run or skipped together
     """
 
     stage: str
@@ -88,7 +88,7 @@ class CapturedFrame:
         captured_pass.unit = last + 1 if unit_index is None else unit_index
         self.passes.append(captured_pass)
 
-    def record(self, struct_name: str, record: UniformRecord) -> int:
+    def index_of_record(self, struct_name: str, record: UniformRecord) -> int:
         """Return the index of a uniform record in `records`, appending it on first use."""
         if id(record) not in self._record_index:
             self._record_index[id(record)] = len(self.records)
@@ -143,14 +143,14 @@ class FrameCapture(Graph):
         """Return the texture, view, buffer or sampler that `resources` describes at an index."""
         return self._objects[resource_index]
 
-    def resource(self, bound_object: Bindable) -> int:
+    def index_of_resource(self, bound_object: Bindable) -> int:
         """Return the index of a texture, view, buffer or sampler in `resources`, adding it on first use."""
         if id(bound_object) not in self._resource_index:
             if is_view(bound_object):
                 found: PlainData = {
                     "kind": "view",
                     "part": bound_object.layer_and_mip,
-                    "of": self.resource(bound_object.texture),
+                    "of": self.index_of_resource(bound_object.texture),
                 }
             else:
                 found = describe_resource(self.device, bound_object)
@@ -169,11 +169,11 @@ class FrameCapture(Graph):
     ) -> None:
         """Capture a compute pass instead of running it."""
         captured = self._add_pass(stage, program, resources, workgroups)
-        captured.completes = self.resource(resources[in_place_resource]) if in_place_resource else -1
+        captured.completes = self.index_of_resource(resources[in_place_resource]) if in_place_resource else -1
 
     def write(self, stage: str, buffer: Buffer, content: bytes) -> None:
         """Capture a write of bytes from the host to a buffer."""
-        written = self.resource(buffer), content
+        written = self.index_of_resource(buffer), content
         self._frame.add(CapturedPass(stage, None, [], (len(content),), written=written), self._unit)
 
     def draw(
@@ -189,18 +189,20 @@ class FrameCapture(Graph):
     ) -> None:
         """Capture a render pass of triangles instead of running it."""
         attachments = {"indices": index_buffer, "depth": target.depth, "target": target.colour}
-        indices_of = {name: -1 if one is None else self.resource(one) for name, one in attachments.items()}
+        indices_of = {
+            name: -1 if one is None else self.index_of_resource(one) for name, one in attachments.items()
+        }
         captured = self._add_pass(stage, program, resources, (vertex_count,))
         captured.raster = {"layer": instance_index, "far": target.clear_depth, **indices_of}
 
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Raise NotImplementedError, as players of captured frames have no support for such passes."""
+        """Raise NotImplementedError, as players of captured frames cannot run a program once per texel."""
         raise NotImplementedError(f"{stage}: passes that fill targets cannot be captured")
 
     def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Capture the passes that `record_passes` adds, as one unit that players run or skip as a whole."""
+        """Capture the passes that `record_passes` adds as one unit; players run all of them or none."""
         if self._unit is not None:
             return record_passes(self, *args)
         passes = self._frame.passes
@@ -220,10 +222,10 @@ class FrameCapture(Graph):
 
     def _binding_index(self, program: Program, binding: Binding, bound_object: Bindable) -> int:
         if not isinstance(bound_object, np.ndarray):
-            return self.resource(bound_object)
+            return self.index_of_resource(bound_object)
         struct = uniform_type(program.source.text, binding.name)
         self.structs[struct] = bound_object.dtype
-        return -1 - self._frame.record(struct, cast("UniformRecord", bound_object))
+        return -1 - self._frame.index_of_record(struct, cast("UniformRecord", bound_object))
 
     def _index_of_program(self, program: Program) -> int:
         if id(program) not in self._program_index:

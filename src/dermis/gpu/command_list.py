@@ -105,7 +105,7 @@ class CommandList(Recorder):
         )
 
     def read_back(self, buffers: Sequence[Buffer], readback: BufferReadback) -> None:
-        """Add copies of buffers, one after another, to a readback, which is mapped after submission."""
+        """Copy buffers, one after another, to a readback, which the CPU can map after submission."""
         self._end_pass()
         start = 0
         for buffer in buffers:
@@ -196,7 +196,7 @@ class CommandList(Recorder):
 
     @property
     def _encoder(self) -> Untyped:
-        """Return the current command encoder, a new encoder after each submission."""
+        """Return the open command encoder, or create one if there is none since the last submission."""
         if self._open_encoder is None:
             self._open_encoder = self.device.command_encoder()
         return self._open_encoder

@@ -1,4 +1,4 @@
-"""Dependencies between the passes of a frame, used to find stale passes."""
+"""Dependencies between the passes of a frame, used to find stale passes: those with outdated output."""
 
 from __future__ import annotations
 
@@ -106,10 +106,11 @@ PassAccess = tuple[int, tuple[ResourceState, ...], tuple[ResourceState, ...]]
 
 
 class Dependencies:
-    """Dependencies between the passes of a frame, used to find stale passes.
+    """Dependencies between the passes of a frame, used to find stale passes: those with outdated output.
 
     The version that a pass writes is a hash of its key and of the versions that it reads. A pass is skipped
-    if its outputs already have that version, or if no pass that runs reads these outputs.
+    if its outputs already have that version. It is also skipped if no pass that runs reads its outputs, and
+    each output is scratch or overwritten later.
 
     passes : for each pass, in order, its access id and the states of the resources that it reads and writes
     """
@@ -152,22 +153,22 @@ class Dependencies:
         current = [state.version == versions[last] for state, last in self._last_writer.items()]
         return self._cached_stale(tuple(current))
 
-    def _find_stale(self, is_current: tuple[bool, ...]) -> list[bool]:
-        """Return for each pass whether it is stale.
+    def _find_stale(self, is_up_to_date: tuple[bool, ...]) -> list[bool]:
+        """Return for each pass whether it must run to bring all resources up to date.
 
-        is_current : for each written resource, in the order of `_last_writer`, whether it already has its
+        is_up_to_date : for each written resource, in the order of `_last_writer`, whether it already has its
             final version
         """
-        valid = {state for state, now in zip(self._last_writer, is_current, strict=True) if now}
+        valid = {state for state, now in zip(self._last_writer, is_up_to_date, strict=True) if now}
         while True:
-            stale = self._find_stale_unless(valid)
+            stale = self._passes_with_outdated_output(valid)
             running = [writes for (*_, writes), now in zip(self.passes, stale, strict=True) if now]
             overwritten = {one for writes in running for one in writes if not stale[self._last_writer[one]]}
             if not overwritten & valid:
                 return stale
             valid -= overwritten
 
-    def _find_stale_unless(self, valid_states: set[ResourceState]) -> list[bool]:
+    def _passes_with_outdated_output(self, valid_states: set[ResourceState]) -> list[bool]:
         """Return for each pass whether it writes an output that is needed and not up to date.
 
         An output is needed if it is the final content of a resource that is not scratch, or the input of a
@@ -186,9 +187,13 @@ class Dependencies:
                     break
         return stale
 
-    def set_versions(self, ran_by_pass: Sequence[bool], versions: Sequence[int]) -> None:
-        """Set the versions of all resources that the executed passes wrote."""
-        for (*_, writes), now, version in zip(self.passes, ran_by_pass, versions, strict=True):
+    def set_versions(self, pass_has_run: Sequence[bool], versions: Sequence[int]) -> None:
+        """Set the versions of all resources that the executed passes wrote.
+
+        pass_has_run : for each pass, whether it ran in this frame
+        versions : version that each pass writes
+        """
+        for (*_, writes), now, version in zip(self.passes, pass_has_run, versions, strict=True):
             if now:
                 for state in writes:
                     state.set_version(version)

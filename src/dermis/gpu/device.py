@@ -48,7 +48,7 @@ def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
 
 
 class Device:
-    """Logical device with its queue, on which all resources and programs of a renderer live.
+    """Logical device with its queue, which holds all resources and programs of a renderer.
 
     The device has WebGPU's default limits, even if the adapter offers more, so that a program that exceeds
     them fails on every machine. Only the maximum sizes of textures and buffers are those of the adapter. The
@@ -156,7 +156,7 @@ class Device:
         return False
 
     def _check_alive(self) -> None:
-        """Raise GPUError if the device is lost, which a write of zero bytes to a buffer reveals."""
+        """Raise GPUError if the device is lost; this is tested by writing zero bytes to a buffer."""
         self.write(self._unwritten, b"", 0)
 
     @cached_property
@@ -210,7 +210,7 @@ class Device:
         )
 
     def _allocate_buffer(
-        self, buffer_name: str, byte_count: int, usage: str, create: Callable[..., Buffer]
+        self, buffer_name: str, byte_count: int, usage: str, create_buffer: Callable[..., Buffer]
     ) -> Buffer:
         import wgpu
 
@@ -218,7 +218,7 @@ class Device:
         flags |= 0 if usage == "MAP_READ" else wgpu.BufferUsage.COPY_SRC
         limit = self.max_storage_bytes if usage == "STORAGE" else self.max_buffer_bytes
         with checked_allocation(self.adapter.name, buffer_name, byte_count, limit):
-            return create(usage=flags)
+            return create_buffer(usage=flags)
 
     def sampler(self, **options: str) -> Sampler:
         """Return a sampler with options of wgpu, such as its filters; samplers are cached."""

@@ -62,8 +62,8 @@ class ReopeningDevice:
 
     open_device : function that opens a device
     on_open : function that is called with each opened device and creates the resources of the caller on it
-    reopens : whether a lost device is opened again; if False, DeviceLostError is raised, for callers whose
-        device also holds resources that `on_open` does not create
+    reopens : whether a lost device is opened again; if False, its loss raises DeviceLostError. Pass False if
+        the device also holds resources that `on_open` does not create
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Frame graph: passes are declared in order, and only the passes with stale output run."""
+"""Frame graph: passes are declared in order, and only passes with outdated output run."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def _describe_resource(resource: Bindable) -> str:
 
 @dataclass(slots=True)
 class DeclaredPass:
-    """Pass declared on a graph, or all passes of a recording, which run as a whole.
+    """Pass declared on a graph, or all passes of a recording, which are run or skipped together.
 
     stages : names of the stages of the pass or passes
     run : function that adds the pass, or the passes, to a command list
@@ -159,12 +159,12 @@ class DeclaredPass:
 
 
 class Graph(Recorder):
-    """Frame graph: a recorder that runs only the declared passes whose output is stale.
+    """Frame graph: a recorder that runs only those declared passes whose output is outdated.
 
     The resources that a pass reads and writes follow from the bindings of its shader. The version of its
     output is a hash of the program, the resources and their versions, the workgroups, and the uniforms that
-    the shader reads. A pass is skipped if its outputs already have that version, or if no pass that runs
-    reads these outputs.
+    the shader reads. A pass is skipped if its outputs already have that version. It is also skipped if no
+    pass that runs reads its outputs, and each output is scratch or overwritten later.
 
     recordings : cache of the recordings that `repeat` makes
     executed_stages : stages of the passes that ran in the last frame, in order
@@ -207,21 +207,21 @@ class Graph(Recorder):
             unchanged = resource_state(self.device, resources[in_place_resource])
             writes = tuple(state for state in writes if state is not unchanged)
 
-        def run(frame: CommandList) -> None:
+        def add_dispatch(frame: CommandList) -> None:
             frame.dispatch(stage, program, resources, workgroups, access=access)
 
-        self._declare_pass(stage, program, resources, workgroups, access, writes, run)
+        self._declare_pass(stage, program, resources, workgroups, access, writes, add_dispatch)
 
     def write(self, stage: str, buffer: Buffer, content: bytes) -> None:
         """Declare a write of bytes from the host to a buffer, see `Recorder.write`."""
         state = resource_state(self.device, buffer)
 
-        def run(frame: CommandList) -> None:
+        def add_write(frame: CommandList) -> None:
             frame.write(stage, buffer, content)
 
         if self.listing is not None:
             self.listing.add_write(stage, buffer, len(content), len(self._passes))
-        self._passes.append(DeclaredPass((stage,), run, content, (0, (), (state,))))
+        self._passes.append(DeclaredPass((stage,), add_write, content, (0, (), (state,))))
 
     def draw(
         self,
@@ -238,7 +238,7 @@ class Graph(Recorder):
         attachments = (target.depth, target.colour)
         writes = tuple(resource_state(self.device, one) for one in attachments if one is not None)
 
-        def run(frame: CommandList) -> None:
+        def add_draw(frame: CommandList) -> None:
             frame.draw(
                 stage,
                 program,
@@ -252,7 +252,7 @@ class Graph(Recorder):
         access = program.access(resources)
         index_state = None if index_buffer is None else resource_state(self.device, index_buffer)
         more_keys = instance_index, target.clear_depth, index_state
-        self._declare_pass(stage, program, resources, (vertex_count,), access, writes, run, more_keys)
+        self._declare_pass(stage, program, resources, (vertex_count,), access, writes, add_draw, more_keys)
 
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
@@ -260,10 +260,10 @@ class Graph(Recorder):
         """Declare a render pass that runs a program once per texel of its targets, see `Recorder.fill`."""
         writes = tuple(resource_state(self.device, one) for one in targets)
 
-        def run(frame: CommandList) -> None:
+        def add_fill(frame: CommandList) -> None:
             frame.fill(stage, program, resources, targets)
 
-        self._declare_pass(stage, program, resources, (3,), program.access(resources), writes, run)
+        self._declare_pass(stage, program, resources, (3,), program.access(resources), writes, add_fill)
 
     def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
         """Declare the passes that `record_passes(recorder, *args)` adds.
@@ -332,5 +332,5 @@ class Graph(Recorder):
     ) -> None:
         if self.listing is not None:
             self.listing.add(stage, program, resources, workgroups, len(self._passes))
-        key = access.id, workgroups, further_key_parts, program.uniform_values(resources, self._uniforms)
+        key = access.id, workgroups, further_key_parts, program.used_uniform_bytes(resources, self._uniforms)
         self._passes.append(DeclaredPass((stage,), run, key, (access.id, access.reads, writes)))

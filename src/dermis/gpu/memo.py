@@ -138,10 +138,10 @@ class Memo:
         return result
 
     def _mark_hits_used(self, function_key: FunctionKey | None = None) -> None:
-        """Move the results that this frame used to the front of the cache.
+        """Move to the front of the cache all results that this frame used.
 
         function_key : key of a function, to move only its results and those computed from them; None to move
-            all results that this frame used
+            all of them
         """
         for one, result in self._hits:
             if function_key is None or function_key in result.keys:

@@ -134,14 +134,15 @@ def check_driver_address_space() -> None:
     """Raise DermisError if the address space limit (ulimit -v) is too low to load the graphics drivers."""
     if _address_space_limit() < math.inf and not _has_loaded_drivers():
         _check_address_space(
-            _bytes_for_threads(_DRIVER_LOADING_BYTES), _bytes_for_threads(_SOFTWARE_RENDERING_BYTES)
+            _bytes_for_software_threads(_DRIVER_LOADING_BYTES),
+            _bytes_for_software_threads(_SOFTWARE_RENDERING_BYTES),
         )
 
 
 def check_software_address_space() -> None:
     """Raise DermisError if the address space limit (ulimit -v) is too low to render in software."""
     if _address_space_limit() < math.inf:
-        _check_address_space(_bytes_for_threads(_SOFTWARE_RENDERING_BYTES))
+        _check_address_space(_bytes_for_software_threads(_SOFTWARE_RENDERING_BYTES))
 
 
 def available_memory() -> float:
@@ -206,8 +207,8 @@ def _has_loaded_drivers() -> bool:
         return False
 
 
-def _bytes_for_threads(fixed_and_per_thread: tuple[float, float]) -> float:
-    return fixed_and_per_thread[0] + fixed_and_per_thread[1] * _software_threads()
+def _bytes_for_software_threads(fixed_and_per_thread_bytes: tuple[float, float]) -> float:
+    return fixed_and_per_thread_bytes[0] + fixed_and_per_thread_bytes[1] * _software_threads()
 
 
 def _address_space_limit() -> float:

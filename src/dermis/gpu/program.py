@@ -112,10 +112,10 @@ class Program:
             self._accesses.add(key, bound, found)
         return found
 
-    def uniform_values(self, resources: Bindings, uniforms: Uniforms) -> tuple[Hashable, ...]:
-        """Return the bytes of the uniform records that the shader reads, as part of a pass's key.
+    def used_uniform_bytes(self, resources: Bindings, uniforms: Uniforms) -> tuple[Hashable, ...]:
+        """Return the bytes of uniform records that the shader reads; they are a part of the pass's key.
 
-        Large records are returned as a whole, because several passes can then share the hash of a record.
+        Large records are returned completely, because Python caches the hash of the bytes for other passes.
         """
         found: list[Hashable] = []
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time

@@ -51,8 +51,8 @@ class Recorder(ABC):
         stage : name of the stage, under which the pass is timed
         resources : resources and uniform records by their names in the shader
         workgroups : number of workgroups along each axis
-        in_place_resource : name of a resource of which the pass only completes the present content, such as a
-            map whose gutters it fills; the pass does not change the version of this resource
+        in_place_resource : name of a resource whose content the pass only completes, such as a map whose
+            gutters it fills; the pass does not change the version of this resource
         """
 
     def compute(

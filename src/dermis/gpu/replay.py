@@ -18,7 +18,7 @@ from dermis.gpu.memo import are_equal, dataclass_field_names, has_value_equality
 from dermis.gpu.program import ComputeProgram
 from dermis.gpu.recorder import Recorder, Workgroups
 from dermis.gpu.types import Bindings, Buffer, NativeObject
-from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
+from dermis.gpu.uniforms import UNIFORM_CHUNK_BYTES, Uniforms
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
@@ -44,7 +44,7 @@ class Recording(Recorder):
 
     @cached_property
     def access(self) -> Access:
-        """Return the resources that the recording reads and writes, except written scratch resources."""
+        """Return the resources that the recording reads, and the non-scratch resources that it writes."""
         writes = tuple(state for state in self._writes if not state.scratch)
         return Access(new_access_id(), tuple(self._reads), writes)
 
@@ -95,7 +95,7 @@ class Recording(Recorder):
 
 def _uniform_chunk(device: Device, chunks: list[Buffer], chunk_index: int) -> Buffer:
     if chunk_index == len(chunks):
-        chunks.append(device.make_uniform_buffer(CHUNK_BYTES))
+        chunks.append(device.make_uniform_buffer(UNIFORM_CHUNK_BYTES))
     return chunks[chunk_index]
 
 
@@ -135,7 +135,7 @@ class _WeakFields:
 
 
 def _weak_copy(argument: object) -> object:
-    """Return a copy of an argument, for later comparison, that keeps no resource alive.
+    """Return a copy of an argument for later comparison; the copy keeps no resource alive.
 
     Arrays are copied; objects that compare by identity, such as textures, become weak references.
     """

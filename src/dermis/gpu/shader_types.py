@@ -126,10 +126,10 @@ def used_member_selector(wgsl_text: str, variable_name: str) -> Callable[[bytes]
     return itemgetter(*_member_slices(struct_dtype(wgsl_text, struct), set(used)))
 
 
-def _member_slices(dtype: np.dtype[np.void], members: Set[str]) -> Iterator[slice]:
-    """Yield the byte range of each run of consecutive members of a struct that are in `members`."""
+def _member_slices(dtype: np.dtype[np.void], member_names: Set[str]) -> Iterator[slice]:
+    """Yield the byte range of each run of consecutive struct members that are in `member_names`."""
     fields = dict(dtype.fields or {})
-    for used, names in groupby(fields, members.__contains__):
+    for used, names in groupby(fields, member_names.__contains__):
         if used:
             extents = [(fields[name][1], fields[name][0].itemsize) for name in names]
             yield slice(extents[0][0], sum(extents[-1]))
@@ -144,13 +144,13 @@ def _parse_struct(struct_bodies: dict[str, str], struct_name: str) -> tuple[np.d
     end, align = 0, 4
     for member, kind in _MEMBER_PATTERN.findall(struct_bodies[struct_name]):
         base, member_align, size = _parse_member(struct_bodies, kind)
-        end = _round_up(end, member_align)
+        end = _round_up_to_alignment(end, member_align)
         names.append(member)
         formats.append(base)
         offsets.append(end)
         end += size
         align = max(align, member_align)
-    size = _round_up(end, align)
+    size = _round_up_to_alignment(end, align)
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size}), align
 
 
@@ -158,7 +158,7 @@ def _parse_member(struct_bodies: dict[str, str], wgsl_type: str) -> tuple[DTypeL
     if array := re.match(r"array<\s*(\w+)\s*,\s*(\d+)\s*>", wgsl_type):
         base, align, size = _parse_member(struct_bodies, array[1])
         count = int(array[2])
-        if _round_up(size, align) != np.dtype(base).itemsize:
+        if _round_up_to_alignment(size, align) != np.dtype(base).itemsize:
             raise DermisError(f"{wgsl_type}: expected array elements without padding between them.")
         return (base, (count,)), align, count * size
     if wgsl_type in _WGSL_TYPES:
@@ -168,8 +168,8 @@ def _parse_member(struct_bodies: dict[str, str], wgsl_type: str) -> tuple[DTypeL
     return dtype, align, dtype.itemsize
 
 
-def _round_up(value: int, step: int) -> int:
-    return -(-value // step) * step
+def _round_up_to_alignment(byte_count: int, alignment: int) -> int:
+    return -(-byte_count // alignment) * alignment
 
 
 def shader_bindings(wgsl_text: str) -> tuple[Binding, ...]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.gpu.device import Device
 from dermis.gpu.types import Buffer
 
-CHUNK_BYTES = 1 << 18
+UNIFORM_CHUNK_BYTES = 1 << 18
 _RECORD_ALIGNMENT_BYTES = 256  # WebGPU's default alignment of uniforms in a buffer
 
 
@@ -20,14 +20,14 @@ class Uniforms:
 
     Sharing is safe because the queue orders the writes of a frame after the submissions of earlier frames.
 
-    chunk : function from index to a buffer of CHUNK_BYTES; None for the shared buffers of the device
+    make_chunk : function from an index to a buffer of UNIFORM_CHUNK_BYTES; None for the device's buffers
     """
 
     def __init__(self, device: Device, make_chunk: Callable[[int], Buffer] | None = None) -> None:
         self._device = device
-        self._chunk = make_chunk or partial(device.uniform_chunk, chunk_bytes=CHUNK_BYTES)
+        self._chunk = make_chunk or partial(device.uniform_chunk, chunk_bytes=UNIFORM_CHUNK_BYTES)
         self._staged: list[bytearray] = []
-        self._end = CHUNK_BYTES
+        self._end = UNIFORM_CHUNK_BYTES
         # The record itself is kept so that its id stays unique.
         self._bytes: dict[int, tuple[bytes, NDArray[np.generic]]] = {}
         self._positions: dict[int, int] = {}
@@ -51,14 +51,14 @@ class Uniforms:
 
     def locate(self, uniform_position: int) -> tuple[Buffer, int]:
         """Return the buffer for a position in uniform memory, and the offset in this buffer [byte]."""
-        index, offset = divmod(uniform_position, CHUNK_BYTES)
+        index, offset = divmod(uniform_position, UNIFORM_CHUNK_BYTES)
         return self._chunk(index), offset
 
     def upload(self) -> None:
         """Write all placed records to their buffers before the next submission runs."""
         for index, staged in enumerate(self._staged):
             last = index == len(self._staged) - 1
-            self._device.write(self._chunk(index), staged, self._end if last else CHUNK_BYTES)
+            self._device.write(self._chunk(index), staged, self._end if last else UNIFORM_CHUNK_BYTES)
 
     def finish(self) -> None:
         """Forget all records after the last submission; keep their host memory for later frames."""
@@ -67,17 +67,17 @@ class Uniforms:
 
     def clear(self) -> None:
         """Forget all records."""
-        self._staged, self._end = [], CHUNK_BYTES
+        self._staged, self._end = [], UNIFORM_CHUNK_BYTES
         self._bytes.clear()
         self._positions.clear()
 
     def _add_record(self, record: bytes) -> int:
         size = len(record)
-        if self._end + size > CHUNK_BYTES:
+        if self._end + size > UNIFORM_CHUNK_BYTES:
             spare = self._device.spare_chunks
-            self._staged.append(spare.pop() if spare else bytearray(CHUNK_BYTES))
+            self._staged.append(spare.pop() if spare else bytearray(UNIFORM_CHUNK_BYTES))
             self._end = 0
         start = self._end
         self._staged[-1][start : start + size] = record
         self._end += -(-size // _RECORD_ALIGNMENT_BYTES) * _RECORD_ALIGNMENT_BYTES
-        return (len(self._staged) - 1) * CHUNK_BYTES + start
+        return (len(self._staged) - 1) * UNIFORM_CHUNK_BYTES + start

@@ -36,7 +36,7 @@ class ShaderListMember(NamedTuple):
 
     name : name in scene files; in shaders, {name} has underscores for hyphens and {NAME} is in capitals
     file : shader file to include; None for a member without a file
-    words : pairs of a further {word} in `//#each` lines and its replacement
+    words : pairs (word, replacement) for other {word}s in `//#each` lines
     """
 
     name: str
@@ -79,14 +79,14 @@ class ShaderSource:
     def locate(self, compiler_message: str) -> str:
         """Return a compiler message in which line numbers of the composed text are replaced by file:line."""
 
-        def replacement(match: re.Match[str]) -> str:
+        def file_and_line(match: re.Match[str]) -> str:
             line = int(match[1])
             if not 0 < line <= len(self.origin):
                 return match[0]
             file, number = self.origin[line - 1]
             return f"{file}:{number}:{match[2]}"
 
-        return _ERROR_LINE_PATTERN.sub(replacement, compiler_message)
+        return _ERROR_LINE_PATTERN.sub(file_and_line, compiler_message)
 
 
 def compose_shader(path: Path, folders: Sequence[Folder]) -> ShaderSource:
@@ -104,7 +104,7 @@ def compose_shader(path: Path, folders: Sequence[Folder]) -> ShaderSource:
     definitions = _Definitions(
         tuple(map(Path, folders)), tuple(lists.items()), tuple(numbers.items()), options
     )
-    return _cached_compose(path, definitions)
+    return _compose_with_definitions(path, definitions)
 
 
 class _Definitions(NamedTuple):
@@ -117,9 +117,9 @@ class _Definitions(NamedTuple):
 
 
 @cache
-def _cached_compose(path: Path, definitions: _Definitions) -> ShaderSource:
+def _compose_with_definitions(path: Path, definitions: _Definitions) -> ShaderSource:
     composer = _Composer(definitions)
-    composer.insert(path)
+    composer.insert_file(path)
     text, origin = zip(*composer.lines, strict=True) if composer.lines else ((), ())
     return ShaderSource("\n".join(text), origin)
 
@@ -136,7 +136,7 @@ class _Composer:
         self._included: set[Path] = set()
         self.lines: list[tuple[str, tuple[str, int]]] = []
 
-    def insert(self, path: Path) -> None:
+    def insert_file(self, path: Path) -> None:
         if path in self._included:
             return
         self._included.add(path)
@@ -150,11 +150,11 @@ class _Composer:
             elif directive is None:
                 self.lines.append((line, (path.name, number)))
             elif name := directive["file"]:
-                self.insert(self._find_file(name, path))
+                self.insert_file(self._find_file(name, path))
             elif name := directive["files"]:
                 for member in self._list_members(name, path):
                     if member.file is not None:
-                        self.insert(member.file)
+                        self.insert_file(member.file)
             else:
                 self.lines += [(text, (path.name, number)) for text in self._expand_lines(directive, path)]
 
@@ -207,11 +207,11 @@ def _member_words(member: ShaderListMember, member_number: int) -> dict[str, str
 
 
 def _substitute_words(text: str, words: Mapping[str, str], shader_file: Path) -> str:
-    def replacement(match: re.Match[str]) -> str:
+    def replacement_of_word(match: re.Match[str]) -> str:
         if match[1] not in words:
             raise DermisError(
                 f"{shader_file.name}: expected a word of {', '.join(words)}, but got {match[0]}."
             )
         return words[match[1]]
 
-    return _WORD_PATTERN.sub(replacement, text)
+    return _WORD_PATTERN.sub(replacement_of_word, text)

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human.makehuman import EXPRESSION_PREFIX, Points, model_data, target_deltas
+from dermis.human.makehuman import EXPRESSION_PREFIX, Points, makehuman_arrays, target_deltas
 from dermis.human.movement import expression_targets, gaze_rotations
 from dermis.human.skin.surface import average_surface, lid_rings
 from dermis.mesh.eyeball import SCLERA_MM, LidContact, build_eyeball, radial_distances_mm
 
 Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+BoolArray = NDArray[np.bool_]
 
 MAKEHUMAN_EYE_RADIUS_MM = 15.4
 """Mean radius of MakeHuman's eyeball of the average person, which MakeHuman's lids touch [mm]."""
@@ -54,7 +54,7 @@ Doubles = NDArray[np.float64]
 
 
 class EyeSocket(NamedTuple):
-    """Position and size of an eyeball of a person in MakeHuman's data.
+    """Position and size of one of a person's eyeballs, as MakeHuman models it.
 
     centre : (3,) centre of MakeHuman's eyeball [mm]
     size : radius relative to MakeHuman's eyeball of the average person [-]
@@ -81,13 +81,13 @@ class LidSide(NamedTuple):
     contact: Index
     clearances_mm: Points
 
-    def reindexed(self, point: Index) -> LidSide:
-        """Return a copy with indices into the array `point` instead of point indices.
+    def reindexed(self, sorted_points: Index) -> LidSide:
+        """Return a copy with indices into the array `sorted_points` instead of point indices.
 
-        point : sorted point indices, which include all points of the lids
+        sorted_points : sorted point indices, which include all points of the lids
         """
         names = "rings", "point", "contact"
-        return self._replace(**{name: np.searchsorted(point, getattr(self, name)) for name in names})
+        return self._replace(**{name: np.searchsorted(sorted_points, getattr(self, name)) for name in names})
 
 
 def fit_socket(eyeball_points: Points) -> EyeSocket:
@@ -117,7 +117,7 @@ def fit_lids(
 
 
 def _project_lids(
-    points: Points, lid_side: LidSide, socket: EyeSocket, is_closed: bool | Flags, gaze_axis: Points
+    points: Points, lid_side: LidSide, socket: EyeSocket, is_closed: bool | BoolArray, gaze_axis: Points
 ) -> None:
     """Move the lids of one eye onto its eyeball in place, for one person or for m poses of a person.
 
@@ -136,28 +136,34 @@ def _project_lids(
     points[..., lid_side.contact, :] = centre + size * relative * scale[..., None]
 
 
-def lid_contact(first_eye_point: int, eyeball_point_count: int, apex: int, back: int) -> LidContact:
+def lid_contact(
+    first_eye_point: int, eyeball_point_count: int, apex_point: int, back_point: int
+) -> LidContact:
     """Return the lid points that slide over the eyeballs, with minimum distances from the eyeballs.
 
     first_eye_point : index of the first point of the left eyeball
     eyeball_point_count : number of points of an eyeball; the right eyeball's points follow the left eyeball's
-    apex, back : indices of the front and rear poles within an eyeball's points
+    apex_point, back_point : indices of the front and rear poles within an eyeball's points
     """
     both = lid_sides()
     return LidContact(
         np.concatenate([side.contact for side in both]).astype(np.int32),
         np.repeat(np.arange(2, dtype=np.int32), [len(side.contact) for side in both]),
         np.concatenate([side.clearances_mm for side in both]).astype(np.float32),
-        np.array([first_eye_point + apex, first_eye_point + eyeball_point_count + apex], np.int32),
-        np.array([first_eye_point + back, first_eye_point + eyeball_point_count + back], np.int32),
+        np.array(
+            [first_eye_point + apex_point, first_eye_point + eyeball_point_count + apex_point], np.int32
+        ),
+        np.array(
+            [first_eye_point + back_point, first_eye_point + eyeball_point_count + back_point], np.int32
+        ),
         lid_rings()[..., _EDGE_COLUMN].astype(np.int32),
     )
 
 
-def _lid_displacements(rings: Points, socket: EyeSocket, lid_is_closed: bool | Flags) -> Points:
+def _lid_displacements(rings: Points, socket: EyeSocket, lid_is_closed: bool | BoolArray) -> Points:
     """Return the displacements (..., r, 3) that move MakeHuman's lids onto an anatomical eyeball [mm].
 
-    Seen from the front, only points near the outline of the eyeball move. The edges of the lids touch the
+    The x and y of open lids change only near the outline of the eyeball. The edges of the lids touch the
     eyeball, and the lids keep their thickness.
     """
     published = (rings - socket.centre) / socket.size
@@ -178,9 +184,9 @@ def _lid_displacements(rings: Points, socket: EyeSocket, lid_is_closed: bool | F
 
 
 def _close_upper_lid(rings: Points) -> None:
-    """Lower an upper lid in place until its crest is below the crest of the lower lid.
+    """Lower an upper lid in place until its margin overlaps the margin of the lower lid.
 
-    rings : (rows, 4, 3) lid points by row and column of lid_rings.csv, relative to the eye
+    rings : (rows, 4, 3) lid points by row and column of lid_rings.csv, relative to the centre of the eye
     """
     crest = rings[:, _CREST_COLUMN]
     lower = crest[_LOWER_LID_ROWS][np.argsort(crest[_LOWER_LID_ROWS, 0])]
@@ -189,9 +195,9 @@ def _close_upper_lid(rings: Points) -> None:
 
 
 def _compress_radius(axis_distance: Points) -> Points:
-    """Compress large distances of lid points from the viewing axis, so that the points stay on the eyeball.
+    """Limit distances of lid points from the viewing axis smoothly, so that the points stay on the eyeball.
 
-    axis_distance : distances from the axis divided by the radius of the eyeball [-]
+    axis_distance : original distances, divided by the radius of the eyeball [-]
     """
     room = _MAX_COMPRESSED_RADIUS - _MAX_UNCOMPRESSED_RADIUS
     compressed = _MAX_UNCOMPRESSED_RADIUS + room * np.tanh((axis_distance - _MAX_UNCOMPRESSED_RADIUS) / room)
@@ -202,7 +208,7 @@ def _compress_radius(axis_distance: Points) -> Points:
 def lid_sides() -> tuple[LidSide, LidSide]:
     """Return the lid points of the left and the right eye, which are the same for all people."""
     points_mm, (left, right) = average_surface()[0].astype(np.float64), lid_rings()
-    body = np.unique(model_data()["quads"][model_data()["group"] == 0]).astype(np.int64)
+    body = np.unique(makehuman_arrays()["quads"][makehuman_arrays()["group"] == 0]).astype(np.int64)
     return _lid_side(left, points_mm, body, "Left"), _lid_side(right, points_mm, body, "Right")
 
 
@@ -237,7 +243,7 @@ def _sliding_points(rings: Index, candidate_points: Index, side_name: str) -> In
     part = slice(*target_deltas().first[index : index + 2])
     is_far = np.linalg.norm(target_deltas().delta_mm[part], axis=1) > _MIN_BLINK_DISPLACEMENT_MM
     moving = np.intersect1d(target_deltas().point[part][is_far], candidate_points)
-    quads, skin = model_data()["quads"].astype(np.int64), rings[:, -1]
+    quads, skin = makehuman_arrays()["quads"].astype(np.int64), rings[:, -1]
     quads = quads[np.isin(quads, moving).any(axis=1) & ~np.isin(quads, rings[:, :-1]).any(axis=1)]
     for _ in range(_SLIDING_QUAD_ROWS):  # from the lids outwards
         skin = np.union1d(skin, quads[np.isin(quads, skin).any(axis=1)])
@@ -264,9 +270,9 @@ def fit_lid_targets(points_mm: Points, sockets: tuple[EyeSocket, EyeSocket]) -> 
 
 
 class _LidTargets(NamedTuple):
-    """Index tables of the t morph targets that move the lids; the tables are the same for all people.
+    """Arrays for the t morph targets that move the lids; they are the same for all people.
 
-    closed : (t,) whether each target closes the lids
+    closed : (t,) mask of the targets that close the lids
     axis : (t, 1, 3) viewing direction of the eyes when each target is active
     point : (n,) indices of the points around both eyes
     lid_sides : lid points of the left and of the right eye, as indices into `point`
@@ -275,7 +281,7 @@ class _LidTargets(NamedTuple):
     target, point_index : (m,) target of each of these displacements, and its point as an index into `point`
     """
 
-    closed: Flags
+    closed: BoolArray
     axis: Points
     point: Index
     lid_sides: tuple[LidSide, ...]
@@ -309,7 +315,7 @@ def _lid_targets() -> _LidTargets:
 
 @cache
 def gaze_axes() -> dict[str, Points]:
-    """Return a dictionary from gaze target to the viewing direction (3,) of the eye at full target weight."""
+    """Return a dictionary from the name of a gaze target to the eye's viewing direction (3,) at weight 1."""
     angles = {rotation.target: np.radians(rotation.degrees) for rotation in gaze_rotations()}
     axes = {}
     for name, (x, y, _) in angles.items():

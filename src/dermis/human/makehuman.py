@@ -28,8 +28,7 @@ class TargetDeltas(NamedTuple):
     """Displacements of all t morph targets of MakeHuman, concatenated.
 
     names : names of the targets, with their folders
-    first : (t + 1,) index in `point` and `delta_mm` at which each target starts, and m, the number of
-        displacements, at the end
+    first : (t + 1,) index of the first displacement of each target; the last element is m
     point, delta_mm : (m,) indices of the displaced points, and (m, 3) displacements at a weight of 1 [mm]
     """
 
@@ -39,21 +38,21 @@ class TargetDeltas(NamedTuple):
     delta_mm: NDArray[np.float32]
 
 
-def morphed_points_mm(weights: Mapping[str, float]) -> Points:
+def morphed_points_mm(target_weights: Mapping[str, float]) -> Points:
     """Return the points (n, 3) of a person's mesh, followed by the joints of the skeleton [mm].
 
     The origin is the midpoint between the eyes.
 
-    weights : mapping from names of MakeHuman's morph targets to weights
+    target_weights : mapping from names of MakeHuman's morph targets to weights
 
     Raises DermisError for unknown targets.
     """
-    arrays, targets = model_data(), target_deltas()
+    arrays, targets = makehuman_arrays(), target_deltas()
     points = [np.arange(len(arrays["positions_mm"]))]
     deltas: list[NDArray[np.floating]] = [arrays["positions_mm"].astype(np.float64)]
-    check_targets(weights)
+    check_targets(target_weights)
     known = _target_indices()
-    for name, weight in weights.items():
+    for name, weight in target_weights.items():
         part = slice(*targets.first[known[name] : known[name] + 2])
         points.append(targets.point[part])
         deltas.append(weight * targets.delta_mm[part])
@@ -100,7 +99,7 @@ def human_targets() -> tuple[str, ...]:
 
 
 @cache
-def model_data() -> Mapping[str, NDArray[Any]]:
+def makehuman_arrays() -> Mapping[str, NDArray[Any]]:
     """Return the arrays of data/human.npz by name: MakeHuman's mesh, morph targets and bones."""
     file = resources.files(__package__).joinpath("data", "human.npz")
     with resources.as_file(file) as path, np.load(path) as stored:
@@ -110,21 +109,21 @@ def model_data() -> Mapping[str, NDArray[Any]]:
 @cache
 def group_points(group_name: str) -> NDArray[np.int64]:
     """Return the sorted point indices of a mesh group, such as "helper-l-eye" for the left eyeball."""
-    arrays = model_data()
+    arrays = makehuman_arrays()
     group = list(map(str, arrays["group_names"])).index(group_name)
     return np.unique(arrays["quads"][arrays["group"] == group]).astype(np.int64)
 
 
 def mesh_point_count() -> int:
     """Return the number of mesh points, which precede the joints in the array of points."""
-    arrays = model_data()
+    arrays = makehuman_arrays()
     return len(arrays["positions_mm"]) - len(arrays["joint_names"])
 
 
 @cache
 def target_deltas() -> TargetDeltas:
     """Return the displacements of all morph targets of MakeHuman."""
-    arrays = model_data()
+    arrays = makehuman_arrays()
     delta = DELTA_UNIT_MM * arrays["target_delta"].astype(np.float32)
     first, point = (arrays[name].astype(np.int64) for name in ("target_first", "target_point"))
     return TargetDeltas(tuple(map(str, arrays["target_names"])), first, point, delta)

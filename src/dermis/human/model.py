@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dermis.human import lids, teeth
 from dermis.human.hair.root_finder import RootFinder, eye_centres
 from dermis.human.lids import fit_lid_targets
-from dermis.human.makehuman import Points, group_points, mesh_point_count, model_data, morphed_points_mm
+from dermis.human.makehuman import Points, group_points, makehuman_arrays, mesh_point_count, morphed_points_mm
 from dermis.human.movement import build_skeleton, expression_targets, gaze_rotations
 from dermis.mesh import eyeball
 from dermis.mesh.eye_look import EyeLook
@@ -42,7 +42,7 @@ MATERIAL_OF_GROUP = {
 }
 """Materials by group of quads."""
 _EQUAL_MACRO_WEIGHT = 1 / 6
-MEAN_WEIGHTS = {
+MEAN_PERSON_WEIGHTS = {
     f"macrodetails/{people}-{sex}-young": _EQUAL_MACRO_WEIGHT
     for people in ("african", "asian", "caucasian")
     for sex in ("female", "male")
@@ -65,15 +65,15 @@ class _LayoutFaces(NamedTuple):
     material: Index
 
 
-def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: EyeLook) -> Head:
+def build_head(target_weights: Mapping[str, float], maps: Maps, layout: Layout, eye_look: EyeLook) -> Head:
     """Return the bare head of a person before subdivision, without hair.
 
-    weights : mapping from names of MakeHuman's morph targets to weights
+    target_weights : mapping from names of MakeHuman's morph targets to weights
     maps : maps of the skin
     layout : uv layout
-    eyes : look of the eyes
+    eye_look : look of the eyes
     """
-    points_mm, faces = morphed_points_mm(weights), _layout_faces(layout)
+    points_mm, faces = morphed_points_mm(target_weights), _layout_faces(layout)
     sockets = _eye_sockets(points_mm)
     (left, left_centre), (right, right_centre) = map(lids.place_eyeball, sockets)
     points = np.concatenate([lids.fit_lids(points_mm, sockets)[: mesh_point_count()], left, right])
@@ -91,15 +91,15 @@ def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
     apex, back, _ = eyeball.axis_points()
     contact = lids.lid_contact(mesh_point_count(), len(left), apex, back)
     rig = Rig(points.astype(np.float32), targets, bones, bone_rotations=gaze_rotations(), contact=contact)
-    return Head("human", mesh, maps, MAKEHUMAN_CREDIT, rig, _build_eyes(eyes))
+    return Head("human", mesh, maps, MAKEHUMAN_CREDIT, rig, _build_eyes(eye_look))
 
 
-def control_points_mm(weights: Mapping[str, float]) -> NDArray[np.float32]:
+def control_points_mm(target_weights: Mapping[str, float]) -> NDArray[np.float32]:
     """Return the control points (p, 3) of a person in rest pose, relative to the midpoint of the eyes [mm].
 
-    weights : mapping from names of MakeHuman's morph targets to weights
+    target_weights : mapping from names of MakeHuman's morph targets to weights
     """
-    points_mm = morphed_points_mm(weights)
+    points_mm = morphed_points_mm(target_weights)
     sockets = _eye_sockets(points_mm)
     balls = [lids.place_eyeball(eye)[0] for eye in sockets]
     skin = lids.fit_lids(points_mm, sockets)[: mesh_point_count()]
@@ -112,12 +112,12 @@ def _eye_sockets(points_mm: Points) -> tuple[lids.EyeSocket, lids.EyeSocket]:
     return left, right
 
 
-def _build_eyes(look: EyeLook) -> Eyes:
+def _build_eyes(eye_look: EyeLook) -> Eyes:
     size = len(lids.eyeball_mesh()[0])
     first = mesh_point_count() + np.array([0, size], np.int32)
     apex, back, side = (np.asarray(first + point, np.int32) for point in eyeball.axis_points())
     material = np.array([list(MATERIAL_OF_GROUP).index(name) for name in (LEFT_EYE, RIGHT_EYE)], np.int32)
-    return Eyes(apex, back, side, material, look)
+    return Eyes(apex, back, side, material, eye_look)
 
 
 @cache
@@ -133,7 +133,7 @@ def _combined_quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
 
     The arrays are uv (u, 2), control point indices (q, 4), uv indices (q, 4) and material indices (q,).
     """
-    arrays = model_data()
+    arrays = makehuman_arrays()
     if layout == "own":
         uv, corner = arrays["uv"].astype(np.float64), arrays["quads_uv"].astype(np.int64)
     else:  # without the cut surface of the neck
@@ -178,18 +178,18 @@ class Template:
         rig = replace(control_head.control, stencils=self.head.control.stencils, template=self.head.control)
         mesh = control_head.mesh
         if self.refinement is not None:
-            mesh = self.refinement.mesh(mesh)
+            mesh = self.refinement.subdivided_mesh(mesh)
         return replace(control_head, mesh=mesh, rig=rig, levels=self.head.levels, template=self.head)
 
 
 @cache
 def template(layout: Layout, levels: int) -> Template:
     """Return the template for a uv layout and a number of subdivision levels; templates are cached."""
-    head = control_head = build_head(MEAN_WEIGHTS, Maps(), layout, EyeLook())
+    head = control_head = build_head(MEAN_PERSON_WEIGHTS, Maps(), layout, EyeLook())
     refined = refinement(control_head.mesh, levels) if levels else None
     if refined is not None:
         rig = replace(control_head.control, stencils=refined.stencils)
-        head = replace(control_head, mesh=refined.mesh(control_head.mesh), rig=rig, levels=levels)
+        head = replace(control_head, mesh=refined.subdivided_mesh(control_head.mesh), rig=rig, levels=levels)
     mean_mm = control_head.control.positions_mm.astype(np.float64)
     root_finder = RootFinder(control_head.mesh, mean_mm, eye_centres(control_head.mesh), head.mesh)
     return Template(head, root_finder, refined)

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human.makehuman import EXPRESSION_PREFIX, Points, model_data, target_deltas
+from dermis.human.makehuman import EXPRESSION_PREFIX, Points, makehuman_arrays, target_deltas
 from dermis.mesh.rig import BoneRotation, MorphTargets, Skeleton
 
 _BONE_ORIGINS: dict[str, tuple[str, str, float]] = {  # two joints, and the position between them, 0 to 1
@@ -53,16 +53,16 @@ def expression_targets() -> MorphTargets:
         if name.startswith(EXPRESSION_PREFIX):
             part = np.arange(*targets.first[index : index + 2])
             names.append(name.removeprefix(EXPRESSION_PREFIX))
-            rows.append(part[_moved_points()[targets.point[part]]])
+            rows.append(part[_blend_shape_point_mask()[targets.point[part]]])
     first, chosen = np.cumsum([0, *map(len, rows)]), np.concatenate(rows)
     point, delta_mm = targets.point[chosen].astype(np.int32), targets.delta_mm[chosen]
     return MorphTargets(tuple(names), first.astype(np.int32), point, delta_mm)
 
 
 @cache
-def _moved_points() -> NDArray[np.bool_]:
+def _blend_shape_point_mask() -> NDArray[np.bool_]:
     """Return a mask (n,) of MakeHuman's points that blend shapes may move: all but joints and eyeballs."""
-    arrays = model_data()
+    arrays = makehuman_arrays()
     balls = [index for index, name in enumerate(arrays["group_names"]) if str(name).endswith("-eye")]
     moved = np.ones(len(arrays["positions_mm"]), bool)
     moved[len(moved) - len(arrays["joint_names"]) :] = False
@@ -80,7 +80,7 @@ def build_skeleton(
     eyeball_point_count : number of points of an eyeball; the points of the left and then of the right eyeball
         come after all other points
     """
-    arrays = model_data()
+    arrays = makehuman_arrays()
     names = tuple(map(str, arrays["bone_names"]))
     joints = dict(zip(map(str, arrays["joint_names"]), joint_mm, strict=True))
     joints |= dict(zip(("l-eye", "r-eye"), eye_centres_mm, strict=True))
@@ -105,7 +105,7 @@ def _skin_weights(
 
     eye_bones : indices of the bones of the left and the right eye
     """
-    arrays = model_data()
+    arrays = makehuman_arrays()
     weights = arrays["weight"].astype(np.float32)
     eyeball_weights = np.zeros((2 * eyeball_point_count, weights.shape[1]), np.float32)
     eyeball_weights[:, 0] = 1.0

@@ -160,7 +160,7 @@ def _sample_ancestry(
     sampled_fractions: NDArray[np.float64],
     fixed_fields: Mapping[str, Any],
 ) -> tuple[NDArray[np.float64], dict[str, float]]:
-    """Return the ancestry fractions (3,) of the shape, and the weights of the measured groups for the skin.
+    """Return ancestry fractions (3,) for the shape of a person, and weights of measured groups for the skin.
 
     If the ancestry of the shape is fixed, the skin follows the shape. If only a skin ancestry or an ITA is
     fixed, the shape follows the skin. Otherwise some people of Caucasian shape have South Asian or Middle
@@ -191,15 +191,15 @@ def _sample_ancestry(
     return ancestry, groups
 
 
-def _pick_name(weight_of_name: Mapping[str, float], cumulative_chance: float) -> str:
-    """Return the name whose share of the cumulative weights contains a number from 0 to 1.
+def _pick_name(weight_of_name: Mapping[str, float], uniform_sample: float) -> str:
+    """Return a random name, with probabilities proportional to weights.
 
     weight_of_name : weight of each name
-    cumulative_chance : uniformly distributed number, 0 to 1
+    uniform_sample : uniformly distributed random number, 0 to 1, which selects the name
     """
     ends = np.cumsum(list(weight_of_name.values()))
     return list(weight_of_name)[
-        min(int(np.searchsorted(ends, cumulative_chance, "right")), len(weight_of_name) - 1)
+        min(int(np.searchsorted(ends, uniform_sample, "right")), len(weight_of_name) - 1)
     ]
 
 
@@ -226,7 +226,9 @@ def _sample_hair_and_skin(
 
 
 def _sample_hair_pigments(rng: np.random.Generator, ancestry: NDArray[np.float64]) -> tuple[float, float]:
-    """Return random eumelanin and pheomelanin of hair, which is nearly black without European ancestry.
+    """Return random amounts of eumelanin and pheomelanin in hair.
+
+    Hair of people without European ancestry is nearly black.
 
     ancestry : (3,) fractions of African, Asian and European ancestry
     """
@@ -293,7 +295,7 @@ def _opposite_targets() -> tuple[_OppositeTargets, ...]:
 
 @dataclass(frozen=True)
 class Human:
-    """Person of the parametric human: ancestry, sex, age, weight, muscle, and MakeHuman's morph targets.
+    """Person described by parameters: ancestry, sex, age, weight, muscle, and MakeHuman's morph targets.
 
     Parameters
     ----------
@@ -520,7 +522,7 @@ class Human:
 
     def weights(self) -> dict[str, float]:
         """Return the nonzero weights of MakeHuman's morph targets for this person, by target name."""
-        weights = {**self._ancestry_weights(), **self._build_weights()}
+        weights = {**self._ancestry_weights(), **self._physique_weights()}
         for name, weight in self.targets.items():
             weights[name] = weights.get(name, 0.0) + weight
         return {name: weight for name, weight in weights.items() if weight}
@@ -533,7 +535,7 @@ class Human:
             for kind, fraction in self._adult_fractions().items()
         }
 
-    def _build_weights(self) -> dict[str, float]:
+    def _physique_weights(self) -> dict[str, float]:
         """Return the weights of morph targets for body weight and muscle; average build needs no targets."""
         weights = {}
         for kind, fraction in self._adult_fractions().items():

@@ -87,18 +87,23 @@ def write_person_glb(
     head: Head,
     *,
     roughness: float,
-    weights: Mapping[str, float] | None = None,
+    expression_weights: Mapping[str, float] | None = None,
     eyes: EyeTextures | None = None,
 ) -> int:
     """Write a person's head as a .glb file, atomically, and return the file size [byte].
 
     roughness : Beckmann roughness m of skin without a roughness map [-]
-    weights : weights of the expression morph targets, stored as default weights in the file
+    expression_weights : weights of the expression morph targets, stored as default weights in the file
     eyes : colour and normal textures of the eyes; if None, the eyes are exported with one colour
     """
     notes = {"person": person_parameters(person)}
     data = encode_head(
-        head, roughness=roughness, weights=weights, slopes=relief_slopes(head), notes=notes, eyes=eyes
+        head,
+        roughness=roughness,
+        weights=expression_weights,
+        slopes=relief_slopes(head),
+        asset_extras=notes,
+        eyes=eyes,
     )
     with atomic_file(path) as temporary:
         temporary.write_bytes(data)

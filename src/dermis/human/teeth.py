@@ -34,7 +34,7 @@ def teeth_layout(upper: bool) -> tuple[NDArray[np.int64], Doubles]:
 
 
 def _arc_length(ellipse_angle: Doubles, half_width_mm: float, half_depth_mm: float) -> Doubles:
-    """Return the signed arc length (n,) of an ellipse from its vertex in the middle of the teeth [mm].
+    """Return the signed arc length (n,) along the elliptic dental arch from the middle of the teeth [mm].
 
     ellipse_angle : (n,) parameter of the ellipse [rad]
     half_width_mm, half_depth_mm : half axes of the ellipse, sideways and backwards [mm]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dermis.base.arrays import Bytes, Floats, Numbers
 from dermis.base.extras import import_extra
 from dermis.images.header import UnsupportedError
-from dermis.images.opening import PNG_SIGNATURE, open_picture, table_transform
+from dermis.images.opening import PNG_SIGNATURE, lookup_table_transform, open_picture
 from dermis.images.sizes import MAX_PIXELS, check_size
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def decode_with_pillow(file_bytes: bytes, convert_lookup_tables: bool = False) -
     picture = open_picture(file_bytes)
     if picture.format == "PNG":
         open_picture(file_bytes).verify()  # the checksums, which Pillow does not check when it decodes
-    to_srgb = table_transform(picture) if convert_lookup_tables or picture.mode == "CMYK" else None
+    to_srgb = lookup_table_transform(picture) if convert_lookup_tables or picture.mode == "CMYK" else None
     pixel_format = None if to_srgb else _ffmpeg_format_of_16_bit(file_bytes, picture)
     if pixel_format:
         image = decode_up_filtered_png(file_bytes)
@@ -127,14 +127,14 @@ def _decode_16_bit(file_bytes: bytes, pixel_format: str, picture: Image) -> NDAr
 
 
 def encode_png(pixel_levels: Numbers, zlib_level: int = 6, use_isal: bool = False) -> bytes:
-    """Encode a picture (H, W, 1, 3 or 4) of uint8 or uint16 as a PNG file.
+    """Encode a picture (H, W, C) of uint8 or uint16 with 1, 3 or 4 channels as a PNG file.
 
     zlib_level : compression level of zlib, from 1 (fast) to 9 (small files)
     use_isal : whether to compress with ISA-L, from the extra "batch", instead of zlib; for rendered pictures,
         ISA-L is four times as fast as zlib at level 1
 
     PNG's "up" filter is used: each row is stored as the difference from the row above. For rendered pictures,
-    the files are as small as with the best filter for each row, and encoding takes half of the time.
+    the files are as small as if the best filter were chosen for each row, and encoding is twice as fast.
     """
     height, width, channels = pixel_levels.shape
     bits = 8 * pixel_levels.itemsize
@@ -175,7 +175,8 @@ def png_size(file_bytes: bytes) -> tuple[int, int]:
 def decode_up_filtered_png(file_bytes: bytes) -> Bytes | NDArray[np.uint16] | None:
     """Decode a PNG file in which all rows use the "up" filter, as in files that `encode_png` writes.
 
-    The result is an array (H, W, 1, 3 or 4) of uint8 or uint16, or None for a file with other filters.
+    The result is an array (H, W, C) of uint8 or uint16 with 1, 3 or 4 channels, or None for a file with other
+    filters.
 
     Raises ValueError when the file is damaged or too large.
     """

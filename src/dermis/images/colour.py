@@ -17,47 +17,47 @@ _WHITE_XYZ = _XYZ_OF_REC709.sum(axis=1)
 _CIELAB_DELTA = 6.0 / 29.0  # constant delta of the CIELAB function
 
 
-def encode_srgb(linear: ArrayLike) -> NDArray[np.floating]:
+def encode_srgb(linear_values: ArrayLike) -> NDArray[np.floating]:
     """Convert linear values to sRGB by the exact piecewise curve, neither clipped nor rounded [-].
 
-    linear : any shape; float32 stays float32, all other types become float64
+    linear_values : any shape; float32 stays float32, all other types become float64
     """
-    value = _as_float(linear)
+    value = _as_float(linear_values)
     # The power branch is computed everywhere, so its argument is clamped where the linear branch is used.
     curve = 1.055 * np.maximum(value, 0.0031308) ** (1 / 2.4) - 0.055
     return np.asarray(np.where(value <= 0.0031308, 12.92 * value, curve))
 
 
-def decode_srgb(encoded: ArrayLike) -> NDArray[np.floating]:
+def decode_srgb(srgb_values: ArrayLike) -> NDArray[np.floating]:
     """Convert sRGB values to linear values by the exact piecewise curve, not clipped [-].
 
-    encoded : any shape; float32 stays float32, all other types become float64
+    srgb_values : any shape; float32 stays float32, all other types become float64
     """
-    value = _as_float(encoded)
+    value = _as_float(srgb_values)
     curve = ((np.maximum(value, 0.04045) + 0.055) / 1.055) ** 2.4
     return np.asarray(np.where(value <= 0.04045, value / 12.92, curve))
 
 
-def encode_srgb8(linear: ArrayLike) -> Bytes:
+def encode_srgb8(linear_values: ArrayLike) -> Bytes:
     """Convert linear values to 8-bit sRGB levels, rounded to nearest.
 
-    linear : any shape; clipped to [0, 1], NaN becomes 0
+    linear_values : any shape; clipped to [0, 1], NaN becomes 0
     """
-    value = np.clip(np.nan_to_num(_as_float(linear), nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
+    value = np.clip(np.nan_to_num(_as_float(linear_values), nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
     return np.asarray(np.rint(encode_srgb(value) * 255.0).astype(np.uint8))
 
 
-def decode_srgb_levels(levels: Bytes | NDArray[np.uint16]) -> Floats:
+def decode_srgb_levels(srgb_levels: Bytes | NDArray[np.uint16]) -> Floats:
     """Convert 8- or 16-bit sRGB levels of any shape to linear values from 0 to 1, by table lookup."""
-    return _linear_by_level(np.iinfo(levels.dtype).max + 1)[levels]
+    return _linear_by_level(np.iinfo(srgb_levels.dtype).max + 1)[srgb_levels]
 
 
-def luminance(linear: ArrayLike) -> NDArray[np.floating]:
+def luminance(linear_colours: ArrayLike) -> NDArray[np.floating]:
     """Return the relative luminance Y (...) of linear Rec. 709 colours [-].
 
-    linear : (..., 3) or, with alpha, which is ignored, (..., 4)
+    linear_colours : (..., 3) or, with alpha, which is ignored, (..., 4)
     """
-    colour = _as_float(linear)[..., :3]
+    colour = _as_float(linear_colours)[..., :3]
     return colour @ np.asarray(REC709_LUMINANCE, colour.dtype)
 
 
@@ -73,9 +73,9 @@ def _as_float(numbers: ArrayLike) -> NDArray[np.floating]:
     return array if array.dtype == np.float32 else array.astype(np.float64)
 
 
-def lab(linear: ArrayLike) -> Doubles:
+def lab(linear_colours: ArrayLike) -> Doubles:
     """Convert linear Rec. 709 colours (..., 3) to CIE L*a*b* (..., 3) with the white point D65."""
-    t = np.asarray(linear, np.float64) @ _XYZ_OF_REC709.T / _WHITE_XYZ
+    t = np.asarray(linear_colours, np.float64) @ _XYZ_OF_REC709.T / _WHITE_XYZ
     f = np.where(t > _CIELAB_DELTA**3, np.cbrt(t), t / (3.0 * _CIELAB_DELTA**2) + 4.0 / 29.0)
     X, Y, Z = np.moveaxis(f, -1, 0)
     return np.stack([116.0 * Y - 16.0, 500.0 * (X - Y), 200.0 * (Y - Z)], axis=-1)

@@ -55,11 +55,13 @@ class ColourSpace:
 
     @property
     def is_default(self) -> bool:
-        """Return whether pixels are sRGB levels, or floats of linear Rec. 709."""
+        """Return whether integer pixels are sRGB, and float pixels are linear Rec. 709."""
         return self.to_rec709 is None and self.curves is None
 
-    def linear(self, pixels: Numbers) -> Floats:
-        """Convert pixels (..., 1, 3 or 4) to linear Rec. 709 (..., 3); grey is repeated, alpha is dropped.
+    def to_linear(self, pixels: Numbers) -> Floats:
+        """Convert pixels (..., C) with 1, 3 or 4 channels to linear Rec. 709 (..., 3).
+
+        Grey is repeated in all channels; alpha is dropped.
 
         If the primaries are converted, results below 0 are clipped; for integer pixels, results above 1 are
         clipped too.
@@ -83,27 +85,29 @@ SRGB = ColourSpace()
 
 def adobe_rgb() -> ColourSpace:
     """Return Adobe RGB (1998), which cameras may declare in EXIF without embedding an ICC profile."""
-    return _simplified_space(
+    return _simplified_colour_space(
         "Adobe RGB", _matrix_to_rec709(_PRIMARIES["Adobe RGB"]), _CURVE_SAMPLE_LEVELS**_ADOBE_GAMMA
     )
 
 
-def coded_space(primaries: int, transfer: int) -> ColourSpace | None:
+def coded_colour_space(primaries_code: int, transfer_code: int) -> ColourSpace | None:
     """Return the colour space for ITU-T H.273 code points, as in AVIF, HEIC and PNG; None for unknown codes.
 
-    primaries, transfer : code points of the primaries and of the transfer function
+    primaries_code, transfer_code : code points of the primaries and of the transfer function
 
     Raises ValueError for the transfer functions of HDR displays.
     """
-    if transfer in _HDR_CURVES:
-        raise ValueError(f"its levels are coded for HDR displays ({_HDR_CURVES[transfer]})")
-    if primaries not in _CODED_PRIMARIES or transfer not in _CODED_GAMMAS:
+    if transfer_code in _HDR_CURVES:
+        raise ValueError(f"its levels are coded for HDR displays ({_HDR_CURVES[transfer_code]})")
+    if primaries_code not in _CODED_PRIMARIES or transfer_code not in _CODED_GAMMAS:
         return None
-    name, gamma = _CODED_PRIMARIES[primaries], _CODED_GAMMAS[transfer]
-    return gamma_space(name, gamma, _PRIMARIES[name])
+    name, gamma = _CODED_PRIMARIES[primaries_code], _CODED_GAMMAS[transfer_code]
+    return gamma_colour_space(name, gamma, _PRIMARIES[name])
 
 
-def gamma_space(space_name: str, gamma: float | None, primaries: Sequence[float] | None) -> ColourSpace:
+def gamma_colour_space(
+    space_name: str, gamma: float | None, primaries: Sequence[float] | None
+) -> ColourSpace:
     """Return the colour space with the given gamma and primaries.
 
     gamma : exponent that converts levels to linear values; None for the curve of sRGB
@@ -112,7 +116,9 @@ def gamma_space(space_name: str, gamma: float | None, primaries: Sequence[float]
     Raises ValueError for primaries that are invalid or lie on one line.
     """
     matrix = np.eye(3) if primaries is None else _matrix_to_rec709(primaries)
-    return _simplified_space(space_name, matrix, None if gamma is None else _CURVE_SAMPLE_LEVELS**gamma)
+    return _simplified_colour_space(
+        space_name, matrix, None if gamma is None else _CURVE_SAMPLE_LEVELS**gamma
+    )
 
 
 def profile_name(icc_profile: bytes) -> str:
@@ -126,10 +132,10 @@ def profile_name(icc_profile: bytes) -> str:
     return shorten("".join(one for one in name.strip() if one.isprintable()), _MAX_PROFILE_NAME_LENGTH)
 
 
-def profile_space(icc_profile: bytes) -> ColourSpace | None:
+def profile_colour_space(icc_profile: bytes) -> ColourSpace | None:
     """Return the colour space of an ICC profile; None if the profile has lookup tables or no curves.
 
-    `ColourSpace.linear` converts colours at the full bit depth of a picture, whereas LittleCMS in Pillow
+    `ColourSpace.to_linear` converts colours at the full bit depth of a picture, whereas LittleCMS in Pillow
     supports only 8 bits.
 
     Raises ValueError, ArithmeticError and struct.error for a damaged profile.
@@ -141,14 +147,14 @@ def profile_space(icc_profile: bytes) -> ColourSpace | None:
     if b"A2B0" in tags or {b"RGB ": b"rTRC", b"GRAY": b"kTRC"}.get(kind, b"") not in tags:
         return None
     if kind == b"GRAY":
-        return _simplified_space(profile_name(icc_profile), np.eye(3), _profile_curve(tags[b"kTRC"]))
+        return _simplified_colour_space(profile_name(icc_profile), np.eye(3), _profile_curve(tags[b"kTRC"]))
     columns = [_fixed_point_numbers(tags[b"%cXYZ" % one], 3) for one in channels]
     curves = [_profile_curve(tags[b"%cTRC" % one]) for one in channels]
     to_rec709 = np.linalg.inv(_matrix_to_xyz(_PRIMARIES["Rec. 709"])) @ np.array(columns).T
-    return _simplified_space(profile_name(icc_profile), to_rec709, np.array(curves))
+    return _simplified_colour_space(profile_name(icc_profile), to_rec709, np.array(curves))
 
 
-def _simplified_space(space_name: str, to_rec709: Doubles, curves: Doubles | None) -> ColourSpace:
+def _simplified_colour_space(space_name: str, to_rec709: Doubles, curves: Doubles | None) -> ColourSpace:
     """Return a colour space, with None in place of a matrix or curves that are equal to those of sRGB.
 
     to_rec709 : see `ColourSpace`

@@ -41,20 +41,22 @@ class ExrLayer:
     channels: tuple[str, ...]
 
 
-def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, str | None]:
+def choose_layer(channels_of_parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, str | None]:
     """Choose the layer to read from an OpenEXR file; also return a note if several layers have colours.
 
     Layers with colours are preferred to grey layers. Among layers with colours, a layer without a name is
     preferred; the second choice is a layer whose name means the whole picture, such as "beauty".
 
-    parts : name and channels of each part
+    channels_of_parts : name and channels of each part
 
     A file with a single channel of any name is read as grey.
 
     Raises UnsupportedError if the file has several channels and no layer of colours or grey.
     """
     found = [
-        layer for index, part in enumerate(parts) for layer in _picture_layers(index, *part, len(parts) > 1)
+        layer
+        for index, part in enumerate(channels_of_parts)
+        for layer in _picture_layers(index, *part, len(channels_of_parts) > 1)
     ]
     if found:
         chosen = min(found, key=_layer_preference)
@@ -63,7 +65,7 @@ def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, 
             return chosen, None
         listed = ", ".join(colours[:_MAX_LISTED_LAYERS]) + ", ..." * (len(colours) > _MAX_LISTED_LAYERS)
         return chosen, f"of its layers, {listed}, only {_display_name(chosen.name)} is read"
-    names = [name for _, channels in parts for name in channels]
+    names = [name for _, channels in channels_of_parts for name in channels]
     if len(names) == 1:
         return ExrLayer(0, "", (names[0],)), None
     listed = ", ".join(map(_display_name, names[:20]))
@@ -71,7 +73,7 @@ def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, 
 
 
 def _picture_layers(
-    part_index: int, part_name: str, channels: Sequence[str], several_parts: bool
+    part_index: int, part_name: str, channels: Sequence[str], has_several_parts: bool
 ) -> Iterator[ExrLayer]:
     """Yield the layers of a part that can be read as a picture.
 
@@ -80,7 +82,7 @@ def _picture_layers(
 
     part_index, part_name : index and name of the part
     channels : names of the channels of the part
-    several_parts : whether the file has several parts; layer names then begin with the name of the part
+    has_several_parts : whether the file has several parts; layer names then begin with the name of the part
     """
     groups: dict[str, dict[str, str]] = {}
     for channel in channels:
@@ -92,7 +94,7 @@ def _picture_layers(
         if names == "Y" and {"RY", "BY"} & letters.keys():
             raise UnsupportedError("its colours are stored as luminance and chroma (Y, RY, BY)")
         if names and not is_vector:
-            title = ".".join(filter(None, (part_name if several_parts else "", layer)))
+            title = ".".join(filter(None, (part_name if has_several_parts else "", layer)))
             yield ExrLayer(part_index, title, tuple(letters[name] for name in names))
 
 

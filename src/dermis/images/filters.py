@@ -39,14 +39,14 @@ def _halve_axis(image: Floats, axis: int) -> Floats:
     return np.ascontiguousarray(np.moveaxis(halved, 0, axis), np.float32)
 
 
-def smooth_quantisation(height: NDArray[np.floating]) -> Floats:
+def smooth_quantisation(height_map: NDArray[np.floating]) -> Floats:
     """Smooth a height map to remove the steps of 8-bit quantisation, which would look like contour lines.
 
     The filter is binomial over seven texels along each axis, with a standard deviation of 1.2 texels.
 
-    height : (H, W) heights in any unit
+    height_map : (H, W) heights in any unit
     """
-    plain = np.asarray(height, np.float32)
+    plain = np.asarray(height_map, np.float32)
     padded, smooth = np.pad(plain, 3, "edge"), np.empty_like(plain)
     for top in range(0, len(plain), _ROWS_PER_STRIP):
         rows = padded[top : top + _ROWS_PER_STRIP + 6]

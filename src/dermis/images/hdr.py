@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dermis.base.arrays import Bytes, Doubles, Floats, Index
 from dermis.base.errors import shorten
 from dermis.base.file_properties import drawn, drawn_with_note, markdown_code, no_effect, noted, refused
-from dermis.images.colour_spaces import SRGB, ColourSpace, gamma_space
+from dermis.images.colour_spaces import SRGB, ColourSpace, gamma_colour_space
 from dermis.images.exr_layers import ExrLayer, choose_layer
 from dermis.images.header import PictureHeader, UnsupportedError
 from dermis.images.sizes import MAX_PIXELS, TooLargeError, check_size
@@ -80,7 +80,7 @@ _ENCODED_BYTES_BY_RUN_CODE = [k + 1 if k <= _MAX_LITERAL_RUN else 2 for k in ran
 
 
 def decode_exr(file_bytes: bytes) -> Floats:
-    """Decode the picture in an OpenEXR file to an array (H, W, 1, 3 or 4).
+    """Decode the picture in an OpenEXR file to an array (H, W, C) with 1, 3 or 4 channels.
 
     Pixels outside the data window are 0.
 
@@ -131,7 +131,7 @@ def _exr_colour_space(header: Any) -> tuple[ColourSpace, str | None]:
                 SRGB,
                 f"its colour space, {shown}, is unknown, and its colours are taken as linear Rec. 709",
             )
-    space = gamma_space("", None, primaries)
+    space = gamma_colour_space("", None, primaries)
     return space, None if space.is_default else "its colours are converted from its primaries to Rec. 709"
 
 
@@ -199,7 +199,9 @@ def _window_size(exr_window: Any) -> tuple[int, int]:
 
 
 def encode_exr(picture: NDArray[np.floating]) -> bytes:
-    """Encode a picture (H, W, 1 or 3) of float16 or float32 as an OpenEXR file with channels Y or R, G, B.
+    """Encode a picture (H, W, C) of float16 or float32 as an OpenEXR file.
+
+    A picture with one channel is stored as Y, a picture with three channels as R, G and B.
 
     The compression is run-length encoding. For noisy pictures, other methods are slower, and the files are
     no smaller.
@@ -221,8 +223,8 @@ class _RadianceHeader:
     axes : direction in which scanlines follow each other, and direction of the pixels of a scanline, such as
         "-Y" and "+X"
     lengths : number of scanlines, and number of pixels per scanline
-    values : dictionary from the name of a variable, such as EXPOSURE, to its number; the numbers of a
-        variable on several lines are multiplied
+    values : dictionary from the name of a variable, such as EXPOSURE, to its numbers; if several lines state
+        a variable, their numbers are multiplied
     is_xyz : whether the colours are CIE XYZ
     offset : byte at which the pixels start
     """
@@ -268,7 +270,7 @@ def radiance_header(file_bytes: bytes) -> PictureHeader:
     rows_first = "Y" in header.axes[0]
     size = header.lengths[::-1] if rows_first else header.lengths
     primaries = _XYZ_PRIMARIES if header.is_xyz else header.values["PRIMARIES"]
-    space = gamma_space("", None, [float(one) for one in primaries]) if np.any(primaries) else SRGB
+    space = gamma_colour_space("", None, [float(one) for one in primaries]) if np.any(primaries) else SRGB
     notes = [
         f"its {name} of {float(header.values[name][0]):g} is not used"
         for name in _UNUSED_RADIANCE_HEADER_NAMES

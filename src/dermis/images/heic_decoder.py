@@ -15,7 +15,7 @@ def decode(request: Arrays) -> Arrays:
     """Return the size, ICC profile, properties and pixels of a HEIC picture.
 
     The properties are the bits per channel in the file, whether the picture was turned upright, and whether
-    the file has more pictures. The pixels of a picture that is too large are left out.
+    the file contains further pictures. The pixels of a picture that is too large are left out.
 
     request : arrays with the bytes of the file as "data"
     """

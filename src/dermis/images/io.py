@@ -95,39 +95,46 @@ def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
     Raises DermisError when the file is missing, not a picture, truncated, or has unsupported pixels.
     """
     data = read_bytes(path)
-    _issue_note(path, _read_header(path, data), read_as_colours=False, upright=False)
+    _issue_note(path, _read_header(path, data), read_as_colours=False, apply_exif_orientation=False)
     return _decode_pixels(path, data, convert_lookup_tables=False)
 
 
-def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> tuple[Pixels, ColourSpace]:
+def read_colours(
+    path: str | Path | EmbeddedPicture, apply_exif_orientation: bool = False
+) -> tuple[Pixels, ColourSpace]:
     """Return the stored pixels (H, W, C) of a colour picture, see `read_image`, and their colour space.
 
     The colour space is given by the file's profile or primaries; pictures of glTF files are sRGB or linear
     Rec. 709, as glTF requires.
 
-    upright : whether to rotate the picture by its EXIF orientation, as for photographs
+    apply_exif_orientation : whether to rotate the picture by its EXIF orientation, as for photographs
 
     Raises DermisError as `read_image` does.
     """
     data, embedded = read_bytes(path), isinstance(path, EmbeddedPicture)
     header = _read_header(path, data)
-    _issue_note(path, header, read_as_colours=True, upright=upright)
+    _issue_note(path, header, read_as_colours=True, apply_exif_orientation=apply_exif_orientation)
     image = _decode_pixels(path, data, convert_lookup_tables=not embedded)
     return _apply_orientation(
-        image, header.orientation if upright else 1
+        image, header.orientation if apply_exif_orientation else 1
     ), SRGB if embedded else header.colour_space
 
 
 def note_properties(path: str | Path | EmbeddedPicture, read_as_colours: bool) -> None:
-    """Issue the note that reading a picture would issue, for a picture that is taken from a cache instead.
+    """Issue the note on a picture's properties that reading the picture would issue.
 
-    read_as_colours : whether the note is that of `read_colours`; otherwise, that of `read_image`
+    This function serves for pictures that are taken from a cache instead.
+
+    read_as_colours : whether to issue the note of `read_colours` instead of that of `read_image`
     """
-    _issue_note(path, _read_header(path, read_bytes(path)), read_as_colours, upright=False)
+    _issue_note(path, _read_header(path, read_bytes(path)), read_as_colours, apply_exif_orientation=False)
 
 
 def _issue_note(
-    path: str | Path | EmbeddedPicture, header: PictureHeader, read_as_colours: bool, upright: bool
+    path: str | Path | EmbeddedPicture,
+    header: PictureHeader,
+    read_as_colours: bool,
+    apply_exif_orientation: bool,
 ) -> None:
     notes = [*header.notes, *["it is grey, without colours"] * (read_as_colours and header.is_grey)]
     if read_as_colours and header.colour_note:
@@ -135,7 +142,9 @@ def _issue_note(
         notes.append("its colour profile is not used, as glTF demands" if embedded else header.colour_note)
     if header.orientation != 1:
         turned = "it is turned upright as its EXIF says"
-        notes.append(turned if upright else "it is not turned as its EXIF says, as usual for textures")
+        notes.append(
+            turned if apply_exif_orientation else "it is not turned as its EXIF says, as usual for textures"
+        )
     if notes:
         notify(f"{path}: {'; '.join(notes)}")
 
@@ -203,20 +212,20 @@ def _apply_format_function(
     file_bytes: bytes,
     exr_function: Callable[[bytes], T],
     radiance_function: Callable[[bytes], T],
-    other_function: Callable[[bytes], T],
+    default_function: Callable[[bytes], T],
 ) -> T:
-    """Call one of three functions with the bytes of a picture file, and return its result.
+    """Call the function for the format of a picture file with the bytes of the file; return its result.
 
-    The format of the file, recognised by the first bytes, determines which function is called.
+    The format is recognised by the first bytes of the file.
 
     file_bytes : bytes of the file
     exr_function : function for OpenEXR files
     radiance_function : function for Radiance .hdr files
-    other_function : function for all other formats
+    default_function : function for all other formats
 
     Raises DermisError if the format is unknown, or if the function fails.
     """
-    codec = other_function if picture_format(file_bytes) else None
+    codec = default_function if picture_format(file_bytes) else None
     for start, other in ((EXR_SIGNATURE, exr_function), (RADIANCE_SIGNATURE, radiance_function)):
         codec = other if file_bytes.startswith(start) else codec
     is_inside = isinstance(path, EmbeddedPicture) and isinstance(path.data, bytes)
@@ -317,46 +326,50 @@ def write_png(path: str | Path, pixel_levels: Numbers, zlib_level: int = 6) -> N
         temporary.write_bytes(data)
 
 
-def write_exr(path: str | Path, linear: NDArray[np.floating], run_length: bool = False) -> None:
+def write_exr(
+    path: str | Path, linear_picture: NDArray[np.floating], use_run_length_encoding: bool = False
+) -> None:
     """Write a float32 OpenEXR file with lossless compression.
 
-    linear : (H, W, 3) or (H, W, 4), linear Rec. 709, stored as channels R, G, B (and A)
-    run_length : use run-length encoding instead of ZIP: twice as fast, but files of a rendered head are 4 %
-        larger
+    linear_picture : (H, W, 3) or (H, W, 4), linear Rec. 709, stored as channels R, G, B (and A)
+    use_run_length_encoding : whether to use run-length encoding instead of ZIP, which is twice as fast; files
+        of a rendered head are then 4 % larger
     """
     import OpenEXR
 
-    if linear.ndim != 3 or linear.shape[2] not in (3, 4):
-        refuse(path, "pixels (H, W, 3 or 4)", f"they have shape {linear.shape}", "Stack them first")
-    channels = {"RGB" if linear.shape[2] == 3 else "RGBA": np.ascontiguousarray(linear, np.float32)}
+    if linear_picture.ndim != 3 or linear_picture.shape[2] not in (3, 4):
+        refuse(path, "pixels (H, W, 3 or 4)", f"they have shape {linear_picture.shape}", "Stack them first")
+    channels = {
+        "RGB" if linear_picture.shape[2] == 3 else "RGBA": np.ascontiguousarray(linear_picture, np.float32)
+    }
     with atomic_write.atomic_file(path) as temporary:
-        OpenEXR.File(_exr_header(run_length), channels).write(str(temporary))
+        OpenEXR.File(_exr_header(use_run_length_encoding), channels).write(str(temporary))
 
 
 def encode_exr_parts(
-    channels_of_parts: Mapping[str, Mapping[str, Numbers]], run_length: bool = False
+    channels_of_parts: Mapping[str, Mapping[str, Numbers]], use_run_length_encoding: bool = False
 ) -> bytes:
     """Encode several pictures as the parts of one float32 OpenEXR file with lossless compression.
 
     channels_of_parts : dictionary from the name of a part to a dictionary from the name of a channel to an
         array (H, W); most programs show only the first part
-    run_length : use run-length encoding instead of ZIP, see `write_exr`
+    use_run_length_encoding : whether to use run-length encoding instead of ZIP, see `write_exr`
     """
     import OpenEXR
 
     exr_parts = []
     for name, channels in channels_of_parts.items():
         floats = {key: np.ascontiguousarray(values, np.float32) for key, values in channels.items()}
-        exr_parts.append(OpenEXR.Part(_exr_header(run_length), floats, name))
+        exr_parts.append(OpenEXR.Part(_exr_header(use_run_length_encoding), floats, name))
     file = io.BytesIO()
     OpenEXR.File(exr_parts).write(file)
     return file.getvalue()
 
 
-def _exr_header(run_length: bool) -> dict[str, Any]:
+def _exr_header(use_run_length_encoding: bool) -> dict[str, Any]:
     import OpenEXR
 
-    compression = OpenEXR.RLE_COMPRESSION if run_length else OpenEXR.ZIP_COMPRESSION
+    compression = OpenEXR.RLE_COMPRESSION if use_run_length_encoding else OpenEXR.ZIP_COMPRESSION
     return {"compression": compression, "type": OpenEXR.scanlineimage}
 
 

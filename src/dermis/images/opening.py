@@ -21,10 +21,10 @@ from dermis.images.colour_spaces import (
     SRGB,
     ColourSpace,
     adobe_rgb,
-    coded_space,
-    gamma_space,
+    coded_colour_space,
+    gamma_colour_space,
+    profile_colour_space,
     profile_name,
-    profile_space,
 )
 from dermis.images.header import PictureHeader, UnsupportedError
 from dermis.images.sizes import check_size
@@ -179,7 +179,7 @@ def pillow_header(file_bytes: bytes) -> PictureHeader:
     return PictureHeader((picture.width, picture.height), space, orientation, notes, colour_note, is_grey)
 
 
-def table_transform(picture: Image) -> ImageCmsTransform | None:
+def lookup_table_transform(picture: Image) -> ImageCmsTransform | None:
     """Return the conversion of a picture to 8-bit sRGB if its ICC profile has lookup tables, else None.
 
     CMYK files and files of some scanners have profiles with lookup tables. The rendering intent is relative
@@ -205,7 +205,7 @@ def table_transform(picture: Image) -> ImageCmsTransform | None:
 
 def _has_curves(icc_profile: bytes) -> bool:
     try:
-        return profile_space(icc_profile) is not None
+        return profile_colour_space(icc_profile) is not None
     except (ValueError, *MALFORMED_DATA_ERRORS):
         return False
 
@@ -226,15 +226,15 @@ def _colour_space(file_bytes: bytes, picture: Image, exif: Exif) -> tuple[Colour
     icc = picture.info.get("icc_profile")
     coded = _colour_code_points(file_bytes, picture)
     if icc and not (coded and picture.format == "PNG"):
-        return _profiled_space(picture, icc)
+        return _colour_space_of_profile(picture, icc)
     if coded:
-        space = coded_space(*coded)
+        space = coded_colour_space(*coded)
         if space is None:
             return SRGB, f"its colour code points {coded} are unknown, and its colours are taken as sRGB"
     elif _is_adobe_rgb(exif):
         space = adobe_rgb()
     else:
-        space = _png_space(picture)
+        space = _png_colour_space(picture)
     return space, None if space.is_default else _conversion_note(space.name)
 
 
@@ -242,7 +242,7 @@ def _conversion_note(space_name: str) -> str:
     return f"its colours are converted from {space_name} to sRGB"
 
 
-def _profiled_space(picture: Image, icc_profile: bytes) -> tuple[ColourSpace, str | None]:
+def _colour_space_of_profile(picture: Image, icc_profile: bytes) -> tuple[ColourSpace, str | None]:
     """Return the colour space of the decoded pixels of a picture with an ICC profile.
 
     The second result is a note for the user if colours are converted or the profile is not used, else None.
@@ -250,10 +250,10 @@ def _profiled_space(picture: Image, icc_profile: bytes) -> tuple[ColourSpace, st
     name = profile_name(icc_profile) or "a profile without a name"
     is_grey = picture.mode in _PILLOW_GREY_MODES
     try:
-        space = profile_space(icc_profile)
+        space = profile_colour_space(icc_profile)
     except (ValueError, *MALFORMED_DATA_ERRORS):
         return SRGB, "its colour profile is damaged, and its colours are taken as sRGB"
-    if space is None and table_transform(picture):
+    if space is None and lookup_table_transform(picture):
         is_cmyk = picture.mode == "CMYK"  # noted at the conversion
         return SRGB, None if is_cmyk else f"{_conversion_note(name)}, at 8 bits a channel"
     if space is None or picture.mode in ("CMYK", "F") or (icc_profile[16:20] == b"GRAY" and not is_grey):
@@ -286,7 +286,7 @@ def _is_adobe_rgb(exif: Exif) -> bool:
         return False
 
 
-def _png_space(picture: Image) -> ColourSpace:
+def _png_colour_space(picture: Image) -> ColourSpace:
     """Return the colour space that a PNG file declares by its gamma and chromaticities.
 
     Returns sRGB for PNG files without gamma, and for other formats.
@@ -296,13 +296,15 @@ def _png_space(picture: Image) -> ColourSpace:
         return SRGB
     is_srgb = abs(gamma - _SRGB_GAMMA) < _GAMMA_TOLERANCE
     primaries = (*corners[2:], *corners[:2]) if corners else None
-    return gamma_space(f"gamma {gamma:.3g}", None if is_srgb else 1.0 / gamma, primaries)
+    return gamma_colour_space(f"gamma {gamma:.3g}", None if is_srgb else 1.0 / gamma, primaries)
 
 
 def _header_notes(file_bytes: bytes, picture: Image) -> Iterator[str]:
     """Yield notes for the user about properties of a picture that are converted or not used."""
     if picture.mode == "CMYK":
-        profile = profile_name(picture.info.get("icc_profile", b"")) if table_transform(picture) else ""
+        profile = (
+            profile_name(picture.info.get("icc_profile", b"")) if lookup_table_transform(picture) else ""
+        )
         how = f"by its profile, {profile}" if profile else "without a profile, so that its colours are rough"
         yield f"its CMYK is converted to sRGB {how}"
     if (bits := _stored_bits_per_channel(file_bytes, picture)) > 8:

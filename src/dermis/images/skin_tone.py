@@ -1,4 +1,4 @@
-"""Descriptions of a skin's colour: CIELAB, hue angle, individual typology angle (ITA) and nearest classes."""
+"""Descriptions of a skin's colour: CIELAB, hue, individual typology angle (ITA) and classes of two scales."""
 
 from __future__ import annotations
 
@@ -79,12 +79,12 @@ def hue_degrees(cielab: ArrayLike) -> Doubles:
     return np.asarray(np.degrees(np.arctan2(b, a)))
 
 
-def skin_tone(linear: ArrayLike) -> SkinTone:
+def skin_tone(linear_colour: ArrayLike) -> SkinTone:
     """Return the description of a skin colour.
 
-    linear : (3,) diffuse reflectance, linear Rec. 709 [-]
+    linear_colour : (3,) diffuse reflectance, linear Rec. 709 [-]
     """
-    colour = np.asarray(linear, np.float64)
+    colour = np.asarray(linear_colour, np.float64)
     L, a, b = (float(one) for one in lab(colour))
     ita = float(ita_degrees((L, a, b)))
     monk = 1 + int(np.argmin(delta_e_2000(_monk_colours(), colour)))

@@ -31,7 +31,9 @@ _NUMBER_PLACEHOLDER = re.compile(r"%(?:0(\d+))?d")
 class ImageWriter:
     """Context manager that encodes and writes pictures on other threads; on exit, it waits for all pictures.
 
-    threads : number of threads; by default, one thread per processor core
+    thread_count : number of threads; by default, one thread per processor core
+
+    Example:
 
     with ImageWriter() as writer:
         for number, image in enumerate(renderer.render_many(scenes)):
@@ -48,8 +50,8 @@ class ImageWriter:
     def write(self, path: str | Path, picture: NDArray[np.generic]) -> None:
         """Queue a picture to be written atomically; the call blocks only while the queue is full.
 
-        picture : (H, W, 3 or 4) uint8 sRGB for .png, or linear floats for .exr; the array must not be changed
-            afterwards
+        picture : (H, W, C) with 3 or 4 channels: uint8 sRGB for .png, linear floats for .exr; the array must
+            not be changed afterwards
 
         Raises DermisError for a path that is not writable, and when an earlier picture could not be written.
         """
@@ -62,7 +64,9 @@ class ImageWriter:
             advice = "Use the renderer's sRGB picture, or write .exr"
             refuse(path, "pixels (H, W, 3 or 4) of uint8", actual, advice)
         write = (
-            partial(write_exr, run_length=True) if is_exr else partial(write_png, zlib_level=_FAST_ZLIB_LEVEL)
+            partial(write_exr, use_run_length_encoding=True)
+            if is_exr
+            else partial(write_png, zlib_level=_FAST_ZLIB_LEVEL)
         )
         self._queue.append(self._pool.submit(write, path, picture))
         while len(self._queue) > self._max_queued or (self._queue and self._queue[0].done()):
@@ -102,8 +106,8 @@ class ImageWriter:
 class FrameFiles:
     """Numbered picture files of a sequence, named by a pattern such as frames/%05d.png.
 
-    A hidden record file stores the content key of the sequence to which the existing pictures belong: a text
-    that is equal for sequences with equal frames.
+    The content key of a sequence is a text that is equal for sequences with equal frames. A hidden record
+    file stores the content key of the sequence to which the existing pictures belong.
     """
 
     pattern: Path
@@ -134,7 +138,7 @@ class FrameFiles:
             refuse_output(self.pattern.parent, fault)
         check_output(self.path(0))
 
-    def start(self, content_key: str, *, force: bool = False) -> None:
+    def start_sequence(self, content_key: str, *, force: bool = False) -> None:
         """Start or continue a sequence; existing pictures are kept if the record file has this content key.
 
         content_key : text that is equal for sequences with equal frames

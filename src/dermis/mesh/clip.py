@@ -17,9 +17,12 @@ _MIN_FRAME_RATE, _MAX_FRAME_RATE = 0.001, 1000.0
 _END_TOLERANCE_FRAMES = 1e-6  # fraction of a frame by which rounding may put the last frame behind the end
 
 
-def check_frame_rate(culprit: object, frame_rate: object) -> float:
-    """Return a frame rate [1/s] after checking that the rate is positive; raise DermisError if not."""
-    return checked_number(culprit, frame_rate, _MIN_FRAME_RATE, _MAX_FRAME_RATE, "frames a second")
+def check_frame_rate(setting_name: object, frame_rate: object) -> float:
+    """Return a frame rate [1/s] unchanged if it is within the allowed range; raise DermisError otherwise.
+
+    setting_name : name of the option or file in the error message
+    """
+    return checked_number(setting_name, frame_rate, _MIN_FRAME_RATE, _MAX_FRAME_RATE, "frames a second")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -28,9 +28,11 @@ UV_DECAY_ANGLE_RADIANS = 0.9
 
 
 def limbus_plane_mm(radius_mm: float) -> float:
-    """Return the distance from a sphere's centre to the plane of the limbus, a circle on the sphere [mm].
+    """Return the distance from a sphere's centre to the plane of the limbus [mm].
 
-    radius_mm : radius of the sphere, such as the ball or the cornea
+    The limbus is the circle in which the spheres of sclera and cornea intersect.
+
+    radius_mm : radius of one of these two spheres [mm]
     """
     return math.sqrt(radius_mm**2 - LIMBUS_MM**2)
 
@@ -50,7 +52,7 @@ def iris_plane_mm() -> float:
     return apex_mm() - IRIS_DEPTH_MM
 
 
-def profile_mm(angle_from_axis: Doubles) -> Doubles:
+def surface_distance_mm(angle_from_axis: Doubles) -> Doubles:
     """Return the distance from the ball's centre to the outer surface of ball and cornea [mm].
 
     angle_from_axis : angle between the eye's axis and the direction in which the distance is measured [rad]
@@ -62,21 +64,22 @@ def profile_mm(angle_from_axis: Doubles) -> Doubles:
 
 
 def radial_distances_mm(points: Doubles, eye_axis: Doubles) -> tuple[Doubles, Doubles]:
-    """Return distances (...) from the ball's centre, first to points, then to the eyeball's surface [mm].
+    """Return how far points and the eyeball's surface are from the ball's centre [mm].
 
-    The distance to the surface is measured along the ray from the centre through each point.
+    The first array has the distance of each point, the second the distance of the surface along the ray from
+    the centre through that point.
 
     points : (..., 3) positions relative to the ball's centre [mm]
     eye_axis : (..., 3) unit vectors of the eyes' axes
     """
     distance = np.linalg.norm(points, axis=-1)
     cosine = (points * eye_axis).sum(axis=-1) / np.maximum(distance, 1e-9)
-    return distance, profile_mm(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return distance, surface_distance_mm(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LidContact(ShortRepr):
-    """Collision of eyelids with eyeballs, which keeps control points of the lids outside the eyeballs.
+    """Collision response that keeps control points of the eyelids outside the eyeballs.
 
     point : (n,) control points of the lids
     ball : (n,) index of the eyeball over which each lid point slides
@@ -116,8 +119,8 @@ def build_eyeball(quads_per_edge: int = QUADS_PER_EDGE, position_scale: float = 
     """Return the points (n, 3) [mm] and the quads (q, 4) of an eyeball that looks along +Z.
 
     quads_per_edge : number of quads along each edge of the cube that is projected to the ball
-    position_scale : factor of the positions; above 1 for control points, because a subdivision surface is
-        smaller than its control mesh
+    position_scale : factor by which the positions are multiplied; above 1 for a control mesh, because its
+        subdivision surface is smaller
     """
     points, quads = list[Doubles](), list[Index]()
     grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, quads_per_edge + 1))  # evenly spaced in angle
@@ -133,7 +136,7 @@ def build_eyeball(quads_per_edge: int = QUADS_PER_EDGE, position_scale: float = 
     cube = np.concatenate(points)
     _, first, welded = np.unique(np.rint(1e6 * cube), axis=0, return_index=True, return_inverse=True)
     direction = cube[first] / np.linalg.norm(cube[first], axis=1, keepdims=True)
-    radius = profile_mm(np.arccos(np.clip(direction[:, 2], -1.0, 1.0)))
+    radius = surface_distance_mm(np.arccos(np.clip(direction[:, 2], -1.0, 1.0)))
     return position_scale * radius[:, None] * direction, welded.reshape(-1)[np.concatenate(quads)]
 
 

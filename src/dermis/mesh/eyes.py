@@ -22,7 +22,7 @@ class Eyes(ShortRepr):
     material : (k,) index of the material of each eyeball
     look : appearance of both eyes
     radius_mm : (k,) radius of the ball when the eye is scaled to a cornea of adult size [mm]
-    centre_offset_mm : (k,) shift of the ball's centre along the axis, relative to an adult eye [mm]
+    centre_offset_mm : (k,) shift of the ball's centre along the axis, from its position in an adult eye [mm]
     gaze : (k, 3) unit direction of gaze in eye coordinates: the axis of the eye, or a direction inferred from
         the lids
     """
@@ -36,7 +36,7 @@ class Eyes(ShortRepr):
     centre_offset_mm: Doubles = field(default_factory=lambda: np.zeros(2))
     gaze: Doubles = field(default_factory=lambda: np.tile([0.0, 0.0, 1.0], (2, 1)))
 
-    def frames(self, rig: Rig, motion: Motion) -> Doubles:
+    def eye_matrices(self, rig: Rig, motion: Motion) -> Doubles:
         """Return the matrices (k, 4, 4) from head coordinates [mm] to the coordinates of each eye.
 
         Eye coordinates are scaled to an eye with a cornea of adult size [mm], with z along the axis of the

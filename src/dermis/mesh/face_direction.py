@@ -39,8 +39,8 @@ def face_direction(positions: Doubles, triangles: Index, eyes: Doubles) -> Direc
     triangles : (f, 3) vertex indices
     eyes : (n, 3) vertices of eyeballs, or joints of the eyes; empty if unknown
 
-    Eyes lie in front of the middle of the head. If no eyes are known, the head must be symmetric about a
-    vertical plane, and its front is the side with more relief and with a ridge in the middle, the nose.
+    Known eyes show the front, because they lie in front of the middle of the head. Without them, the head
+    must be symmetric about a vertical plane. The front is then the side with more relief and with a nose.
     """
     if not len(triangles):
         return None
@@ -73,7 +73,10 @@ def _direction_from_eyes(points: Doubles, eyes: Doubles) -> Direction | None:
 
 
 def _direction_from_shape(corners: Doubles) -> Direction | None:
-    """Return the direction of the face of a head or of a standing figure from its triangles (f, 3, 3)."""
+    """Return the direction in which a head or a standing figure looks; None if it is uncertain.
+
+    corners : (f, 3, 3) corner positions of the triangles
+    """
     top, height = float(corners[..., 1].max()), _head_height(corners[:, 0])
     head = corners[corners[..., 1].max(axis=1) >= top - height]
     normals = _area_normals(head)
@@ -160,7 +163,7 @@ def _asymmetry(points: Doubles, mirrored_axis: int) -> float:
 
 
 def _normal_variation(points: Doubles, normals: Doubles) -> float:
-    """Return how much normals (n, 3) at points (n, 3) vary within small cells of space, 0 to 1 [-]."""
+    """Return how much normals (n, 3) of nearby points (n, 3) differ, from 0 (not at all) to 1 [-]."""
     keys = np.floor(points / _VARIATION_CELL_SIDE).astype(np.int64) @ [1, 1 << 20, 1 << 40]
     cells = np.unique(keys, return_inverse=True)[1].reshape(-1)
     sums: Doubles = np.stack([np.bincount(cells, one) for one in normals.T])
@@ -168,7 +171,7 @@ def _normal_variation(points: Doubles, normals: Doubles) -> float:
 
 
 def _ridge_height(points: Doubles, front_axis: int) -> float:
-    """Return the largest distance by which the middle of a face protrudes beyond its sides at any height.
+    """Return how far the nose protrudes beyond the cheeks of a face; nearly 0 if there is no nose.
 
     points : (n, 3) points of the front or back of a head
     front_axis : index of the coordinate along which the face may look

@@ -15,9 +15,10 @@ T = TypeVar("T", np.float32, np.float64)
 
 
 def weld(vertex_rows: ArrayLike) -> Ints:
-    """Return for each row (v, k) its index among the unique rows, (v,); rows are compared in float32.
+    """Return one index (v,) for each vertex, which is the same for vertices with equal attributes.
 
-    vertex_rows : positions [mm], or positions and uv side by side
+    vertex_rows : (v, k) attributes of each vertex, such as its position, or its position and uv; they are
+        compared in float32
     """
     table = np.asarray(vertex_rows, dtype=np.float32)
     order = np.lexsort(table.T)
@@ -30,9 +31,11 @@ def weld(vertex_rows: ArrayLike) -> Ints:
 
 
 def compact_vertices(triangles: NDArray[np.integer]) -> tuple[Index, Index]:
-    """Return the indices (n,) of the vertices that triangles use, and the triangles renumbered to match.
+    """Return the indices (n,) of the vertices that triangles use, and the triangles (f, 3) renumbered.
 
-    triangles : (f, 3) vertex indices; the returned triangles are indices into the returned vertex array
+    The renumbered triangles refer to vertices by their position in the first array.
+
+    triangles : (f, 3) vertex indices
     """
     used = np.zeros(int(triangles.max()) + 1, bool)
     used[triangles] = True
@@ -42,11 +45,13 @@ def compact_vertices(triangles: NDArray[np.integer]) -> tuple[Index, Index]:
 def merge_near_points(
     positions: Doubles, triangles: NDArray[np.integer], spacing: float
 ) -> tuple[Doubles, Index]:
-    """Replace the points in each cell of a grid by their mean; return the points and the triangles (f, 3).
+    """Merge the vertices in each cube of a regular grid into one vertex at their mean position.
+
+    Returns the new vertices and the triangles (f, 3) between them, some of which have coincident corners.
 
     positions : (v, 3) vertex positions
-    triangles : (f, 3) vertex indices; some of the returned triangles have coincident corners
-    spacing : length of the sides of the cells
+    triangles : (f, 3) vertex indices
+    spacing : side length of the cubes
     """
     cell = np.floor(positions / spacing).astype(np.int64)
     cell -= cell.min(axis=0)
@@ -58,10 +63,11 @@ def merge_near_points(
 
 
 def edges(triangles: NDArray[np.integer]) -> tuple[Index, Index, Index]:
-    """Return the unique edges (e, 2) of triangles, the edge of each triangle side, and the sides per edge.
+    """Return the edges (e, 2) of a triangle mesh, each once, with the triangle sides that lie on them.
 
-    The second array (3f,) is the index of each side's edge: first of the sides from corner 0 to corner 1 of
-    all triangles, then from 1 to 2, then from 2 to 0. The third array (e,) is the number of sides.
+    The second array (3f,) has the index of the edge on which each triangle side lies: first the sides from
+    corner 0 to corner 1 of all triangles, then those from 1 to 2, then those from 2 to 0. The third array
+    (e,) has the number of triangle sides on each edge.
 
     triangles : (f, 3) point indices
     """
@@ -90,7 +96,10 @@ def triangle_keys(corners: NDArray[np.integer], point_count: int) -> Index:
 
 
 def unique_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
-    """Return the unique edges (e, 2), the edge index of each side (n,) and the sides per edge (e,).
+    """Return edges (e, 2), each once, with the triangle sides that lie on them.
+
+    The second array (n,) has the index of the edge on which each side lies. The third array (e,) has the
+    number of sides on each edge.
 
     sides : (n, 2) point indices at the two ends of each triangle side, in either order
     """
@@ -105,12 +114,11 @@ def unique_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
 def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
     """Return vertex normals (v, 3): normalised sums of face normals, weighted by the corner angles.
 
-    All vertices of a point have the same normal, so that there is no crease at a uv seam. The normal is +Z
-    where the sum is 0. Unlike weights by area, weights by angle do not depend on how the surface is
-    triangulated.
+    Vertices at the same point have the same normal, so that there is no crease at a uv seam. The normal is +Z
+    where the sum is 0.
 
     positions : (v, 3) [mm]
-    point : (v,) index of the point of each vertex
+    point : (v,) index of the point at which each vertex lies; see `Mesh.point`
     triangles : (f, 3) vertex indices
     """
     columns, corner = np.ascontiguousarray(positions.T, np.float64), np.ascontiguousarray(triangles.T)
@@ -130,7 +138,7 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
 
 
 def sum_by_index(row_index: NDArray[np.integer], row_values: Doubles, sum_count: int) -> Doubles:
-    """Return the sums (sum_count, k) of rows that have the same index.
+    """Return the sums (sum_count, k) of all rows with the same index.
 
     row_index : (n,) index of the sum to which each row is added
     row_values : (n, k) rows
@@ -151,12 +159,12 @@ def triangle_areas(corners: NDArray[np.floating]) -> Doubles:
 
 
 def cross_2d(a: Doubles, b: Doubles) -> Doubles:
-    """Return the cross products a × b (...) of 2D vectors (..., 2), which are scalars."""
+    """Return the z components of the cross products a × b of vectors (..., 2) in the xy plane."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def uv_cross(corners: NDArray[np.floating]) -> Doubles:
-    """Return twice the signed area of each triangle in uv space, (f,).
+    """Return twice the signed area (f,) of each triangle in uv space.
 
     corners : (f, 3, 2) uv of the corners
     """
@@ -211,7 +219,7 @@ def _nonzero_tangents(dpdu: Doubles, dpdv: Doubles, normals: Doubles) -> tuple[F
 
 
 def split_quads(quads: NDArray[np.integer]) -> Index:
-    """Split quads (q, 4) with corners a, b, c, d into triangles (a, b, c) and (c, d, a), (2q, 3)."""
+    """Split quads (q, 4) with corners a, b, c, d into triangles (2q, 3): (a, b, c) and (c, d, a)."""
     return np.ascontiguousarray(quads[:, [0, 1, 2, 2, 3, 0]], np.int64).reshape(-1, 3)
 
 
@@ -234,7 +242,7 @@ def cross_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
 def label_components(
     node_count: int, link_start: NDArray[np.integer], link_end: NDArray[np.integer]
 ) -> Index:
-    """Return for each node of a graph the index of its connected component, (n,).
+    """Return the index (n,) of the connected component to which each node of a graph belongs.
 
     Components are numbered in the order in which they first appear.
 
@@ -258,7 +266,9 @@ def label_components(
 
 
 def expand_runs(run_start: Index, run_length: Index) -> tuple[Index, Index]:
-    """Expand r runs of consecutive integers into two arrays: the run of each integer, and the integer itself.
+    """List all integers in r runs of consecutive integers.
+
+    Returns two arrays of the same length: the index of the run of each integer, and the integer itself.
 
     run_start, run_length : (r,) first integer and length of each run
     """

@@ -1,4 +1,4 @@
-"""Grooms: hair that the device grows from guide curves, which move with the skin of a quad mesh."""
+"""Grooms: hair that the GPU grows along guide curves, which move with the skin of a quad mesh."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ class StrandRoots(ShortRepr):
 
     roots : n roots on quads of the control mesh
     guide, guide_weight : (n, 4) guides between which each strand is interpolated, and their weights
-    clump : (n,) index of the strand in the middle of the clump to which each strand belongs
-    place : (n, 4) place of each root on the head: angle from the front [degrees]; height above the midpoint
-        of the eyes [mm]; thinning of the hair there if the crown recedes, 0 to 1; and position from the nape
-        (0) to the top of the head (1)
+    clump : (n,) index of the strand at the centre of the clump to which each strand belongs
+    place : (n, 4) four properties of the spot where each root is: its angle from the front [degrees]; its
+        height above the midpoint of the eyes [mm]; how much its hair thins if the crown goes bald, 0 to 1;
+        and its position from the nape (0) to the top of the head (1)
     along_mm : (n,) position of each strand's clump along its cornrow [mm]
-    part : (n,) row of `Groom.parameters` for each strand, which is that of scalp hair or beard
+    part : (n,) row of `Groom.parameters` that applies to each strand: that of scalp hair, or of the beard
     """
 
     roots: Roots
@@ -70,12 +70,12 @@ class StrandRoots(ShortRepr):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Groom(ShortRepr):
-    """Hair of a person: guides and roots that all people with a style share, and parameters of the person.
+    """Hair of a person: the guides and roots of a hair style, and parameters of the person.
 
     guides, roots : guides and strand roots of the style
     parameters : (p,) structured array with one row of parameters for scalp hair and one for the beard
-    strands : number of roots to use, from the start of `roots`; if some are unused, the strands are widened
-        to keep coverage
+    strands : number of roots to use, from the start of `roots`; if it is less than all, the strands are
+        widened to keep coverage
     knots : number of knots per strand
     hairline_mm : (91,) heights of the hairline at angles of 0 to 180 degrees from the front [mm]
     centre_mm : (3,) centre of the roots on the mean person [mm]

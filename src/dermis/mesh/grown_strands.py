@@ -11,9 +11,9 @@ from dermis.base.arrays import Doubles, Ints
 from dermis.mesh.groom import GUIDE_KNOTS, Groom
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Roots, Strands, cover_of_points, root_frames, to_frames
+from dermis.mesh.strands import Roots, Strands, hair_cover_of_points, offsets_in_frames, root_frames
 
-Words = NDArray[np.uint32]
+UInt32s = NDArray[np.uint32]
 MAX_EXPORTED_STRANDS = 40_000
 """Number of strands with which exports and path tracing show hair."""
 _SMOOTHING_KNOTS, _SMOOTH_HEIGHTS_MM = 8, (2.0, 18.0)
@@ -21,7 +21,7 @@ _MIN_HEIGHT_MM, _RISE_LENGTH_MM = 0.35, 4.0
 _HAIRLINE_FADE_MM, _SHORT_HAIR_HEIGHTS_MM = (-3.0, 11.0), (-2.0, 14.0)
 _HAIRLINE_STEP_DEGREES = 2.0
 _TIP_FRACTION, _TIP_WIDTH_RATIO = 0.12, 0.35
-_COLOUR_SAMPLES = 5
+_HAIRS_SAMPLED_PER_STRAND = 5
 _COVERING_LENGTH_MM = 60.0  # length from the root along which hair covers the skin around it
 _HEAD_RADIUS_MM, _LIFTED_HEIGHT_MM = 80.0, 20.0
 _STRANDS_PER_CHUNK = 4_000  # strands that are grown at once
@@ -47,7 +47,7 @@ def grow_strands(
     every = groom.roots.roots
     middles = Roots(every.quad.take(middle), every.position.take(middle, axis=0))
     middle_mm, _ = root_frames(mesh, middles, points_mm)
-    grown = _growing_indices(groom, count)
+    grown = _growing_root_indices(groom, count)
     parts = [
         _grow_chunk(groom, guides, index, root_mm[index], frames[index], middle_mm[index])
         for index in np.array_split(grown, max(1, -(-len(grown) // _STRANDS_PER_CHUNK)))
@@ -71,8 +71,8 @@ def hair_strands(head: Head, points_mm: NDArray[np.floating] | None = None) -> S
 
 
 def hair_cover(groom: Groom, mesh: Mesh) -> Doubles:
-    """Return the projected area of the hair rooted around each point of a mesh, per area of skin (p,) [-]."""
-    index = _growing_indices(groom, len(groom.roots))
+    """Return the projected area of the hair rooted around each mesh point (p,), per area of skin [-]."""
+    index = _growing_root_indices(groom, len(groom.roots))
     part = groom.parameters[groom.roots.part[index]]
     strand_number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
     length = part["guide_mm"] * _length_fractions(
@@ -80,13 +80,13 @@ def hair_cover(groom: Groom, mesh: Mesh) -> Doubles:
     )
     roots = groom.roots.roots
     kept = Roots(roots.quad.take(index), roots.position.take(index, axis=0))
-    return cover_of_points(mesh, kept, 2.0 * part["radius_mm"] * np.minimum(length, _COVERING_LENGTH_MM))
+    return hair_cover_of_points(mesh, kept, 2.0 * part["radius_mm"] * np.minimum(length, _COVERING_LENGTH_MM))
 
 
-def absorbed_by_hair(groom: Groom) -> float:
-    """Return the fraction of diffuse light that a hair absorbs: a mean over channels and parts of the groom.
+def mean_hair_absorptance(groom: Groom) -> float:
+    """Return the mean fraction of diffuse light that a single hair absorbs [-].
 
-    The parts are scalp hair and beard.
+    The mean is over the colour channels, and over scalp hair and beard.
     """
     parts = groom.parameters
     chord = 0.5 * np.pi * (parts["radius_mm"] / parts["hairs_per_strand"])[:, None]
@@ -114,13 +114,13 @@ def _posed_guides(groom: Groom, points_mm: NDArray[np.floating]) -> tuple[Double
     """
     guides = groom.guides
     a, b, c, d = np.moveaxis(points_mm.astype(np.float64)[guides.corner], -2, 0)
-    along = _unit((b - a) + (c - d))
+    along = _unit_vectors((b - a) + (c - d))
     across = np.cross(c - a, d - b)
-    normal = _unit(across - (across * along).sum(axis=-1, keepdims=True) * along)
+    normal = _unit_vectors(across - (across * along).sum(axis=-1, keepdims=True) * along)
     axes = np.stack([along, np.cross(normal, along), normal], axis=-2)
     knots = 0.25 * (a + b + c + d) + np.einsum("gkaic,gkai->gkac", axes, guides.local_mm)
     weight = guides.weight[..., None]
-    bound, outward = (weight * knots).sum(axis=2), _unit((weight * normal).sum(axis=2))
+    bound, outward = (weight * knots).sum(axis=2), _unit_vectors((weight * normal).sum(axis=2))
     moved, total = bound - guides.rest_mm[..., :3], 0.0
     smooth = np.zeros_like(moved)
     for step in range(-_SMOOTHING_KNOTS, _SMOOTHING_KNOTS + 1):
@@ -133,40 +133,46 @@ def _posed_guides(groom: Groom, points_mm: NDArray[np.floating]) -> tuple[Double
 
 def _grow_chunk(
     groom: Groom,
-    guides: tuple[Doubles, Doubles],
-    index: Ints,
+    posed_guides: tuple[Doubles, Doubles],
+    strand_index: Ints,
     root_mm: Doubles,
-    frames: Doubles,
-    middle_mm: Doubles,
+    root_axes: Doubles,
+    clump_centre_mm: Doubles,
 ) -> tuple[NDArray[np.float32], Doubles, Doubles, Doubles]:
-    """Return the knots, radii, absorption coefficients and covers of n strands, see `Strands`.
+    """Return the knots, radii, absorption coefficients and `cover` of n strands, as in `Strands`.
 
-    guides : knots of the posed guides, and skin normals below the knots
-    index : (n,) indices of the strands
+    posed_guides : knots of the posed guides, and skin normals below the knots
+    strand_index : (n,) indices of the strands
     root_mm : (n, 3) positions of the roots [mm]
-    frames : (n, 3, 3) root frames of the strands
-    middle_mm : (n, 3) roots of the strands in the middle of the clumps [mm]
+    root_axes : (n, 3, 3) axes of the coordinate system at each root, as rows
+    clump_centre_mm : (n, 3) root of the strand at the centre of each strand's clump [mm]
     """
     roots, seed = groom.roots, groom.parameters["seed"].astype(np.uint32) * np.uint32(131071)
-    part = groom.parameters[roots.part[index]]
-    strand_number = index.astype(np.uint32) + seed[roots.part[index]]
-    clump = roots.clump[index]
-    clump_number = clump.astype(np.uint32) + seed[roots.part[index]]
-    above_hairline_mm = _heights_above_hairline(groom, index)
+    part = groom.parameters[roots.part[strand_index]]
+    strand_number = strand_index.astype(np.uint32) + seed[roots.part[strand_index]]
+    clump = roots.clump[strand_index]
+    clump_number = clump.astype(np.uint32) + seed[roots.part[strand_index]]
+    above_hairline_mm = _heights_above_hairline(groom, strand_index)
     t = np.linspace(0.0, 1.0, groom.knots)[None]
-    u = t * _length_fractions(groom, index, part, strand_number, above_hairline_mm)[:, None]
+    u = t * _length_fractions(groom, strand_index, part, strand_number, above_hairline_mm)[:, None]
     own, at = (
-        _interpolate_guides(groom, guides, index, u, root_mm),
-        _interpolate_guides(groom, guides, clump, u, middle_mm),
+        _interpolate_guides(groom, posed_guides, strand_index, u, root_mm),
+        _interpolate_guides(groom, posed_guides, clump, u, clump_centre_mm),
     )
-    s = u * _column(part, "guide_mm")
-    near = 1.0 - np.exp(-((s / _column(part, "clump_start_mm")) ** 1.5))
-    rope = _column(part, "rope_mm") > 0
-    pull = _column(part, "clump") * near * np.where(rope, 1.0, 0.6 + 0.4 * _random(strand_number, 2)[:, None])
-    side, other = _axes_across(at)
+    s = u * _parameter_column(part, "guide_mm")
+    near = 1.0 - np.exp(-((s / _parameter_column(part, "clump_start_mm")) ** 1.5))
+    rope = _parameter_column(part, "rope_mm") > 0
+    pull = (
+        _parameter_column(part, "clump")
+        * near
+        * np.where(rope, 1.0, 0.6 + 0.4 * _uniform_random(strand_number, 2)[:, None])
+    )
+    side, other = _cross_section_axes(at)
     to_middle = pull[..., None] * (at.position - own.position)
     across = (
-        near * np.where(rope, 1.0, 0.0) * _rope_offsets(strand_number, part, s + roots.along_mm[index, None])
+        near
+        * np.where(rope, 1.0, 0.0)
+        * _rope_offsets(strand_number, part, s + roots.along_mm[strand_index, None])
     )
     across = across + np.where(rope, 0.0, 1.0) * _curl_offsets(strand_number, clump_number, part, s)
     across = across + _frizz_offsets(strand_number, part, s)
@@ -176,20 +182,20 @@ def _grow_chunk(
     positions = own.position + to_middle + varied + np.maximum(least - height, 0.0)[..., None] * own.normal
     taper = 1.0 - (1.0 - _TIP_WIDTH_RATIO) * _smoothstep(1.0 - _TIP_FRACTION, 1.0, t)
     edge = 1.0 - part["hairline"] * (0.45 - 0.45 * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_hairline_mm))
-    radius = (part["radius_mm"] * (0.8 + 0.4 * _random(strand_number, 3)) * edge)[:, None] * taper
+    radius = (part["radius_mm"] * (0.8 + 0.4 * _uniform_random(strand_number, 3)) * edge)[:, None] * taper
     return (
-        to_frames(frames, positions - root_mm[:, None]),
+        offsets_in_frames(root_axes, positions - root_mm[:, None]),
         radius,
         _strand_absorption(strand_number, part),
         part["cover"],
     )
 
 
-def _column(part: NDArray[np.void], name: str) -> Doubles:
-    return part[name].astype(np.float64)[:, None]
+def _parameter_column(hair_parameters: NDArray[np.void], parameter_name: str) -> Doubles:
+    return hair_parameters[parameter_name].astype(np.float64)[:, None]
 
 
-def _random(strand_number: Words, stream: int) -> Doubles:
+def _uniform_random(strand_number: UInt32s, stream: int) -> Doubles:
     """Return a uniform random number (n,) for each strand, 0 to 1.
 
     strand_number : (n,) numbers that identify the strands
@@ -205,67 +211,77 @@ def _random(strand_number: Words, stream: int) -> Doubles:
         return np.asarray((((word >> np.uint32(22)) ^ word) >> np.uint32(8)) / 16777216.0)
 
 
-def _random_normal(strand_number: Words, stream: int) -> Doubles:
-    return np.asarray(2.0 * (sum(_random(strand_number, stream + k) for k in range(3)) - 1.5))
+def _normal_random(strand_number: UInt32s, stream: int) -> Doubles:
+    return np.asarray(2.0 * (sum(_uniform_random(strand_number, stream + k) for k in range(3)) - 1.5))
 
 
-def _heights_above_hairline(groom: Groom, index: Ints) -> Doubles:
-    place = groom.roots.place[index]
+def _heights_above_hairline(groom: Groom, strand_index: Ints) -> Doubles:
+    place = groom.roots.place[strand_index]
     angles = _HAIRLINE_STEP_DEGREES * np.arange(len(groom.hairline_mm))
     return np.asarray(place[:, 1] - np.interp(place[:, 0], angles, groom.hairline_mm))
 
 
-def _growing_indices(groom: Groom, count: int) -> Ints:
-    """Return the indices of the roots from which a strand grows, among the first `count` roots."""
-    index = np.arange(count, dtype=np.int32)
-    roots, part = groom.roots, groom.parameters[groom.roots.part[:count]]
+def _growing_root_indices(groom: Groom, root_count: int) -> Ints:
+    """Return the indices of the roots from which a strand grows, among the first `root_count` roots."""
+    index = np.arange(root_count, dtype=np.int32)
+    roots, part = groom.roots, groom.parameters[groom.roots.part[:root_count]]
     fade = _smoothstep(*_HAIRLINE_FADE_MM, _heights_above_hairline(groom, index))
     density = 1.0 + part["hairline"] * (fade - 1.0)
-    density = density * part["density"] * (1.0 - part["thinning"] * roots.place[:count, 2])
+    density = density * part["density"] * (1.0 - part["thinning"] * roots.place[:root_count, 2])
     strand_number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
-    return np.flatnonzero(_random(strand_number, 0) < density).astype(np.int32)
+    return np.flatnonzero(_uniform_random(strand_number, 0) < density).astype(np.int32)
 
 
 def _length_fractions(
-    groom: Groom, index: Ints, part: NDArray[np.void], strand_number: Words, above_hairline_mm: Doubles
+    groom: Groom,
+    strand_index: Ints,
+    hair_parameters: NDArray[np.void],
+    strand_number: UInt32s,
+    above_hairline_mm: Doubles,
 ) -> Doubles:
     """Return the length (n,) of each strand as a fraction of the length of its guides.
 
-    index : (n,) indices of the strands
-    part : (n,) parameters of the part of the groom to which each strand belongs
-    strand_number : (n,) numbers that identify the strands, for `_random`
+    strand_index : (n,) indices of the strands
+    hair_parameters : (n,) row of `Groom.parameters` for each strand
+    strand_number : (n,) numbers that identify the strands, for `_uniform_random`
     above_hairline_mm : (n,) heights of the roots above the hairline [mm]
     """
     roots = groom.roots
-    cut = (roots.guide_weight[index] * groom.guides.cut[roots.guide[index]]).sum(axis=1)
-    sides = 1.0 - part["fade"] * (1.0 - roots.place[index, 3])
-    edge = 1.0 - part["hairline"] * (0.75 - 0.75 * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_hairline_mm))
-    length = np.minimum(cut, part["length_mm"] / part["guide_mm"] * sides) * edge
-    return np.asarray(length * (1.0 - part["layers"] * _random(strand_number, 1)))
+    cut = (roots.guide_weight[strand_index] * groom.guides.cut[roots.guide[strand_index]]).sum(axis=1)
+    sides = 1.0 - hair_parameters["fade"] * (1.0 - roots.place[strand_index, 3])
+    edge = 1.0 - hair_parameters["hairline"] * (
+        0.75 - 0.75 * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_hairline_mm)
+    )
+    length = np.minimum(cut, hair_parameters["length_mm"] / hair_parameters["guide_mm"] * sides) * edge
+    return np.asarray(length * (1.0 - hair_parameters["layers"] * _uniform_random(strand_number, 1)))
 
 
 def _interpolate_guides(
-    groom: Groom, guides: tuple[Doubles, Doubles], index: Ints, u: Doubles, root_mm: Doubles
+    groom: Groom,
+    posed_guides: tuple[Doubles, Doubles],
+    strand_index: Ints,
+    guide_position: Doubles,
+    root_mm: Doubles,
 ) -> _Curves:
     """Return curves of strands, interpolated between the guides of each strand.
 
-    guides : knots of the posed guides, and skin normals below the knots
-    index : (n,) indices of the strands
-    u : (n, k) positions of points along the guides, 0 at the root to 1 at the tip
+    posed_guides : knots of the posed guides, and skin normals below the knots
+    strand_index : (n,) indices of the strands
+    guide_position : (n, k) positions of points along the guides, 0 at the root to 1 at the tip
     root_mm : (n, 3) positions of the roots [mm]
     """
-    knots, normals = guides
-    at = np.clip(u, 0.0, 1.0) * (GUIDE_KNOTS - 1)
+    knots, normals = posed_guides
+    at = np.clip(guide_position, 0.0, 1.0) * (GUIDE_KNOTS - 1)
     first = np.minimum(at.astype(np.int64), GUIDE_KNOTS - 2)
     part = (at - first)[..., None]
     height_mm = groom.guides.rest_mm[..., 3]
-    position = np.repeat(root_mm[:, None], u.shape[1], axis=1)
+    position = np.repeat(root_mm[:, None], guide_position.shape[1], axis=1)
     normal, tangent, middle = (np.zeros_like(position) for _ in range(3))
-    height, square = np.zeros(u.shape), np.zeros(u.shape)
+    height, square = np.zeros(guide_position.shape), np.zeros(guide_position.shape)
     for k in range(4):
         guide, weight = (
-            groom.roots.guide[index, k][:, None],
-            groom.roots.guide_weight[index, k][:, None, None],
+            groom.roots.guide[strand_index, k][:, None],
+            groom.roots.guide_weight[strand_index, k][:, None, None],
         )
         a, b = knots[guide, first], knots[guide, first + 1]
         here = (1.0 - part) * a + part * b
@@ -276,97 +292,121 @@ def _interpolate_guides(
         tangent += weight * (b - a)
         heights = (1.0 - part[..., 0]) * height_mm[guide, first] + part[..., 0] * height_mm[guide, first + 1]
         height += weight[..., 0] * heights
-    normal = _unit(normal)
+    normal = _unit_vectors(normal)
     near = 1.0 / (1.0 + (np.maximum(height, 0.0) / _LIFTED_HEIGHT_MM) ** 2)
     sag = near * np.maximum(square - (middle**2).sum(axis=-1), 0.0) / (2.0 * _HEAD_RADIUS_MM)
     position += sag[..., None] * normal
-    return _Curves(position, height, normal, _unit(tangent + 1e-9 * normal))
+    return _Curves(position, height, normal, _unit_vectors(tangent + 1e-9 * normal))
 
 
-def _axes_across(curves: _Curves) -> tuple[Doubles, Doubles]:
-    """Return two unit vectors (n, k, 3) at each point, orthogonal to the curve and to each other."""
+def _cross_section_axes(curves: _Curves) -> tuple[Doubles, Doubles]:
+    """Return two unit vectors (n, k, 3) at each point, orthogonal to the tangent and to each other."""
     side = np.cross(curves.tangent, curves.normal)
     upright = (side**2).sum(axis=-1, keepdims=True) < 0.08
-    side = _unit(np.where(upright, np.cross(curves.tangent, _FALLBACK_AXIS), side))
+    side = _unit_vectors(np.where(upright, np.cross(curves.tangent, _FALLBACK_AXIS), side))
     return side, np.cross(side, curves.tangent)
 
 
-def _rope_offsets(strand_number: Words, part: NDArray[np.void], length_mm: Doubles) -> Doubles:
-    """Return the offsets (2, n, k) of strands from the middle of their twisted or braided ropes [mm].
+def _rope_offsets(strand_number: UInt32s, hair_parameters: NDArray[np.void], length_mm: Doubles) -> Doubles:
+    """Return the offsets (2, n, k) of strands from the centre line of their twist or braid [mm].
 
-    strand_number : (n,) numbers that identify the strands, for `_random`
-    part : (n,) parameters of the part of the groom to which each strand belongs
+    The first axis is for the two directions of `_cross_section_axes`.
+
+    strand_number : (n,) numbers that identify the strands, for `_uniform_random`
+    hair_parameters : (n,) row of `Groom.parameters` for each strand
     length_mm : (n, k) lengths from the root along the rope [mm]
     """
-    rope = np.maximum(_column(part, "rope_mm"), 1e-6)
+    rope = np.maximum(_parameter_column(hair_parameters, "rope_mm"), 1e-6)
     radius, turn = (
-        rope * np.sqrt(_random(strand_number, 4))[:, None],
-        2 * np.pi * _random(strand_number, 5)[:, None],
+        rope * np.sqrt(_uniform_random(strand_number, 4))[:, None],
+        2 * np.pi * _uniform_random(strand_number, 5)[:, None],
     )
-    bundle = np.floor(3.0 * _random(strand_number, 6))[:, None]
+    bundle = np.floor(3.0 * _uniform_random(strand_number, 6))[:, None]
     phase = 2 * np.pi * (length_mm / (8.0 * rope) + bundle / 3.0)
     middle = rope * np.sin(phase), 0.45 * rope * np.sin(2 * phase)
     braided = np.stack([middle[0] + 0.5 * radius * np.cos(turn), middle[1] + 0.5 * radius * np.sin(turn)])
     phase = turn + 2 * np.pi * length_mm / (7.0 * rope)
     twisted = np.stack([radius * np.cos(phase), radius * np.sin(phase)])
-    return np.where(_column(part, "braid") > 0, braided, twisted)
+    return np.where(_parameter_column(hair_parameters, "braid") > 0, braided, twisted)
 
 
 def _curl_offsets(
-    strand_number: Words, clump_number: Words, part: NDArray[np.void], length_mm: Doubles
+    strand_number: UInt32s, clump_number: UInt32s, hair_parameters: NDArray[np.void], length_mm: Doubles
 ) -> Doubles:
     """Return the offsets (2, n, k) by which curls displace the points of strands [mm].
 
-    strand_number, clump_number : (n,) numbers that identify the strands and their clumps, for `_random`
-    part : (n,) parameters of the part of the groom to which each strand belongs
+    The first axis is for the two directions of `_cross_section_axes`.
+
+    strand_number, clump_number : (n,) numbers that identify strands and their clumps, for `_uniform_random`
+    hair_parameters : (n,) row of `Groom.parameters` for each strand
     length_mm : (n, k) lengths from the root along the strand [mm]
     """
-    pitch = _column(part, "pitch_mm") * (0.85 + 0.3 * _random(clump_number, 8))[:, None]
-    shift = _random(clump_number, 9) + part["incoherence"] * _random(strand_number, 7)
+    pitch = (
+        _parameter_column(hair_parameters, "pitch_mm")
+        * (0.85 + 0.3 * _uniform_random(clump_number, 8))[:, None]
+    )
+    shift = _uniform_random(clump_number, 9) + hair_parameters["incoherence"] * _uniform_random(
+        strand_number, 7
+    )
     phase = 2 * np.pi * (length_mm / pitch + shift[:, None])
-    radius = _column(part, "curl_mm") * (0.75 + 0.5 * _random(strand_number, 10))[:, None]
-    radius = radius * np.minimum(length_mm / (0.5 * _column(part, "pitch_mm") + 4.0), 1.0)
+    radius = (
+        _parameter_column(hair_parameters, "curl_mm")
+        * (0.75 + 0.5 * _uniform_random(strand_number, 10))[:, None]
+    )
+    radius = radius * np.minimum(
+        length_mm / (0.5 * _parameter_column(hair_parameters, "pitch_mm") + 4.0), 1.0
+    )
     return np.stack([radius * np.cos(phase), radius * np.sin(phase)])
 
 
-def _frizz_offsets(strand_number: Words, part: NDArray[np.void], length_mm: Doubles) -> Doubles:
+def _frizz_offsets(strand_number: UInt32s, hair_parameters: NDArray[np.void], length_mm: Doubles) -> Doubles:
     """Return smooth random offsets (2, n, k) by which frizz displaces the points of strands [mm].
 
-    strand_number : (n,) numbers that identify the strands, for `_random`
-    part : (n,) parameters of the part of the groom to which each strand belongs
+    The first axis is for the two directions of `_cross_section_axes`.
+
+    strand_number : (n,) numbers that identify the strands, for `_uniform_random`
+    hair_parameters : (n,) row of `Groom.parameters` for each strand
     length_mm : (n, k) lengths from the root along the strand [mm]
     """
-    amount = part["frizz_mm"] * np.where(_random(strand_number, 11) < part["flyaways"], 5.0, 1.0)
+    amount = hair_parameters["frizz_mm"] * np.where(
+        _uniform_random(strand_number, 11) < hair_parameters["flyaways"], 5.0, 1.0
+    )
     amount = amount[:, None] * np.minimum(length_mm / 25.0, 1.0)
-    x, y = (2 * np.pi * _random(strand_number, stream)[:, None] for stream in (12, 13))
+    x, y = (2 * np.pi * _uniform_random(strand_number, stream)[:, None] for stream in (12, 13))
     slow, fast = 2 * np.pi * length_mm / 90.0, 2 * np.pi * length_mm / 31.0
     waves = np.sin(slow + x) + 0.4 * np.sin(fast + y), np.cos(slow + y) + 0.4 * np.cos(fast + x)
     return np.stack(
         [
-            amount * _random_normal(strand_number, k)[:, None] * wave
+            amount * _normal_random(strand_number, k)[:, None] * wave
             for k, wave in zip((14, 17), waves, strict=True)
         ]
     )
 
 
-def _strand_absorption(strand_number: Words, part: NDArray[np.void]) -> Doubles:
+def _strand_absorption(strand_number: UInt32s, hair_parameters: NDArray[np.void]) -> Doubles:
     """Return the absorption coefficients (n, 3) of strands [1/mm].
 
     Each strand represents several hairs, some of which may be white.
 
-    strand_number : (n,) numbers that identify the strands, for `_random`
-    part : (n,) parameters of the part of the groom to which each strand belongs
+    strand_number : (n,) numbers that identify the strands, for `_uniform_random`
+    hair_parameters : (n,) row of `Groom.parameters` for each strand
     """
     white = (
-        sum(_random(strand_number, 20 + k) < part["grey"] for k in range(_COLOUR_SAMPLES)) / _COLOUR_SAMPLES
+        sum(
+            _uniform_random(strand_number, 20 + k) < hair_parameters["grey"]
+            for k in range(_HAIRS_SAMPLED_PER_STRAND)
+        )
+        / _HAIRS_SAMPLED_PER_STRAND
     )
     white = np.asarray(white)[:, None]
-    dark = part["dark"] * np.exp(0.12 * _random_normal(strand_number, 26))[:, None]
+    dark = hair_parameters["dark"] * np.exp(0.12 * _normal_random(strand_number, 26))[:, None]
     mixed = (1.0 - white) ** 2 * ((1.0 - white) * dark + white * dark.mean(axis=1, keepdims=True))
-    return np.asarray(np.maximum(mixed, part["white"]) / part["hairs_per_strand"][:, None])
+    return np.asarray(
+        np.maximum(mixed, hair_parameters["white"]) / hair_parameters["hairs_per_strand"][:, None]
+    )
 
 
-def _unit(vectors: Doubles) -> Doubles:
+def _unit_vectors(vectors: Doubles) -> Doubles:
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))
 
 

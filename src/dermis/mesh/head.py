@@ -44,7 +44,7 @@ class Head:
     strands : Strands, optional
         Strands of brows and lashes.
     hair : Groom, optional
-        Scalp hair and beard, whose strands the device grows.
+        Scalp hair and beard, whose strands are grown on the GPU.
     note : str, optional
         Text about parts of the file that are not used, with reasons; empty if all parts are used.
     levels : int, optional

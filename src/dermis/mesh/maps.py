@@ -17,7 +17,7 @@ _MEAN_SAMPLES_PER_SIDE, _MAX_SAMPLE_DISTANCE_TEXELS = 64, 16
 
 @dataclass(frozen=True, repr=False)
 class PartMaps(ShortRepr):
-    """Texture maps, in one common uv layout, of all groups of triangles except skin.
+    """Texture maps of everything except the skin, in one common uv layout.
 
     colour : (H, W, 4) base colour, linear Rec. 709, and opacity; surfaces are cut out where opacity is below
         0.5 [-]
@@ -37,12 +37,12 @@ class Maps(ShortRepr):
     Row 0 is the top of the map; sizes may differ from map to map.
 
     colour : (H, W, 3) linear Rec. 709 [-]
-    normal : (H, W, 2) slopes dh/du and dh/d(up) of the relief, where up is towards row 0 [-]
-    height : (H, W) outwards, from an arbitrary zero [mm]
-    specular : (H, W) grey 0..1, which the renderer scales to a mean over the skin [-]
-    roughness : (H, W) grey 0..1 [-]
+    normal : (H, W, 2) slopes of the relief to the right and upwards (towards row 0) [-]
+    height : (H, W) height of the relief, outwards from an arbitrary zero [mm]
+    specular : (H, W) specular strength, 0 to 1; the renderer divides it by its mean over the skin [-]
+    roughness : (H, W) roughness, 0 to 1 [-]
     region : (H, W) uint8 index of the facial region
-    parts : maps of the groups of triangles that are not skin
+    parts : maps of everything that is not skin
     """
 
     colour: Floats | None = None
@@ -53,7 +53,7 @@ class Maps(ShortRepr):
     region: Bytes | None = None
     parts: PartMaps | None = None
     is_painted: ClassVar[bool] = False
-    """Whether the device paints the maps that are None."""
+    """Whether maps that are None are painted on the GPU."""
 
     @property
     def has_roughness(self) -> bool:

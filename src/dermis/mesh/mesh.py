@@ -14,7 +14,7 @@ from dermis.base.arrays import Doubles, Floats, Ints, Mask
 from dermis.base.summary import ShortRepr
 from dermis.mesh.geometry import tangents, vertex_normals, weld
 from dermis.mesh.outline import Outline, convex_hull
-from dermis.mesh.skull import Point, body_skull, is_head_sized, skull_below
+from dermis.mesh.skull import Point, body_skull_centre, is_head_sized, skull_centre_below
 
 MouthPart = Literal["upper teeth", "lower teeth", "tongue"]
 MOUTH_PARTS: tuple[MouthPart, ...] = ("upper teeth", "lower teeth", "tongue")
@@ -83,7 +83,7 @@ class Mesh(ShortRepr):
         return points
 
     @property
-    def cut_out(self) -> Mask:
+    def cut_out_mask(self) -> Mask:
         """Return a mask (f,) of triangles, such as hair cards, from which an opacity map cuts out parts."""
         return np.array([one.has_maps and one.opacity_cutoff > 0 for one in self.materials])[self.material]
 
@@ -106,9 +106,11 @@ class Mesh(ShortRepr):
     def skull_mm(self) -> Point | None:
         """Return the centre of the skull, without neck and shoulders; None for a mesh without a head [mm]."""
         if self.is_head_sized:
-            return skull_below(self.positions, float(self.positions[:, 1].max()))
+            return skull_centre_below(self.positions, float(self.positions[:, 1].max()))
         is_eye = np.array([one.eye for one in self.materials])[self.material]
-        return body_skull(self.positions, self.triangles, self.positions[self.triangles[is_eye].ravel()])
+        return body_skull_centre(
+            self.positions, self.triangles, self.positions[self.triangles[is_eye].ravel()]
+        )
 
     @cached_property
     def topology_key(self) -> bytes:
@@ -120,12 +122,12 @@ class Mesh(ShortRepr):
 
     @property
     def dpdu(self) -> Floats:
-        """Return the face-averaged derivatives (v, 3) of the position with respect to u [mm]."""
+        """Return the derivatives (v, 3) of the position with respect to u at the vertices [mm]."""
         return self._tangents[0]
 
     @property
     def dpdv(self) -> Floats:
-        """Return the face-averaged derivatives (v, 3) of the position with respect to v [mm]."""
+        """Return the derivatives (v, 3) of the position with respect to v at the vertices [mm]."""
         return self._tangents[1]
 
     @cached_property

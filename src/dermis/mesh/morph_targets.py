@@ -13,11 +13,11 @@ from dermis.base.summary import ShortRepr
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MorphTargets(ShortRepr):
-    """Sparse displacements of points by t morph targets, stored target after target.
+    """Displacements of points by t morph targets, without zeros, stored target after target.
 
     names : (t,) names of the targets
-    first : (t + 1,) index of the first displacement of each target, then the number n of displacements
-    point : (n,) point of each displacement
+    first : (t + 1,) index of the first displacement of each target; the last element is n
+    point : (n,) index of the point of each displacement
     delta_mm : (n, 3) displacement at weight 1
     rest : (t,) weights in the rest pose; None if all are 0
     """
@@ -38,11 +38,11 @@ class MorphTargets(ShortRepr):
         """Return the permutation (n,) that sorts the displacements by point, then by target."""
         return np.argsort(self.point, kind="stable")
 
-    def rows(self, target_index: int) -> slice:
+    def displacement_rows(self, target_index: int) -> slice:
         """Return the slice of the rows of `point` and `delta_mm` that belong to a target."""
         return slice(int(self.first[target_index]), int(self.first[target_index + 1]))
 
-    def dense(self, points: Intp, point_count: int) -> Floats:
+    def dense_displacements(self, points: Intp, point_count: int) -> Floats:
         """Return the displacements (t, n, 3) of n points by all targets at weight 1 [mm].
 
         points : (n,) indices of the points

@@ -24,7 +24,7 @@ _DIRECTION_COUNT, _COARSE_DIRECTION_COUNT = 512, 256
 _DIRECTION_COUNTS_OF_PASSES = 64, 512, 2048
 # points are skipped if they exceed the bounds of the chosen points by at most this distance
 _IGNORED_EXCESS_MM = 0.5
-_NUMBERS_PER_BLOCK = 80_000  # numbers that are computed at a time
+_PROJECTIONS_PER_BLOCK = 80_000  # numbers that are computed at a time
 _CANDIDATES_PER_DIRECTION = 16  # candidates per direction; any of them may be outermost in some pose
 _RANDOM_POSE_COUNT, _RANDOM_POSE_SEED = 128, 0
 _MAX_BONE_DEGREES = 60.0
@@ -46,7 +46,7 @@ class Outline(ShortRepr):
     margin_mm: float = 0.0
 
     @cached_property
-    def homogeneous(self) -> Floats:
+    def homogeneous_points(self) -> Floats:
         """Return the points as homogeneous columns (4, n) in float32, the precision of meshes [mm]."""
         return np.vstack([self.points_mm.T, np.ones(len(self.points_mm))]).astype(np.float32)
 
@@ -75,10 +75,10 @@ def hull_vertices(positions: NDArray[np.floating]) -> Intp:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RigOutline(ShortRepr):
-    """The s outline points of a rig, stored as columns, with dense morph targets and skin weights.
+    """Outline points of a rig, with the morph targets and bones that move them.
 
-    rest_mm : (4, s) homogeneous points at rest
-    delta_mm : (t, 3 s) displacements by each target at weight 1
+    rest_mm : (4, s) s points at rest as homogeneous columns
+    delta_mm : (t, 3 s) displacements by each target at weight 1: all x, then all y, then all z
     weight : (m, s) weights of the m bones that move any of the points; None without bones
     bones : (m,) indices of these bones in the skeleton
     """
@@ -88,35 +88,37 @@ class RigOutline(ShortRepr):
     weight: Floats | None
     bones: Intp
 
-    def pose(self, weights: Floats, matrices: Floats) -> Floats:
-        """Return the outline points in a pose, (s, 3) [mm].
+    def pose(self, target_weights: Floats, bone_matrices: Floats) -> Floats:
+        """Return the outline points (s, 3) in a pose [mm].
 
-        weights : (t,) weights of the targets, relative to the rest pose
-        matrices : (b, 3, 4) matrices of all bones of the rig
+        target_weights : (t,) weights of the targets, relative to the rest pose
+        bone_matrices : (b, 3, 4) matrices of all bones of the rig
         """
-        columns, active = self.rest_mm, weights.nonzero()[0]
+        columns, active = self.rest_mm, target_weights.nonzero()[0]
         if len(active):
-            few = 2 * len(active) < len(weights)
-            delta = weights[active] @ self.delta_mm[active] if few else weights @ self.delta_mm
+            few = 2 * len(active) < len(target_weights)
+            delta = target_weights[active] @ self.delta_mm[active] if few else target_weights @ self.delta_mm
             columns = columns.copy()
             columns[:3] += delta.reshape(3, -1)
         if self.weight is None:
             return columns[:3].T
-        blended = matrices[self.bones].reshape(-1, 12).T @ self.weight
+        blended = bone_matrices[self.bones].reshape(-1, 12).T @ self.weight
         return np.asarray((blended.reshape(3, 4, -1) * columns).sum(axis=1).T)
 
 
 def rig_outline(
     positions: Floats, targets: MorphTargets, skeleton: Skeleton | None, outline_points: Intp
 ) -> RigOutline:
-    """Return the outline formed by some points of a rig, with their morph targets and bone weights.
+    """Return a `RigOutline` of selected points of a rig.
 
     positions : (p, 3) positions of all control points at rest [mm]
     outline_points : (s,) indices of the outline points
     """
     rest = np.vstack([positions[outline_points].T, np.ones(len(outline_points), np.float32)])
     delta = (
-        targets.dense(outline_points, len(positions)).transpose(0, 2, 1).reshape(-1, 3 * len(outline_points))
+        targets.dense_displacements(outline_points, len(positions))
+        .transpose(0, 2, 1)
+        .reshape(-1, 3 * len(outline_points))
     )
     if skeleton is None:
         return RigOutline(rest, delta, None, np.zeros(0, np.intp))
@@ -148,20 +150,20 @@ def find_outline_points(positions: Floats, targets: MorphTargets, skeleton: Skel
     rest = np.zeros((0, 3, 4), np.float32) if skeleton is None else skeleton.rest_matrices
     chosen = np.zeros(len(candidates), bool)
     for count in _DIRECTION_COUNTS_OF_PASSES:
-        _select_extreme(chosen, positions[candidates], count)
+        _select_extreme_points(chosen, positions[candidates], count)
     for weights in np.eye(len(targets.names), dtype=np.float32):
-        _select_extreme(chosen, outline.pose(weights, rest))
+        _select_extreme_points(chosen, outline.pose(weights, rest))
     rng = np.random.default_rng(_RANDOM_POSE_SEED)
     for _ in range(_RANDOM_POSE_COUNT if targets.names or skeleton else 0):
         random_weights = rng.random(len(targets.names)) * (
             rng.random(len(targets.names)) < _ACTIVE_TARGET_FRACTION
         )
         matrices = rest if skeleton is None else _random_bone_matrices(skeleton, rng)
-        _select_extreme(chosen, outline.pose(random_weights.astype(np.float32), matrices))
+        _select_extreme_points(chosen, outline.pose(random_weights.astype(np.float32), matrices))
     return candidates[chosen]
 
 
-def _select_extreme(
+def _select_extreme_points(
     selected_points: Mask, positions: Floats, direction_count: int = _DIRECTION_COUNT
 ) -> None:
     """Select more points: those that exceed the bounds of the selected points in some direction.
@@ -182,25 +184,25 @@ def _project_on_directions(positions: Floats, direction_count: int) -> Iterator[
 
     direction_count : total number of directions
     """
-    block = max(1, _NUMBERS_PER_BLOCK // len(positions))
+    block = max(1, _PROJECTIONS_PER_BLOCK // len(positions))
     for start in range(0, direction_count, block):
-        yield _directions(direction_count)[start : start + block] @ positions.T
+        yield _sphere_directions(direction_count)[start : start + block] @ positions.T
 
 
 @lru_cache(maxsize=3)
-def _directions(direction_count: int) -> Floats:
+def _sphere_directions(direction_count: int) -> Floats:
     """Return unit vectors (direction_count, 3) distributed evenly over the sphere."""
     return np.ascontiguousarray(fibonacci_sphere(direction_count)[:, [0, 2, 1]], np.float32)
 
 
 def _outline_candidates(positions: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Intp:
-    """Return the indices of points that may be outermost in some pose, to limit the search."""
+    """Return the indices of the points among which `find_outline_points` searches."""
     layers = min(_CANDIDATES_PER_DIRECTION, len(positions))
     found: list[Numbers] = [extreme_points(positions, _DIRECTION_COUNTS_OF_PASSES[-1])]
     for height in _project_on_directions(positions, _DIRECTION_COUNT):
         found.append(np.argpartition(height, -layers, axis=1)[:, -layers:].ravel())
     for target in range(len(targets.names)):
-        rows = targets.rows(target)
+        rows = targets.displacement_rows(target)
         displaced = targets.point[rows]
         if len(displaced):
             found.append(displaced[extreme_points(positions[displaced] + targets.delta_mm[rows])])
@@ -216,11 +218,11 @@ def _outline_candidates(positions: Floats, targets: MorphTargets, skeleton: Skel
 def _random_bone_matrices(skeleton: Skeleton, rng: np.random.Generator) -> Floats:
     """Return bone matrices (b, 3, 4) for random rotations of a few bones.
 
-    Bones are chosen with a probability proportional to the number of points that follow them.
+    The more points follow a bone or its descendants, the more likely the bone is chosen.
     """
-    probability = skeleton.follower_counts / skeleton.follower_counts.sum()
+    probability = skeleton.subtree_weight_sums / skeleton.subtree_weight_sums.sum()
     count = min(int(rng.integers(1, _MAX_ROTATED_BONES + 1)), int((probability > 0).sum()))
     bones = np.sort(rng.choice(len(probability), count, replace=False, p=probability)).tolist()
     angles = rng.uniform(-_MAX_BONE_DEGREES, _MAX_BONE_DEGREES, (count, 3))
-    rows = [skeleton.bone_rotation(*pair) for pair in zip(bones, angles.tolist(), strict=True)]
+    rows = [skeleton.joint_rotation_matrix(*pair) for pair in zip(bones, angles.tolist(), strict=True)]
     return skeleton.pose_matrices(bones, np.array(rows).reshape(-1, 4, 4))

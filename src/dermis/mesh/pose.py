@@ -39,8 +39,8 @@ class Pose(ShortRepr):
         nod, y: turn, z: tilt) relative to the rest pose, applied about z first, then x, then y; or a (4, 4)
         matrix from the bone's space to its parent's space, in the units of the file, as in animations.
     positions_mm : (n, 3) array, optional
-        Rest positions of all points of the control mesh, in the order of `Head.positions_mm` [mm], such as
-        those of another person with the same topology, or of a motion from another program.
+        Rest positions of all points of the control mesh, in the order of `Head.positions_mm` [mm]. They may
+        be those of another person with the same topology, or a frame of a motion from another program.
 
     Raises
     ------
@@ -131,9 +131,9 @@ class Pose(ShortRepr):
         )
 
     def _bones_with_target_rotations(self, rig: Rig) -> Mapping[str, ArrayLike]:
-        """Return the bones of the pose, with the rotations that active morph targets add to them.
+        """Return the bone rotations of the pose, with the rotations that active morph targets add to them.
 
-        Bones whose pose is a matrix are not changed.
+        Rotations that are given as matrices are returned unchanged.
         """
         rotations = [one for one in rig.bone_rotations if self.weights.get(one.target)]
         if not rotations:
@@ -192,7 +192,7 @@ def _bone_transforms(
         try:
             if len(bone_values[name]) == 3:
                 angles = checked_array(culprit, bone_values[name], (3,), -MAX_DEGREES, MAX_DEGREES)
-                rows.append(skeleton.bone_rotation(bone, angles.tolist()))
+                rows.append(skeleton.joint_rotation_matrix(bone, angles.tolist()))
                 by_angles.append(k)
             else:
                 changes[k] = checked_array(
@@ -210,12 +210,12 @@ def _bone_transforms(
     return changes
 
 
-def _check_matrices(matrices: Doubles, bone_names: list[str], culprit: object) -> None:
+def _check_matrices(bone_matrices: Doubles, bone_names: list[str], culprit: object) -> None:
     """Raise DermisError if one of the matrices (n, 4, 4) is singular.
 
     bone_names : (n,) names of the bones
     """
-    linear = matrices[:, :3, :3]
+    linear = bone_matrices[:, :3, :3]
     size = np.sqrt(np.einsum("nij,nij->n", linear, linear))
     singular = np.abs(np.linalg.det(linear)) <= _MIN_RELATIVE_DETERMINANT * size**3
     if singular.any():
@@ -229,13 +229,13 @@ def _refuse_bone_value(culprit: str, bone_value: object) -> NoReturn:
 
 
 def _refuse_weights(
-    weights: Mapping[str, object], target_names: tuple[str, ...], culprit: object
+    target_weights: Mapping[str, object], target_names: tuple[str, ...], culprit: object
 ) -> NoReturn:
     """Raise DermisError for the first invalid weight or unknown morph target.
 
     target_names : names of the morph targets of the rig
     """
-    for name, weight in weights.items():
+    for name, weight in target_weights.items():
         if name not in target_names:
             _refuse_name(f"{culprit}: weights", name, target_names, "morph target")
         checked_number(f"{culprit}: weights.{name}", weight, -MAX_WEIGHT, MAX_WEIGHT)

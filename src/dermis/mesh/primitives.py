@@ -81,20 +81,22 @@ def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
     return build_mesh(radius_mm * normals[used], uv[used], corners, material, SKIN, normals[used])
 
 
-def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells: int = 4) -> Mesh:
-    """Return a closed slab of linearly varying thickness about the origin, with one uv chart per face.
+def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells_per_side: int = 4) -> Mesh:
+    """Return a closed slab, centred at the origin, that gets thicker along +X, with one uv chart per face.
 
     side_mm : length along X and Y [mm]
     thin_mm, thick_mm : thickness along Z at -X and at +X [mm]
-    cells : number of cells along each side
+    cells_per_side : number of cells along each side
     """
-    if not (side_mm > 0 and min(thin_mm, thick_mm) > 0 and cells >= 1):
-        actual = f"got {side_mm}, {thin_mm} and {thick_mm} mm and {cells}"
+    if not (side_mm > 0 and min(thin_mm, thick_mm) > 0 and cells_per_side >= 1):
+        actual = f"got {side_mm}, {thin_mm} and {thick_mm} mm and {cells_per_side}"
         refuse("wedge", "sides above 0 and a cell", actual, "Correct the arguments")
-    v, u = (axis.ravel() for axis in np.mgrid[: cells + 1, : cells + 1] / cells)
-    row, column = (axis.ravel() for axis in np.mgrid[:cells, :cells])
-    a = row * (cells + 1) + column
-    quads = np.column_stack((a, a + cells + 1, a + cells + 2, a, a + cells + 2, a + 1)).reshape(-1, 3)
+    v, u = (axis.ravel() for axis in np.mgrid[: cells_per_side + 1, : cells_per_side + 1] / cells_per_side)
+    row, column = (axis.ravel() for axis in np.mgrid[:cells_per_side, :cells_per_side])
+    a = row * (cells_per_side + 1) + column
+    quads = np.column_stack(
+        (a, a + cells_per_side + 1, a + cells_per_side + 2, a, a + cells_per_side + 2, a + 1)
+    ).reshape(-1, 3)
     positions, uv, normals, triangles = [], [], [], []
     for index, (corners, (left, top, size)) in enumerate(_WEDGE_FACES):
         c = np.array(corners, float)

@@ -33,7 +33,7 @@ _CACHE_VERSION = "outline 6"  # change it when the search returns other points
 
 
 class Motion(NamedTuple):
-    """State of a rig as arrays, which are uploaded to the device.
+    """Pose of a rig as arrays for the GPU.
 
     weights : (t,) weights of the targets, relative to the rest pose
     matrices : (b, 3, 4) bone matrices, which transform points at rest [mm]
@@ -49,9 +49,9 @@ class Motion(NamedTuple):
 class Stencils(ShortRepr):
     """Points of a subdivided mesh as weighted means of control points, in compressed rows.
 
-    first : (q + 1,) index in `point` and `weight` at which each mesh point starts
-    point : (n,) control points
-    weight : (n,) weights, which sum to 1 for each mesh point
+    first : (q + 1,) index at which the control points of each mesh point start in `point` and `weight`
+    point : (n,) indices of control points
+    weight : (n,) weights of these control points, which sum to 1 for each mesh point
     """
 
     first: Ints
@@ -97,8 +97,8 @@ class Rig(ShortRepr):
     bone_rotations : rotations of bones by morph targets
     rigid_followers : points that are not in the file, such as fitted eyeballs; they follow the file's points
     contact : lids that must stay outside the eyeballs; None if lids may intersect eyeballs
-    template : rig with corresponding points, targets and bones, whose outline points are reused together with
-        the extreme points of this rig; None to search for outline points
+    template : rig with corresponding points, targets and bones, whose outline points this rig reuses to avoid
+        a search for its own; None if there is no such rig
     """
 
     positions_mm: Floats
@@ -144,7 +144,7 @@ class Rig(ShortRepr):
         return rig_outline(self.positions_mm, self.targets, self.skeleton, self._outline_points)
 
     def outline_mm(self, motion: Motion) -> Floats:
-        """Return points (s, 3) that bound the head in a pose in every direction, to about a millimetre [mm].
+        """Return points (s, 3) whose convex hull contains the posed head, to about a millimetre [mm].
 
         If `motion` replaces the rest positions, the extreme points of the new positions are added.
         """
@@ -183,28 +183,28 @@ class Rig(ShortRepr):
         ).astype(np.intp)
 
     def points_mm(self, motion: Motion) -> Doubles:
-        """Return the points of the mesh in a pose, after any subdivision, (q, 3) [mm]."""
+        """Return the points (q, 3) of the mesh in a pose, after any subdivision [mm]."""
         rig = replace(self, positions_mm=motion.positions_mm)
         control = rig.pose(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
         return control if self.stencils is None else self.stencils.points(control)
 
     def lid_edges_mm(self, motion: Motion) -> Doubles:
-        """Return points along the lid edges in a pose, on the subdivided surface, (k, r, 3) [mm].
+        """Return points (k, r, 3) along the lid edges in a pose, on the subdivided surface [mm].
 
         There are k eyes with r points around each opening, see `LidContact.edge`.
         """
         assert self.contact is not None
-        points, weights, outline = self._lid_edge_data
+        points, weights, outline = self._posable_lid_edges
         rest = np.vstack([motion.positions_mm[points].T, outline.rest_mm[3]])
         posed = replace(outline, rest_mm=rest).pose(motion.weights, motion.matrices)
         return np.asarray(weights @ posed).reshape(*self.contact.edge.shape, 3)
 
     @cached_property
-    def _lid_edge_data(self) -> tuple[Intp, Doubles, RigOutline]:
-        """Return the precomputed data for `lid_edges_mm`.
+    def _posable_lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
+        """Return arrays for `lid_edges_mm` that do not depend on the pose.
 
-        The data are the indices (n,) of the control points around the edges, their weights (e, n) in the e
-        points of the edges, and a `RigOutline` of these control points, which can be posed.
+        They are the indices (n,) of the control points around the lid edges, and the weights (e, n) of these
+        control points in the e points along the edges. The `RigOutline` poses the control points.
         """
         assert self.contact is not None
         edge = self.contact.edge.ravel().astype(np.intp)
@@ -218,12 +218,12 @@ class Rig(ShortRepr):
         return points, weights, rig_outline(self.positions_mm, self.targets, self.skeleton, points)
 
     def pose_points(self, points: Ints, motion: Motion) -> Doubles:
-        """Return selected control points in a pose, (n, 3) [mm].
+        """Return selected control points (n, 3) in a pose [mm].
 
         points : (n,) indices of the control points
         """
         positions = motion.positions_mm[points].astype(np.float64)
-        if self._has_targets[points].any():
+        if self._target_moved_mask[points].any():
             positions += np.einsum("t,tpk->pk", motion.weights, self._dense_displacements(points))
         if self.skeleton is None:
             return positions
@@ -232,7 +232,7 @@ class Rig(ShortRepr):
         return np.asarray(np.einsum("pk,pkij,pj->pi", weight, matrices, homogeneous))
 
     @cached_property
-    def _has_targets(self) -> Mask:
+    def _target_moved_mask(self) -> Mask:
         """Return a mask (p,) of the control points that some morph target moves."""
         displaced = np.zeros(len(self.positions_mm), bool)
         displaced[self.targets.point] = True
@@ -242,21 +242,21 @@ class Rig(ShortRepr):
         """Return the displacements (t, n, 3) of n control points by all targets; cache the last result."""
         last_points, dense = vars(self).get("_last", (None, None))
         if dense is None or not np.array_equal(last_points, points):
-            dense = self.targets.dense(points.astype(np.intp), len(self.positions_mm))
+            dense = self.targets.dense_displacements(points.astype(np.intp), len(self.positions_mm))
             vars(self)["_last"] = points, dense
         return np.asarray(dense)
 
-    def pose(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
-        """Return all control points (p, 3) in a pose [mm], as a reference for the computation on the device.
+    def pose(self, target_weights: Doubles, bone_matrices: Doubles | None = None) -> Doubles:
+        """Return all control points (p, 3) in a pose, computed on the CPU [mm].
 
-        weights : (t,) weights of the targets, relative to the rest pose
-        matrices : (b, 3, 4) matrices of the bones, from `Skeleton.matrices`; None for the rest pose
+        target_weights : (t,) weights of the targets, relative to the rest pose
+        bone_matrices : (b, 3, 4) matrices of the bones, from `Skeleton.matrices`; None for the rest pose
         """
         targets, points = self.targets, self.positions_mm.astype(np.float64)
-        row_weights = np.repeat(weights, np.diff(targets.first))
+        row_weights = np.repeat(target_weights, np.diff(targets.first))
         np.add.at(points, targets.point, row_weights[:, None] * targets.delta_mm)
-        if self.skeleton is not None and matrices is not None:
+        if self.skeleton is not None and bone_matrices is not None:
             homogeneous = np.concatenate([points, np.ones((len(points), 1))], axis=1)
-            blended = np.einsum("pk,pkij->pij", self.skeleton.weight, matrices[self.skeleton.bone])
+            blended = np.einsum("pk,pkij->pij", self.skeleton.weight, bone_matrices[self.skeleton.bone])
             points = np.asarray(np.einsum("pij,pj->pi", blended, homogeneous))
         return points if self.contact is None else self.contact.push_out(points)

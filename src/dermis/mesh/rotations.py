@@ -1,7 +1,6 @@
 """Rotations as quaternions, Euler angles and matrices.
 
-SciPy's Rotation is over twenty times slower for the few rotations of a pose, and refuses quaternions of
-length 0.
+For the few rotations of a pose, these functions are over twenty times faster than SciPy's Rotation.
 """
 
 from __future__ import annotations
@@ -51,8 +50,7 @@ def matrix_quaternion(matrix: Doubles) -> Doubles:
 def angles_matrix(degrees: Sequence[float]) -> list[list[float]]:
     """Return the rotation matrix (3, 3) of Euler angles about x, y and z [degrees].
 
-    The rotation about z is applied first, then x, then y. Plain floats are used, as NumPy is ten times slower
-    for so few numbers.
+    The rotation about z is applied first, then x, then y.
     """
     (sx, cx), (sy, cy), (sz, cz) = ((math.sin(r), math.cos(r)) for r in map(math.radians, degrees))
     return [

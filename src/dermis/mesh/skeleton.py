@@ -54,22 +54,22 @@ class Skeleton(ShortRepr):
 
     @cached_property
     def rest_matrices(self) -> Floats:
-        """Return the bone matrices in the rest pose, (b, 3, 4)."""
+        """Return the bone matrices (b, 3, 4) in the rest pose."""
         return self.matrices().astype(np.float32)
 
     @cached_property
-    def origin_mm(self) -> list[list[float]]:
-        """Return the positions of the joints at rest, (b, 3), in head space [mm]."""
+    def joint_positions_mm(self) -> list[list[float]]:
+        """Return the positions (b, 3) of the joints at rest, in head space [mm]."""
         origins: list[list[float]] = (self.to_head @ self._bone_to_file(self.local))[:, :3, 3].tolist()
         return origins
 
-    def bone_rotation(self, bone_index: int, degrees: Sequence[float]) -> list[float]:
+    def joint_rotation_matrix(self, bone_index: int, degrees: Sequence[float]) -> list[float]:
         """Return the head-space matrix that rotates about a bone's joint at rest, as 16 numbers row by row.
 
         degrees : angles about x, y and z, see `angles_matrix`
         """
         (a, b, c), (d, e, f), (g, h, i) = angles_matrix(degrees)
-        x, y, z = self.origin_mm[bone_index]
+        x, y, z = self.joint_positions_mm[bone_index]
         p, q, r = x - a * x - b * y - c * z, y - d * x - e * y - f * z, z - g * x - h * y - i * z
         return [a, b, c, p, d, e, f, q, g, h, i, r, 0.0, 0.0, 0.0, 1.0]
 
@@ -84,8 +84,6 @@ class Skeleton(ShortRepr):
 
     def pose_matrices(self, bones: Sequence[int], bone_changes: Doubles) -> Floats:
         """Return the bone matrices (b, 3, 4) of a pose in which n bones and their descendants move.
-
-        For few bones, the cost depends on n and not on the number of all bones.
 
         bones : (n,) indices, parents before children
         bone_changes : (n, 4, 4) head-space transform of each bone relative to its rest pose [mm]
@@ -102,9 +100,10 @@ class Skeleton(ShortRepr):
         return matrices.astype(np.float32)
 
     def _accumulate_in_order(self, bones: Sequence[int], bone_changes: Doubles) -> Doubles:
-        """Accumulate transforms of n bones over the hierarchy, one moving bone after the other.
+        """Multiply transforms of n bones down the hierarchy, bone by bone.
 
-        The result (b, 4, 4) is the head-space transform of every bone relative to its rest pose.
+        Used for few bones. The result (b, 4, 4) is the head-space transform of every bone of the skeleton,
+        relative to its rest pose.
         """
         nearest, transform = np.zeros(len(self.names), np.intp), np.empty((len(bones) + 1, 4, 4))
         transform[0] = _IDENTITY_MATRIX
@@ -114,9 +113,10 @@ class Skeleton(ShortRepr):
         return transform[nearest]
 
     def _accumulate_by_depth(self, bones: Sequence[int], bone_changes: Doubles) -> Doubles:
-        """Accumulate transforms of n bones over the hierarchy, level by level, which is faster for large n.
+        """Multiply transforms of n bones down the hierarchy, level by level.
 
-        The result (b, 4, 4) is the head-space transform of every bone relative to its rest pose.
+        Used for many bones. The result (b, 4, 4) is the head-space transform of every bone of the skeleton,
+        relative to its rest pose.
         """
         transform = np.tile(_IDENTITY_MATRIX, (len(self.names), 1, 1))
         transform[list(bones)] = bone_changes
@@ -163,8 +163,8 @@ class Skeleton(ShortRepr):
         return [np.array(bones, np.intp) for bones in descendants]
 
     @cached_property
-    def follower_counts(self) -> Doubles:
-        """Return for each bone the sum (b,) of the skin weights of the bone and of its descendants."""
+    def subtree_weight_sums(self) -> Doubles:
+        """Return for each bone (b,) the sum of the skin weights of the bone and of its descendants."""
         own = np.bincount(self.bone.ravel(), self.weight.ravel(), minlength=len(self.names))
         return np.array([own[bones].sum() for bones in self._descendants])
 

@@ -17,7 +17,7 @@ _MIN_BODY_HEIGHT_MM = 300.0
 MAX_ELONGATION = 2.4
 """Largest ratio of length to width of a head with neck or shoulders; forearms have 3 and more [-]."""
 _MAX_RELATIVE_WIDTH = 3.0  # largest width of a bust relative to its depth
-_MAX_EYES_TO_HAIR_MM = 250.0  # largest horizontal distance between the eyes and other parts of the head
+_HEAD_RADIUS_ABOUT_EYES_MM = 250.0  # largest horizontal distance between the eyes and other parts of the head
 _MAX_FLAT_THICKNESS_RATIO = 0.5  # thickness relative to width below which a mesh is flat
 _MIN_MEAN_NORMAL_LENGTH = 0.2  # length of the mean normal of an open surface; 0 for closed meshes
 _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
@@ -25,7 +25,7 @@ _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _HEAD_SECTION_HEIGHT = 0.95
 _NECK_SECTION_HEIGHTS = 0.82, 0.85, 0.88
 _SHOULDER_SECTION_HEIGHTS = 0.74, 0.77, 0.8
-_MIN_FIGURE_TO_DEPTH = 2.5
+_MIN_FIGURE_HEIGHT_TO_DEPTH = 2.5
 _MAX_HEAD_WIDTH, _MAX_NECK_WIDTH, _MIN_SHOULDERS_TO_NECK = 0.25, 0.16, 1.6
 
 
@@ -40,7 +40,7 @@ def is_head_sized(positions: Floats) -> bool:
 
 
 def principal_sizes(positions: Floats) -> Doubles:
-    """Return the sizes (3,) of vertices (v, 3) along their principal axes, the main axis last."""
+    """Return the extents (3,) of a set of vertices (v, 3) along its principal axes, the longest axis last."""
     points = positions.astype(np.float64)
     return np.asarray(np.ptp(points @ np.linalg.eigh(np.cov(points.T)).eigenvectors, axis=0))
 
@@ -52,7 +52,7 @@ def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
     triangles : (f, 3) vertex indices
     """
     width, height, depth = (float(one) for one in np.ptp(positions, axis=0))
-    if height <= _MIN_FIGURE_TO_DEPTH * min(width, depth):
+    if height <= _MIN_FIGURE_HEIGHT_TO_DEPTH * min(width, depth):
         return False
     points, ends = positions.astype(np.float64), positions[:, 1][triangles]
     low, high = ends.min(axis=1), ends.max(axis=1)
@@ -70,11 +70,11 @@ def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
     )
 
 
-def skull_below(positions: NDArray[np.floating], crown_height: float) -> Point:
-    """Return the centre of a skull below its crown [mm].
+def skull_centre_below(positions: NDArray[np.floating], crown_height: float) -> Point:
+    """Return the centre of the skull of a head whose crown is at a given height [mm].
 
-    positions : (v, 3) vertices of a head [mm]
-    crown_height : height of the crown [mm]
+    positions : (v, 3) vertices of the head, Y up [mm]
+    crown_height : y coordinate of the crown [mm]
     """
     x, y, z = positions.T
     skull = y > crown_height - 2 * _CROWN_TO_CENTRE_MM
@@ -82,11 +82,11 @@ def skull_below(positions: NDArray[np.floating], crown_height: float) -> Point:
     return centre_x, crown_height - _CROWN_TO_CENTRE_MM, centre_z
 
 
-def body_skull(positions: Floats, triangles: Ints, eyes: Floats) -> Point | None:
+def body_skull_centre(positions: Floats, triangles: Ints, eyes: Floats) -> Point | None:
     """Return the centre of the skull of a body: at the level of its eyes, or at the top of a standing figure.
 
-    The result is None for a mesh without eyes that is not a standing figure, and for a mesh smaller than a
-    body.
+    The result is None for a mesh without eyes that is not a standing figure, and for a mesh that is too small
+    to be a body.
 
     positions : (v, 3) vertices, Y up [mm]
     triangles : (f, 3) vertex indices
@@ -96,10 +96,10 @@ def body_skull(positions: Floats, triangles: Ints, eyes: Floats) -> Point | None
         return None
     if len(eyes):
         x, y, z = 0.5 * (eyes.min(axis=0) + eyes.max(axis=0))
-        near = np.hypot(positions[:, 0] - x, positions[:, 2] - z) < _MAX_EYES_TO_HAIR_MM
-        return skull_below(positions[near], float(y) + _CROWN_TO_CENTRE_MM)
+        near = np.hypot(positions[:, 0] - x, positions[:, 2] - z) < _HEAD_RADIUS_ABOUT_EYES_MM
+        return skull_centre_below(positions[near], float(y) + _CROWN_TO_CENTRE_MM)
     if is_standing_figure(positions, triangles):
-        return skull_below(positions, float(positions[:, 1].max()))
+        return skull_centre_below(positions, float(positions[:, 1].max()))
     return None
 
 
@@ -145,7 +145,7 @@ class _Section(NamedTuple):
     middle: float
 
 
-def _horizontal_section(positions: Doubles, cut_triangles: Ints, height: float) -> _Section:
+def _horizontal_section(positions: Doubles, cut_triangles: Ints, plane_height: float) -> _Section:
     """Return the intersection of a mesh with the horizontal plane at a height.
 
     cut_triangles : (n, 3) vertex indices of the triangles that the plane cuts
@@ -154,8 +154,8 @@ def _horizontal_section(positions: Doubles, cut_triangles: Ints, height: float) 
         return _Section(0, 0.0, 0.0)
     (x, y), a, b = positions.T[:2], cut_triangles, np.roll(cut_triangles, 1, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        crossing: Doubles = x[a] + (x[b] - x[a]) * (height - y[a]) / (y[b] - y[a])
-    crossing[(y[a] > height) == (y[b] > height)] = np.nan
+        crossing: Doubles = x[a] + (x[b] - x[a]) * (plane_height - y[a]) / (y[b] - y[a])
+    crossing[(y[a] > plane_height) == (y[b] > plane_height)] = np.nan
     low, high = np.nanmin(crossing, axis=1), np.nanmax(crossing, axis=1)
     order = np.argsort(low)
     low, reached = low[order], np.maximum.accumulate(high[order])

@@ -78,10 +78,10 @@ def to_root_frames(mesh: Mesh, roots: Roots, offsets_mm: Doubles) -> Floats:
 
     offsets_mm : (n, k, 3) offsets in head space, on the mesh at rest
     """
-    return to_frames(root_frames(mesh, roots, mesh.points_mm)[1], offsets_mm)
+    return offsets_in_frames(root_frames(mesh, roots, mesh.points_mm)[1], offsets_mm)
 
 
-def to_frames(root_axes: Doubles, offsets_mm: Doubles) -> Floats:
+def offsets_in_frames(root_axes: Doubles, offsets_mm: Doubles) -> Floats:
     """Express knot offsets (n, k, 3), measured from each root, in the frame of that root.
 
     root_axes : (n, 3, 3) axes of the frames as rows, as returned by `root_frames`
@@ -90,7 +90,7 @@ def to_frames(root_axes: Doubles, offsets_mm: Doubles) -> Floats:
 
 
 def quad_corners(mesh: Mesh, quad_index: NDArray[np.integer]) -> Ints:
-    """Return the point indices at the four corners of quads, (n, 4).
+    """Return the point indices (n, 4) at the four corners of quads.
 
     quad_index : (n,) rows of `Mesh.quads`
     """
@@ -109,11 +109,11 @@ def quad_weights(bilinear_position: NDArray[np.floating]) -> Doubles:
     return np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
 
 
-def cover_of_points(mesh: Mesh, roots: Roots, area_mm2: Doubles) -> Doubles:
-    """Return the projected area of the strands rooted around each point of a mesh, per area of skin (p,) [-].
+def hair_cover_of_points(mesh: Mesh, roots: Roots, area_mm2: Doubles) -> Doubles:
+    """Return the projected area of the strands rooted around each mesh point (p,), per area of skin [-].
 
-    The projected area is half the area of a strand seen from the side, because hair is inclined. All of it is
-    assigned to the skin at the root.
+    Because hair is inclined, half the area of a strand seen from the side counts as its projected area. The
+    whole projected area counts as cover of the skin at the root.
 
     area_mm2 : (n,) area of each strand seen from the side [mm2]
     """
@@ -151,7 +151,9 @@ def _root_positions(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -
 
 
 def interpolate_quads(bilinear_position: NDArray[np.floating], corner_values: Doubles) -> Doubles:
-    """Interpolate quantities bilinearly from the corners of quads to one point in each quad, (c, n).
+    """Interpolate quantities bilinearly from the corners of quads to one point in each quad.
+
+    Returns an array (c, n) of c quantities at n points.
 
     bilinear_position : (n, 2) bilinear coordinates of the points, see `Roots`
     corner_values : (c, 4, n) values of c quantities at the corners of n quads

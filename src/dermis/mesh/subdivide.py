@@ -26,7 +26,7 @@ MAX_SUBDIVISION_LEVELS = 3
 _CACHE_VERSION = "subdivision 1"  # change it when weights or corners change for the same mesh
 _MIN_CACHED_TRIANGLES = 500_000
 """Smallest number of triangles of a finer mesh whose weights are cached on disk, to save half a second."""
-Corners = NDArray[np.integer]
+CornerIndices = NDArray[np.integer]
 
 
 class SubdividedMesh(NamedTuple):
@@ -38,11 +38,11 @@ class SubdividedMesh(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """Subdivision for all meshes with the same triangles: p control points become q points with v vertices.
+    """Subdivision that applies to all meshes with the same triangles, whatever their positions.
 
-    weights : (q, p) weights of the control points in each finer point
-    stencils : the same weights in the format of a rig
-    uv, point : (v, 2) uv and (v,) point of each vertex of the finer mesh
+    weights : (q, p) weights of the p control points in each of the q points of the finer mesh
+    stencils : the same weights, as the stencils of a rig
+    uv, point : (v, 2) uv and (v,) point index of each vertex of the finer mesh
     triangles, material, quads : arrays of the finer mesh, see `Mesh`
     """
 
@@ -54,11 +54,16 @@ class Refinement:
     material: Ints
     quads: Ints
 
-    def mesh(self, coarse: Mesh) -> Mesh:
-        """Return a mesh, which must have the triangles of this refinement, after subdivision."""
-        positions = (self.weights @ coarse.points_mm)[self.point]
+    def subdivided_mesh(self, coarse_mesh: Mesh) -> Mesh:
+        """Return a subdivided mesh.
+
+        coarse_mesh : mesh before subdivision, with the triangles for which this refinement was computed
+        """
+        positions = (self.weights @ coarse_mesh.points_mm)[self.point]
         topology = {"point": self.point, "quads": self.quads}
-        return build_mesh(positions, self.uv, self.triangles, self.material, coarse.materials, **topology)
+        return build_mesh(
+            positions, self.uv, self.triangles, self.material, coarse_mesh.materials, **topology
+        )
 
 
 def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
@@ -96,20 +101,20 @@ def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
     """Return a mesh subdivided `levels` times, with smoothed positions and linearly interpolated uv.
 
     A mesh that has more quads than triangles is subdivided by the rules of Catmull and Clark, and its points
-    are moved to the limit surface. Other meshes are subdivided by the rules of Loop. Positions depend on
-    points and not on vertices, so that uv seams neither crack nor crease; open borders are smoothed as
-    curves. Normals and tangents are computed from the subdivided mesh; normals of the file are dropped.
+    are moved to the limit surface. Other meshes are subdivided by the rules of Loop. Vertices at the same
+    point stay together, so that the surface has no cracks or creases at uv seams. Open borders are smoothed
+    as curves. Normals are computed from the subdivided mesh; normals of the file are dropped.
 
     levels : 0 to 3, each of which multiplies the number of triangles by four
     """
     if _check_levels(levels) == 0:
         return SubdividedMesh(mesh, None)
     refined = refinement(mesh, levels)
-    return SubdividedMesh(refined.mesh(mesh), refined.stencils)
+    return SubdividedMesh(refined.subdivided_mesh(mesh), refined.stencils)
 
 
 def refinement(mesh: Mesh, levels: int) -> Refinement:
-    """Return the subdivision of all meshes with this mesh's topology; see `subdivide` for its rules.
+    """Return the subdivision of meshes with the triangles and uv of this mesh; see `subdivide` for the rules.
 
     levels : 1 to 3
     """
@@ -174,9 +179,10 @@ def _compute_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
 
 
 def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
-    """Return a mesh as f polygons: all corner vertices (n,), the numbers of corners (f,), the materials (f,).
+    """Return the triangles and quads of a mesh as f polygons.
 
-    Triangles that belong to no quad come first, then quads.
+    The arrays are the vertices (n,) at the corners of all polygons, and the number (f,) of corners and the
+    material (f,) of each polygon. Triangles that belong to no quad come first, then quads.
     """
     first, second = mesh.quads.T
     loose = np.delete(np.arange(len(mesh.triangles)), mesh.quads.ravel())
@@ -187,12 +193,13 @@ def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
 
 
 def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
-    """Return triangles (t, 3) for a subdivided head, with fewer levels of subdivision in flat regions.
+    """Return triangles (t, 3) of a subdivided head, with fewer levels of subdivision in flat regions.
 
-    The indices refer to the vertices of the subdivided mesh. Triangles with an opacity map are left out.
+    The triangles are indices of vertices of the subdivided mesh. Triangles with an opacity map are left out.
 
-    min_faces : least number of faces that the mesh has at the coarsest level used
-    tolerance_mm : largest distance between a vertex that is dropped and the coarse edge that replaces it
+    min_faces : coarser levels are used only if the mesh has at least this number of faces at these levels
+    tolerance_mm : largest distance between a dropped vertex and the middle of the coarse edge that replaces
+        it [mm]
     """
     mesh, levels = head.mesh, head.levels
     by_quads = len(mesh.quads) > 0
@@ -201,39 +208,45 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
         levels, count = levels - 1, count // 4
     skipped = head.levels - levels
     if skipped == 0:
-        return mesh.triangles[~mesh.cut_out]
+        return mesh.triangles[~mesh.cut_out_mask]
     if by_quads:
-        solid = mesh.quads[~mesh.cut_out[mesh.quads[:, 0]]]
+        solid = mesh.quads[~mesh.cut_out_mask[mesh.quads[:, 0]]]
         quads = np.column_stack((mesh.triangles[solid[:, 0]], mesh.triangles[solid[:, 1], 1]))
         return _coarsen_quads(quads, mesh.positions, skipped, tolerance_mm)
-    return _coarsen_triangles(mesh.triangles[~mesh.cut_out], mesh.positions, skipped, tolerance_mm)
+    return _coarsen_triangles(mesh.triangles[~mesh.cut_out_mask], mesh.positions, skipped, tolerance_mm)
 
 
-def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """Return triangles of a mesh after Loop subdivision, but of a coarser level in flat regions.
+def _coarsen_triangles(
+    triangles: Ints, positions_mm: Floats, dropped_levels: int, tolerance_mm: float
+) -> Ints:
+    """Return triangles (t, 3) of a mesh after Loop subdivision, with fewer levels in flat regions.
 
-    Loop's rules divide a triangle into four, the first three of which are at its corners.
-
-    levels : number of levels to leave out in flat regions
+    triangles : (f, 3) triangles of the finest level; Loop's rules divide a triangle into four, of which the
+        first three are at its corners
+    dropped_levels : number of subdivision levels to leave out in flat regions
+    tolerance_mm : largest deviation of a region that counts as flat [mm]
     """
     coarse, finer = triangles, triangles
-    for _ in range(levels):
+    for _ in range(dropped_levels):
         coarse, finer = coarse.reshape(-1, 4, 3)[:, :3, 0], coarse
     middles = finer.reshape(-1, 4, 3)[:, :3, 1]
-    deviation = _deviation_mm(positions_mm, middles, coarse, np.roll(coarse, -1, axis=1))
+    deviation = _edge_deviation_mm(positions_mm, middles, coarse, np.roll(coarse, -1, axis=1))
     is_curved = deviation.max(axis=1) > tolerance_mm
-    return np.concatenate((coarse[~is_curved], triangles[np.repeat(is_curved, 4**levels)]))
+    return np.concatenate((coarse[~is_curved], triangles[np.repeat(is_curved, 4**dropped_levels)]))
 
 
-def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """Return triangles of a mesh after Catmull-Clark subdivision, but of a coarser level in flat regions.
+def _coarsen_quads(
+    quads: CornerIndices, positions_mm: Floats, dropped_levels: int, tolerance_mm: float
+) -> Ints:
+    """Return triangles (t, 3) of a mesh after Catmull-Clark subdivision, with fewer levels in flat regions.
 
-    The rules divide a polygon into quads, one from each corner to its centre.
-
-    levels : number of levels to leave out in flat regions
+    quads : (q, 4) quads of the finest level; the rules divide a polygon into quads, one from each corner to
+        its centre
+    dropped_levels : number of subdivision levels to leave out in flat regions
+    tolerance_mm : largest deviation of a region that counts as flat [mm]
     """
     coarse = quads
-    for _ in range(levels - 1):
+    for _ in range(dropped_levels - 1):
         coarse = coarse[:, 0].reshape(-1, 4)
     corner, side, centre = coarse[:, 0], coarse[:, 1], coarse[:, 2]
     is_first = np.append(True, centre[1:] != centre[:-1])
@@ -241,15 +254,15 @@ def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_
     first = np.flatnonzero(is_first)[polygon]
     following = np.where(is_last, corner[first], np.roll(corner, -1))
     is_curved = np.zeros(polygon[-1] + 1, bool)
-    is_curved[polygon[_deviation_mm(positions_mm, side, corner, following) > tolerance_mm]] = True
+    is_curved[polygon[_edge_deviation_mm(positions_mm, side, corner, following) > tolerance_mm]] = True
     in_fan = ~is_first & ~is_last & ~is_curved[polygon]
     fans = np.column_stack((corner[first], corner, following))[in_fan]
-    fine = quads[np.repeat(is_curved[polygon], 4 ** (levels - 1))]
+    fine = quads[np.repeat(is_curved[polygon], 4 ** (dropped_levels - 1))]
     return np.concatenate((fans, split_quads(fine))).astype(np.int32)
 
 
-def _deviation_mm(
-    positions_mm: Floats, middle_vertex: Corners, start_vertex: Corners, end_vertex: Corners
+def _edge_deviation_mm(
+    positions_mm: Floats, middle_vertex: CornerIndices, start_vertex: CornerIndices, end_vertex: CornerIndices
 ) -> Floats:
     """Return the distance between the middle vertex of each coarse edge and the midpoint of this edge [mm].
 

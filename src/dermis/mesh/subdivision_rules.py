@@ -1,4 +1,7 @@
-"""Rules for one level of Loop or Catmull-Clark subdivision: the weights of old points in each new point."""
+"""Rules for one level of Loop or Catmull-Clark subdivision.
+
+The rules are sparse matrices with the weights of the old points in each new point.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +19,11 @@ if TYPE_CHECKING:
 
 
 class Cage(NamedTuple):
-    """Polygons before a level of subdivision.
+    """Polygon mesh before one level of subdivision.
 
     uv : (v, 2) uv of each vertex
-    point : (v,) point of each vertex
-    corner : (n,) vertices at the corners, face by face
+    point : (v,) index of the point at which each vertex lies
+    corner : (n,) indices of the vertices at the corners, face by face
     corner_count : (f,) number of corners of each face
     material : (f,) material of each face
     """
@@ -34,17 +37,19 @@ class Cage(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Sides:
-    """The n half-edges of all faces, called sides, which run from each corner to the next, and their e edges.
+    """Edges of a polygon mesh, and the sides (half-edges) of its faces.
+
+    A side runs from one corner of a face to the next. Faces that meet at an edge each have a side on it.
 
     point_count : number of points
-    start : (n,) point where each side starts
-    previous : (n,) preceding side of the same face
-    face : (n,) face of each side
-    ends : (e, 2) points at the ends of each edge
-    edge : (n,) edge of each side
-    border : (e,) mask of edges whose number of sides is not two
+    start : (n,) index of the point where each of the n sides starts
+    previous : (n,) index of the preceding side of the same face
+    face : (n,) index of the face of each side
+    ends : (e, 2) indices of the points at the ends of each of the e edges
+    edge : (n,) index of the edge on which each side lies
+    border : (e,) mask of edges on which the number of sides is not two
     seam_edges : edges as pairs of vertices; an edge on a uv seam occurs twice, once for each chart
-    seam_edge : (n,) index of each side's edge in `seam_edges`
+    seam_edge : (n,) row of `seam_edges` for each side
     """
 
     point_count: int
@@ -83,10 +88,10 @@ def _find_sides(cage: Cage) -> _Sides:
 
 
 def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
-    """Return the weights (q, p) of old points in the new points, and four triangles for each triangle.
+    """Return the weights (q, p) of old points in the new points, and the subdivided triangles.
 
-    Of the four triangles, three are at the corners of the old triangle and one is in its middle. Old points
-    come first, then one point on each edge. Borders become cubic B-splines.
+    Each triangle becomes four: three at its corners and one in its middle. The new points are the old points
+    at new positions, then one point on each edge. Borders become cubic B-splines.
 
     Source: [Loop1987], with Warren's weights of the old points.
     """
@@ -110,10 +115,11 @@ def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
 
 
 def refine_catmull_clark(cage: Cage) -> tuple[csr_array, Cage]:
-    """Return the weights (q, p) of old points in the new points, and a quad for each corner of each face.
+    """Return the weights (q, p) of old points in the new points, and the quads of the subdivided mesh.
 
-    Old points come first, then one point on each edge, then one in each face. The first corner of a quad is
-    an old point, the third is the centre of the face. Borders become cubic B-splines.
+    A face with k corners becomes k quads. The new points are the old points at new positions, then one point
+    on each edge, then one in each face. The first corner of a quad is an old point, the third is the centre
+    of the face. Borders become cubic B-splines.
 
     Sources: [CatmullClark1978]; uv and borders as in [DeRose1998].
     """
@@ -163,12 +169,12 @@ def catmull_clark_limit(cage: Cage) -> csr_array:
 
 
 def _inner_edge_weights(sides: _Sides, edge_weight: float) -> Doubles:
-    """Return for each side the weight of its edge, (n,): `edge_weight` on inner edges and 0 on borders."""
+    """Return a weight (n,) for each side: `edge_weight` on inner edges, 0 on borders."""
     return np.where(sides.border, 0, edge_weight)[sides.edge]
 
 
 def _inner_point_weights(sides: _Sides, point_weight: Doubles) -> Doubles:
-    """Return for each side the weight of the point where it starts, (n,): 0 for points on borders.
+    """Return a weight (n,) for each side: that of the point where it starts, or 0 if this is a border point.
 
     point_weight : (p,) weight of each point
     """
@@ -176,7 +182,7 @@ def _inner_point_weights(sides: _Sides, point_weight: Doubles) -> Doubles:
 
 
 def _edge_end_weights(sides: _Sides, edge_weight: Doubles) -> csr_array:
-    """Return a matrix (e, p) with a row for each edge, which contains its weight at its two end points.
+    """Return a matrix (e, p) in which the row of each edge has its weight in the columns of its end points.
 
     edge_weight : (e,) weight of each edge
     """
@@ -191,8 +197,9 @@ def _old_point_weights(
 ) -> csr_array:
     """Return the weights (p, p) of old points in the new positions of the old points.
 
-    inner_weight, neighbour_weight : (p,) weights of an inner point itself, and of each of its neighbours
-    border_weight : weight, at a border point, of each of its two neighbours on the border
+    inner_weight : (p,) weight of each inner point in its own new position
+    neighbour_weight : (p,) weight of each of its neighbours in this position
+    border_weight : weight of each of the two neighbours on the border in the new position of a border point
     """
     is_inner, is_border = (sides.border_valence == 0) & (sides.valence > 0), sides.border_valence == 2
     both, other = sides.ends.T.ravel(), sides.ends[:, ::-1].T.ravel()
@@ -206,7 +213,10 @@ def _old_point_weights(
 
 
 def _add_edge_vertices(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:
-    """Return uv and point of the old vertices, followed by a new vertex in the middle of each edge."""
+    """Return uv (w, 2) and point index (w,) of the old vertices and of new vertices in the middle of edges.
+
+    The new vertices follow the old vertices. An edge on a uv seam gets a new vertex for each chart.
+    """
     edge_of_cut = np.empty(len(sides.seam_edges), dtype=np.int64)
     edge_of_cut[sides.seam_edge] = sides.edge
     uv = np.vstack((cage.uv, cage.uv[sides.seam_edges].mean(axis=1)))

@@ -1,1 +1,1 @@
-"""Light transport in tissue: media, pigments, diffusion profiles and their fits, and thin parts."""
+"""Light transport in tissue: media, pigments, diffusion profiles with their fits, and transmitted light."""

@@ -25,7 +25,7 @@ def interpolate_table(column_at: Callable[[float], Floats], table_position: floa
 
     The positions of the table's columns are the multiples of 1 / INTERPOLATION_STEPS from 0 to 1.
 
-    column_at : function from such a position to the column, an array; it should cache its results
+    column_at : function that returns the column, an array, at such a position; it should cache its results
     table_position : position between 0 and 1; values outside this range are clamped
     """
     scaled = min(max(table_position, 0.0), 1.0) * INTERPOLATION_STEPS
@@ -42,7 +42,7 @@ def interpolate_columns(column_at: Callable[[float], Floats], table_positions: A
 
     The columns are stacked along the last axis of the result.
 
-    column_at : function from a position to the column there, see `interpolate_table`
+    column_at : function that returns the column at a position, see `interpolate_table`
     table_positions : (c,) positions between 0 and 1
     """
     values = np.atleast_1d(np.asarray(table_positions, np.float64)).tolist()
@@ -131,7 +131,7 @@ def refracted_cosine(cosine: ArrayLike, eta: float) -> Floats:
 
 
 class _HalfSpace:
-    """Isotropically scattering half-space below a smooth surface, at discrete directions.
+    """Isotropically scattering half-space below a smooth surface, for a set of discrete directions.
 
     The operator R describes reflection by the medium, and the operator r internal reflection by the surface.
     One linear system is solved to sum the series R + R r R + ... of multiple reflections.
@@ -149,15 +149,20 @@ class _HalfSpace:
             np.eye(len(self._mu)) - self._reflected_radiance(self._mu, self._H) * flux * internal
         )
 
-    def _reflected_radiance(self, mu: Floats, H: Floats) -> Floats:
+    def _reflected_radiance(self, incident_cosine: Floats, h_values: Floats) -> Floats:
         """Return pi times the radiance that the medium reflects into each of the discrete directions [-].
 
         The result (d, n) has a row for each discrete direction and a column for each incident direction.
 
-        mu : (n,) cosines of the directions of incident light below the surface
-        H : (n,) H function at these cosines
+        incident_cosine : (n,) cosines of the directions of incident light below the surface
+        h_values : (n,) H function at these cosines
         """
-        return 0.25 * self._albedo * np.outer(self._H, H) / np.maximum(self._mu[:, None] + mu, 1e-12)
+        return (
+            0.25
+            * self._albedo
+            * np.outer(self._H, h_values)
+            / np.maximum(self._mu[:, None] + incident_cosine, 1e-12)
+        )
 
     def reflectance(self, cosine: ArrayLike) -> Floats:
         """Return the fraction of the entering light that leaves again, for given directions [-].

@@ -37,7 +37,7 @@ class CumulativeProfile:
     def from_function(
         cls, fraction_within: Callable[[Floats], Floats], energy: ArrayLike
     ) -> CumulativeProfile:
-        """Return a cumulative profile that samples a function of the radius.
+        """Return the cumulative profile that is sampled from a function of the radius.
 
         fraction_within : function from radii (n,) [mm] to the fractions (n, 3) of the emerging light that
             leave within them [-]

@@ -59,7 +59,7 @@ def _half_space_column(eta: float, from_photons: bool, total_reflectance: float)
     albedo = albedo_for_total(total_reflectance, eta, from_photons)
     kind = tabulated_kind_for_index(eta) if from_photons else None
     if kind is None:
-        half = _half_frequency(partial(_reflectance_transform, _unit_medium(albedo, eta)))
+        half = _half_frequency(partial(_reflectance_transform, _unit_mean_free_path_medium(albedo, eta)))
     else:
         cumulative = half_space(kind, np.full(3, albedo), np.ones(3))
         half = _half_frequency(partial(_cumulative_transform, cumulative))
@@ -81,7 +81,9 @@ def albedo_for_total(total_reflectance: float, eta: float, from_photons: bool = 
 
     def reflectance_excess(albedo: float) -> float:
         return (
-            _reflectance_transform(_unit_medium(albedo, eta), float(hankel.NEAR_ZERO_FREQUENCY[0]))
+            _reflectance_transform(
+                _unit_mean_free_path_medium(albedo, eta), float(hankel.NEAR_ZERO_FREQUENCY[0])
+            )
             - total_reflectance
         )
 
@@ -94,7 +96,7 @@ def albedo_for_total(total_reflectance: float, eta: float, from_photons: bool = 
     )
 
 
-def _unit_medium(albedo: float, eta: float) -> Medium:
+def _unit_mean_free_path_medium(albedo: float, eta: float) -> Medium:
     """Return a half-space whose mean free path is 1 mm."""
     return Medium("half-space", (Layer(np.array([1.0 - albedo]), np.array([albedo])),), eta)
 
@@ -108,16 +110,16 @@ def _gaussian_transform(gaussians: tuple[tuple[float, float], ...], frequency: f
     return sum(weight * math.exp(-0.5 * variance * frequency**2) for variance, weight in gaussians)
 
 
-def _cumulative_transform(cumulative: CumulativeProfile, frequency: float) -> float:
+def _cumulative_transform(cumulative_profile: CumulativeProfile, frequency: float) -> float:
     """Return the Hankel transform of a profile's first channel, relative to its value at frequency 0 [-].
 
     frequency : frequency [1/mm]
     """
     from scipy.special import j0
 
-    edges = cumulative.radii_mm
+    edges = cumulative_profile.radii_mm
     ring_radius = np.append(0.5 * edges[1], np.sqrt(edges[1:-1] * edges[2:]))
-    return float(j0(frequency * ring_radius) @ np.diff(cumulative.fraction[:, 0]))
+    return float(j0(frequency * ring_radius) @ np.diff(cumulative_profile.fraction[:, 0]))
 
 
 def _reflectance_transform(medium: Medium, frequency: float) -> float:
@@ -129,12 +131,12 @@ def _reflectance_transform(medium: Medium, frequency: float) -> float:
     return float(layered_diffusion.solve_reflectance(np.array([frequency]), medium, A)[0, 0])
 
 
-def _half_frequency(transform: Callable[[float], float]) -> float:
+def _half_frequency(hankel_transform: Callable[[float], float]) -> float:
     """Return the frequency at which a Hankel transform has fallen to half of its value at 0 [1/mm]."""
     from scipy.optimize import brentq
 
-    total = transform(float(hankel.NEAR_ZERO_FREQUENCY[0]))
-    excess = lambda log: transform(float(np.exp(log))) - 0.5 * total  # noqa: E731
+    total = hankel_transform(float(hankel.NEAR_ZERO_FREQUENCY[0]))
+    excess = lambda log: hankel_transform(float(np.exp(log))) - 0.5 * total  # noqa: E731
     return float(np.exp(brentq(excess, *_LOG_FREQUENCY_RANGE)))
 
 

@@ -28,7 +28,7 @@ class GaussianSum:
     variance_mm2 : (k,) variances v, increasing [mm2]
     weight : (k, c) weights w, the light that each Gaussian spreads in c channels; the renderer needs three
         channels, in linear Rec. 709 [-]
-    from_photons : whether the sum was fitted to photon counts instead of a diffusion model
+    from_photons : whether the sum was fitted to Monte Carlo photon counts instead of a diffusion model
 
     Source: [dEonLuebke2007] section 14.4.
 

@@ -79,7 +79,7 @@ def half_space(
 def fractions_within(
     half_space_kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayLike
 ) -> Callable[[Floats], Floats]:
-    """Return a function from radii (n,) [mm] to the fractions (n, 3) of the emerging light within them [-].
+    """Return a function from radii (n,) [mm] to tabulated fractions (n, 3) of light within them [-].
 
     half_space_kind : surface and illumination of the half-space
     albedo : (3,) single-scattering albedo, clamped to the range of the table [-]
@@ -110,12 +110,14 @@ def tabulated_albedo(half_space_kind: HalfSpaceKind, total_reflectance: ArrayLik
     return np.asarray(1.0 - root**2)
 
 
-def _table_position(table: _PhotonTable, albedo: ArrayLike) -> Floats:
-    return np.clip(_root_absorption(albedo), table.root_absorption[0], table.root_absorption[-1])
+def _table_position(photon_table: _PhotonTable, albedo: ArrayLike) -> Floats:
+    return np.clip(
+        _root_absorption(albedo), photon_table.root_absorption[0], photon_table.root_absorption[-1]
+    )
 
 
 def _root_absorption(albedo: ArrayLike) -> Floats:
-    """Return sqrt(1 - albedo); as functions of it, totals and profiles are smooth up to an albedo of 1."""
+    """Return sqrt(1 - albedo), on which reflectances and profiles depend smoothly up to an albedo of 1."""
     return np.sqrt(np.maximum(1.0 - np.asarray(albedo, np.float64), 0.0))
 
 
@@ -138,8 +140,8 @@ def _photon_table(half_space_kind: HalfSpaceKind) -> _PhotonTable:
 def has_photon_table(medium: Medium) -> bool:
     """Return whether a photon-count table covers a medium.
 
-    The medium must be a half-space with three channels, and a table must contain its index of refraction and
-    its reduced albedos.
+    The medium must be a half-space with three channels. There must be a table for its index of refraction,
+    and its reduced albedos must be in the range of the table.
     """
     layer = medium.layers[0]
     single = len(medium.layers) == 1 and medium.semi_infinite and medium.channels == 3
@@ -151,7 +153,7 @@ def has_photon_table(medium: Medium) -> bool:
 def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
     """Return the cumulative profile of a medium from a photon-count table, or None if no table covers it.
 
-    The table is for isotropic scattering, with the reduced coefficients of the medium.
+    The medium is taken to scatter isotropically, with its reduced coefficients.
     """
     kind, layer = tabulated_kind_for_index(medium.eta), medium.layers[0]
     if kind is None or not has_photon_table(medium):
@@ -162,7 +164,7 @@ def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
 def tabulated_profile(medium: Medium) -> RadialProfile | None:
     """Return the radial profile of a medium from a photon-count table, or None if no table covers it.
 
-    The table is for isotropic scattering, with the reduced coefficients of the medium.
+    The medium is taken to scatter isotropically, with its reduced coefficients.
     """
     cumulative, kind, layer = (
         tabulated_cumulative(medium),

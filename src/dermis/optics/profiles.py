@@ -1,4 +1,4 @@
-"""Diffusion profiles as sums of Gaussians: the published preset, files, and fits to tissue."""
+"""Diffusion profiles as sums of Gaussians: a published preset, files, and fits to tissue."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def load_profile(
         Preset ("gpu-gems-3", "dj3", "spectral" ...), or a file: .csv, or .toml as written by
         ``dermis profile``.
     pigments : Mapping of str to float, optional
-        For a skin made of pigments, values that replace fields of its `SkinParameters`.
+        For a skin that is defined by its pigments, values that replace fields of its `SkinParameters`.
     initial : GaussianSum, optional
         Fit of a similar skin, as start of the new fit, which is then several times faster.
 
@@ -93,7 +93,7 @@ def load_profile(
 
 
 def find_gaussians(name: str | Path) -> GaussianSum | None:
-    """Return the Gaussians that a preset or file contains, or None if it describes a tissue instead.
+    """Return the Gaussians of a preset or file, or None if the preset or file describes a tissue.
 
     Raises DermisError for an unknown name, and for Gaussians that are not a valid profile.
     """
@@ -115,10 +115,9 @@ def find_gaussians(name: str | Path) -> GaussianSum | None:
 
 @lru_cache(_MAX_CACHED_FILES)
 def _read_gaussians(path: Path, file_state: tuple[int, ...]) -> GaussianSum | None:
-    """Return the Gaussians in a file, or None if it describes a tissue; cache the result for later frames.
+    """Return the Gaussians in a file, or None if the file describes a tissue; cache the result.
 
-    file_state : state of the file from `_file_state`; if it differs from that of the cached result, the file
-        is read again
+    file_state : state of the file from `_file_state`; the file is read again if its state has changed
     """
     if path.suffix.lower() == ".toml":
         document = read_toml(path)
@@ -138,33 +137,33 @@ def _file_state(path: Path) -> tuple[int, ...]:
 def write_profile(path: Path, profile: GaussianSum, metadata: Mapping[str, Any]) -> None:
     """Write a sum of Gaussians to a .toml file atomically.
 
-    metadata : dictionary from key to value of further entries: text, numbers, and lists of these
+    metadata : further entries of the file, as a dictionary from key to text, number, or list of these
 
     Raises DermisError when the file cannot be written.
     """
     lines = ["# Written by dermis profile. Lengths in mm; red, green, blue are linear Rec. 709."]
-    lines += [f"{key} = {_toml_value(value)}" for key, value in metadata.items()]
-    lines += [f"variances_mm2 = {_toml_value(profile.variance_mm2)}", "weights = ["]
-    lines += [f"    {_toml_value(row)}," for row in profile.weight]
+    lines += [f"{key} = {_format_toml_value(value)}" for key, value in metadata.items()]
+    lines += [f"variances_mm2 = {_format_toml_value(profile.variance_mm2)}", "weights = ["]
+    lines += [f"    {_format_toml_value(row)}," for row in profile.weight]
     with atomic_file(path) as temporary:
         temporary.write_text("\n".join([*lines, "]", ""]), encoding="utf-8")
 
 
-def _toml_value(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, np.ndarray):
-        return _toml_value(value.tolist())
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return f"[{', '.join(map(_toml_value, value))}]"
-    if isinstance(value, float):
-        return repr(float(value))  # the repr of NumPy scalars contains their type
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+def _format_toml_value(entry_value: Any) -> str:
+    if isinstance(entry_value, bool):
+        return str(entry_value).lower()
+    if isinstance(entry_value, np.ndarray):
+        return _format_toml_value(entry_value.tolist())
+    if isinstance(entry_value, Sequence) and not isinstance(entry_value, str):
+        return f"[{', '.join(map(_format_toml_value, entry_value))}]"
+    if isinstance(entry_value, float):
+        return repr(float(entry_value))  # the repr of NumPy scalars contains their type
+    return json.dumps(entry_value, ensure_ascii=False) if isinstance(entry_value, str) else repr(entry_value)
 
 
 @cache
-def _fit_preset(name: str) -> GaussianSum:
-    return fit_profile(load_tissue(name), name)
+def _fit_preset(preset_name: str) -> GaussianSum:
+    return fit_profile(load_tissue(preset_name), preset_name)
 
 
 def fit_profile(
@@ -172,8 +171,8 @@ def fit_profile(
 ) -> GaussianSum:
     """Fit six Gaussians to the diffusion profile of a tissue, computed by the tissue's default model.
 
-    Fits to photon counts keep the total reflectance. Such profiles are steeper at the centre than those of
-    diffusion models, so a fit without this constraint would lose up to 2 % of the light.
+    The fit keeps the total reflectance if the profile comes from photon counts. Such profiles are so steep at
+    the centre that a fit without this constraint would lose up to 2 % of the light.
 
     similar_fit : fit of a similar tissue, as start of the new fit, which is then several times faster
 
@@ -183,14 +182,14 @@ def fit_profile(
 
 
 def fit_radial(
-    radial: RadialProfile, profile_name: str, similar_fit: GaussianSum | None = None
+    radial_profile: RadialProfile, profile_name: str, similar_fit: GaussianSum | None = None
 ) -> GaussianSum:
     """Fit six Gaussians to a radial profile; fits to photon counts keep the total reflectance.
 
     profile_name : name of the fitted profile
     similar_fit : fit of a similar profile, as start of the new fit, which is then several times faster
     """
-    return _fit_rings(radial.rings(), radial.model, profile_name, similar_fit)
+    return _fit_rings(radial_profile.rings(), radial_profile.model, profile_name, similar_fit)
 
 
 def _fit_rings(

@@ -88,7 +88,7 @@ def enclosed_energy(radius_mm: Floats, grid_mm: Floats, reflectance: Floats) -> 
 
     radius_mm : (n,) radii [mm]
     grid_mm : (m,) log-spaced radii of the samples [mm]
-    reflectance : (m, c) R(r) at the radii of the grid [1/mm2]
+    reflectance : (m, c) samples of R(r) [1/mm2]
     """
     from scipy.integrate import cumulative_simpson
 

@@ -73,9 +73,9 @@ def _reduced_scattering(mu_s: float, g: float) -> float:
     return mu_s * (1.0 - g)
 
 
-def _parse_numbers(cells: list[str]) -> list[float]:
-    """Return the numbers in cells of text, or an empty list if any cell is not a number."""
+def _parse_numbers(text_cells: list[str]) -> list[float]:
+    """Return the cells as numbers, or an empty list if any cell is not a number."""
     try:
-        return [float(cell) for cell in cells]
+        return [float(cell) for cell in text_cells]
     except ValueError:
         return []

@@ -84,9 +84,9 @@ def spectral_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_N
 
 
 def _select_rows(layer: Layer, row_indices: NDArray[np.int64]) -> Layer:
-    """Return a layer whose channels are selected rows of coefficients, one row after the other.
+    """Return a layer with k c channels: the coefficients in k rows of a layer's arrays, row after row.
 
-    layer : layer with an array of coefficients (n, c)
-    row_indices : (k,) indices of the selected rows, which may repeat; the result has k c channels
+    layer : layer with coefficients of the shape (n, c)
+    row_indices : (k,) indices of the rows, which may repeat
     """
     return replace(layer, **{name: getattr(layer, name)[row_indices].ravel() for name in _COEFFICIENT_FIELDS})

@@ -13,7 +13,7 @@ from dermis.optics.pigments.spectra import (
     WAVELENGTHS_NM,
     baseline_absorption,
     blood_absorption,
-    donner_jensen_2006,
+    donner_jensen_scattering,
     eumelanin_absorption,
     pheomelanin_absorption,
 )
@@ -45,7 +45,7 @@ def skin_reflectance(
     bloodless = _as_column(baseline) * baseline_absorption(WAVELENGTHS_NM)
     pigment = eu * eumelanin_absorption(WAVELENGTHS_NM) + (1.0 - eu) * pheomelanin_absorption(WAVELENGTHS_NM)
     vessels = ox * blood_absorption(WAVELENGTHS_NM, 1.0) + (1.0 - ox) * blood_absorption(WAVELENGTHS_NM, 0.0)
-    sigma_s_prime = _as_column(scattering) * donner_jensen_2006(WAVELENGTHS_NM)
+    sigma_s_prime = _as_column(scattering) * donner_jensen_scattering(WAVELENGTHS_NM)
     epidermis = m * pigment + (1.0 - m) * bloodless
     return two_layer_reflectance(
         epidermis, b * vessels + (1.0 - b) * bloodless, sigma_s_prime, _as_column(epidermis_mm)
@@ -53,24 +53,27 @@ def skin_reflectance(
 
 
 def two_layer_reflectance(
-    epidermis: Floats,
-    dermis: Floats,
+    epidermis_absorption: Floats,
+    dermis_absorption: Floats,
     sigma_s_prime: Floats,
     epidermis_mm: ArrayLike,
     scattering_ratio: float = DERMIS_SCATTERING_RATIO,
 ) -> Floats:
     """Return the diffuse reflectance (n, c) of an epidermis on a semi-infinite dermis, per incident light.
 
-    epidermis, dermis : (n, c) absorption coefficients of the layers [1/mm]
+    epidermis_absorption, dermis_absorption : (n, c) absorption coefficients of the layers [1/mm]
     sigma_s_prime : (n, c) or (c,) reduced scattering coefficient of the epidermis [1/mm]
     epidermis_mm : (n, 1) thicknesses of the epidermis, or one number [mm]
     scattering_ratio : scattering coefficient of the dermis relative to the epidermis [-]
     """
-    upper, lower = Layer(epidermis, sigma_s_prime), Layer(dermis, scattering_ratio * sigma_s_prime)
+    upper, lower = (
+        Layer(epidermis_absorption, sigma_s_prime),
+        Layer(dermis_absorption, scattering_ratio * sigma_s_prime),
+    )
     A = boundary_mismatch(SKIN_ETA, "exact")
     return (1.0 - normal_reflectance(SKIN_ETA)) * solve_two_layers(upper, epidermis_mm, lower, A)
 
 
-def _as_column(value: ArrayLike) -> Floats:
-    """Return a value as an array with one more axis at the end: (n,) becomes (n, 1)."""
-    return np.asarray(value, np.float64)[..., None]
+def _as_column(number_or_array: ArrayLike) -> Floats:
+    """Return a number or an array as an array with one more axis at the end: (n,) becomes (n, 1)."""
+    return np.asarray(number_or_array, np.float64)[..., None]

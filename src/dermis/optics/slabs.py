@@ -64,7 +64,7 @@ def phase_matrices(albedo: float, g: float, cosine: Floats, polynomial_count: in
     albedo : reduced albedo [-]
     g : mean cosine of the scattering angle, at least 0 and less than 1 [-]
     cosine : (m,) cosines of the directions from the normal
-    polynomial_count : number of polynomials; scattering by the rest of the series is treated as no scattering
+    polynomial_count : number of polynomials; light scattered by further terms is treated as unscattered
 
     Sources: [HenyeyGreenstein1941]; [Wiscombe1977] for the truncated forward peak.
     """
@@ -88,7 +88,7 @@ class Slabs:
     """Power reflected and transmitted by slabs in air, for n thicknesses and m incident directions.
 
     cosine : (m,) cosines of the directions, after refraction into the slab [-]
-    flux : (m,) fraction of the light entering from a uniform sky that has each direction; the sum is 1 [-]
+    flux : (m,) fraction of the entering light of a uniform sky that takes each direction; the sum is 1 [-]
     reflected : (n, m) fraction of the entering light that scatters and leaves on the side of entry [-]
     transmitted : (n, m) fraction of the entering light that scatters and leaves on the far side [-]
     """
@@ -134,7 +134,9 @@ def solve_doubled_slabs(
     direction_nodes: int = DIRECTION_NODES,
     g: float = 0.0,
 ) -> Slabs:
-    """Solve slabs, and slabs of twice, four times ... their depth; as fast as for the thickest ones alone.
+    """Return the reflection and transmission of slabs, and of slabs that are 2, 4, 8 ... times as thick.
+
+    The time is about that of `solve_slabs` for the thickest slabs alone.
 
     albedo, eta, direction_nodes, g : as in `solve_slabs`
     smallest_depth : (n,) optical depths of similar size [-]
@@ -191,10 +193,10 @@ class _Transport:
     phase: PhaseMatrices
 
     @classmethod
-    def create(cls, albedo: float, eta: float, nodes: int, g: float) -> _Transport:
-        mu, weight = _direction_quadrature(eta, nodes)
+    def create(cls, albedo: float, eta: float, direction_nodes: int, g: float) -> _Transport:
+        mu, weight = _direction_quadrature(eta, direction_nodes)
         internal, escapes = internal_reflectance(mu, eta), mu > critical_cosine(eta)
-        return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, nodes))
+        return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, direction_nodes))
 
     def doubling_count(self, depth: float) -> int:
         """Return how many doublings turn a slab thin enough for single scattering into one of a given depth.
@@ -204,15 +206,24 @@ class _Transport:
         return int(np.ceil(np.log2(max(depth * self.phase.extinction / _MIN_OPTICAL_DEPTH, 1.0))))
 
 
-def _slabs_in_air(transport: _Transport, R: Floats, T: Floats, unscattered_fraction: Floats) -> Slabs:
+def _slabs_in_air(
+    transport: _Transport, reflection: Floats, transmission: Floats, unscattered_fraction: Floats
+) -> Slabs:
     """Return the reflection and transmission of slabs with faces to air, from those of slabs without faces.
 
-    R, T : (n, m, m) reflection and transmission without faces, as pi times the radiance for unit power from
-        each direction
+    reflection, transmission : (n, m, m) reflection and transmission without faces, as pi times the radiance
+        for unit power from each direction
     unscattered_fraction : (n, m) fraction of light that crosses the slab without scattering [-]
     """
     flux, escapes = transport.flux, transport.escapes
-    reflected, transmitted = _add_faces(R * flux, T * flux, unscattered_fraction, transport.internal, R, T)
+    reflected, transmitted = _add_faces(
+        reflection * flux,
+        transmission * flux,
+        unscattered_fraction,
+        transport.internal,
+        reflection,
+        transmission,
+    )
     leaving = flux * (1.0 - transport.internal)
     entering = leaving[escapes] / leaving[escapes].sum()
     up, down = (np.einsum("k,nkm->nm", leaving, part[..., escapes]) for part in (reflected, transmitted))
@@ -252,17 +263,17 @@ def _direction_quadrature(eta: float, direction_nodes: int) -> tuple[Floats, Flo
 
 
 def _doubling_steps(
-    transport: _Transport, tau: Floats, doubling_count: int
+    transport: _Transport, initial_depth: Floats, doubling_count: int
 ) -> Iterator[tuple[Floats, Floats, Floats]]:
-    """Yield reflection, transmission and unscattered light of slabs, and again each time they are doubled.
+    """Yield reflection, transmission and unscattered light of slabs, then those of slabs twice as thick, etc.
 
     Reflection and transmission (n, m, m) are pi times the radiance for unit power from each direction. The
     unscattered light (n, m) is the fraction that crosses the slab without scattering.
 
-    tau : (n,) initial thicknesses in reduced mean free paths
+    initial_depth : (n,) initial thicknesses in reduced mean free paths
     """
     mu, flux, albedo = transport.mu, transport.flux, transport.phase.albedo
-    t = transport.phase.extinction * tau[:, None, None]
+    t = transport.phase.extinction * initial_depth[:, None, None]
     a, b = mu[:, None], mu[None, :]
     R = -0.25 * albedo / (a + b) * np.expm1(-t * (1.0 / a + 1.0 / b)) * transport.phase.backward
     T = 0.25 * albedo * t / (a * b) * np.exp(-0.5 * t * (1.0 / a + 1.0 / b)) * transport.phase.forward
@@ -282,22 +293,23 @@ def _add_faces(
     transmission_operator: Floats,
     unscattered_fraction: Floats,
     face_reflectance: Floats,
-    R: Floats,
-    T: Floats,
+    reflection: Floats,
+    transmission: Floats,
 ) -> tuple[Floats, Floats]:
     """Return the scattered light that meets the faces of slabs, including internal reflections.
 
     The results (n, m, m) are pi times the radiance at the upper face and at the lower face, for unit power
     from each direction.
 
-    reflection_operator, transmission_operator : (n, m, m) `R` and `T`, each column multiplied by the flux of
-        its direction
+    reflection_operator, transmission_operator : (n, m, m) `reflection` and `transmission`, each column
+        multiplied by the flux of its direction
     unscattered_fraction : (n, m) fraction of light that crosses the slab without scattering [-]
     face_reflectance : (m,) reflectance of a face from inside [-]
-    R, T : (n, m, m) reflection and transmission of the slabs without faces, as pi times the radiance
+    reflection, transmission : (n, m, m) reflection and transmission of the slabs without faces, as pi times
+        the radiance
     """
     if not face_reflectance.any():
-        return R, T
+        return reflection, transmission
     identity, count = np.eye(len(face_reflectance)), len(face_reflectance)
     passing = (transmission_operator + unscattered_fraction[:, :, None] * identity) * face_reflectance
     system = np.block(
@@ -309,8 +321,8 @@ def _add_faces(
     # Unscattered light is reflected back and forth between the faces.
     passes = 1.0 / (1.0 - (unscattered_fraction * face_reflectance) ** 2)
     below = face_reflectance * unscattered_fraction * passes
-    top = R * (passes[:, None, :]) + T * below[:, None, :]
-    bottom = T * passes[:, None, :] + R * below[:, None, :]
+    top = reflection * (passes[:, None, :]) + transmission * below[:, None, :]
+    bottom = transmission * passes[:, None, :] + reflection * below[:, None, :]
     solved = np.linalg.solve(system, np.concatenate([top, bottom], axis=1))
     return solved[:, :count], solved[:, count:]
 
@@ -325,8 +337,8 @@ def anisotropic_response(total_reflectance: ArrayLike, eta: float, g: float) -> 
     eta : index of refraction relative to air, at least 1 [-]
     g : mean cosine of the scattering angle, at least 0 [-]
 
-    The field `single_scattering` is that of `angular_response` plus a correction for anisotropy. For the
-    correction, this factor is fitted to the emerging radiance by least squares, both for g and for isotropic
+    The field `single_scattering` is that of `angular_response` plus a correction for anisotropy. To find the
+    correction, this field is fitted to the emerging radiance by least squares, both for g and for isotropic
     scattering. The correction is the difference of the two fits.
     """
     isotropic = angular_response(total_reflectance, eta)
@@ -369,13 +381,13 @@ def _response_column(eta: float, g: float, total_reflectance: float) -> Floats:
 
 
 def _interpolate_over_cosines(sample_cosine: Floats, sample_values: Floats, cosine: Floats) -> Floats:
-    """Return a function of the cosine, interpolated linearly between samples.
+    """Return values at given cosines, interpolated linearly between samples.
 
-    Beyond the first and the last sample, the function is extrapolated by a polynomial.
+    Beyond the first and the last sample, the values are extrapolated by a polynomial.
 
     sample_cosine : (m,) cosines of the samples
     sample_values : (m,) values of the samples
-    cosine : cosines at which the function is returned
+    cosine : cosines at which the values are returned
     """
     order = np.argsort(sample_cosine)
     x, y = sample_cosine[order], sample_values[order]

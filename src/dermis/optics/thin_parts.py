@@ -1,4 +1,4 @@
-"""Light through thin parts such as ears, as weights of Gaussians that depend on the thickness."""
+"""Light through thin parts of the body, such as ears: weights of Gaussians as functions of the thickness."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dermis.optics.angular_response import (
 )
 from dermis.optics.diffusion import hankel
 from dermis.optics.diffusion.boundary import boundary_mismatch
-from dermis.optics.diffusion.layered_diffusion import solve_thicknesses
+from dermis.optics.diffusion.layered_diffusion import solve_homogeneous_slabs
 from dermis.optics.equivalent_medium import MAX_EQUIVALENT_ALBEDO, MIN_EQUIVALENT_ALBEDO, albedo_for_total
 from dermis.optics.media import Layer, Medium
 from dermis.optics.slabs import DEEP_OPTICAL_DEPTH, DIRECTION_NODES, Slabs, solve_doubled_slabs, solve_slabs
@@ -42,9 +42,9 @@ _FIT_FREQUENCIES = np.geomspace(
 
 @dataclass(frozen=True, eq=False)
 class ThinParts:
-    """Light that thin parts transmit, and light that they fail to reflect, for a range of thicknesses.
+    """Light that thin parts of the body transmit, and the reflectance that they lack, by thickness.
 
-    Row 0 of each table is for the thickness 0, and the last row for `max_thickness_mm`; the square roots of
+    Row 0 of each array is for the thickness 0, and the last row for `max_thickness_mm`; the square roots of
     the thicknesses are evenly spaced. The light is given as weights of k Gaussians in 3 channels, relative to
     the reflectance of a half-space of the medium.
 
@@ -52,8 +52,8 @@ class ThinParts:
     transmitted : (THICKNESS_ROWS, k, 3) weights of the light that leaves on the far side [-]
     lost : (THICKNESS_ROWS, k, 3) weights of the light that a half-space would reflect but the thin part does
         not; lost light spreads as widely as transmitted light [-]
-    directionality : (THICKNESS_ROWS,) how strongly transmittance depends on the incident direction: 1 if as
-        in deep slabs (see `oblique_transmittance`), 0 if not at all, and below 0 if in the opposite sense [-]
+    directionality : (THICKNESS_ROWS,) dependence of the transmittance on the incident direction, relative to
+        that of deep slabs (see `oblique_transmittance`); 0 for no dependence [-]
     """
 
     max_thickness_mm: float
@@ -119,7 +119,7 @@ def _oblique_column(eta: float, from_photons: bool, g: float, total_reflectance:
 def _deep_transmittance(albedo: float, eta: float, direction_nodes: int, g: float) -> tuple[Slabs, Floats]:
     """Return a half-space with m incident directions, and the relative transmittance (m,) of deep slabs.
 
-    For the definition of relative transmittance, see `oblique_transmittance`.
+    Relative transmittance is defined as in `oblique_transmittance`.
     """
     half_space = solve_slabs(albedo, DEEP_OPTICAL_DEPTH, eta, direction_nodes, g)
     deep = solve_slabs(albedo, _DEEP_SLAB_OPTICAL_DEPTH, eta, direction_nodes, g)
@@ -127,9 +127,9 @@ def _deep_transmittance(albedo: float, eta: float, direction_nodes: int, g: floa
 
 
 def _relative_transmittance(slabs: Slabs, half_space: Slabs) -> Floats:
-    """Return the transmittance (n, m) of n slabs for m directions, divided by a half-space's reflectance [-].
+    """Return the relative transmittance (n, m) of n slabs for m directions [-].
 
-    Transmittance and reflectance are first divided by their values for uniform light.
+    It is defined as in `oblique_transmittance`.
     """
     reflected = half_space.reflected[0] / (half_space.reflected @ half_space.flux)
     transmitted = np.maximum(slabs.transmitted @ slabs.flux, _MIN_TRANSMITTANCE)[:, None]
@@ -143,7 +143,7 @@ class _SlabTotals(NamedTuple):
     relative_transmittance : (n,) transmittance divided by the reflectance of the half-space [-]
     lost : (n,) reflectance that is lost due to the finite thickness, divided by the reflectance of the
         half-space [-]
-    directionality : (n,) how strongly transmittance depends on the incident direction, see `ThinParts` [-]
+    directionality : (n,) dependence of the transmittance on the incident direction, see `ThinParts` [-]
     """
 
     transmittance: Floats
@@ -153,7 +153,7 @@ class _SlabTotals(NamedTuple):
 
 
 def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> Iterator[_SlabTotals]:
-    """Yield the totals of slabs for each channel, interpolated by cubic splines between cached depths."""
+    """Yield the `_SlabTotals` of each channel, interpolated by cubic splines between cached depths."""
     from scipy.interpolate import CubicSpline
 
     roots = np.sqrt(1.0 - layer.alpha_prime).tolist()
@@ -196,7 +196,7 @@ def _spread_weights(medium: Medium, thickness_mm: Floats, variance_mm2: Floats) 
     layer, A, stiffness = medium.layers[0], boundary_mismatch(medium.eta, "exact"), 100.0
     s = _FIT_FREQUENCIES * float(layer.sigma_t_prime[0])
     frequency = np.concatenate([hankel.NEAR_ZERO_FREQUENCY, s])
-    transform = solve_thicknesses(frequency, layer, thickness_mm, A)[1][..., 0]
+    transform = solve_homogeneous_slabs(frequency, layer, thickness_mm, A)[1][..., 0]
     # the last row makes the weights sum to 1
     ones = np.full((1, len(variance_mm2)), stiffness)
     gaussians = np.vstack([np.exp(-0.5 * variance_mm2 * s[:, None] ** 2), ones])

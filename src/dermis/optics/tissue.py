@@ -1,4 +1,4 @@
-"""Tissues from presets and files: media with colours as channels, and skins made of pigments."""
+"""Tissues from presets and files: media with colours as channels, and skins defined by their pigments."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Tissue:
     rgb : numpy.ndarray, optional
         (3, c) weights that convert wavelengths to red, green and blue [-]; None if the channels are colours.
     parameters : SkinParameters, optional
-        Parameters of a skin made of pigments; None for other media.
+        Parameters of a skin that is defined by its pigments; None for other media.
 
     Examples
     --------
@@ -93,7 +93,7 @@ class Tissue:
     def with_layers(self, layers: Sequence[Layer]) -> Tissue:
         """Return a tissue with other layers but the same name and index of refraction.
 
-        Raises DermisError for a skin made of pigments, and for invalid layers.
+        Raises DermisError for a skin that is defined by its pigments, and for invalid layers.
         """
         if self.rgb is not None:
             actual = f"{self.medium.name} is a skin made of pigments"
@@ -102,16 +102,17 @@ class Tissue:
 
     @property
     def default_model(self) -> ProfileModel:
-        """Return the default profile model: "counted" if there are photon counts, else "layered"."""
+        """Return the default profile model: "counted" if photon counts cover the medium, else "layered"."""
         return COUNTED_MODEL if self.rgb is None and has_photon_table(self.medium) else "layered"
 
     def profile(self, model: ProfileModel | None = None, clamp: Clamp = "layer") -> RadialProfile:
         """Return the diffusion profile R(r) of the tissue in linear Rec. 709.
 
-        R(r) is per power that enters the tissue or, for a skin made of pigments, per incident power.
+        R(r) is per incident power for a skin that is defined by its pigments, and per power that enters for
+        other media.
 
         model : model that computes the profile; by default `default_model`
-        clamp : depth of the multipole's source in thin layers, "none" or "layer", see `Slab`
+        clamp : whether the multipole's source stays inside thin layers ("layer") or not ("none"), see `Slab`
 
         Raises DermisError when the model is not valid for the medium.
         """
@@ -135,8 +136,8 @@ class Tissue:
     def transmittance(self, thickness_mm: ArrayLike) -> Floats:
         """Return the transmittance (n, 3) of slabs of the tissue [-].
 
-        The transmittance is per power that enters the slab or, for a skin made of pigments, per incident
-        power.
+        The transmittance is per incident power for a skin that is defined by its pigments, and per power that
+        enters for other media.
 
         thickness_mm : (n,) thicknesses of the slabs [mm]
         """
@@ -161,10 +162,10 @@ def load_tissue(
     name : str or Path
         Preset ("skin1", "dj3", "spectral" ...), or a .toml file.
     structure : {"dj2006", "donner2008", "biospec"}, optional
-        Layer structure of a skin made of pigments; by default the structure that the file states, or else
+        Layer structure of a skin defined by pigments; by default the structure that the file states, or else
         "dj2006".
     pigments : Mapping of str to float, optional
-        For a skin made of pigments, values that replace fields of its `SkinParameters`.
+        For a skin that is defined by its pigments, values that replace fields of its `SkinParameters`.
 
     Returns
     -------
@@ -197,7 +198,7 @@ def load_tissue(
         refuse(f"tissue {name}", f"one of {known}, or a .toml file", "it is none of these", "Check the name")
     document = {} if str(name) in published_media() else read_toml(Path(name))
     if "skin" in document:
-        return _from_skin_table(Path(name), document, structure, overrides)
+        return _tissue_from_skin_table(Path(name), document, structure, overrides)
     if overrides:
         option = "--" + next(iter(overrides)).replace("_", "-")
         skins = ", ".join(SKINS)
@@ -222,15 +223,15 @@ def _checked_pigments(pigments: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _spectral_tissue(
-    name: str, structure: Structure, defaults: SkinParameters, overrides: dict[str, Any]
+    name: str, structure: Structure, default_parameters: SkinParameters, pigment_overrides: dict[str, Any]
 ) -> Tissue:
-    parameters = replace(defaults, **overrides)
+    parameters = replace(default_parameters, **pigment_overrides)
     medium = replace(spectral_medium(structure, parameters), name=name)
     return Tissue(medium, rgb_weights(WAVELENGTHS_NM), parameters)
 
 
-def _from_skin_table(
-    path: Path, document: Mapping[str, Any], structure: Structure | None, overrides: dict[str, Any]
+def _tissue_from_skin_table(
+    path: Path, document: Mapping[str, Any], structure: Structure | None, pigment_overrides: dict[str, Any]
 ) -> Tissue:
     table = document["skin"]
     fields = set(SkinParameters.__dataclass_fields__)
@@ -250,4 +251,4 @@ def _from_skin_table(
     except DermisError as fault:
         raise DermisError(f"{path}: {fault}") from None
     name, structure = str(document.get("name", path.stem)), structure or table_structure
-    return _spectral_tissue(name, structure, parameters, overrides)
+    return _spectral_tissue(name, structure, parameters, pigment_overrides)

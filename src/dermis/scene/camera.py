@@ -14,7 +14,7 @@ from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
 from dermis.base.renamed import renamed_attribute
 from dermis.mesh.head import Head
-from dermis.scene.field_errors import Reason
+from dermis.scene.field_errors import BoundsReason
 from dermis.scene.frozen_model import Direction, FrozenModel, Vector
 from dermis.scene.opencv import OpenCvCamera, camera_fields, extrinsics, intrinsics
 
@@ -24,7 +24,7 @@ _FRAME_SIZE_PER_MESH_SIZE = 1.08  # size of the frame relative to a mesh that is
 _WORLD_UP = (0.0, 1.0, 0.0)
 
 
-_PictureFraction = Annotated[float, Field(ge=-10, le=10), Reason("lenses do not shift farther")]
+_PictureFraction = Annotated[float, Field(ge=-10, le=10), BoundsReason("lenses do not shift farther")]
 
 
 class Window(NamedTuple):
@@ -66,12 +66,16 @@ class Camera(FrozenModel):
     """Point on the optical axis, normally in the middle of the picture [mm]."""
     up: Direction = (0.0, 1.0, 0.0)
     """Direction that is up in the picture."""
-    frame_mm: Annotated[float, Field(ge=0.01, le=1e5), Reason("mm: from a part of a pore to a crowd")] = 340.0
+    frame_mm: Annotated[
+        float, Field(ge=0.01, le=1e5), BoundsReason("mm: from a part of a pore to a crowd")
+    ] = 340.0
     """Height of the picture in the plane of the target [mm]."""
     principal_point: tuple[_PictureFraction, _PictureFraction] = (0.5, 0.5)
     """Point of the picture on the optical axis, as fractions of width and height from the upper left
     corner."""
-    pixel_aspect: Annotated[float, Field(ge=0.1, le=10), Reason("pixels of sensors are nearly square")] = 1.0
+    pixel_aspect: Annotated[
+        float, Field(ge=0.1, le=10), BoundsReason("pixels of sensors are nearly square")
+    ] = 1.0
     """Width of a pixel divided by its height."""
 
     @model_validator(mode="after")
@@ -85,7 +89,7 @@ class Camera(FrozenModel):
     def from_opencv(cls, K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int]) -> Camera:
         """Return the camera of an OpenCV calibration without lens distortion.
 
-        If lens distortion was part of the calibration, the camera fits the undistorted pictures.
+        For a calibration with lens distortion, the camera matches the undistorted pictures.
 
         Parameters
         ----------
@@ -137,7 +141,7 @@ class Camera(FrozenModel):
     half_tangent = renamed_attribute("half_tangent", "half_view_tangent")
 
     def window(self, aspect: float) -> Window:
-        """Return the image rectangle at distance 1, from which projection and view rays are computed.
+        """Return the image rectangle in the plane at distance 1 in front of the camera.
 
         aspect : width of the picture divided by its height
         """
@@ -152,12 +156,12 @@ def portrait(head: Head) -> Camera:
     Parameters
     ----------
     head : Head
-        The head. A mesh without a head, such as a hand, is shown as a whole.
+        The head. If the mesh has no head, for example a hand, the camera shows the whole mesh.
 
     Returns
     -------
     Camera
-        Camera at a distance of 1.1 m.
+        Camera 1.1 m from the head, or farther from a large mesh without a head.
 
     Examples
     --------
@@ -171,17 +175,17 @@ def portrait(head: Head) -> Camera:
 
 
 def three_quarter(head: Head) -> Camera:
-    """Return a camera 40 degrees to the left of the face, as seen by the head.
+    """Return a camera for a three-quarter view, 40 degrees from the front towards the head's left.
 
     Parameters
     ----------
     head : Head
-        The head. A mesh without a head, such as a hand, is shown as a whole.
+        The head. If the mesh has no head, for example a hand, the camera shows the whole mesh.
 
     Returns
     -------
     Camera
-        Camera at a distance of 1.1 m.
+        Camera 1.1 m from the head, or farther from a large mesh without a head.
 
     Examples
     --------
@@ -201,12 +205,12 @@ def side(head: Head) -> Camera:
     Parameters
     ----------
     head : Head
-        The head. A mesh without a head, such as a hand, is shown as a whole.
+        The head. If the mesh has no head, for example a hand, the camera shows the whole mesh.
 
     Returns
     -------
     Camera
-        Camera at a distance of 1.1 m.
+        Camera 1.1 m from the head, or farther from a large mesh without a head.
 
     Examples
     --------
@@ -220,17 +224,17 @@ def side(head: Head) -> Camera:
 
 
 def full_body(head: Head) -> Camera:
-    """Return a camera that shows all of a mesh from the front, such as a whole body.
+    """Return a camera that shows the whole mesh of a head from the front, including any body.
 
     Parameters
     ----------
     head : Head
-        The head, with all meshes of the file.
+        The head, whose mesh may include a body.
 
     Returns
     -------
     Camera
-        Camera at a distance of 1.1 m, or of three times the size of the mesh if that is farther.
+        Camera 1.1 m from the centre of the mesh, or three times the mesh's size if this is farther.
 
     Examples
     --------
@@ -247,7 +251,7 @@ def full_body(head: Head) -> Camera:
 def cheek(head: Head) -> Camera:
     """Return a camera for a close-up of the left cheek.
 
-    The key light of the light preset "studio" grazes the pores there.
+    The key light of the light preset "studio" meets the skin there at grazing incidence.
     """
     beside = (40.0, -35.0) if head.skull_mm is not None else (0.0, 0.0)
     focus = _to_scene_axes(head, head.frontmost(*beside))
@@ -306,7 +310,7 @@ def _camera_at_azimuth(head: Head, azimuth_degrees: float) -> Camera:
 
 
 def _camera_showing_all(head: Head, azimuth_degrees: float) -> Camera:
-    """Return a camera that shows all of a mesh with a margin.
+    """Return a camera that shows the whole mesh of a head, with a margin.
 
     azimuth_degrees : azimuth of the camera: 0 in front of the head, 90 at its left side [degrees]
     """

@@ -91,10 +91,10 @@ def as_environment(environment: object) -> Environment | None:
 
 
 def as_model(settings_class: type[P], field_values: object, argument_name: str, example_text: str) -> P:
-    """Return an instance of a settings class from an instance or from field values.
+    """Return an instance of a settings class, built from field values.
 
     settings_class : class of the settings, such as `Skin`
-    field_values : instance, which is returned unchanged, or a mapping from field names to values
+    field_values : mapping from field names to values, or an instance, which is returned unchanged
     argument_name : name of the `Scene` argument, for the error message
     example_text : example of field values, such as 'profile="medium"', for the error message
 

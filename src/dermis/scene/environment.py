@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from dermis.scene.field_errors import Reason
+from dermis.scene.field_errors import BoundsReason
 from dermis.scene.frozen_model import FrozenModel, slider
 
 
@@ -29,12 +29,12 @@ class Environment(FrozenModel):
     rotation_degrees: Annotated[
         float,
         Field(ge=-3600, le=3600, json_schema_extra=slider(-180, 180)),
-        Reason("degrees: ten turns either way"),
+        BoundsReason("degrees: ten turns either way"),
     ] = 0.0
     """Rotation about the upward axis, counter-clockwise as seen from above [degrees]."""
     exposure: Annotated[
         float,
         Field(ge=0, le=1e6, json_schema_extra=slider(0.02, 10, logarithmic=True)),
-        Reason("up to 20 stops brighter; light is not negative"),
+        BoundsReason("up to 20 stops brighter; light is not negative"),
     ] = 1.0
     """Factor of the panorama's radiance."""

@@ -23,8 +23,8 @@ _MAX_NAME_LENGTH = 80
 _MAX_TABLE_LENGTH = 160
 
 
-class Keywords:
-    """Annotation of a numeric field that also accepts words, as in `Annotated[float, Keywords("auto")]`."""
+class AcceptedWords:
+    """Annotation of a numeric field for words that it also accepts, as in `AcceptedWords("auto")`."""
 
     def __init__(self, *words: str) -> None:
         self.words = words
@@ -42,7 +42,7 @@ class Keywords:
         )
 
 
-class Reason(str):
+class BoundsReason(str):
     """Annotation of a numeric field: the reason for the field's bounds, which error messages quote."""
 
     __slots__ = ()
@@ -72,12 +72,12 @@ class _NotANumber:
 
 @cache
 def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
-    """Return a mapping from each numeric field of a model to whether the field also accepts text."""
+    """Return a mapping from the names of a model's numeric fields to whether the field also accepts text."""
     found = {}
     for name, info in model.model_fields.items():
-        kinds = set(_leaf_types(info.annotation))
+        kinds = set(_scalar_types(info.annotation))
         if kinds & {float, int} and kinds <= {float, int, NoneType}:
-            found[name] = any(isinstance(one, Keywords) or hasattr(one, "func") for one in info.metadata)
+            found[name] = any(isinstance(one, AcceptedWords) or hasattr(one, "func") for one in info.metadata)
     return found
 
 
@@ -103,7 +103,7 @@ def to_python_numbers(field_value: Any, accepts_text: bool = False) -> Any:
 
 def field_keywords(model: type[BaseModel], field: str) -> tuple[str, ...]:
     """Return the words that a numeric field accepts besides numbers, such as "auto"."""
-    found = [one.words for one in model.model_fields[field].metadata if isinstance(one, Keywords)]
+    found = [one.words for one in model.model_fields[field].metadata if isinstance(one, AcceptedWords)]
     return found[0] if found else ()
 
 
@@ -128,7 +128,7 @@ def _format_error(pydantic_error: ErrorDetails, model: type[BaseModel]) -> str:
     expected = re.sub(
         "^(Input should be|Tuple should have|Value error,) |, unable to .*", "", pydantic_error["msg"]
     )
-    expected = expected.replace("a valid tuple", f"a list{_length_text(pydantic_error, model)}")
+    expected = expected.replace("a valid tuple", f"a list{_tuple_length_text(pydantic_error, model)}")
     if pydantic_error["type"] in _BOUND_ERROR_TYPES | _NUMBER_ERROR_TYPES:
         expected = _range_text(pydantic_error["loc"], model) or re.sub(
             "^(greater|less)", r"a number \1", expected
@@ -144,40 +144,40 @@ def _format_error(pydantic_error: ErrorDetails, model: type[BaseModel]) -> str:
     return f"expected {expected}, but got {actual}"
 
 
-def _range_text(location: tuple[int | str, ...], model: type[BaseModel]) -> str:
+def _range_text(number_location: tuple[int | str, ...], model: type[BaseModel]) -> str:
     """Return the range of a number as text, such as "a number from 0 to 1"; "" for a number without bounds.
 
-    If the field has a `Reason` for its bounds, the text ends with this reason in parentheses.
+    If the field has a `BoundsReason`, the text ends with this reason in parentheses.
 
-    location : path of the number in the model: the field name, then indices
+    number_location : path of the number in the model: the field name, then indices
     """
-    info = model.model_fields.get(str(location[0])) if location else None
+    info = model.model_fields.get(str(number_location[0])) if number_location else None
     if info is None:
         return ""
-    if len(location) > 1 and get_args(info.annotation):
+    if len(number_location) > 1 and get_args(info.annotation):
         info = FieldInfo.from_annotation(get_args(info.annotation)[-1])
     low, high = field_bounds(info)
-    reasons = [one for one in info.metadata if isinstance(one, Reason)]
+    reasons = [one for one in info.metadata if isinstance(one, BoundsReason)]
     reason = f" ({reasons[0]})" if reasons else ""
-    kind = "a whole number" if set(_leaf_types(info.annotation)) <= {int, NoneType} else "a number"
+    kind = "a whole number" if set(_scalar_types(info.annotation)) <= {int, NoneType} else "a number"
     return f"{kind} from {low:.10g} to {high:.10g}{reason}" if low is not None and high is not None else ""
 
 
-def _leaf_types(annotation: Any) -> Iterator[Any]:
+def _scalar_types(annotation: Any) -> Iterator[Any]:
     """Yield the scalar types inside an annotation, such as float for tuple[float, ...] | None."""
     parts = get_args(annotation)
     if get_origin(annotation) is dict:
-        yield from _leaf_types(parts[1])
+        yield from _scalar_types(parts[1])
     elif get_origin(annotation) in (tuple, list, Union, UnionType):
         for part in parts:
-            yield from _leaf_types(part)
+            yield from _scalar_types(part)
     elif hasattr(annotation, "__metadata__"):
-        yield from _leaf_types(parts[0])
+        yield from _scalar_types(parts[0])
     elif annotation is not Ellipsis:
         yield annotation
 
 
-def _length_text(pydantic_error: ErrorDetails, model: type[BaseModel]) -> str:
+def _tuple_length_text(pydantic_error: ErrorDetails, model: type[BaseModel]) -> str:
     """Return " of N numbers" if the error is in a tuple field of fixed length N, otherwise ""."""
     info = model.model_fields.get(str(pydantic_error["loc"][0])) if len(pydantic_error["loc"]) == 1 else None
     count = len([part for part in get_args(info.annotation) if part is not Ellipsis]) if info else 0

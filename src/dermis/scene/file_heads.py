@@ -40,11 +40,11 @@ MapFile = str | os.PathLike[str] | None
 class MapOptions:
     """Maps that users choose for the skin.
 
-    files : dictionary from each role, such as "colour", to the user's picture file, or to None to keep the
-        mesh file's picture
+    files : dictionary from each map role, such as "colour", to the user's picture file, or to None to keep
+        the mesh file's picture
     height_mm : height of one grey level of the height map, see `load_maps` [mm]
     normal_y : direction of green in the normal map, see `load_maps`
-    skin_site : name of the measured colour that skin without a picture gets, see `measured_tone`
+    skin_site : name of a measured skin colour, used for skin without a colour map; see `measured_tone`
     """
 
     files: Mapping[str, MapFile]
@@ -59,36 +59,36 @@ class MapOptions:
 
     @property
     def replaced_roles(self) -> set[str]:
-        """Return the map roles, such as "colour", whose pictures in the mesh file the user replaces."""
+        """Return the map roles, such as "colour", for which the user replaces the mesh file's pictures."""
         relief = {"normal", "height", "bump"}
         return {*self.user_files, *(relief if relief & self.user_files.keys() else ())}
 
-    def load(self, files: Mapping[str, Any]) -> Maps:
-        """Load the user's files and, for all other roles, the pictures of the mesh.
+    def load(self, mesh_pictures: Mapping[str, Any]) -> Maps:
+        """Load the skin maps: the user's picture for each map role, or else the mesh file's picture.
 
-        files : dictionary from roles to pictures of the mesh file; its entry "height_mm" is the height of one
-            grey level of the height map [mm]
+        mesh_pictures : dictionary from map roles, such as "colour", to pictures of the mesh file; its entry
+            "height_mm" is the height of one grey level of the height map [mm]
         """
         chosen: dict[str, Any] = {
-            role: files.get(role) if file is None else file for role, file in self.files.items()
+            role: mesh_pictures.get(role) if file is None else file for role, file in self.files.items()
         }
-        chosen["region"] = files.get("region")
+        chosen["region"] = mesh_pictures.get("region")
         used: dict[str, Any] = {role: file for role, file in chosen.items() if file is not None}
-        return load_maps(**used, height_mm=self.relief_mm(files), normal_y=self.normal_y)
+        return load_maps(**used, height_mm=self.grey_level_height_mm(mesh_pictures), normal_y=self.normal_y)
 
-    def relief_mm(self, files: Mapping[str, Any]) -> float | None:
+    def grey_level_height_mm(self, mesh_pictures: Mapping[str, Any]) -> float | None:
         """Return the height of one grey level of the height map, from the user or from the mesh file [mm].
 
-        files : dictionary with the pictures and the "height_mm" of the mesh file, as for `load`
+        mesh_pictures : dictionary with the pictures and the "height_mm" of the mesh file, as for `load`
         """
-        mesh_relief_mm = files.get("height_mm") if self.files["height"] is None else None
-        return mesh_relief_mm if self.height_mm is None else self.height_mm
+        file_height_mm = mesh_pictures.get("height_mm") if self.files["height"] is None else None
+        return file_height_mm if self.height_mm is None else self.height_mm
 
 
 def load_file_head(
     sample_or_path: str, mesh_options: dict[str, Any], map_options: MapOptions
 ) -> tuple[Head, EyeLook]:
-    """Return the head of a sample or a mesh file, and the appearance of the eyes that the file states.
+    """Return the head of a sample or a mesh file, and its eye look, from the file or the default look.
 
     sample_or_path : name of the sample, or path of the mesh file
     mesh_options : keyword arguments of `load_rigged`
@@ -117,7 +117,7 @@ def _load_mesh(path: Path, culprit: str, mesh_options: dict[str, Any]) -> Rigged
 
 
 def _load_sample(sample: Sample, mesh_options: dict[str, Any], map_options: MapOptions) -> Head:
-    """Return the head of a sample; the package knows the unit and the maps of each sample."""
+    """Return the head of a sample, with the unit and the maps that the registry of samples states."""
     if sample.kind != "head":
         hint = f"Use one of {', '.join(name for name, one in SAMPLES.items() if one.kind == 'head')}"
         refuse(sample.name, "a head", f"this sample is an {sample.kind}", hint)
@@ -155,7 +155,7 @@ def _with_materials(
 
 
 def _unpacked_maps(path: Path, material: FileMaterial, map_options: MapOptions) -> tuple[Maps, list[str]]:
-    """Return skin maps from the unchanged pictures of a material, and notes on maps that are not used."""
+    """Return skin maps from the pictures of one material, and notes on pictures that are not used."""
     if path.suffix.lower() != ".obj" or not material.name:
         return with_material_factors(
             map_options.load(material.skin_pictures()), material, map_options.user_files

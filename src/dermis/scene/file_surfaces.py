@@ -21,7 +21,7 @@ _SURFACE_ROLES: tuple[Role, ...] = ("normal", "roughness", "metalness")
 
 
 def with_generated_uv(rigged: RiggedMesh) -> RiggedMesh:
-    """Return a mesh in which skin groups without uv have a new uv layout and are named in a note."""
+    """Return a mesh with new uv for skin groups that have none, and with a note that names these groups."""
     mesh, surface = rigged.mesh, rigged.surface
     bare = np.array(
         [own.kind == "skin" and not has for own, has in zip(mesh.materials, surface.has_uv, strict=True)]
@@ -39,9 +39,9 @@ def with_generated_uv(rigged: RiggedMesh) -> RiggedMesh:
 
 
 def directly_usable_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
-    """Return the material whose pictures can be used unchanged as skin maps; None if there is none.
+    """Return the only skin material of a file if its pictures can be used unchanged as skin maps.
 
-    Without such a material, the pictures of several materials must be packed into common maps.
+    Otherwise, the result is None, and the pictures of the skin materials must be packed into common maps.
 
     rigged : mesh of the file
     materials : materials of the file
@@ -57,15 +57,15 @@ def directly_usable_material(rigged: RiggedMesh, materials: Sequence[FileMateria
         return material
     uv = mesh.uv[np.unique(mesh.triangles[skin[mesh.material]])]
     inside = uv.min() > -UV_TOLERANCE and uv.max() < 1.0 + UV_TOLERANCE
-    plain = all(texture.mapping == (0, IDENTITY_UV_TRANSFORM) for texture in material.textures.values())
+    plain = all(texture.uv_mapping == (0, IDENTITY_UV_TRANSFORM) for texture in material.textures.values())
     return material if inside and plain and not _has_colours(mesh, surface, skin) else None
 
 
 def with_material_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]) -> Maps:
     """Return the maps of a skin material, multiplied by the factors of the material in the file.
 
-    The product of roughness map and roughness factor is squared, as files store the square root of the
-    roughness m.
+    Files store the square root of the Beckmann roughness m. The product of the roughness map and the
+    roughness factor is therefore squared.
 
     user_roles : roles, such as "colour", of maps that the user replaces; these maps are not multiplied
     """
@@ -209,43 +209,44 @@ def _with_surface(material: Material, file_material: FileMaterial | None, has_ma
         roughness=file_material.roughness,
         metalness=file_material.metalness,
         emission=file_material.emission,
-        opacity_cutoff=0.0 if file_material.alpha_mode == "opaque" else file_material.cutoff,
+        opacity_cutoff=0.0 if file_material.alpha_mode == "opaque" else file_material.opacity_cutoff,
     )
 
 
 def unused_properties(
     mesh: Mesh,
     materials: Sequence[FileMaterial],
-    file_index: Sequence[int],
+    file_material_index: Sequence[int],
     user_roles: Collection[str],
-    is_packed: bool,
+    skin_is_packed: bool,
 ) -> str:
     """Return a note on properties of a file's materials that are not drawn; empty if all are drawn.
 
-    file_index : (m,) index in the file of each material of the mesh, -1 for a material that the file lacks
+    file_material_index : (m,) index in the file of each material of the mesh, -1 for a material that the
+        file lacks
     user_roles : roles, such as "colour", of skin maps that the user replaces
-    is_packed : whether pictures of the skin materials are packed into common maps
+    skin_is_packed : whether pictures of the skin materials are packed into common maps
     """
     if any(one.maps is not None for one in materials):  # this package wrote the file
         return ""
     lines = dict[str, None]()
-    for material, index in zip(mesh.materials, file_index, strict=True):
+    for material, index in zip(mesh.materials, file_material_index, strict=True):
         file_material, is_skin = materials[index] if index >= 0 else FileMaterial(), material.kind == "skin"
         unused = list(file_material.unused)
         unused += [
             text for role, text in file_material.missing.items() if not (is_skin and role in user_roles)
         ]
         if is_skin and file_material.maps is None:
-            unused += _replaced_by_skin(file_material)
-        if not is_skin or is_packed:
+            unused += _properties_replaced_by_skin(file_material)
+        if not is_skin or skin_is_packed:
             unused += file_material.skin_only
         if unused:
             lines[f"{file_material.name or material.name!r}: {', '.join(dict.fromkeys(unused))}"] = None
     return "\n  ".join(["not drawn, or replaced by the properties of skin:", *lines]) if lines else ""
 
 
-def _replaced_by_skin(material: FileMaterial) -> list[str]:
-    """Return the properties of a material in the file that the skin settings replace, as texts for a note."""
+def _properties_replaced_by_skin(material: FileMaterial) -> list[str]:
+    """Return the names of a file material's properties that the skin settings replace."""
     replaced = []
     if "roughness" not in material.textures and material.roughness not in (None, 1.0):
         replaced.append(f"roughness {material.roughness:g}")

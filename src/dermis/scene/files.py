@@ -18,7 +18,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.pose import MAX_WEIGHT, Pose
 from dermis.scene.camera import CAMERA_PRESETS, Camera, find_camera_preset
 from dermis.scene.environment import Environment
-from dermis.scene.field_errors import InvalidFieldsError, Reason
+from dermis.scene.field_errors import BoundsReason, InvalidFieldsError
 from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.head_table import AUTO, NO_REGIONS, HeadTable, has_region_table
 from dermis.scene.heads import load_head
@@ -32,7 +32,7 @@ P = TypeVar("P", bound=FrozenModel)
 _SCENE_TABLE_NAMES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
 _MAP_ROLES = ("colour", "normal", "height", "specular", "roughness")
 _TargetWeight = Annotated[
-    float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), Reason("faces break apart long before")
+    float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), BoundsReason("faces break apart long before")
 ]
 
 
@@ -224,18 +224,18 @@ def load_head_and_skin(
     return head, skin.model_copy(update={"rho_s": rho_s})
 
 
-def _parse_skin(path: Path, skin_entry: Any) -> Skin:
+def _parse_skin(path: Path, table_or_preset: Any) -> Skin:
     """Return the skin of a scene file, from its [skin] table or from the name of a skin preset."""
-    if not isinstance(skin_entry, str):
-        return _build_settings(Skin, path, "skin", skin_entry)
-    if skin_entry not in SKIN_PRESETS:
+    if not isinstance(table_or_preset, str):
+        return _build_settings(Skin, path, "skin", table_or_preset)
+    if table_or_preset not in SKIN_PRESETS:
         refuse(
             f"{path}: skin",
             f"a table or one of {', '.join(SKIN_PRESETS)}",
-            f"got {skin_entry!r}",
+            f"got {table_or_preset!r}",
             "Correct it",
         )
-    return Skin.preset(skin_entry)
+    return Skin.preset(table_or_preset)
 
 
 def _resolve_skin_files(scene_folder: Path, skin: Skin) -> Skin:
@@ -256,14 +256,14 @@ def _check_rho_s_given_once(path: Path, head_settings: HeadTable, skin: Skin) ->
         refuse(f"{path}: skin: rho_s", "one or the other", actual, "Leave one out, or use oiliness")
 
 
-def _parse_camera(path: Path, camera_entry: Any, head: Head) -> Camera:
-    if isinstance(camera_entry, str):
-        return load_camera(_resolve_file(path.parent, camera_entry), head)
-    return _build_settings(Camera, path, "camera", camera_entry)
+def _parse_camera(path: Path, table_or_preset: Any, head: Head) -> Camera:
+    if isinstance(table_or_preset, str):
+        return load_camera(_resolve_file(path.parent, table_or_preset), head)
+    return _build_settings(Camera, path, "camera", table_or_preset)
 
 
-def _parse_pose(path: Path, pose_entry: Any, head: Head) -> Pose:
-    entry = _build_settings(PoseTable, path, "pose", pose_entry)
+def _parse_pose(path: Path, pose_table: Any, head: Head) -> Pose:
+    entry = _build_settings(PoseTable, path, "pose", pose_table)
     pose = Pose(entry.weights, entry.bones)
     pose.motion(head.control, f"{path}: pose")  # for an error that names the file
     return pose
@@ -286,11 +286,11 @@ def _resolve_file(scene_folder: Path, file_or_preset: str) -> str:
     return str(file) if is_file(file) else file_or_preset
 
 
-def _parse_lights(culprit: object, tables: Any) -> tuple[Light, ...]:
-    if not isinstance(tables, list) or not tables:
-        actual = "got none" if not tables else f"got {tables!r}"
+def _parse_lights(culprit: object, light_tables: Any) -> tuple[Light, ...]:
+    if not isinstance(light_tables, list) or not light_tables:
+        actual = "got none" if not light_tables else f"got {light_tables!r}"
         refuse(culprit, "at least one [[lights]] table", actual, "Add one with kind, position and irradiance")
-    return tuple(_parse_light(culprit, f"light {k}", table) for k, table in enumerate(tables, start=1))
+    return tuple(_parse_light(culprit, f"light {k}", table) for k, table in enumerate(light_tables, start=1))
 
 
 def _parse_light(culprit: object, light_label: str, light_table: Any) -> Light:
@@ -321,8 +321,8 @@ def _build_settings(settings_class: type[P], file_name: object, table_name: str,
             raise InvalidFieldsError(f"{file_name}: {table_name}", error.messages) from None
 
 
-def _read_scene_file(file_name: str | Path, expected: str) -> dict[str, Any]:
-    return read_toml(checked_path(file_name, expected), expected)
+def _read_scene_file(file_name: str | Path, expected_content: str) -> dict[str, Any]:
+    return read_toml(checked_path(file_name, expected_content), expected_content)
 
 
 class PoseTable(FrozenModel):

@@ -30,8 +30,8 @@ from pydantic_core import PydanticUndefined
 from dermis.base.errors import format_value, refuse
 from dermis.base.registry import RegisteredName
 from dermis.scene.field_errors import (
+    BoundsReason,
     InvalidFieldsError,
-    Reason,
     field_bounds,
     field_keywords,
     messages_by_field,
@@ -46,7 +46,7 @@ else:
 
 MAX_COORDINATE_MM = 1e6
 _MAX_DISPLAYED_BOUND = 1e5  # larger bounds are not shown to users, as they only keep numbers finite
-_MEMBER_TYPES = FunctionType, classmethod, property
+_PUBLIC_MEMBER_TYPES = FunctionType, classmethod, property
 _DOCSTRING_WIDTH = 92
 
 
@@ -59,15 +59,17 @@ def _checked_direction(vector: tuple[float, float, float]) -> tuple[float, float
 Coordinate = Annotated[
     float,
     Field(ge=-MAX_COORDINATE_MM, le=MAX_COORDINATE_MM),
-    Reason("mm: beyond a kilometre single precision is too coarse for skin"),
+    BoundsReason("mm: beyond a kilometre single precision is too coarse for skin"),
 ]
 Vector = tuple[Coordinate, Coordinate, Coordinate]
-_Component = Annotated[
-    float, Field(ge=-MAX_COORDINATE_MM, le=MAX_COORDINATE_MM), Reason("only their ratios count")
+_DirectionComponent = Annotated[
+    float, Field(ge=-MAX_COORDINATE_MM, le=MAX_COORDINATE_MM), BoundsReason("only their ratios count")
 ]
-Direction = Annotated[tuple[_Component, _Component, _Component], AfterValidator(_checked_direction)]
+Direction = Annotated[
+    tuple[_DirectionComponent, _DirectionComponent, _DirectionComponent], AfterValidator(_checked_direction)
+]
 Intensity = Annotated[
-    float, Field(ge=0, le=1e6), Reason("light is not negative, and the sun on skin is about 3")
+    float, Field(ge=0, le=1e6), BoundsReason("light is not negative, and the sun on skin is about 3")
 ]
 Colour = tuple[Intensity, Intensity, Intensity]
 
@@ -94,7 +96,7 @@ class _DocumentedMeta(ModelMetaclass):
             bases = self.__mro__[: self.__mro__.index(BaseModel)]
             members = {name: member for base in reversed(bases) for name, member in vars(base).items()}
             public = ((name, member) for name, member in members.items() if name[0] != "_")
-            return [name for name, member in public if isinstance(member, _MEMBER_TYPES)]
+            return [name for name, member in public if isinstance(member, _PUBLIC_MEMBER_TYPES)]
 
 
 class FrozenModel(BaseModel, metaclass=_DocumentedMeta):
@@ -142,7 +144,7 @@ class SliderRange(NamedTuple):
     """Range of the slider with which the viewer sets a numeric field.
 
     low, high : values at the ends of the slider
-    logarithmic : whether equal steps of the slider are equal ratios of the value
+    logarithmic : whether equal slider steps multiply the value by equal factors
     """
 
     low: float
@@ -154,13 +156,13 @@ def slider(low: float, high: float, *, logarithmic: bool = False) -> dict[str, A
     """Return the `json_schema_extra` that gives a field a slider range narrower than its bounds.
 
     low, high : values at the ends of the slider
-    logarithmic : whether equal steps of the slider are equal ratios of the value
+    logarithmic : whether equal slider steps multiply the value by equal factors
     """
     return {"slider": SliderRange(low, high, logarithmic)}
 
 
 def field_help(model: type[BaseModel], field: str) -> str:
-    """Return the help text of a field as one line; add a summary of each registered name that is accepted."""
+    """Return the help text of a field as one line, with a summary of each registered name it accepts."""
     info = model.model_fields[field]
     text = re.sub(r"\s+", " ", info.description or "")
     summaries = [one for named in _registry_names(info) for one in named.registry.summaries()]
@@ -253,15 +255,15 @@ def accepted_values(model: type[BaseModel], field: str) -> str:
     return ", ".join(words)
 
 
-def format_default(default: Any) -> str:
+def format_default(default_value: Any) -> str:
     """Return a default value as a user types it on the command line; "" for None, booleans and no default."""
-    if isinstance(default, tuple):
-        return ("x" if all(isinstance(one, int) for one in default) else ",").join(
-            map(format_default, default)
+    if isinstance(default_value, tuple):
+        return ("x" if all(isinstance(one, int) for one in default_value) else ",").join(
+            map(format_default, default_value)
         )
-    if default is None or isinstance(default, bool) or default is PydanticUndefined:
+    if default_value is None or isinstance(default_value, bool) or default_value is PydanticUndefined:
         return ""
-    return f"{default:g}" if isinstance(default, float) else str(default)
+    return f"{default_value:g}" if isinstance(default_value, float) else str(default_value)
 
 
 def _registry_names(field_info: FieldInfo) -> list[RegisteredName]:

@@ -49,8 +49,8 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
     gaze_targets = {rotation.target for rotation in rig.bone_rotations if rotation.bone in eye_bones}
     weights = {name: value for name, value in base.weights.items() if name not in gaze_targets}
     bones = {name: value for name, value in base.bones.items() if name not in eye_bones}
-    frames = eyes.frames(rig, Pose(weights, bones, base.positions_mm).motion(rig))
-    resting = eyes.frames(rig, rig.rest)
+    frames = eyes.eye_matrices(rig, Pose(weights, bones, base.positions_mm).motion(rig))
+    resting = eyes.eye_matrices(rig, rig.rest)
     for k, (frame, rest, bone) in enumerate(zip(frames, resting, eye_bones, strict=True)):
         to_target = (frame @ np.append(point_mm + np.array(head.centre_mm), 1.0))[:3]
         to_target = to_target - [0.0, 0.0, eyes.centre_offset_mm[k]]
@@ -66,9 +66,9 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
 
 
 def _eyelid_rotations(rig: Rig, side_name: str) -> list[BoneRotation]:
-    """Return the morph targets that move the lids of an eye, for eyes that a bone turns.
+    """Return the morph targets that move the eyelids of an eye, for a head whose eyes are turned by bones.
 
-    Each target comes with a rotation of the eye; at this rotation, the target has full weight.
+    Each target comes with the rotation of the eye at which the target has full weight.
 
     rig : rig of the head with the targets
     side_name : "Left" or "Right"

@@ -21,7 +21,7 @@ def head_pose(scene: Scene) -> Doubles:
     does not move.
     """
     rotation, shift = _camera_extrinsics(scene)
-    head_rotation, head_shift = _rigid_motion(scene)
+    head_rotation, head_shift = _head_bone_motion(scene)
     return np.column_stack([rotation @ head_rotation, rotation @ head_shift + shift])
 
 
@@ -33,7 +33,9 @@ def gaze_directions(scene: Scene) -> Doubles | None:
     head, motion = scene.head, _pose_motion(scene)
     if head.eyes is None:
         return None
-    directions = np.einsum("kij,ki->kj", head.eyes.frames(head.control, motion)[:, :3, :3], head.eyes.gaze)
+    directions = np.einsum(
+        "kij,ki->kj", head.eyes.eye_matrices(head.control, motion)[:, :3, :3], head.eyes.gaze
+    )
     in_camera = (
         directions / np.linalg.norm(directions, axis=1, keepdims=True) @ _camera_extrinsics(scene)[0].T
     )
@@ -49,8 +51,8 @@ def _pose_motion(scene: Scene) -> Motion:
     return scene.head.control.rest if scene.motion is None else scene.motion
 
 
-def _rigid_motion(scene: Scene) -> tuple[Doubles, Doubles]:
-    """Return the rotation (3, 3) and translation (3,) [mm] of the head bone, about the centre of the head."""
+def _head_bone_motion(scene: Scene) -> tuple[Doubles, Doubles]:
+    """Return the head bone's motion: rotation (3, 3) about the head's centre, and translation (3,) [mm]."""
     names = [name.replace(":", " ").split()[-1:] for name in scene.head.bones]
     bone = next((k for k, name in enumerate(names) if [part.lower() for part in name] == [_HEAD_BONE]), None)
     if bone is None:

@@ -12,16 +12,16 @@ from dermis.base.errors import format_value, refuse
 from dermis.formats.axes import Axis, Front
 from dermis.formats.size_limits import MAX_RELIEF_MM
 from dermis.mesh.eye_look import EYE_LOOK_RANGES
-from dermis.scene.field_errors import InvalidFieldsError, Keywords, Reason
+from dermis.scene.field_errors import AcceptedWords, BoundsReason, InvalidFieldsError
 from dermis.scene.frozen_model import FrozenModel
 
 _ReliefHeight = Annotated[
     float | None,
     Field(ge=1e-6, le=MAX_RELIEF_MM),
-    Reason("mm: 255 levels from a quarter of a micrometre to a nose and more"),
+    BoundsReason("mm: 255 levels from a quarter of a micrometre to a nose and more"),
 ]
 _UnitLength = Annotated[
-    float | None, Field(ge=1e-3, le=1e6), Reason("mm: files count in micrometres to kilometres")
+    float | None, Field(ge=1e-3, le=1e6), BoundsReason("mm: files count in micrometres to kilometres")
 ]
 VOrigin = Literal["auto", "top", "bottom"]
 NormalY = Literal["up", "down"]
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     _SubdivisionLevels = int | Literal["auto"]
 else:
     _SubdivisionLevels = Annotated[
-        int, Field(ge=0, le=3), Reason("each level has four times the triangles"), Keywords(AUTO)
+        int, Field(ge=0, le=3), BoundsReason("each level has four times the triangles"), AcceptedWords(AUTO)
     ]
 _UNIT_LENGTHS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "inch": 25.4, "in": 25.4, "ft": 304.8}
 
@@ -48,12 +48,12 @@ class EyeTable(FrozenModel):
     eumelanin: Annotated[float | None, _eye_limits("eumelanin")] = None
     """Eumelanin of the iris, from 0 for blue to 1 for the darkest brown."""
     pupil_mm: Annotated[
-        float | None, _eye_limits("pupil_mm"), Reason("mm: from bright light to darkness")
+        float | None, _eye_limits("pupil_mm"), BoundsReason("mm: from bright light to darkness")
     ] = None
     """Radius of the pupil [mm]."""
     redness: Annotated[float | None, _eye_limits("redness")] = None
     """Redness of the white of the eye."""
-    seed: Annotated[int | None, _eye_limits("seed"), Reason("32 bits")] = None
+    seed: Annotated[int | None, _eye_limits("seed"), BoundsReason("32 bits")] = None
     """Seed of the pattern of fibres and blood vessels."""
 
 
@@ -114,8 +114,8 @@ class HeadTable(FrozenModel):
 
     @field_validator("front")
     @classmethod
-    def _check_axes(cls, front: Front, info: ValidationInfo) -> Front:
-        up = info.data.get("up") or ""
+    def _check_axes(cls, front: Front, validation_info: ValidationInfo) -> Front:
+        up = validation_info.data.get("up") or ""
         if front[-1] == up[-1:]:
             raise ValueError(f"an axis across up, which is {up}")
         return front
@@ -138,14 +138,14 @@ def head_name(head: object) -> str:
     return str(head)
 
 
-def check_files_and_lengths(files: Mapping[str, object], **lengths: object) -> None:
+def check_files_and_lengths(map_files: Mapping[str, object], **lengths: object) -> None:
     """Raise DermisError for lengths that are text, such as "cm", and for maps that are not file names."""
     for name, value in lengths.items():
         if isinstance(value, str):
             known = value in _UNIT_LENGTHS_MM
             advice = f"Write {name}={_UNIT_LENGTHS_MM[value]:g}" if known else "Write 10 for cm, 1000 for m"
             refuse(name, "a length in mm, as a number", f"got {value!r}", advice)
-    for role, file in files.items():
+    for role, file in map_files.items():
         if file is not None and not isinstance(file, str | os.PathLike):
             advice = f"For an array write dataclasses.replace(head, maps=replace(head.maps, {role}=...))"
             refuse(role, "the name of an image file", f"got a {type(file).__name__}", advice)

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 HUMAN = "human"
 _MAX_SEED_DIGITS = 20
-MIN_HUMAN_LEVELS = 1
+MIN_HUMAN_SUBDIVISION_LEVELS = 1
 """Lowest level of subdivision of the parametric human."""
 REMOVED_HEADS = ("bust", "bust_many_charts")
 """Heads of earlier releases, replaced by `HUMAN`."""
@@ -183,23 +183,23 @@ def is_person_name(head_name: str) -> bool:
     )
 
 
-def _with_eye_look(head: Head, look: Mapping[str, float] | None) -> Head:
+def _with_eye_look(head: Head, look_fields: Mapping[str, float] | None) -> Head:
     """Return the head with some fields of its eye look replaced.
 
-    look : dictionary from fields of `EyeLook` to new values; None to change nothing
+    look_fields : dictionary from fields of `EyeLook` to new values; None to change nothing
 
     Raises DermisError for a head without anatomical eyes, and for unknown or invalid fields.
     """
-    if not look:
+    if not look_fields:
         return head
     known = [one.name for one in fields(EyeLook)]
-    for name in look.keys() - set(known):
+    for name in look_fields.keys() - set(known):
         refuse("eye", f"one of {', '.join(known)}", f"got {name!r}", "Correct its name")
     if head.eyes is None:
         actual = head.note or "nothing in its file is called eyes"
         advice = "Name the groups that hold eyeballs (eye_groups)"
         refuse("eye", "a head with the package's eyes", f"{head.name} has none: {actual}", advice)
-    return replace(head, eyes=head.eyes.with_look(replace(head.eyes.look, **dict[str, Any](look))))
+    return replace(head, eyes=head.eyes.with_look(replace(head.eyes.look, **dict[str, Any](look_fields))))
 
 
 def _refuse_name(head_name: str) -> NoReturn:
@@ -218,18 +218,18 @@ def _refuse_name(head_name: str) -> NoReturn:
 @logged_step("making the person")
 def _load_human(
     head_name: str,
-    maps: dict[str, MapFile],
+    user_files: dict[str, MapFile],
     height_mm: float | None,
     normal_y: NormalY,
     mesh_options: dict[str, Any],
-    levels: SubdivisionLevels,
+    subdivision_levels: SubdivisionLevels,
 ) -> Head:
     """Return the head of a parametric human in the uv layout "own".
 
     head_name : "human", "human:SEED", or a person's .json file
-    maps : dictionary from roles to map files that replace painted maps
+    user_files : dictionary from map roles, such as "colour", to files that replace the painted maps
     mesh_options : options that apply only to mesh files; DermisError is raised unless all have their defaults
-    levels : subdivision levels, or a function of the head that returns them
+    subdivision_levels : number of levels, or a function of the head that returns it
     """
     texts = {"v_origin": "auto", "front": "auto", "eyes": "fitted"}
     defaults = {
@@ -244,11 +244,13 @@ def _load_human(
     for option, value in mesh_options.items():
         if value != defaults[option]:
             refuse(option, "a mesh file to which it applies", f"it is given with {HUMAN!r}", "Leave it out")
-    check_relief(height_mm, maps["height"])
-    map_files: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
+    check_relief(height_mm, user_files["height"])
+    map_files: dict[str, Any] = {role: file for role, file in user_files.items() if file is not None}
     loaded = load_maps(**map_files, height_mm=height_mm, normal_y=normal_y) if map_files else None
-    level_of = levels if callable(levels) else lambda plain: levels
-    head = load_person(head_name).head(subdivide=lambda plain: max(MIN_HUMAN_LEVELS, level_of(plain)))
+    level_of = subdivision_levels if callable(subdivision_levels) else lambda plain: subdivision_levels
+    head = load_person(head_name).head(
+        subdivide=lambda plain: max(MIN_HUMAN_SUBDIVISION_LEVELS, level_of(plain))
+    )
     user_maps = {role: getattr(loaded, role) for role in map_files}  # the other maps are painted
     return replace(head, name=head_name, maps=replace(head.maps, **user_maps))
 

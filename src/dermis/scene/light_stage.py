@@ -27,7 +27,7 @@ def light_stage(count: int) -> list[DirectionalLight]:
 
 
 def light_stage_weights(lights: Sequence[DirectionalLight], environment: Environment) -> NDArray[np.float64]:
-    """Return weights (n, 3) with which the lights of a light stage reproduce an environment, linear Rec. 709.
+    """Return weights (n, 3), linear Rec. 709, with which a light stage of n lights reproduces an environment.
 
     The weight of a light is the irradiance from all directions for which this light is the nearest. To obtain
     the picture under the environment, multiply the picture under each light by the light's weight, and add

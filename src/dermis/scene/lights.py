@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from dermis.base.registry import Registry
 from dermis.mesh.head import Head
-from dermis.scene.field_errors import Reason
+from dermis.scene.field_errors import BoundsReason
 from dermis.scene.frozen_model import Colour, Direction, FrozenModel, Vector, slider
 
 __all__ = [
@@ -33,9 +33,9 @@ __all__ = [
 _ConeHalfAngle = Annotated[
     float,
     Field(ge=0.01, le=89, json_schema_extra=slider(0.5, 88, logarithmic=True)),
-    Reason("degrees: half angle of a cone in front of the lamp"),
+    BoundsReason("degrees: half angle of a cone in front of the lamp"),
 ]
-_LAMP_LENGTH_REASON = Reason("mm: from the thickness of paper to 100 m")
+_LAMP_LENGTH_REASON = BoundsReason("mm: from the thickness of paper to 100 m")
 _LampLength = Annotated[
     float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, logarithmic=True)), _LAMP_LENGTH_REASON
 ]
@@ -65,7 +65,7 @@ class _LightBase(FrozenModel):
     softness_mm: Annotated[
         float,
         Field(ge=1e-3, le=1000, json_schema_extra=slider(0.1, 100, logarithmic=True)),
-        Reason("mm: from the wavelength of light to a metre"),
+        BoundsReason("mm: from the wavelength of light to a metre"),
     ] = 1.5
     """Width over which the edge of a shadow fades, at most 12 texels of the shadow map; for area lights the
     minimum width [mm]."""
@@ -193,7 +193,9 @@ class DirectionalLight(_LightBase):
     """Word for this kind of light in scene files."""
     direction: Direction = Field(kw_only=False)
     """Direction in which the light travels."""
-    angle_degrees: Annotated[float, Field(ge=0, le=20), Reason("degrees: wider light is not parallel")] = 0.0
+    angle_degrees: Annotated[
+        float, Field(ge=0, le=20), BoundsReason("degrees: wider light is not parallel")
+    ] = 0.0
     """Angular diameter of the source, 0.53 for the sun; shadows are sharper near the surface that casts
     them."""
 
@@ -256,7 +258,7 @@ reference; exports write a registered light as the class that it derives from.""
 # Reach of a typical head, and largest reach for which the lights of presets are not moved away.
 _HEAD_REACH_MM, _MAX_HEAD_REACH_MM = 400.0, 1000.0
 _NARROW_SPOT_DEGREES = 10.0
-_SIZE_FIELDS = "width_mm", "height_mm", "radius_mm"
+_LAMP_SIZE_FIELDS = "width_mm", "height_mm", "radius_mm"
 _VECTOR_FIELDS = "position", "target", "direction", "up"
 NO_LIGHTS = "none"
 """Name of the preset without lights, for an environment alone."""
@@ -287,11 +289,11 @@ def preset_lights(preset_name: str, head: Head | None = None) -> tuple[Light, ..
 
 def _place_light(light: Light, head: Head) -> Light:
     reach = head.reach_mm
-    factor = reach / _HEAD_REACH_MM if reach > _MAX_HEAD_REACH_MM and not _keeps_distance(light) else 1.0
+    factor = reach / _HEAD_REACH_MM if reach > _MAX_HEAD_REACH_MM and not _ignores_body_size(light) else 1.0
     if factor == 1.0 and np.array_equal(head.axes, np.eye(3)):
         return light
     values: dict[str, Any] = {
-        name: factor * getattr(light, name) for name in _SIZE_FIELDS if hasattr(light, name)
+        name: factor * getattr(light, name) for name in _LAMP_SIZE_FIELDS if hasattr(light, name)
     }
     for name in _VECTOR_FIELDS:
         if hasattr(light, name):
@@ -302,7 +304,7 @@ def _place_light(light: Light, head: Head) -> Light:
     return light.replace(**values)
 
 
-def _keeps_distance(light: Light) -> bool:
+def _ignores_body_size(light: Light) -> bool:
     """Return whether a light is not moved away from large bodies: a directional light or a narrow spot."""
     return not isinstance(light, PointLight) or (
         isinstance(light, SpotLight) and light.outer_degrees < _NARROW_SPOT_DEGREES

@@ -37,8 +37,8 @@ class Output:
     name : str
         Name of the output, as in `--outputs`.
     stage : str
-        Name of the shader features/outputs/STAGE.wgsl that writes the output. The shader calls `fn
-        NAME_output`, which returns a scalar or a vector.
+        Name STAGE of the shader file features/outputs/STAGE.wgsl that writes the output. The shader calls
+        `fn NAME_output`, which returns a scalar or a vector.
     channel_names : str
         One letter for each channel, used in EXR files; empty for an output with one channel for each light.
     kind : str
@@ -46,7 +46,7 @@ class Output:
     unit : str
         Unit of the pixel values; empty for dimensionless outputs.
     description : str
-        A few words for help texts.
+        Short description for help texts.
     background : float
         Pixel value where there is neither head nor hair.
     quantisation : Quantisation, optional

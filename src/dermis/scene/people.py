@@ -7,13 +7,13 @@ from dermis.optics.pigments.parameters import SPECTRAL_PRESET
 from dermis.scene.skin import Pigments, Skin
 
 
-def skin_of(person: Human, base: Skin | None = None) -> Skin:
+def skin_of(person: Human, base_skin: Skin | None = None) -> Skin:
     """Return skin settings whose subsurface scattering matches the pigments of a person.
 
     In darker skin, light scatters less far. The settings do not change the colour of the skin, as the painted
     maps of the person determine this colour.
 
-    base : skin settings from which all other fields are taken; None for the default skin
+    base_skin : skin settings from which all other fields are taken; None for the default skin
     """
     look = person.look
     pigments = Pigments(
@@ -23,4 +23,4 @@ def skin_of(person: Human, base: Skin | None = None) -> Skin:
         oxygen=look.oxygen,
         epidermis_mm=look.epidermis_mm,
     )
-    return Skin(**((base or Skin()).model_dump() | {"profile": SPECTRAL_PRESET, "pigments": pigments}))
+    return Skin(**((base_skin or Skin()).model_dump() | {"profile": SPECTRAL_PRESET, "pigments": pigments}))

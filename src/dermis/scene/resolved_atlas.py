@@ -1,6 +1,6 @@
-"""Size of the atlas, the square texture in which light is diffused, that a picture needs.
+"""Choice of an atlas size for a picture. The atlas is the square texture in which light is diffused.
 
-Software adapters, on which diffusion is slow, get an atlas of this size by default.
+On software adapters, where diffusion is slow, atlases have this size by default.
 """
 
 from __future__ import annotations

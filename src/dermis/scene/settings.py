@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from dermis.base.registry import RegisteredName
-from dermis.scene.field_errors import Keywords, Reason
+from dermis.scene.field_errors import AcceptedWords, BoundsReason
 from dermis.scene.frozen_model import Colour, FrozenModel, slider
-from dermis.scene.talk import Gamma, SeamColour, Seams, Stretch
+from dermis.scene.talk import GammaHandling, SeamColour, SeamTreatment, StretchCorrection
 from dermis.scene.techniques import TECHNIQUES
 
-_Side = Annotated[int, Field(ge=1, le=16384), Reason("pixels: what the largest GPUs hold")]
+_PictureSide = Annotated[int, Field(ge=1, le=16384), BoundsReason("pixels: what the largest GPUs hold")]
 _MAX_SAMPLES_PER_PIXEL = 64
 MAX_SAMPLE_COUNT = 2**27
 _HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
@@ -46,10 +46,10 @@ else:
     Exposure = Annotated[
         float,
         Field(ge=1e-6, le=1e6, json_schema_extra=slider(0.05, 20, logarithmic=True)),
-        Reason("20 stops either way"),
-        Keywords("auto"),
+        BoundsReason("20 stops either way"),
+        AcceptedWords("auto"),
     ]
-    _BACKGROUNDS = Keywords("none", "gradient", "environment")
+    _BACKGROUNDS = AcceptedWords("none", "gradient", "environment")
     Background = Annotated[Colour, BeforeValidator(_parse_colour), _BACKGROUNDS]
 
 
@@ -70,22 +70,24 @@ class Settings(FrozenModel):
 
     synonyms: ClassVar[Mapping[str, str]] = {"resolution": "size", "spp": "samples"}
 
-    size: Annotated[tuple[_Side, _Side], BeforeValidator(_square_size)] = (1024, 1024)
+    size: Annotated[tuple[_PictureSide, _PictureSide], BeforeValidator(_square_size)] = (1024, 1024)
     """Width and height of the picture [pixel]."""
-    atlas: Annotated[int, Field(ge=64, le=16384), Reason("texels: what the largest GPUs hold")] = 2048
+    atlas: Annotated[int, Field(ge=64, le=16384), BoundsReason("texels: what the largest GPUs hold")] = 2048
     """Side of the atlas, the map in which light is diffused [texel]."""
     samples: Annotated[
-        int, Field(ge=1, le=_MAX_SAMPLES_PER_PIXEL), Reason("more make no visible difference")
+        int, Field(ge=1, le=_MAX_SAMPLES_PER_PIXEL), BoundsReason("more make no visible difference")
     ] = 4
     """Samples per pixel for antialiasing."""
     technique: Annotated[str, RegisteredName(TECHNIQUES)] = "texture-space"
     """Technique for subsurface scattering."""
-    stretch: Stretch = "full"
-    seams: Seams = "stitch"
+    stretch: StretchCorrection = "full"
+    seams: SeamTreatment = "stitch"
     seam_colour: SeamColour = (0.5, 0.35, 0.3)
     transmission: Literal["thin", "none"] = "thin"
     """Translucency: "thin" for thin parts such as ears and nostrils, "none" to leave it out."""
-    shadow_size: Annotated[int, Field(ge=64, le=8192), Reason("texels: finer than the pores of skin")] = 2048
+    shadow_size: Annotated[
+        int, Field(ge=64, le=8192), BoundsReason("texels: finer than the pores of skin")
+    ] = 2048
     """Side of each shadow map [texel]."""
     occlusion: Literal["baked", "rest", "none"] = "baked"
     """Occlusion of the environment by the head itself: "baked" is updated when the head moves, "rest" is
@@ -98,7 +100,7 @@ class Settings(FrozenModel):
     """Fraction of the light that the lens scatters."""
     tone: Literal["none", "filmic", "neutral"] = "none"
     """Tone curve before the sRGB encoding; "neutral" is the Khronos Group's curve."""
-    gamma: Gamma = "right"
+    gamma: GammaHandling = "right"
     background: Background = "none"
     """Backdrop behind the head, which emits no light: "none" for pictures with alpha, a grey studio
     "gradient", the "environment", or a colour as linear Rec. 709 or #rrggbb."""
@@ -112,7 +114,7 @@ class Settings(FrozenModel):
     reflection."""
 
     @model_validator(mode="after")
-    def _fits_in_memory(self) -> Settings:
+    def _check_fits_in_memory(self) -> Settings:
         if self.size[0] * self.size[1] * self.samples > MAX_SAMPLE_COUNT:
             limit = MAX_SAMPLE_COUNT // 10**6
             raise ValueError(f"width times height times samples of at most {limit} million")

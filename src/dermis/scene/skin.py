@@ -10,12 +10,12 @@ from pydantic import Field, model_validator
 from dermis.base.errors import format_value, refuse
 from dermis.optics.pigments.parameters import Structure
 from dermis.optics.reduced_scattering import check_reduced
-from dermis.scene.field_errors import Reason
+from dermis.scene.field_errors import BoundsReason
 from dermis.scene.frozen_model import FrozenModel, slider
-from dermis.scene.talk import Energy, SpecularColour
+from dermis.scene.talk import EnergyConservation, SpecularColour
 from dermis.specular.models import FresnelName, SpecularName
 
-DirectionName = Literal["lambertian", "half-space"]
+DiffuseDirectionName = Literal["lambertian", "half-space"]
 MAX_LAYERS = 8
 MAX_OTHER_PROFILES = 2
 """Number of profiles that a map can mix with the main profile."""
@@ -29,7 +29,7 @@ SKIN_PRESETS: dict[str, dict[str, Any]] = {
 
 
 _Fraction = Annotated[float | None, Field(ge=0, le=1)]
-_COEFFICIENT_REASON = Reason("1/mm: white paint has some hundreds")
+_COEFFICIENT_REASON = BoundsReason("1/mm: white paint has some hundreds")
 _AbsorptionCoefficient = Annotated[float, Field(ge=0, le=1e4), _COEFFICIENT_REASON]
 _ScatteringCoefficient = Annotated[float, Field(ge=1e-6, le=1e4), _COEFFICIENT_REASON]
 _COEFFICIENT_SLIDER = Field(json_schema_extra=slider(1e-4, 50, logarithmic=True))
@@ -51,7 +51,7 @@ class Pigments(FrozenModel):
     epidermis_mm: Annotated[
         float | None,
         Field(ge=1e-3, le=2, json_schema_extra=slider(0.02, 0.5)),
-        Reason("mm: from less than a cell to a callus"),
+        BoundsReason("mm: from less than a cell to a callus"),
     ] = None
     """Thickness of the epidermis [mm]."""
     epidermal_blood: Annotated[_Fraction, Field(json_schema_extra=slider(0, 0.1))] = None
@@ -72,7 +72,7 @@ class TissueLayer(FrozenModel):
     thickness_mm: Annotated[
         float | None,
         Field(ge=1e-4, le=1000, json_schema_extra=slider(0.01, 5, logarithmic=True)),
-        Reason("mm: from a cell membrane to more than a body"),
+        BoundsReason("mm: from a cell membrane to more than a body"),
     ] = None
     """Thickness; None for a last layer that is infinitely deep [mm]."""
     absorption_per_mm: Annotated[
@@ -86,7 +86,7 @@ class TissueLayer(FrozenModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _check_reduced(cls, fields: object) -> object:
+    def _check_reduced_scattering(cls, fields: object) -> object:
         if isinstance(fields, Mapping):
             check_reduced("layers", fields)
         return fields
@@ -95,7 +95,7 @@ class TissueLayer(FrozenModel):
 class Skin(FrozenModel):
     """Surface reflection and subsurface scattering of skin.
 
-    Source: [dEonLuebke2007] sections 14.3-14.5; values of [Dudash2007].
+    Sources: [dEonLuebke2007] sections 14.3-14.5, [Dudash2007].
 
     Examples
     --------
@@ -120,7 +120,7 @@ class Skin(FrozenModel):
     mix: Annotated[float, Field(ge=0, le=1)] = 0.5
     """Fraction of the colour map that is applied before scattering; the rest is applied after it."""
     roughness: Annotated[
-        float, Field(ge=0.05, le=1), Reason("from near-mirror skin to slopes of 45 degrees")
+        float, Field(ge=0.05, le=1), BoundsReason("from near-mirror skin to slopes of 45 degrees")
     ] = DEFAULT_ROUGHNESS
     """Beckmann roughness m of the surface; with a roughness map a factor relative to 0.3: 0.6 doubles the
     values of the map."""
@@ -134,14 +134,14 @@ class Skin(FrozenModel):
     fresnel: FresnelName = "schlick"
     """Fresnel reflectance: Schlick's approximation with F0 = 0.028, or exact for an index of 1.4."""
     specular_colour: SpecularColour = "white"
-    energy: Energy = "full"
-    direction: DirectionName = "half-space"
+    energy: EnergyConservation = "full"
+    direction: DiffuseDirectionName = "half-space"
     """Directional dependence of diffuse light: "lambertian" for none; "half-space" as for a scattering
     half-space of the skin's mean colour, which reflects more at oblique incidence and for oblique views."""
     anisotropy: Annotated[
         float,
         Field(ge=0, le=0.95),
-        Reason("more is nearly unscattered light, which the model does not describe"),
+        BoundsReason("more is nearly unscattered light, which the model does not describe"),
     ] = 0.0
     """Mean cosine of the scattering angle, with direction "half-space", at constant reduced scattering: at
     0.8, as in real tissue, more oblique light is reflected and more light passes thin parts."""

@@ -24,7 +24,7 @@ Subdivide = SubdivisionLevels | Literal["auto"]
 Doubles = NDArray[np.float64]
 MAX_SMOOTH_TRIANGLES = 300_000
 """Largest number of triangles that `SmoothIn` subdivides to."""
-MAX_DEVIATION_PX = 0.6
+MAX_SILHOUETTE_DEVIATION_PX = 0.6
 """Largest deviation of a silhouette from its smooth curve that the pixel filter hides."""
 _TYPICAL_DEVIATION_QUANTILE = (
     0.9  # fraction of the silhouette that must be smooth; the rest is mostly hidden or creases
@@ -36,8 +36,8 @@ _NEAR_PLANE_MM = 1.0
 class SmoothIn:
     """Choice of the subdivision levels at which the outline of a head looks smooth in a picture.
 
-    An instance can be called with a head and returns the levels; `load_head` accepts it as `subdivide`. The
-    result depends only on the camera, the size and the head in rest pose.
+    An instance is a function from a head to the number of levels; `load_head` accepts it as `subdivide`. The
+    number depends only on the camera, the size and the head in rest pose.
 
     camera : function that returns a camera for the head before subdivision
     size : width and height of the picture [pixel]
@@ -53,7 +53,7 @@ class SmoothIn:
             return 0
         K, R, t = self.camera(head).to_opencv(self.size)
         seen = silhouette(head.mesh, K, R, t - R @ np.array(head.centre_mm), self.size)
-        return smooth_levels(seen.typical_deviation_px, triangles)
+        return smooth_subdivision_levels(seen.typical_deviation_px, triangles)
 
 
 def resolve_levels(subdivide: Subdivide) -> SubdivisionLevels:
@@ -124,13 +124,13 @@ def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, picture_size: tup
     return Silhouette(np.linalg.norm(pixels[a] - pixels[b], axis=1), np.abs(bend_mm) * scale)
 
 
-def smooth_levels(typical_deviation_px: float, triangle_count: int) -> int:
+def smooth_subdivision_levels(typical_deviation_px: float, triangle_count: int) -> int:
     """Return the smallest number of subdivision levels at which a silhouette looks smooth.
 
     typical_deviation_px : deviation of the silhouette before subdivision; each level divides it by 4 [pixel]
     triangle_count : number of triangles before subdivision; each level multiplies it by 4
     """
-    needed = math.ceil(math.log(max(typical_deviation_px / MAX_DEVIATION_PX, 1.0), 4))
+    needed = math.ceil(math.log(max(typical_deviation_px / MAX_SILHOUETTE_DEVIATION_PX, 1.0), 4))
     affordable = math.floor(math.log(max(MAX_SMOOTH_TRIANGLES / triangle_count, 1.0), 4))
     return min(needed, affordable, MAX_SUBDIVISION_LEVELS)
 

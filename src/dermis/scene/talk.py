@@ -1,7 +1,7 @@
-"""Settings that reproduce faults and older methods described in the 2007 talk, for comparison.
+"""Settings that reproduce faults and older methods shown in the 2007 talk [Dudash2007], for comparison.
 
-These settings are fields of `Skin` and `Settings`, as the gallery uses them to draw its pictures. Help texts
-and the viewer list the fields last, under a separate heading.
+These settings are fields of `Skin` and `Settings`. Help texts and the viewer list them last, under a separate
+heading.
 
 Source: [dEonLuebke2007].
 """
@@ -24,15 +24,17 @@ SpecularColour = Annotated[
 
 _ENERGY_HELP = """Energy conservation of diffuse light: "full" subtracts what the surface reflects,
 "published" subtracts pi times too much, as the talk does, "none" subtracts nothing."""
-Energy = Annotated[EnergyName, COMPARISONS_HEADING, Field(description=_ENERGY_HELP)]
+EnergyConservation = Annotated[EnergyName, COMPARISONS_HEADING, Field(description=_ENERGY_HELP)]
 
 _STRETCH_HELP = """Correction of blur kernels for the uv layout: "full" for stretch and shear, "axes" for
 stretch alone, "none" for the same kernel everywhere."""
-Stretch = Annotated[Literal["full", "axes", "none"], COMPARISONS_HEADING, Field(description=_STRETCH_HELP)]
+StretchCorrection = Annotated[
+    Literal["full", "axes", "none"], COMPARISONS_HEADING, Field(description=_STRETCH_HELP)
+]
 
 _SEAMS_HELP = """How seams in the uv layout are treated: "stitch" diffuses light across them; the other
 methods are the talk's. Techniques that cannot stitch use "clear-colour" instead."""
-Seams = Annotated[
+SeamTreatment = Annotated[
     Literal["stitch", "none", "clear-colour", "stretch-map", "alpha", "multi-uv"],
     COMPARISONS_HEADING,
     Field(description=_SEAMS_HELP),
@@ -44,4 +46,4 @@ SeamColour = Annotated[Colour, COMPARISONS_HEADING, Field(description=_SEAM_COLO
 _GAMMA_HELP = (
     'Colour space: "wrong" reads the colour map as linear and leaves out the sRGB encoding of the picture.'
 )
-Gamma = Annotated[Literal["right", "wrong"], COMPARISONS_HEADING, Field(description=_GAMMA_HELP)]
+GammaHandling = Annotated[Literal["right", "wrong"], COMPARISONS_HEADING, Field(description=_GAMMA_HELP)]

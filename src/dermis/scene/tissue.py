@@ -1,4 +1,4 @@
-"""Optical tissue that the settings of a skin describe."""
+"""Conversion of skin settings to tissue, the layered optical medium that the settings describe."""
 
 from __future__ import annotations
 

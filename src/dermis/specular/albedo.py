@@ -74,14 +74,14 @@ def _slope_quadrature(
 
 
 @cache
-def albedo_table(model: str = "kelemen", fresnel: str = "schlick") -> NDArray[np.float32]:
+def albedo_table(model_name: str = "kelemen", fresnel_name: str = "schlick") -> NDArray[np.float32]:
     """Return the shader's table (roughness, cosine, 2) of directional albedo and mean albedo [-].
 
     Roughnesses and cosines are TABLE_ROUGHNESSES and TABLE_COSINES.
 
-    model, fresnel : names of the specular model and of the Fresnel function, in MODELS and FRESNEL
+    model_name, fresnel_name : names of the specular model and of the Fresnel function, in MODELS and FRESNEL
     """
-    lobe, reflectance = MODELS[model].lobe, FRESNEL[fresnel]
+    lobe, reflectance = MODELS[model_name].lobe, FRESNEL[fresnel_name]
     # row by row, so that the nodes fit into the CPU's cache
     rows = [
         directional_albedo(TABLE_COSINES, m, lobe, reflectance, _TABLE_NODE_COUNTS) for m in TABLE_ROUGHNESSES

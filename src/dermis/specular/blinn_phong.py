@@ -20,10 +20,10 @@ def blinn_phong_exponent(m: ArrayLike) -> Floats:
     return np.asarray(2.0 / np.asarray(m, dtype=np.float64) ** 2 - 2.0)
 
 
-def blinn_phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
+def blinn_phong(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the normalised Blinn-Phong BRDF F (s + 2) / (8 pi) (n.h)^s [1/sr].
 
-    m : roughness, from which `blinn_phong_exponent` yields s; broadcast against the angles [-]
+    m : roughness, from which `blinn_phong_exponent` yields s; broadcast against the cosines [-]
     fresnel : function that returns F from the cosine v.h
 
     The factor (s + 2) / (8 pi) is a quarter of the factor (s + 2) / (2 pi), which normalises the slope
@@ -33,14 +33,14 @@ def blinn_phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Fl
     Source: [Blinn1977]; the distribution as normalised in [Walter2007] section 5.2.
     """
     s = blinn_phong_exponent(m)
-    lobe = fresnel(angles.v_h) * (s + 2.0) / (8.0 * np.pi) * _power_of_n_h(angles, s)
-    return np.asarray(np.where(angles.is_above, lobe, 0.0))
+    lobe = fresnel(cosines.v_h) * (s + 2.0) / (8.0 * np.pi) * _power_of_n_h(cosines, s)
+    return np.asarray(np.where(cosines.is_above, lobe, 0.0))
 
 
-def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
+def blinn_phong_plain(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the BRDF F (n.h)^s / (pi n.l) of the original Blinn-Phong highlight [1/sr].
 
-    m : roughness, from which `blinn_phong_exponent` yields s; broadcast against the angles [-]
+    m : roughness, from which `blinn_phong_exponent` yields s; broadcast against the cosines [-]
 
     The original highlight F (n.h)^s was not multiplied by n.l, so its BRDF contains 1 / n.l and is not
     reciprocal. Early renderers added the highlight to a diffuse term without the factor 1/pi; here both terms
@@ -49,15 +49,15 @@ def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick)
     Source: [Blinn1977].
     """
     lobe = (
-        fresnel(angles.v_h)
-        * _power_of_n_h(angles, blinn_phong_exponent(m))
-        / (np.pi * np.maximum(angles.n_l, 1e-6))
+        fresnel(cosines.v_h)
+        * _power_of_n_h(cosines, blinn_phong_exponent(m))
+        / (np.pi * np.maximum(cosines.n_l, 1e-6))
     )
-    return np.asarray(np.where(angles.is_above, lobe, 0.0))
+    return np.asarray(np.where(cosines.is_above, lobe, 0.0))
 
 
-def _power_of_n_h(angles: Cosines, exponent: Floats) -> Floats:
-    return np.asarray(np.clip(angles.n_h, 0.0, 1.0) ** exponent)
+def _power_of_n_h(cosines: Cosines, exponent: Floats) -> Floats:
+    return np.asarray(np.clip(cosines.n_h, 0.0, 1.0) ** exponent)
 
 
 BLINN_PHONG = Model(

@@ -18,16 +18,16 @@ _DIRECTION_PAIR_COUNT = 4000
 _NORMAL = np.array([0.0, 0.0, 1.0])
 
 
-def normal_incidence_peak(model: str, m: float) -> float:
+def normal_incidence_peak(model_name: str, m: float) -> float:
     """Return the BRDF of a model when light and viewer are both in the direction of the normal [1/sr].
 
-    model : name of the specular model, evaluated for the specular strength rho_s = 1
+    model_name : name of the specular model, evaluated for the specular strength rho_s = 1
     m : roughness [-]
     """
-    return float(MODELS[model].lobe(cosines(_NORMAL, _NORMAL, _NORMAL), m))
+    return float(MODELS[model_name].lobe(cosines(_NORMAL, _NORMAL, _NORMAL), m))
 
 
-def reciprocity_error(model: str) -> float:
+def reciprocity_error(model_name: str) -> float:
     """Return a BRDF's largest change when light and view are exchanged, relative to the BRDF's maximum [-].
 
     Light and view are random directions up to 85 degrees from the normal. The result is the maximum over all
@@ -35,7 +35,7 @@ def reciprocity_error(model: str) -> float:
     """
     rng = np.random.default_rng(1)
     l, v = (_random_directions(rng) for _ in range(2))
-    lobe = MODELS[model].lobe
+    lobe = MODELS[model_name].lobe
     errors = []
     for m in COMPARED_ROUGHNESSES:
         forward, backward = lobe(cosines(_NORMAL, l, v), m), lobe(cosines(_NORMAL, v, l), m)
@@ -43,12 +43,12 @@ def reciprocity_error(model: str) -> float:
     return float(max(errors))
 
 
-def albedo_rows(model: str) -> list[dict[str, float]]:
+def directional_albedo_rows(model_name: str) -> list[dict[str, float]]:
     """Return the directional albedo rho of a model at `COMPARED_ROUGHNESSES` and `COMPARED_COSINES`.
 
     Each row of the result has the keys m, cos_theta and rho, for a CSV file.
     """
-    rho = directional_albedo(COMPARED_COSINES, COMPARED_ROUGHNESSES[:, None], MODELS[model].lobe)
+    rho = directional_albedo(COMPARED_COSINES, COMPARED_ROUGHNESSES[:, None], MODELS[model_name].lobe)
     return [
         {"m": float(m), "cos_theta": float(c), "rho": float(rho[i, k])}
         for i, m in enumerate(COMPARED_ROUGHNESSES)

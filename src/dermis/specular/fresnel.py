@@ -68,12 +68,12 @@ def hemispherical_reflectance(fresnel: Fresnel = dielectric, node_count: int = 6
 class EnergyScheme:
     """Energy conservation scheme: reduces diffuse light by the light that the specular lobe reflects.
 
-    The diffuse BRDF is albedo / pi times (1 - k rho_dt(n.l)) (1 - k rho_dt(n.v)) / c, with the directional
-    albedo rho_dt of the lobe and k = `loss` times the specular strength rho_s. The divisor c is 1 minus k
-    times the mean albedo if `returns_internal_light` is true, otherwise 1.
+    The diffuse BRDF is albedo / pi times (1 - k rho_dt(n.l)) (1 - k rho_dt(n.v)) / c. Here rho_dt is the
+    directional albedo of the lobe, and k is `loss` times the specular strength rho_s. The divisor c is 1
+    minus k times the mean albedo if `returns_internal_light` is true, otherwise 1.
 
-    loss : factor on the reflected light that is subtracted: 0 subtracts nothing, 1 subtracts exactly the
-        light that the lobe reflects, and pi is the published factor
+    loss : ratio of the subtracted light to the light that the lobe reflects: 1 conserves energy, and pi is
+        the published value
     returns_internal_light : whether light that the surface reflects back into the skin leaves the skin later;
         if False, this light is lost
     """
@@ -82,7 +82,7 @@ class EnergyScheme:
     returns_internal_light: bool
 
     def entering_fraction(self, albedo: ArrayLike, rho_s: float) -> Floats:
-        """Return how large a fraction of the light from one direction enters the skin [-].
+        """Return the fraction of the light from one direction that enters the skin [-].
 
         albedo : directional albedo of the lobe for this direction [-]
         rho_s : specular strength [-]

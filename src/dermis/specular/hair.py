@@ -100,21 +100,22 @@ def longitudinal_scattering(sin_i: ArrayLike, sin_o: ArrayLike, variance: float)
     )
 
 
-def azimuthal_logistic(x: ArrayLike, width: float) -> Floats:
-    """Return the density at azimuth x of the logistic distribution truncated to (-pi, pi) [1/rad].
+def azimuthal_logistic(azimuth: ArrayLike, width: float) -> Floats:
+    """Return the density of the logistic distribution truncated to (-pi, pi) at an azimuth [1/rad].
 
+    azimuth : azimuth around the fibre [rad]
     width : scale of the distribution [rad]
 
     Source: [Chiang2016].
     """
-    wrapped = np.abs(np.mod(np.asarray(x, float) + np.pi, 2 * np.pi) - np.pi)
+    wrapped = np.abs(np.mod(np.asarray(azimuth, float) + np.pi, 2 * np.pi) - np.pi)
     e = np.exp(-wrapped / width)
     return np.asarray(e / (width * (1 + e) ** 2) / np.tanh(np.pi / (2 * width)))
 
 
-def fresnel(cosine: ArrayLike) -> Floats:
-    """Return the Fresnel reflectance of keratin at a cosine of incidence [-]."""
-    c = np.clip(np.asarray(cosine, float), 0.0, 1.0)
+def keratin_reflectance(cos_incidence: ArrayLike) -> Floats:
+    """Return the Fresnel reflectance of keratin for the cosine of the angle of incidence [-]."""
+    c = np.clip(np.asarray(cos_incidence, float), 0.0, 1.0)
     t = np.sqrt(1 - (1 - c * c) / KERATIN_ETA**2)
     parallel, across = (
         (KERATIN_ETA * c - t) / (KERATIN_ETA * c + t),
@@ -123,7 +124,7 @@ def fresnel(cosine: ArrayLike) -> Floats:
     return np.asarray(0.5 * (parallel**2 + across**2))
 
 
-def lobe_fractions(sin_o: ArrayLike, absorption_depth: ArrayLike, h: ArrayLike) -> list[Floats]:
+def lobe_fractions(sin_o: ArrayLike, absorption_depth: ArrayLike, ray_offset: ArrayLike) -> list[Floats]:
     """Return four arrays (..., 3): fractions of light in the lobes R, TT and TRT and in all further lobes.
 
     R is reflected light, TT is transmitted light, and TRT is light reflected once inside the fibre. Without
@@ -131,16 +132,16 @@ def lobe_fractions(sin_o: ArrayLike, absorption_depth: ArrayLike, h: ArrayLike) 
 
     sin_o : sine of the angle by which the direction to the viewer is inclined towards the tip of the fibre
     absorption_depth : (..., 3) absorption coefficient times the radius of the fibre [-]
-    h : offset of the incident ray from the fibre's axis, in units of the fibre's radius, -1 to 1 [-]
+    ray_offset : offset of the incident ray from the fibre's axis, in units of the fibre's radius, -1 to 1 [-]
 
     Source: [Chiang2016] section 4.
     """
-    o, h = np.asarray(sin_o, float), np.asarray(h, float)
+    o, ray_offset = np.asarray(sin_o, float), np.asarray(ray_offset, float)
     cos_o = np.sqrt(np.maximum(1 - o * o, _MIN_COS_SQUARED))
-    sin_inner = h * cos_o / np.sqrt(KERATIN_ETA**2 - o * o)
+    sin_inner = ray_offset * cos_o / np.sqrt(KERATIN_ETA**2 - o * o)
     path_length = 2 * np.sqrt(1 - sin_inner**2) / np.sqrt(1 - (o / KERATIN_ETA) ** 2)
     attenuation = np.exp(-np.asarray(absorption_depth, float) * path_length[..., None])
-    f = fresnel(cos_o * np.sqrt(1 - h * h))[..., None]
+    f = keratin_reflectance(cos_o * np.sqrt(1 - ray_offset * ray_offset))[..., None]
     transmitted = (1 - f) ** 2 * attenuation
     internal = transmitted * attenuation * f
     residual = internal * f * attenuation / (1 - f * attenuation)
@@ -182,12 +183,12 @@ def fibre_scattering(
     return total
 
 
-def tilted_sine(sin_o: ArrayLike, p: int) -> Floats:
+def tilted_sine(sin_o: ArrayLike, pass_count: int) -> Floats:
     """Return the sine of the viewer's inclination for one lobe, corrected for the tilt of the cuticle scales.
 
     sin_o : sine of the angle by which the direction to the viewer is inclined towards the tip of the fibre
-    p : number of passes of the light through the fibre: 0 for the lobe R, 1 for TT, 2 for TRT; 3 stands for
-        all further lobes
+    pass_count : number of passes of the light through the fibre: 0 for the lobe R, 1 for TT, 2 for TRT; 3
+        stands for all further lobes
     """
     angle = np.arcsin(np.clip(np.asarray(sin_o, float), -1, 1))
-    return np.asarray(np.sin(angle + (-2.0, 1.0, 4.0, 0.0)[p] * CUTICLE_TILT))
+    return np.asarray(np.sin(angle + (-2.0, 1.0, 4.0, 0.0)[pass_count] * CUTICLE_TILT))

@@ -13,10 +13,10 @@ from dermis.specular.fresnel import Fresnel, schlick
 from dermis.specular.models import Model
 
 
-def kelemen(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
+def kelemen(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the BRDF D F / (4 pi (v.h)^2) of specular strength rho_s = 1, without the factor n.l [1/sr].
 
-    m : roughness of the Beckmann distribution D; broadcast against the angles [-]
+    m : roughness of the Beckmann distribution D; broadcast against the cosines [-]
     fresnel : function that returns F from the cosine v.h
 
     The denominator equals pi |l + v|^2. The published shader omits the factor 1/pi in both the Beckmann
@@ -24,9 +24,9 @@ def kelemen(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats
 
     Source: [Kelemen2001]; [dEonLuebke2007] section 14.3.
     """
-    h2 = np.maximum(4.0 * angles.v_h**2, 1e-12)
-    lobe = beckmann(angles.n_h, m) * fresnel(angles.v_h) / (np.pi * h2)
-    return np.asarray(np.where(angles.is_above, lobe, 0.0))
+    h2 = np.maximum(4.0 * cosines.v_h**2, 1e-12)
+    lobe = beckmann(cosines.n_h, m) * fresnel(cosines.v_h) / (np.pi * h2)
+    return np.asarray(np.where(cosines.is_above, lobe, 0.0))
 
 
 KELEMEN = Model(

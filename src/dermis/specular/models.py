@@ -23,11 +23,11 @@ class Lobe(Protocol):
     The BRDF is 0 if light or viewer is below the surface.
     """
 
-    def __call__(self, angles: Cosines, m: ArrayLike, fresnel: Fresnel = ...) -> Floats:
+    def __call__(self, cosines: Cosines, m: ArrayLike, fresnel: Fresnel = ...) -> Floats:
         """Return the BRDF for arrays of cosines.
 
-        angles : cosines between normal, light, view and half vector
-        m : roughness, broadcast against the angles [-]
+        cosines : cosines between normal, light, view and half vector
+        m : roughness, broadcast against the cosines [-]
         fresnel : function that returns the Fresnel reflectance from the cosine v.h between view and half
             vector
         """
@@ -49,7 +49,7 @@ class Model:
     reciprocal : bool
         Whether the BRDF is unchanged when light and view are exchanged.
     sources : tuple of str
-        Keys of the bibliography.
+        Keys of entries in the bibliography.
     numbers : mapping
         Dictionary from the names of the placeholders in the shader to their values.
 

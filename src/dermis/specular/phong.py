@@ -11,7 +11,7 @@ from dermis.specular.fresnel import Fresnel, schlick
 from dermis.specular.models import Model
 
 
-def phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
+def phong(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the Phong BRDF F (s + 2) / (2 pi) (r.v)^s [1/sr].
 
     The vector r is the light direction mirrored at the normal. The factor (s + 2) / (2 pi) makes the lobe
@@ -23,11 +23,11 @@ def phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     Source: [LafortuneWillems1994].
     """
     s = 0.25 * blinn_phong_exponent(m)
-    lobe = fresnel(angles.v_h) * (s + 2.0) / (2.0 * np.pi) * _power_of_r_v(angles, s)
-    return np.asarray(np.where(angles.is_above, lobe, 0.0))
+    lobe = fresnel(cosines.v_h) * (s + 2.0) / (2.0 * np.pi) * _power_of_r_v(cosines, s)
+    return np.asarray(np.where(cosines.is_above, lobe, 0.0))
 
 
-def phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
+def phong_plain(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the BRDF W(i) (r.v)^s / (pi n.l) of the original Phong highlight [1/sr].
 
     Here r is the light direction mirrored at the normal, s is a quarter of `blinn_phong_exponent(m)`, and
@@ -37,14 +37,14 @@ def phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Fl
 
     Source: [Phong1975].
     """
-    n_l = np.maximum(angles.n_l, 1e-6)
-    lobe = fresnel(n_l) * _power_of_r_v(angles, 0.25 * blinn_phong_exponent(m)) / (np.pi * n_l)
-    return np.asarray(np.where(angles.is_above, lobe, 0.0))
+    n_l = np.maximum(cosines.n_l, 1e-6)
+    lobe = fresnel(n_l) * _power_of_r_v(cosines, 0.25 * blinn_phong_exponent(m)) / (np.pi * n_l)
+    return np.asarray(np.where(cosines.is_above, lobe, 0.0))
 
 
-def _power_of_r_v(angles: Cosines, exponent: Floats) -> Floats:
+def _power_of_r_v(cosines: Cosines, exponent: Floats) -> Floats:
     """Return (r.v)^exponent, where r is the light direction mirrored at the normal."""
-    r_v = 2.0 * angles.n_l * angles.n_v - (2.0 * angles.v_h**2 - 1.0)
+    r_v = 2.0 * cosines.n_l * cosines.n_v - (2.0 * cosines.v_h**2 - 1.0)
     return np.asarray(np.clip(r_v, 0.0, 1.0) ** exponent)
 
 

@@ -15,41 +15,46 @@ from dermis.specular.models import Model
 _MIN_COSINE = 1e-6
 
 
-def torrance_sparrow(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
+def torrance_sparrow(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the BRDF D F G / (4 n.l n.v) with Beckmann's distribution D and V-cavity masking G [1/sr].
 
-    m : roughness, broadcast against the angles [-]
+    m : roughness, broadcast against the cosines [-]
     fresnel : function that returns F from the cosine v.h
 
     Source: [TorranceSparrow1967]; masking in the form of [Blinn1977].
     """
-    n_l, n_v = _clamped_cosines(angles)
-    groove = 2.0 * angles.n_h * np.minimum(n_l, n_v) / np.maximum(angles.v_h, _MIN_COSINE)
-    return _microfacet_brdf(angles, beckmann(angles.n_h, m), fresnel, np.minimum(1.0, groove))
+    n_l, n_v = _clamped_cosines(cosines)
+    groove = 2.0 * cosines.n_h * np.minimum(n_l, n_v) / np.maximum(cosines.v_h, _MIN_COSINE)
+    return _microfacet_brdf(cosines, beckmann(cosines.n_h, m), fresnel, np.minimum(1.0, groove))
 
 
-def torrance_sparrow_smith(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
+def torrance_sparrow_smith(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the BRDF D F G1(l) G1(v) / (4 n.l n.v) with Smith masking G1 [1/sr].
 
-    m : roughness of the Beckmann distribution D; broadcast against the angles [-]
+    m : roughness of the Beckmann distribution D; broadcast against the cosines [-]
     fresnel : function that returns F from the cosine v.h
 
     Source: [Walter2007] section 5; [Smith1967].
     """
-    return masked_lobe(angles, beckmann(angles.n_h, m), fresnel, lambda cosine: smith_masking(cosine, m))
+    return masked_lobe(cosines, beckmann(cosines.n_h, m), fresnel, lambda cosine: smith_masking(cosine, m))
 
 
 def masked_lobe(
-    angles: Cosines, distribution_times_pi: Floats, fresnel: Fresnel, masking: Callable[[Floats], Floats]
+    cosines: Cosines,
+    distribution_times_pi: Floats,
+    fresnel: Fresnel,
+    masking_function: Callable[[Floats], Floats],
 ) -> Floats:
     """Return the BRDF D F G1(l) G1(v) / (4 n.l n.v) for any distribution D and masking G1 [1/sr].
 
     distribution_times_pi : values of pi D, such as the result of `beckmann`
     fresnel : function that returns F from the cosine v.h
-    masking : function that returns G1 from the cosine n.l or n.v
+    masking_function : function that returns G1 from the cosine n.l or n.v
     """
-    n_l, n_v = _clamped_cosines(angles)
-    return _microfacet_brdf(angles, distribution_times_pi, fresnel, masking(n_l) * masking(n_v))
+    n_l, n_v = _clamped_cosines(cosines)
+    return _microfacet_brdf(
+        cosines, distribution_times_pi, fresnel, masking_function(n_l) * masking_function(n_v)
+    )
 
 
 def smith_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
@@ -67,17 +72,17 @@ def smith_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
     return np.asarray(2.0 / (1.0 + erf(a) + np.exp(-(a**2)) / (a * np.sqrt(np.pi))))
 
 
-def _clamped_cosines(angles: Cosines) -> tuple[Floats, Floats]:
+def _clamped_cosines(cosines: Cosines) -> tuple[Floats, Floats]:
     """Return n.l and n.v, clamped to a small positive minimum to avoid divisions by 0."""
-    return np.maximum(angles.n_l, _MIN_COSINE), np.maximum(angles.n_v, _MIN_COSINE)
+    return np.maximum(cosines.n_l, _MIN_COSINE), np.maximum(cosines.n_v, _MIN_COSINE)
 
 
 def _microfacet_brdf(
-    angles: Cosines, distribution_times_pi: Floats, fresnel: Fresnel, masking: Floats
+    cosines: Cosines, distribution_times_pi: Floats, fresnel: Fresnel, masking_factor: Floats
 ) -> Floats:
-    n_l, n_v = _clamped_cosines(angles)
-    lobe = distribution_times_pi / np.pi * fresnel(angles.v_h) * masking / (4.0 * n_l * n_v)
-    return np.where(angles.is_above, lobe, 0.0)
+    n_l, n_v = _clamped_cosines(cosines)
+    lobe = distribution_times_pi / np.pi * fresnel(cosines.v_h) * masking_factor / (4.0 * n_l * n_v)
+    return np.where(cosines.is_above, lobe, 0.0)
 
 
 TORRANCE_SPARROW = Model(

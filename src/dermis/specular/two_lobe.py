@@ -23,17 +23,17 @@ NARROW_WEIGHT = 0.85
 MIN_ROUGHNESS, MAX_ROUGHNESS = 0.05, 1.0
 
 
-def two_lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
+def two_lobe(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the BRDF of a mixture of a narrow and a wide Beckmann slope distribution [1/sr].
 
-    m : roughness, broadcast against the angles; the roughnesses of the two lobes are NARROW_FACTOR m and
+    m : roughness, broadcast against the cosines; the roughnesses of the two lobes are NARROW_FACTOR m and
         WIDE_FACTOR m, clamped to the range 0.05 to 1 [-]
     fresnel : function that returns the Fresnel reflectance from the cosine v.h
 
     Source: [EpicGames2025] for the two lobes; [Walter2007] section 5 for the BRDF.
     """
-    slopes = _mix_lobes(lambda rough: beckmann(angles.n_h, rough), m)
-    return masked_lobe(angles, slopes, fresnel, lambda cosine: two_lobe_masking(cosine, m))
+    slopes = _weighted_lobe_mean(lambda rough: beckmann(cosines.n_h, rough), m)
+    return masked_lobe(cosines, slopes, fresnel, lambda cosine: two_lobe_masking(cosine, m))
 
 
 def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
@@ -45,10 +45,10 @@ def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
     cos_theta : cosine of the angle between the direction and the normal
     m : roughness of the model, from which the roughnesses of the two lobes are computed [-]
     """
-    return np.asarray(1.0 / _mix_lobes(lambda rough: 1.0 / smith_masking(cos_theta, rough), m))
+    return np.asarray(1.0 / _weighted_lobe_mean(lambda rough: 1.0 / smith_masking(cos_theta, rough), m))
 
 
-def _mix_lobes(lobe_quantity: Callable[[Floats], Floats], roughness: ArrayLike) -> Floats:
+def _weighted_lobe_mean(lobe_quantity: Callable[[Floats], Floats], roughness: ArrayLike) -> Floats:
     """Return the mean of a quantity over the narrow and the wide lobe, with the weights of the lobes.
 
     lobe_quantity : function that returns the quantity from the roughness of a lobe

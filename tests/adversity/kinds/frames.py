@@ -37,7 +37,7 @@ def _take(plan: Plan) -> None:
 
     files = FrameFiles(Path(plan["file"]))
     files.prepare()
-    files.start(_MADE_OF)
+    files.start_sequence(_MADE_OF)
     missing = files.missing_frames(range(_COUNT), _SIZE)
     for number in set(range(_COUNT)) - set(missing):
         try:

@@ -12,10 +12,10 @@ from dermis.specular.models import Model
 ALBEDO = 0.5
 
 
-def chalk(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
+def chalk(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the BRDF, albedo / pi [1/sr]."""
-    value = np.broadcast_to(ALBEDO / np.pi, np.broadcast_shapes(angles.n_l.shape, np.shape(m)))
-    return np.where(angles.is_above, value, 0.0)
+    value = np.broadcast_to(ALBEDO / np.pi, np.broadcast_shapes(cosines.n_l.shape, np.shape(m)))
+    return np.where(cosines.is_above, value, 0.0)
 
 
 CHALK = Model(chalk, "the same in all directions", True, ("Phong1975",), {"chalk_albedo": ALBEDO})

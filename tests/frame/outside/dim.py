@@ -35,7 +35,7 @@ class Dim(AtlasTechnique):
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
         """Declare the pass that halves the light."""
-        shader = program(graph.device, Path(__file__).parent / "dim.wgsl", store=levels.texel)
+        shader = program(graph.device, Path(__file__).parent / "dim.wgsl", store_format=levels.texel)
         bound = {"light": levels.layer(0), "stored": levels.layer(1)}
         graph.compute("dim", shader, bound, (levels.size, levels.size), TILE_SIDE)
 

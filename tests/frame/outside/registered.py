@@ -38,7 +38,7 @@ OUTPUTS.register("uv_sum", UV_SUM)
 import numpy as np
 from setups import frontal, head_of, place, scene_of, settings_of
 
-from dermis.apps.export.targets.pbrt.scene import light_lines
+from dermis.apps.export.targets.pbrt.scene import light_directives
 from dermis.apps.truths.lights import cycles_lamp
 from dermis.base.errors import DermisError
 from dermis.cli import main
@@ -63,7 +63,7 @@ picture = drawn(glow, 1.0) - drawn(glow, 64.0)
 assert picture[24, 24].max() < 1e-3 * 3.14 and picture[0, 0].min() > 0.01, "the frame draws the light"
 with warnings.catch_warnings(record=True) as notes:
     warnings.simplefilter("always")
-    lines = light_lines([glow], None)
+    lines = light_directives([glow], None)
 assert [str(one.message) for one in notes] == [
     "light 1: pbrt has no after-glow light, so it becomes a point light"
 ]

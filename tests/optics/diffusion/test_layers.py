@@ -182,7 +182,7 @@ def test_two_layer_total_is_near_monte_carlo(sample_folder: Path) -> None:
 
 
 @pytest.mark.parametrize("source", ["beam", "point"])
-def test_what_is_reflected_alone_is_the_same(source: layered_diffusion.Source) -> None:
+def test_what_is_reflected_alone_is_the_same(source: layered_diffusion.SourceKind) -> None:
     medium, frequency = published_media()["dj3"], hankel.transform_frequencies()
     alone = layered_diffusion.solve_reflectance(frequency, medium, A, source)
     assert np.array_equal(alone, layered_diffusion.solve_layers(frequency, medium, A, source)[0])

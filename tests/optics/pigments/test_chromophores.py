@@ -62,7 +62,7 @@ def test_coefficients_of_an_independent_computation(sample_folder: Path) -> None
         (chromophores.deoxyhaemoglobin_extinction, "eps_Hb_cm1_M1"),
         (chromophores.eumelanin_absorption, "mua_melanosome_mm1"),
         (chromophores.baseline_absorption, "mua_baseline_mm1"),
-        (chromophores.jacques_1998, "musp_mm1"),
+        (chromophores.jacques_scattering, "musp_mm1"),
     ]:
         assert np.allclose(name(wavelength), table[column], rtol=PUBLISHED, atol=0.0), column
 
@@ -106,13 +106,13 @@ def test_water_as_measured() -> None:
 
 def test_scattering_in_the_reading_per_millimetre() -> None:
     """It is 6.08 per mm at 550 nm; half of it is the law published for the dermis."""
-    assert chromophores.donner_jensen_2006(550.0) == pytest.approx(6.08, abs=0.005)
+    assert chromophores.donner_jensen_scattering(550.0) == pytest.approx(6.08, abs=0.005)
     others_per_cm = 73.7 * VISIBLE_NM**-0.22 + 1.1e12 * VISIBLE_NM**-4.0
-    dermis = chromophores.DERMIS_SCATTERING_RATIO * chromophores.donner_jensen_2006(VISIBLE_NM)
+    dermis = chromophores.DERMIS_SCATTERING_RATIO * chromophores.donner_jensen_scattering(VISIBLE_NM)
     assert np.allclose(10.0 * dermis, others_per_cm, rtol=PUBLISHED)
 
 
-@pytest.mark.parametrize("law", [chromophores.donner_jensen_2006, chromophores.jacques_1998])
+@pytest.mark.parametrize("law", [chromophores.donner_jensen_scattering, chromophores.jacques_scattering])
 def test_skin_scatters_blue_more(law: chromophores.ScatteringLaw) -> None:
     assert (np.diff(law(VISIBLE_NM)) < 0.0).all()
 
@@ -127,8 +127,8 @@ def test_skin_scatters_blue_more(law: chromophores.ScatteringLaw) -> None:
         chromophores.oxyhaemoglobin_extinction,
         chromophores.deoxyhaemoglobin_extinction,
         chromophores.water_absorption,
-        chromophores.donner_jensen_2006,
-        chromophores.jacques_1998,
+        chromophores.donner_jensen_scattering,
+        chromophores.jacques_scattering,
     ],
 )
 def test_invisible_light_is_refused(spectrum: Callable[[ArrayLike], Floats], wavelength: ArrayLike) -> None:

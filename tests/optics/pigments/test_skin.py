@@ -18,8 +18,8 @@ from dermis.optics.pigments.spectra import (
     WAVELENGTHS_NM,
     baseline_absorption,
     blood_absorption,
-    donner_jensen_2006,
-    jacques_1998,
+    donner_jensen_scattering,
+    jacques_scattering,
     melanosome_absorption,
     rgb_weights,
 )
@@ -111,10 +111,10 @@ def test_tissue_without_blood_and_melanin_absorbs_as_in_measured_people() -> Non
 
 
 def test_another_law_of_scattering() -> None:
-    epidermis, dermis = spectral_medium("dj2006", SKIN, scattering=jacques_1998).layers
-    assert np.array_equal(epidermis.sigma_s_prime, jacques_1998(WAVELENGTHS_NM))
-    assert np.allclose(dermis.sigma_s_prime / jacques_1998(WAVELENGTHS_NM), 0.5)
-    assert not np.allclose(epidermis.sigma_s_prime, donner_jensen_2006(WAVELENGTHS_NM), rtol=0.1)
+    epidermis, dermis = spectral_medium("dj2006", SKIN, scattering=jacques_scattering).layers
+    assert np.array_equal(epidermis.sigma_s_prime, jacques_scattering(WAVELENGTHS_NM))
+    assert np.allclose(dermis.sigma_s_prime / jacques_scattering(WAVELENGTHS_NM), 0.5)
+    assert not np.allclose(epidermis.sigma_s_prime, donner_jensen_scattering(WAVELENGTHS_NM), rtol=0.1)
 
 
 def test_melanin_darkens() -> None:

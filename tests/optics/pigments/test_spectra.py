@@ -13,7 +13,12 @@ from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.media import Medium
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.pigments.skin import spectral_medium
-from dermis.optics.pigments.spectra import WAVELENGTHS_NM, interpolate_spectrum, jacques_1998, rgb_weights
+from dermis.optics.pigments.spectra import (
+    WAVELENGTHS_NM,
+    interpolate_spectrum,
+    jacques_scattering,
+    rgb_weights,
+)
 
 FINE_NM = np.arange(380.0, 781.0, 5.0)
 COLOUR = 3e-5
@@ -67,10 +72,10 @@ def test_whole_chain_from_pigments_to_the_colours_of_another_program(sample_fold
         dtype=None,
         encoding="utf-8",
     )
-    sigma_s_prime = jacques_1998(WAVELENGTHS_NM)
+    sigma_s_prime = jacques_scattering(WAVELENGTHS_NM)
     for row in table[::6]:
         skin = SkinParameters(row["f_mel"], 1.0, row["f_blood"], oxygen=0.75, epidermis_mm=0.06, baseline=1.0)
-        epidermis, dermis = spectral_medium("dj2006", skin, scattering=jacques_1998).layers
+        epidermis, dermis = spectral_medium("dj2006", skin, scattering=jacques_scattering).layers
         medium = Medium("skin", (epidermis, replace(dermis, sigma_s_prime=sigma_s_prime)))
         total = diffusion_profile(medium, rgb_weights=rgb_weights()).total
         assert total == pytest.approx([row["lin_R"], row["lin_G"], row["lin_B"]], abs=6e-4)

@@ -48,7 +48,7 @@ def atomic_write(final_path: Path, write_content: Callable[[Path], object]) -> N
         return
 
 
-def move_into_place(temporary_file: Path, final_path: Path, replaces_folder: bool = True) -> None:
+def move_into_place(unfinished_path: Path, final_path: Path, replaces_folder: bool = True) -> None:
     """Rename a temporary file or folder to its final path, replacing what was at that path.
 
     replaces_folder : whether to replace a non-empty folder; if False, the folder is kept and OSError is
@@ -60,7 +60,7 @@ def move_into_place(temporary_file: Path, final_path: Path, replaces_folder: boo
         replaced = temporary_path(final_path)
         final_path.rename(replaced)
         try:
-            temporary_file.rename(final_path)
+            unfinished_path.rename(final_path)
         except OSError:
             with contextlib.suppress(OSError):  # another process has moved a folder there
                 replaced.rename(final_path)
@@ -68,7 +68,7 @@ def move_into_place(temporary_file: Path, final_path: Path, replaces_folder: boo
         finally:
             remove_path(replaced)
     else:
-        temporary_file.replace(final_path)
+        unfinished_path.replace(final_path)
     flush_to_disk(final_path.parent)
 
 

@@ -66,7 +66,7 @@ def sampled_camera(
     )
 
     def scaled_aim_offset(offset_fraction: float) -> AimOffset:
-        """Return the aim offset that moves the face in the picture by a fraction of its sampled offset."""
+        """Return the aim offset [mm] that moves the face by a fraction of the sampled picture offset."""
         return -0.5 * frame * offset_fraction * offset[0], -0.5 * frame * offset_fraction * offset[1]
 
     fraction, low, high = 1.0, 0.0, 1.0
@@ -81,14 +81,14 @@ def sampled_camera(
 
 
 def _aim_camera(
-    centre: Doubles, axes: Doubles, distance_mm: float, frame_mm: float, aim_offset: AimOffset
+    centre: Doubles, axes: Doubles, distance_mm: float, visible_height_mm: float, aim_offset: AimOffset
 ) -> Camera:
     """Return a camera that looks at a point beside the centre of the face.
 
     centre : (3,) centre of the face [mm]
     axes : (3, 3) axes of the camera as rows, from `_camera_axes`
     distance_mm : distance of the camera from the centre of the face [mm]
-    frame_mm : visible height at the centre of the face, for a camera aimed at this centre [mm]
+    visible_height_mm : visible height at the centre of the face, for a camera aimed at this centre [mm]
     aim_offset : offset of the camera's target from the centre of the face, to the right and upwards [mm]
     """
     scale = math.hypot(distance_mm, *aim_offset) / distance_mm  # keeps the angle of view
@@ -96,12 +96,12 @@ def _aim_camera(
         position=_as_tuple(centre + distance_mm * axes[2]),
         target=_as_tuple(centre + aim_offset[0] * axes[0] + aim_offset[1] * axes[1]),
         up=_as_tuple(axes[1]),
-        frame_mm=frame_mm * scale,
+        frame_mm=visible_height_mm * scale,
     )
 
 
 def _max_projected_coordinate(
-    positions_mm: Doubles, distance_mm: float, aim_offset: AimOffset, frame_mm: float, aspect: float
+    positions_mm: Doubles, distance_mm: float, aim_offset: AimOffset, visible_height_mm: float, aspect: float
 ) -> float:
     """Return the largest absolute picture coordinate of the points: 0 at the centre, 1 at an edge.
 
@@ -109,7 +109,7 @@ def _max_projected_coordinate(
         centre [mm]
     distance_mm : distance of the camera from the face's centre [mm]
     aim_offset : offset of the camera's target to the right and upwards [mm]
-    frame_mm : visible height at the face's centre [mm]
+    visible_height_mm : visible height at the face's centre [mm]
     aspect : ratio of the picture's width to its height [-]
     """
     x, y, z = positions_mm.T
@@ -121,7 +121,9 @@ def _max_projected_coordinate(
     depth = np.maximum(back[2] * away - back[0] * x - back[1] * y, 1e-3)
     projected_x = (right[0] * x - right[2] * away) / (aspect * depth)
     projected_y = (up[0] * x + up[1] * y - up[2] * away) / depth
-    return float(max(np.abs(projected_x).max(), np.abs(projected_y).max()) * 2.0 * distance_mm / frame_mm)
+    return float(
+        max(np.abs(projected_x).max(), np.abs(projected_y).max()) * 2.0 * distance_mm / visible_height_mm
+    )
 
 
 def _camera_axes(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Doubles:

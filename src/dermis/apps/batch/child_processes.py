@@ -58,7 +58,7 @@ def start_process(target: Callable[..., None], *args: object) -> ChildProcess:
     """
     parent_pipe, child_pipe = _SPAWN_CONTEXT.Pipe()
     process = _SPAWN_CONTEXT.Process(target=_run_in_child, args=(target, child_pipe, args))
-    with _allow_children(), _block_sigint(), _limit_blas_to_one_thread():
+    with _allow_child_processes(), _block_sigint(), _limit_blas_to_one_thread():
         process.start()
     child_pipe.close()  # the parent's end now breaks when the child dies
     return ChildProcess(process, parent_pipe)
@@ -92,7 +92,7 @@ def _exit_with_parent(parent_sentinel: int) -> None:
 
 
 @contextmanager
-def _allow_children() -> Iterator[None]:
+def _allow_child_processes() -> Iterator[None]:
     """Allow a daemon process, such as a dask worker, to start children, which multiprocessing forbids."""
     current = multiprocessing.current_process()
     was_daemon = current.daemon

@@ -1,4 +1,4 @@
-"""Worker pool of dask.distributed, on one machine or several, with one adapter per worker."""
+"""Pool of dask.distributed workers on one or several machines; each worker uses one graphics adapter."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ _CONNECTION_TIMEOUT_S = 60.0  # for the scheduler, and for its first worker
 
 @dataclass(frozen=True)
 class DaskCluster:
-    """Pool of dask workers, each of which renders one part at a time.
+    """Pool of dask workers, each of which renders one part of a shard at a time.
 
     address : address of the scheduler; None if `file` is given
     file : scheduler file, written by `dask scheduler --scheduler-file`
-    adapter : adapters to use, as in `SlotRequest`; the workers of a host are assigned the matching adapters
-        in turn
+    adapter : graphics adapters to use, as in `SlotRequest`; the workers of a host are assigned the matching
+        adapters in turn
     """
 
     address: str | None
@@ -41,7 +41,7 @@ class DaskCluster:
     def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
         """Process the tasks as dask tasks, and yield an event for each completed task.
 
-        tasks : parts to render and shards to verify
+        tasks : parts of shards to render, and complete shards to verify
 
         Raises DermisError if no worker can be reached, if a worker does not share the disk, and for errors
         that would recur on another attempt.
@@ -81,12 +81,12 @@ class DaskCluster:
 
 
 @contextmanager
-def _create_marker_file(out: Path) -> Iterator[Path]:
+def _create_marker_file(dataset_folder: Path) -> Iterator[Path]:
     """Yield a new marker file in the output folder, which every worker that shares the disk can see.
 
     The file is removed at the end of the block.
     """
-    marker = out.resolve() / f".dermis-{secrets.token_hex(6)}"
+    marker = dataset_folder.resolve() / f".dermis-{secrets.token_hex(6)}"
     marker.touch()
     try:
         yield marker
@@ -116,7 +116,7 @@ def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> I
     queue, submitted = deque(tasks), dict[Future, Shard]()
     keys, completed = itertools.count(), as_completed(loop=client.loop)
 
-    def submit() -> None:
+    def submit_waiting_tasks() -> None:
         while queue and len(submitted) < _MAX_TASKS_IN_FLIGHT:
             task = queue.popleft()
             future = client.submit(
@@ -126,7 +126,7 @@ def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> I
             completed.add(future)
 
     try:
-        submit()
+        submit_waiting_tasks()
         for done in completed:
             task = submitted.pop(done)
             if done.status != "finished":
@@ -138,7 +138,7 @@ def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> I
             if event.refusal:
                 raise DermisError(event.refusal)
             queue.extendleft(reversed(event.missing))
-            submit()
+            submit_waiting_tasks()
             yield event
     finally:
         client.cancel(list(submitted))

@@ -35,7 +35,7 @@ class _PluginState:
 
     child : worker process, started for the first task
     lock : lock that is held while a task is processed
-    cleanup : context managers to leave, and callbacks to call, when the process is stopped
+    cleanup : context managers to exit, and callbacks to call, when the process is stopped
     stopped : event that is set when the run has ended and rendering must stop
     """
 
@@ -60,7 +60,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
     out : output folder of the run
     encoders : number of encoder processes, as in `RunOptions`
     keep_going : whether to omit images that cannot be rendered, as in `RunOptions`
-    adapter : adapters to use, as in `DaskCluster`
+    adapter : graphics adapters to use, as in `DaskCluster`
     """
 
     spec_toml: str
@@ -72,7 +72,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
 
     @classmethod
     def for_run(cls, options: RunOptions, adapter: str) -> Self:
-        """Return the plugin for the options of a run and a choice of adapters."""
+        """Return the plugin for the options of a run and the requested graphics adapters."""
         folder, out = options.spec.folder.resolve(), options.out.resolve()
         return cls(options.spec.to_toml(), folder, out, options.encoders, options.keep_going, adapter)
 
@@ -89,7 +89,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
             self._state.lock.release()
 
     def process(self, task: Shard) -> WorkerEvent:
-        """Process a task as `Worker.process` does, and return the event of its completion or its refusal.
+        """Process a task as `Worker.process` does; return an event that reports its completion or an error.
 
         Raises LostProcessError if the process or its device was lost; dask then retries the task.
         """
@@ -141,7 +141,7 @@ def process_task(plugin_name: str, task: Shard) -> WorkerEvent:
     """Process a task with a plugin of the dask worker that runs this function.
 
     plugin_name : name of the `PartPlugin`
-    task : part to render or shard to verify
+    task : part of a shard to render, or complete shard to verify
     """
     event: WorkerEvent = get_worker().plugins[plugin_name].process(task)
     return event

@@ -33,16 +33,16 @@ _NAMES_WITHOUT_FILES = {"none", "uniform", "human"}
 TableRows = Iterable[Sequence[object]]
 
 
-def write_datasheet(out: Path, spec: Spec) -> None:
+def write_datasheet(dataset_folder: Path, spec: Spec) -> None:
     """Write README.md and dataset.json of a data set from its spec, index and shards.
 
-    Data sets with equal specs and equal shards get equal files.
+    Data sets with equal specs and identical shards get identical files.
 
     Raises DermisError if the index is missing, or if a file cannot be written.
     """
-    existing = [shard for shard in list_shards(spec) if shard_exists(out, shard, spec)]
+    existing = [shard for shard in list_shards(spec) if shard_exists(dataset_folder, shard, spec)]
     text = _readme_text(
-        out, spec, [read_manifest(shard_path(out, shard, spec)) for shard in existing]
+        dataset_folder, spec, [read_manifest(shard_path(dataset_folder, shard, spec)) for shard in existing]
     ).encode()
     description = {
         "spec": spec.digest(),
@@ -54,11 +54,11 @@ def write_datasheet(out: Path, spec: Spec) -> None:
         "landmarks": {name: landmark_names(name, spec) for name in spec.landmarks},
     }
     data = (json.dumps(description, indent=1, ensure_ascii=False) + "\n").encode()
-    atomic_write(out / DESCRIPTION_FILE, lambda path: path.write_bytes(data))
-    atomic_write(out / README_FILE, lambda path: path.write_bytes(text))
+    atomic_write(dataset_folder / DESCRIPTION_FILE, lambda path: path.write_bytes(data))
+    atomic_write(dataset_folder / README_FILE, lambda path: path.write_bytes(text))
 
 
-def _readme_text(out: Path, spec: Spec, manifests: Sequence[ShardManifest]) -> str:
+def _readme_text(dataset_folder: Path, spec: Spec, manifests: Sequence[ShardManifest]) -> str:
     width, height = spec.size
     left_out = [image for manifest in manifests for image in manifest.left_out]
     images = sum(manifest.stop - manifest.first for manifest in manifests) - len(left_out)
@@ -75,8 +75,8 @@ def _readme_text(out: Path, spec: Spec, manifests: Sequence[ShardManifest]) -> s
         files=_files_table(spec),
         landmarks=_landmarks_section(spec),
         labels=_labels_section(spec),
-        parameters=_markdown_table(("parameter", "images", "values"), parameter_summaries(out)),
-        tests=_tests_table(fit_tests(out, spec)),
+        parameters=_markdown_table(("parameter", "images", "values"), parameter_summaries(dataset_folder)),
+        tests=_fit_tests_table(fit_tests(dataset_folder, spec)),
         licences=_markdown_table(("part", "by", "licence"), asset_licences(spec)),
         made_with=_software_table(manifests),
         left_out=failed + _markdown_table(("image", "reason"), left_out[:_MAX_LISTED_FAILURES])
@@ -99,10 +99,10 @@ def _files_table(spec: Spec) -> str:
     return _markdown_table(("file", "content", "unit", "stored as", "background value"), rows)
 
 
-def _tests_table(tests: Iterable[FitTest]) -> str:
+def _fit_tests_table(fit_test_results: Iterable[FitTest]) -> str:
     rows = [
         (*one[:4], *(f"{number:.2g}" for number in one[4:]), "" if one.passes else "differs from the spec")
-        for one in tests
+        for one in fit_test_results
     ]
     columns = "parameter", "samples", "spec", "sampled", "distance", "expected distance", "p-value", ""
     return _markdown_table(columns, rows)
@@ -141,8 +141,8 @@ def _markdown_table(column_names: Sequence[str], table_rows: TableRows) -> str:
 class OutputFormat(TypedDict):
     """File format of an output array, for programs that read the data set.
 
-    A stored number `level` stands for the value (level - zero) * step. A step of 1 and a zero of 0 mean that
-    values are stored unscaled.
+    A stored number `level` stands for the value (level - zero) * step. If `step` is 1 and
+    `zero` is 0, values are stored unscaled.
     """
 
     file: str

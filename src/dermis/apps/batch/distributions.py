@@ -35,7 +35,7 @@ class Distribution(ABC):
     @property
     @abstractmethod
     def support(self) -> tuple[SampleValue, ...]:
-        """Return the smallest and the largest number, or all texts, that can be sampled."""
+        """Return the smallest and the largest possible number, or all possible strings."""
 
     @abstractmethod
     def quantile(self, probability: float) -> SampleValue:
@@ -48,7 +48,7 @@ class Distribution(ABC):
 
 @dataclass(frozen=True)
 class Constant(Distribution):
-    """Distribution whose samples are always the same number or text."""
+    """Distribution whose samples are always the same number or string."""
 
     value: SampleValue
 
@@ -62,7 +62,7 @@ class Constant(Distribution):
         return self.value
 
     def spec_value(self) -> SpecValue:
-        """Return the number or text itself."""
+        """Return the constant itself."""
         return self.value if isinstance(self.value, str) else float(self.value)
 
 
@@ -190,7 +190,7 @@ class Choice(Distribution):
 
     @property
     def support(self) -> tuple[SampleValue, ...]:
-        """Return the smallest and the largest number, or all texts, of the alternatives."""
+        """Return the smallest and the largest number, or all strings, of the alternatives."""
         bounds = [bound for value in self.values for bound in value.support]
         if isinstance(bounds[0], str):
             return tuple(dict.fromkeys(bounds))
@@ -236,7 +236,7 @@ class FileChoice(Distribution):
         return {"files": self.pattern}
 
     def __repr__(self) -> str:
-        """Return the TOML table as text, with the pattern but not the paths."""
+        """Return the TOML table as a string, with the pattern but not the paths."""
         return repr(self.spec_value())
 
 

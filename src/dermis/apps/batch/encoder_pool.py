@@ -22,8 +22,8 @@ class EncoderPool:
     """Pool of processes that encode images as files; the images are assigned to the processes in turn.
 
     process_count : number of processes; if 0, the calling process encodes the images
-    encode : picklable function that receives the elements of a job as arguments, and returns the number and
-        the files of an image
+    encode : picklable function that encodes an image; its arguments are the elements of an encoder job, and
+        it returns the image's number and the bytes of its files by suffix
     """
 
     def __init__(self, process_count: int, encode: Callable[..., EncodedImage]) -> None:
@@ -76,8 +76,9 @@ class EncoderPool:
 class _EncoderProcess:
     """Encoder process that receives jobs through shared memory.
 
-    The pipe only carries the offsets of the jobs in the shared memory. If the pipe carried the jobs, parent
-    and child could block, each waiting for the other process to read.
+    A job is the tuple of arguments with which one image is encoded. The pipe only carries the offsets of the
+    jobs in the shared memory. If the pipe carried the jobs, parent and child could block, each waiting for
+    the other process to read.
 
     size : largest size of a job [bytes]
     """
@@ -113,7 +114,7 @@ class _EncoderProcess:
 
 
 def _job_buffers(job: EncoderJob) -> list[memoryview]:
-    """Return a job as buffers for shared memory: a pickle of all but the arrays, then the arrays' bytes."""
+    """Return a job as buffers for shared memory: a pickle without arrays, then the bytes of each array."""
     arrays: list[pickle.PickleBuffer] = []
     pickled = pickle.dumps(job, protocol=5, buffer_callback=arrays.append)
     return [memoryview(pickled), *(array.raw() for array in arrays)]
@@ -128,7 +129,7 @@ def _run_encoder(
 ) -> None:
     """Encode jobs until the pipe is closed; an encoder process runs this function.
 
-    pipe : pipe that delivers the positions of each job in the shared memory and takes the encoded images
+    pipe : pipe that delivers the byte ranges of each job in shared memory, and returns the encoded images
     shared_memory : memory shared with the parent process, which writes the jobs into it
     encode : function that encodes an image, see `EncoderPool`
     """

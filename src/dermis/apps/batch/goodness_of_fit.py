@@ -25,7 +25,7 @@ MIN_P_VALUE = 1e-6
 _MEAN_KOLMOGOROV_STATISTIC = sqrt(np.pi / 2) * np.log(2)  # mean of the Kolmogorov distribution
 _QUANTILE_COUNT = 10_000  # quantiles from which the moments of a distribution are computed
 _RELATIVE_ROUNDING_ERROR = 5e-6  # largest relative error of rounding to six digits
-_MAX_LISTED_TEXTS = 12  # largest number of texts per distribution in the table
+_MAX_LISTED_VALUES = 12  # largest number of texts per distribution in the table
 _MIN_EXPECTED_COUNT = 5.0  # expected samples in a cell of the chi-square test; smaller cells are pooled
 
 Array = NDArray[np.float64]
@@ -37,13 +37,14 @@ class FitTest(NamedTuple):
 
     parameter : name of the parameter
     sample_count : number of samples: one per image, or one per person for a parameter of people
-    expected : mean and standard deviation of the distribution, or, for texts, the probability of each
-    observed : mean and standard deviation of the samples, or, for texts, the fraction of each
-    distance : Kolmogorov-Smirnov distance, or, for texts, the largest difference between the expected and the
-        observed probability of a text [-]
+    expected : mean and standard deviation of the distribution; probability of each value if the parameter is
+        categorical
+    observed : mean and standard deviation of the samples; fraction of each value if categorical
+    distance : Kolmogorov-Smirnov distance; if categorical, largest difference between the probability and the
+        observed fraction of a value [-]
     expected_distance : mean distance for `sample_count` random samples of the distribution; 0 if only one
-        text is possible [-]
-    p_value : p-value of the distance, or of a chi-square test of the probabilities [-]
+        value is possible [-]
+    p_value : p-value of the Kolmogorov-Smirnov test, or of the chi-square test if categorical [-]
     """
 
     parameter: str
@@ -60,14 +61,14 @@ class FitTest(NamedTuple):
         return self.p_value >= MIN_P_VALUE
 
 
-def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
+def fit_tests(dataset_folder: Path, spec: Spec) -> Iterator[FitTest]:
     """Yield a goodness-of-fit test of each parameter with a varying distribution, from a data set's index.
 
     A parameter of a person counts once per person, regardless of the number of that person's images.
 
     Raises DermisError if there is no index.
     """
-    with open_index(out, "the statistics of a data set") as file:
+    with open_index(dataset_folder, "the statistics of a data set") as file:
         names = set(file.schema_arrow.names)
         first: NDArray[np.int64] | slice = slice(None)
         if "person.number" in names:  # rows of the first image of each person
@@ -84,10 +85,12 @@ def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
 
 
 def fit_test(parameter: str, distribution: Distribution, samples: Samples) -> FitTest:
-    """Return the goodness-of-fit test of samples: Kolmogorov-Smirnov for numbers, chi-square for texts."""
+    """Return the goodness-of-fit test of samples: Kolmogorov-Smirnov for numbers, chi-square for strings."""
     if any(isinstance(bound, str) for bound in distribution.support):
-        return _text_test(parameter, text_probabilities(distribution), [str(value) for value in samples])
-    return _number_test(parameter, distribution, np.sort(np.array(samples, np.float64)))
+        return _categorical_test(
+            parameter, value_probabilities(distribution), [str(value) for value in samples]
+        )
+    return _numeric_test(parameter, distribution, np.sort(np.array(samples, np.float64)))
 
 
 def cumulative_probability(distribution: Distribution, numbers: Array, *, is_inclusive: bool) -> Array:
@@ -122,8 +125,8 @@ def cumulative_probability(distribution: Distribution, numbers: Array, *, is_inc
     raise TypeError(f"{distribution} is not numeric")
 
 
-def text_probabilities(distribution: Distribution) -> dict[str, float]:
-    """Return the probability of each text that a distribution can give."""
+def value_probabilities(distribution: Distribution) -> dict[str, float]:
+    """Return the probability of each possible string of a categorical distribution."""
     if isinstance(distribution, distributions.FileChoice):
         return dict.fromkeys(distribution.names, 1.0 / len(distribution.names))
     if isinstance(distribution, Constant):
@@ -131,7 +134,7 @@ def text_probabilities(distribution: Distribution) -> dict[str, float]:
     assert isinstance(distribution, Choice)
     weights = defaultdict[str, float](float)
     for part, weight in zip(distribution.values, distribution.weights, strict=True):
-        for text, probability in text_probabilities(part).items():
+        for text, probability in value_probabilities(part).items():
             weights[text] += weight * probability
     total = sum(weights.values())
     return {text: weight / total for text, weight in weights.items() if weight}
@@ -142,12 +145,14 @@ def _parameter_test(parameter: str, distribution: Distribution, samples: Samples
         return fit_test(parameter, distribution, samples)
     replacement = {"environment": "gradient"}  # in images without an environment, see `Sampler.parameters`
     expected = defaultdict[str, float](float)
-    for text, probability in text_probabilities(distribution).items():
+    for text, probability in value_probabilities(distribution).items():
         expected[replacement.get(text, text)] += probability
-    return _text_test(parameter, expected, [replacement.get(str(value), str(value)) for value in samples])
+    return _categorical_test(
+        parameter, expected, [replacement.get(str(value), str(value)) for value in samples]
+    )
 
 
-def _number_test(parameter: str, distribution: Distribution, sorted_samples: Array) -> FitTest:
+def _numeric_test(parameter: str, distribution: Distribution, sorted_samples: Array) -> FitTest:
     """Return the Kolmogorov-Smirnov test of the samples of a numeric parameter.
 
     sorted_samples : (n,) samples in ascending order, each of which was rounded to six significant digits
@@ -173,15 +178,15 @@ def _number_test(parameter: str, distribution: Distribution, sorted_samples: Arr
     )
 
 
-def _text_test(
-    parameter: str, expected_probabilities: Mapping[str, float], sampled_texts: Sequence[str]
+def _categorical_test(
+    parameter: str, expected_probabilities: Mapping[str, float], sampled_values: Sequence[str]
 ) -> FitTest:
-    """Return the chi-square test of sampled texts.
+    """Return the chi-square test of the samples of a categorical parameter.
 
-    expected_probabilities : probability of each text
-    sampled_texts : texts that were sampled for the parameter
+    expected_probabilities : probability of each value
+    sampled_values : sampled values of the parameter
     """
-    count, counts = len(sampled_texts), Counter(sampled_texts)
+    count, counts = len(sampled_values), Counter(sampled_values)
     distance = max(
         abs(counts[text] / count - expected_probabilities.get(text, 0.0))
         for text in {*expected_probabilities, *counts}
@@ -199,18 +204,20 @@ def _text_test(
 
 def _format_probabilities(probabilities: Mapping[str, float]) -> str:
     return ", ".join(
-        f"{text} {probabilities[text]:.3g}" for text in sorted(probabilities)[:_MAX_LISTED_TEXTS]
+        f"{text} {probabilities[text]:.3g}" for text in sorted(probabilities)[:_MAX_LISTED_VALUES]
     )
 
 
 def _chi_square(
     probabilities: Mapping[str, float], observed_counts: Counter[str], sample_count: int
 ) -> float:
-    """Return the p-value of a chi-square test of counts; texts with few expected samples are pooled.
+    """Return the p-value of a chi-square test of the samples of a categorical parameter.
 
-    probabilities : probability of each text
-    observed_counts : number of samples of each text
-    sample_count : number of samples of all texts
+    Values with few expected samples are pooled.
+
+    probabilities : probability of each value
+    observed_counts : number of samples of each value
+    sample_count : total number of samples
     """
     cells = [
         (observed_counts[text], sample_count * p)

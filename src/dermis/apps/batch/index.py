@@ -1,4 +1,4 @@
-"""Index of a data set: a Parquet table with the parameters of each image; summaries of its columns."""
+"""Index of a data set (a Parquet table with the parameters of each image), and summaries of its columns."""
 
 from __future__ import annotations
 
@@ -23,34 +23,35 @@ INDEX_FILE = "index.parquet"
 MATRIX_COLUMNS = {"camera.K": 9, "camera.R": 9, "camera.t": 3, "head_pose": 12, "gaze": 6}
 """Columns of flattened matrices (row by row), with the number of elements."""
 _IDENTIFIER_COLUMNS = "number", "key", "shard"
-_MAX_LISTED_TEXTS = 12
+_MAX_LISTED_VALUES = 12
 
 IndexRow = dict[str, object]
 
 
-def write_index(out: Path, spec: Spec) -> Path:
+def write_index(dataset_folder: Path, spec: Spec) -> Path:
     """Write the index of the existing shards, with one row per image; return the path of the index.
 
     The columns "number", "key" and "shard" identify the image and its file; "camera.K", "camera.R",
     "camera.t", "head_pose" and "gaze" are flattened matrices; columns that begin with "skin_tone." describe
     the colour of the skin; all other columns are parameters, with null for images without the parameter.
 
-    Equal shards give equal bytes. Raises DermisError if a shard is damaged, if pyarrow is missing, or if the
-    file cannot be written.
+    Identical shards give an identical index.
+
+    Raises DermisError if a shard is damaged, if pyarrow is missing, or if the file cannot be written.
     """
-    parquet, target = import_extra("pyarrow.parquet", "the index of a data set"), out / INDEX_FILE
-    schema = _index_schema(out, spec)
+    parquet, target = import_extra("pyarrow.parquet", "the index of a data set"), dataset_folder / INDEX_FILE
+    schema = _index_schema(dataset_folder, spec)
 
     def write_parquet(path: Path) -> None:
         with parquet.ParquetWriter(path, schema, compression="zstd", store_schema=False) as writer:
-            for rows in _rows_of_shards(out, spec):
+            for rows in _rows_of_shards(dataset_folder, spec):
                 writer.write_table(_arrow_table(rows, schema))
 
     atomic_write(target, write_parquet)
     return target
 
 
-def open_index(out: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
+def open_index(dataset_folder: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
     """Open the index of a data set and return its Parquet file, from which single columns can be read.
 
     purpose : what pyarrow is needed for, for the message if pyarrow is missing
@@ -58,28 +59,33 @@ def open_index(out: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
     Raises DermisError if there is no index.
     """
     parquet = import_extra("pyarrow.parquet", purpose)
-    if not is_file(out / INDEX_FILE):
-        refuse(out, f"a data set with {INDEX_FILE}", "it is missing", "Run dermis batch again to write it")
-    return parquet.ParquetFile(out / INDEX_FILE)
+    if not is_file(dataset_folder / INDEX_FILE):
+        refuse(
+            dataset_folder,
+            f"a data set with {INDEX_FILE}",
+            "it is missing",
+            "Run dermis batch again to write it",
+        )
+    return parquet.ParquetFile(dataset_folder / INDEX_FILE)
 
 
-def parameter_summaries(out: Path) -> Iterator[tuple[str, int, str]]:
+def parameter_summaries(dataset_folder: Path) -> Iterator[tuple[str, int, str]]:
     """Yield the name of each parameter in the index, the number of images with it, and a summary as text.
 
     Raises DermisError if there is no index.
     """
-    with open_index(out, "the statistics of a data set") as file:
+    with open_index(dataset_folder, "the statistics of a data set") as file:
         for name in file.schema_arrow.names:
             if name not in (*_IDENTIFIER_COLUMNS, *MATRIX_COLUMNS):
                 column = file.read(columns=[name]).column(0)
                 yield name, len(column) - column.null_count, _column_summary(column)
 
 
-def _rows_of_shards(out: Path, spec: Spec) -> Iterator[list[IndexRow]]:
+def _rows_of_shards(dataset_folder: Path, spec: Spec) -> Iterator[list[IndexRow]]:
     """Yield the index rows of each existing shard that contains images, one shard at a time."""
     for shard in list_shards(spec):
-        path = shard_path(out, shard, spec)
-        if not shard_exists(out, shard, spec):
+        path = shard_path(dataset_folder, shard, spec)
+        if not shard_exists(dataset_folder, shard, spec):
             continue
         with shard_files(path) as images:
             rows = [
@@ -113,11 +119,11 @@ def _flatten_matrix(matrix: object) -> object:
     return [one for row in matrix for one in row]
 
 
-def _index_schema(out: Path, spec: Spec) -> pyarrow.Schema:
+def _index_schema(dataset_folder: Path, spec: Spec) -> pyarrow.Schema:
     """Return names and types of the index columns, with the columns of parameters sorted by name."""
     arrow = import_extra("pyarrow", "the index of a data set")
     kinds: dict[str, set[type]] = {}
-    for rows in _rows_of_shards(out, spec):
+    for rows in _rows_of_shards(dataset_folder, spec):
         for row in rows:
             for name, value in row.items():
                 if value is not None:
@@ -158,7 +164,7 @@ def _column_summary(column: pyarrow.ChunkedArray) -> str:
         counts = {one["values"]: one["counts"] for one in compute.value_counts(column).to_pylist()}
         counts.pop(None, None)
         sorted_counts = sorted(counts.items(), key=lambda one: (-one[1], str(one[0])))
-        listed = [f"{value} ({count:,})" for value, count in sorted_counts[:_MAX_LISTED_TEXTS]]
+        listed = [f"{value} ({count:,})" for value, count in sorted_counts[:_MAX_LISTED_VALUES]]
         more = len(sorted_counts) - len(listed)
         return ", ".join(listed) + (f" and {more:,} more" if more else "")
     if arrow.types.is_list(column.type):

@@ -29,9 +29,9 @@ _MAX_JOIN_ATTEMPTS = 3
 
 
 class KeptImages(NamedTuple):
-    """Images at the beginning of a part that exist already, because the data set was enlarged afterwards.
+    """Images at the beginning of a shard's part that were rendered before the data set was enlarged.
 
-    path : shard or part that contains these images; None if there are no such images
+    path : path of the existing shard or part that contains them; None if there are no such images
     stop : number after the last of these images
     """
 
@@ -39,10 +39,10 @@ class KeptImages(NamedTuple):
     stop: int
 
 
-def kept_images(out: Path, part: Part, spec: Spec) -> KeptImages:
+def kept_images(dataset_folder: Path, part: Part, spec: Spec) -> KeptImages:
     """Return the images of a part that were rendered before the data set was enlarged."""
     for piece in (part, shard_at(part.index, spec)):
-        path = shard_path(out, piece, spec)
+        path = shard_path(dataset_folder, piece, spec)
         with suppress(DermisError):
             manifest = read_manifest(path)
             is_shorter = manifest.first <= part.first < manifest.stop < piece.stop
@@ -78,26 +78,26 @@ def copy_images(writer: ShardWriter, source_path: Path, first_image: int, stop_i
                 writer.add(int(key), {suffix: read() for suffix, read in files.items()})
 
 
-def join_parts(out: Path, shard: Shard, spec: Spec) -> tuple[Part, ...]:
+def join_parts(dataset_folder: Path, shard: Shard, spec: Spec) -> tuple[Part, ...]:
     """Join the parts of a shard if all parts exist, then remove the parts; return the damaged parts.
 
     If there are damaged parts, nothing is joined: the damaged parts are removed, and must be rendered again.
-    Several processes may join the same parts at once: all write equal bytes, and parts are only removed when
-    the shard exists.
+    Several processes may join the same parts at once: all write identical bytes, and parts are only removed
+    when the shard exists.
 
     Raises DermisError if the shard cannot be written.
     """
-    parts = {part: shard_path(out, part, spec) for part in list_parts(shard, spec)}
+    parts = {part: shard_path(dataset_folder, part, spec) for part in list_parts(shard, spec)}
     for attempts_left in reversed(range(_MAX_JOIN_ATTEMPTS)):  # another process may remove files in between
         if not all(path.exists() for path in reversed(parts.values())):  # the last one is usually missing
             return ()
-        damaged = tuple(part for part in parts if not is_intact(out, part, spec))
-        if not shard_exists(out, shard, spec):
+        damaged = tuple(part for part in parts if not is_intact(dataset_folder, part, spec))
+        if not shard_exists(dataset_folder, shard, spec):
             if damaged:
                 _remove_paths(parts[part] for part in damaged)
                 return damaged
             try:
-                with ShardWriter(out, shard, spec) as writer:
+                with ShardWriter(dataset_folder, shard, spec) as writer:
                     for part, path in parts.items():
                         copy_images(writer, path, part.first, part.stop)
             except (DermisError, OSError):

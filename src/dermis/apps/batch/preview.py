@@ -31,7 +31,7 @@ _MAX_PREVIEW_SIDES = {"atlas": 512, "shadow_size": 1024}  # upper limits of sett
 _MAX_COLUMN_CHARACTERS = 60  # characters
 _MEASURED_IMAGE_COUNT, _WARM_UP_IMAGE_COUNT = 6, 2  # images of an estimate; the first of them are not timed
 _PERSON_IDENTIFIERS = "person.number", "person.seed"
-_MAX_LISTED_TEXTS = 12  # largest number of listed values of a text parameter
+_MAX_LISTED_VALUES = 12  # largest number of listed values of a text parameter
 
 
 class ParameterRow(TypedDict):
@@ -41,7 +41,7 @@ class ParameterRow(TypedDict):
     first : samples of the first 16 images; None for an image without this parameter
     images : number of images with this parameter, among the first 20,000 images
     min, mean, max : statistics of numeric samples
-    counts : for text samples, number of images with each text
+    counts : number of images with each value, if the values are strings
     """
 
     parameter: str
@@ -106,7 +106,7 @@ def parameter_rows(spec: Spec) -> list[ParameterRow]:
     return [_parameter_row(spec, name, samples) for name in varying if name not in _PERSON_IDENTIFIERS]
 
 
-def table_lines(rows: Sequence[ParameterRow]) -> list[str]:
+def parameter_table_lines(rows: Sequence[ParameterRow]) -> list[str]:
     """Return the parameter table as aligned lines of text."""
     cells = [("parameter", "distribution", "images", "min", "mean", "max"), *map(_table_cells, rows)]
     widths = [max(len(row[k]) for row in cells if len(row) > 4 or k < 3) for k in range(3)]
@@ -162,5 +162,5 @@ def _table_cells(parameter_row: ParameterRow) -> tuple[str, ...]:
             f"{number:.4g}" for number in (parameter_row["min"], parameter_row["mean"], parameter_row["max"])
         )
     counts = [f"{name} {count}" for name, count in parameter_row["counts"].items()]
-    more = f", and {len(counts) - _MAX_LISTED_TEXTS} more" if len(counts) > _MAX_LISTED_TEXTS else ""
-    return *fields, ", ".join(counts[:_MAX_LISTED_TEXTS]) + more
+    more = f", and {len(counts) - _MAX_LISTED_VALUES} more" if len(counts) > _MAX_LISTED_VALUES else ""
+    return *fields, ", ".join(counts[:_MAX_LISTED_VALUES]) + more

@@ -73,10 +73,10 @@ def read_dataset(
     Returns
     -------
     iterator of dict
-        Each image has the keys "number", "picture" ((h, w, 3 or 4), sRGB bytes), "camera" (K, R and t in
-        OpenCV's convention), "head_pose" (3, 4), "gaze" ((2, 3) or None), "landmarks" (`LandmarkPoints` by
-        the name of the set), "parameters" (by name), "skin_tone" (numbers that describe the colour of the
-        skin, or None), and one key for each output of the data set, such as "depth" or "normal".
+        Each image has one key for each output of the data set, such as "depth" or "normal", and these keys:
+        "number"; "picture", sRGB bytes (h, w, 3 or 4); "parameters", by name; "camera", with K, R and t in
+        OpenCV's convention; "head_pose" (3, 4); "gaze" (2, 3) or None; "landmarks", `LandmarkPoints` by the
+        name of the set; and "skin_tone", numbers that describe the colour of the skin, or None.
 
     Raises
     ------
@@ -158,7 +158,7 @@ def read_record(json_bytes: bytes, culprit: object) -> Record:
 
 @contextmanager
 def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
-    """Open a shard, and yield functions that read its files, indexed by image key and file suffix.
+    """Open a shard and yield, for each image key and file suffix, a function that reads the file.
 
     The functions can be called inside the with block.
 

@@ -59,7 +59,7 @@ def encode_record(
     spec: Spec,
     skin_tone: SkinTone | None = None,
 ) -> dict[str, bytes]:
-    """Return the files of image `image_number` by suffix; equal arguments give equal bytes.
+    """Return the bytes of the files of image `image_number`, by file suffix.
 
     observation : sRGB picture and output arrays of the image
     parameters : sampled parameters of the image
@@ -67,7 +67,7 @@ def encode_record(
 
     The suffixes are "png" for the picture, with an alpha channel if the picture has no background;
     "NAME.png", "NAME.exr" or "NAME.npy" for each output, see `output_encoding.storage_description`; and
-    "json" for the `Record`.
+    "json" for the `Record`. Equal arguments give identical bytes.
     """
     files = {PICTURE_SUFFIX: encode_png(observation.picture, use_isal=True)}
     for name in spec.outputs:

@@ -1,4 +1,4 @@
-"""Run of a data set: render the missing parts, then write the index and the datasheet."""
+"""Rendering of a data set: missing parts of shards are rendered, then index and datasheet are written."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class WorkerPool(Protocol):
     def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
         """Render parts and verify shards; yield the events that the workers send.
 
-        tasks : parts to render and shards to verify; damaged parts are rendered again
+        tasks : parts of shards to render, and complete shards to verify; damaged parts are rendered again
         """
         ...
 
@@ -130,25 +130,25 @@ def run(
     return RunReport(images, time.monotonic() - start, written, len(kept), failed, complete)
 
 
-def claim_folder(out: Path, spec: Spec) -> None:
+def claim_folder(dataset_folder: Path, spec: Spec) -> None:
     """Create the folder of a data set, or check that an existing folder holds the data set of this spec.
 
     The existing data set may have fewer images than this spec; the spec in the folder is then replaced.
 
     Raises DermisError if the folder belongs to another data set or cannot be written.
     """
-    path, text = out / SPEC_FILE, spec.to_toml()
+    path, text = dataset_folder / SPEC_FILE, spec.to_toml()
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        dataset_folder.mkdir(parents=True, exist_ok=True)
         exists = path.exists()
     except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
-        refuse_output(out, fault)
-    if exists and not _must_grow(read_text(path, "the spec of a data set"), spec, out):
+        refuse_output(dataset_folder, fault)
+    if exists and not _is_smaller_version(read_text(path, "the spec of a data set"), spec, dataset_folder):
         return
     atomic_write(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
-def _must_grow(existing_toml: str, spec: Spec, out: Path) -> bool:
+def _is_smaller_version(existing_toml: str, spec: Spec, dataset_folder: Path) -> bool:
     """Return whether the spec in a data set's folder differs from this spec only by having fewer images.
 
     existing_toml : text of the spec in the folder
@@ -163,7 +163,7 @@ def _must_grow(existing_toml: str, spec: Spec, out: Path) -> bool:
     if number != GENERATOR_NUMBER:
         actual = f"it was made with number {number}, by another version of dermis"
         refuse(
-            out,
+            dataset_folder,
             f"a data set of generator number {GENERATOR_NUMBER}",
             actual,
             f"{other_folder}, or that version",
@@ -172,16 +172,18 @@ def _must_grow(existing_toml: str, spec: Spec, out: Path) -> bool:
         "", spec.to_toml(), count=1
     ):
         advice = f"{other_folder}, or use the spec that the folder was created with"
-        refuse(out, "a folder for this data set", f"its {SPEC_FILE} differs from this spec", advice)
+        refuse(
+            dataset_folder, "a folder for this data set", f"its {SPEC_FILE} differs from this spec", advice
+        )
     if int(count[1]) > spec.count:
         expected, actual = f"a count of at least the {count[1]} images that it has", f"got {spec.count}"
-        refuse(out, expected, actual, f"Use --count {count[1]}, or choose another folder")
+        refuse(dataset_folder, expected, actual, f"Use --count {count[1]}, or choose another folder")
     return True
 
 
-def _remove_joined_parts(out: Path, spec: Spec, complete_shards: Iterable[Shard]) -> None:
+def _remove_joined_parts(dataset_folder: Path, spec: Spec, complete_shards: Iterable[Shard]) -> None:
     """Remove the parts of complete shards, left over by a run that was interrupted after joining them."""
-    if files := part_files(out):
+    if files := part_files(dataset_folder):
         complete_shards = set(complete_shards)
         for number, path in files.items():
             if shard_at(number // spec.shard_size, spec) in complete_shards:
@@ -194,7 +196,7 @@ def _process_tasks(
     tasks: Sequence[Shard],
     on_progress: Callable[[Progress], None],
 ) -> tuple[int, set[Shard], tuple[Failure, ...]]:
-    """Process the tasks; return the number of rendered images, the damaged shards, and the failed images."""
+    """Render parts and verify shards; return the number of rendered images, damaged shards, and failures."""
     to_render = [task for task in tasks if isinstance(task, Part)]
     progress = Progress(total=sum(map(len, to_render)), to_verify=len(tasks) - len(to_render))
     rendered, damaged, failed, notes = 0, set[Shard](), list[Failure](), set[str]()

@@ -192,7 +192,7 @@ class Sampler:
             )
         for name, distribution in self.distributions.items():
             if not name.startswith("pose."):
-                sampled[name] = self._sample(image_number, name, distribution)
+                sampled[name] = self._sample_parameter(image_number, name, distribution)
         if sampled["background.kind"] == "environment" and sampled["environment.name"] == NO_ENVIRONMENT:
             sampled["background.kind"] = "gradient"
         for prefixes, applies in _CONDITIONAL_PARAMETERS:
@@ -202,12 +202,14 @@ class Sampler:
             f"pose.{name}": weight for name, weight in self._target_weights(image_number, sampled).items()
         }
 
-    def _sample(self, image_number: int, parameter: str, distribution: Distribution) -> float | str:
+    def _sample_parameter(self, image_number: int, parameter: str, distribution: Distribution) -> float | str:
         is_constant = isinstance(distribution, Constant)
-        value = distribution.quantile(0.5 if is_constant else self._probability(image_number, parameter))
+        value = distribution.quantile(
+            0.5 if is_constant else self._random_probability(image_number, parameter)
+        )
         return value if isinstance(value, str) else round_significant(value)
 
-    def _probability(self, image_number: int, parameter: str) -> float:
+    def _random_probability(self, image_number: int, parameter: str) -> float:
         """Return the random cumulative probability in (0, 1) at which a parameter is sampled.
 
         image_number : number of the image
@@ -253,7 +255,7 @@ class Sampler:
         )
         target_weights: dict[str, float | str] = {**varied}
         for target, distribution in table_values(self.distributions, "pose").items():
-            weight = self._sample(image_number, f"pose.{target}", distribution)
+            weight = self._sample_parameter(image_number, f"pose.{target}", distribution)
             target_weights |= dict.fromkeys(expand_targets([target]), weight)
         return {target: round_significant(float(target_weights.get(target, 0.0))) for target in self.targets}
 

@@ -26,7 +26,7 @@ from dermis.mesh.rotations import angles_matrix, matrix_angles
 from dermis.scene.environment import Environment
 from dermis.scene.files import load_scene
 from dermis.scene.gaze import looking_at
-from dermis.scene.heads import MIN_HUMAN_LEVELS, load_head
+from dermis.scene.heads import MIN_HUMAN_SUBDIVISION_LEVELS, load_head
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 from dermis.scene.settings import Settings
@@ -87,7 +87,7 @@ class SceneBuilder:
             camera=camera,
             skin=person.skin.replace(**skin_values) if skin_values else person.skin,
             environment=self._sampled_environment(parameters),
-            pose=_with_gaze(parameters, head, pose, camera.position),
+            pose=_pose_with_gaze(parameters, head, pose, camera.position),
         )
         return scene, self.spec.render.replace(**_background_settings(parameters))
 
@@ -117,7 +117,7 @@ class SceneBuilder:
         return _Person(head, face_hull_indices(head), find_rotation_bones(head.control.skeleton).head, skin)
 
     def _resolve_file(self, head_or_panorama: float | str) -> str:
-        """Return the path of a file in the spec's folder, or the name itself if there is no such file."""
+        """Return the path of the file in the spec's folder, or the argument if there is no such file."""
         file = self.spec.folder / str(head_or_panorama)
         return str(file) if is_file(file) else str(head_or_panorama)
 
@@ -157,11 +157,11 @@ def _subdivision_levels(picture_size: tuple[int, int]) -> int:
 
     The number is the same for all sampled people, so that all their heads have the same topology.
     """
-    return max(MIN_HUMAN_LEVELS, SmoothIn(size=picture_size)(Human().head(subdivide=0)))
+    return max(MIN_HUMAN_SUBDIVISION_LEVELS, SmoothIn(size=picture_size)(Human().head(subdivide=0)))
 
 
 def _hair_count_fraction(picture_size: tuple[int, int]) -> float:
-    """Return the fraction of the hairs to generate, which is smaller for small pictures.
+    """Return which fraction of a person's hairs is generated; it is smaller for small pictures.
 
     picture_size : width and height of the picture [pixel]
     """
@@ -190,14 +190,16 @@ def _bone_angles(
     return {name: angles[fraction] for name, fraction in rotation_fractions.items()}
 
 
-def _with_gaze(parameters: Parameters, head: Head, pose: Pose, camera_mm: tuple[float, float, float]) -> Pose:
+def _pose_with_gaze(
+    parameters: Parameters, head: Head, pose: Pose, camera_position_mm: tuple[float, float, float]
+) -> Pose:
     """Return the pose with eyes rotated towards the sampled gaze, if the head has eyes that can rotate.
 
-    camera_mm : position of the camera, the default gaze target [mm]
+    camera_position_mm : position of the camera, the default gaze target [mm]
     """
     if head.eyes is None or head.control.skeleton is None:
         return pose
-    target = np.array(camera_mm)
+    target = np.array(camera_position_mm)
     if parameters["gaze.at"] == GAZE_ANGLES:
         gaze = table_numbers(parameters, "gaze")
         direction = np.array(direction_from_angles(gaze["yaw_deg"], -gaze["pitch_deg"]))

@@ -34,7 +34,7 @@ class ShardManifest:
     first, stop : first image number, and the number after the last image
     left_out : numbers of the images that could not be rendered, with the reasons
     sha256 : SHA-256 of all bytes before the manifest
-    made_with : adapter and software versions with which the images were rendered
+    made_with : graphics adapter and software versions with which the images were rendered
     """
 
     spec: str
@@ -94,9 +94,9 @@ class TarWriter:
         self._file = path.open("xb")
         self._hash = hashlib.sha256()
 
-    def add(self, file_name: str, content: bytes) -> None:
+    def add(self, file_name: str, file_content: bytes) -> None:
         """Append a file to the archive; raises OSError if the disk is full."""
-        for piece in _tar_entry(file_name, content):
+        for piece in _tar_entry(file_name, file_content):
             self._file.write(piece)
             self._hash.update(piece)
 
@@ -104,9 +104,9 @@ class TarWriter:
         """Return the SHA-256 of all bytes written so far."""
         return self._hash.hexdigest()
 
-    def finish(self, manifest: bytes) -> None:
+    def finish(self, manifest_bytes: bytes) -> None:
         """Append the manifest, flush the archive to the disk and close it."""
-        self.add(MANIFEST_NAME, manifest)
+        self.add(MANIFEST_NAME, manifest_bytes)
         self._file.write(_TAR_END_MARKER)
         self._file.flush()
         os.fsync(self._file.fileno())
@@ -175,11 +175,11 @@ def tar_sha256(tar_file: BinaryIO, byte_count: int) -> str:
     return digest.hexdigest()
 
 
-def _tar_entry(file_name: str, content: bytes) -> tuple[bytes, bytes, bytes]:
+def _tar_entry(file_name: str, file_content: bytes) -> tuple[bytes, bytes, bytes]:
     """Return the three parts of a file in a tar archive: header, content, and padding to the block size."""
     head = tarfile.TarInfo(file_name)
-    head.size = len(content)
-    return head.tobuf(tarfile.USTAR_FORMAT), content, bytes(-len(content) % _TAR_BLOCK_BYTES)
+    head.size = len(file_content)
+    return head.tobuf(tarfile.USTAR_FORMAT), file_content, bytes(-len(file_content) % _TAR_BLOCK_BYTES)
 
 
 def _parse_header(header_block: bytes, offset: int) -> TarMember:
@@ -199,19 +199,19 @@ class FolderWriter:
         path.mkdir()
         self._path, self._hash = path, hashlib.sha256()
 
-    def add(self, file_name: str, content: bytes) -> None:
+    def add(self, file_name: str, file_content: bytes) -> None:
         """Write a file into the folder; raises OSError if the disk is full."""
         with (self._path / file_name).open("xb") as file:
-            file.write(content)
-        self._hash.update(_file_hash_input(file_name, content))
+            file.write(file_content)
+        self._hash.update(_file_hash_input(file_name, file_content))
 
     def sha256(self) -> str:
         """Return the SHA-256 of all names and contents written so far."""
         return self._hash.hexdigest()
 
-    def finish(self, manifest: bytes) -> None:
+    def finish(self, manifest_bytes: bytes) -> None:
         """Write the manifest; its hash will show whether files were lost in a power failure."""
-        self.add(MANIFEST_NAME, manifest)
+        self.add(MANIFEST_NAME, manifest_bytes)
         flush_to_disk(self._path / MANIFEST_NAME)
         flush_to_disk(self._path)
 
@@ -230,6 +230,6 @@ def folder_sha256(folder: Path, file_names: Iterable[str]) -> str:
     return digest.hexdigest()
 
 
-def _file_hash_input(file_name: str, content: bytes) -> bytes:
+def _file_hash_input(file_name: str, file_content: bytes) -> bytes:
     """Return the bytes that are hashed for a file of a folder: its name, size and content."""
-    return f"{file_name} {len(content)}\n".encode() + content
+    return f"{file_name} {len(file_content)}\n".encode() + file_content

@@ -27,7 +27,7 @@ _MIN_PART_IMAGES, _MAX_PART_IMAGES = 16, 32
 
 @dataclass(frozen=True, order=True, slots=True)
 class Shard:
-    """Number of a shard, and the shard's range of image numbers, from `first` up to but excluding `stop`."""
+    """Shard: its number and its range of image numbers, from `first` up to but excluding `stop`."""
 
     index: int
     first: int
@@ -43,7 +43,7 @@ class Shard:
 
 
 class Part(Shard):
-    """Part of a shard, the unit of work: number of the shard, and range of image numbers of the part."""
+    """Part of a shard, the unit of work: the number of the shard, and the part's range of image numbers."""
 
     __slots__ = ()
 
@@ -66,9 +66,9 @@ def shard_at(shard_number: int, spec: Spec) -> Shard:
 def list_parts(shard: Shard, spec: Spec) -> list[Part]:
     """Return the parts of a shard in order.
 
-    The part size is the smallest multiple of the number of images per person that is between 16 and 32, or 16
-    if there is none. Except for the first part of a shard, every part starts at an image number that is a
-    multiple of the part size. The first and the last part may therefore be smaller.
+    The part size is the smallest multiple of the number of images per person that is between 16 and 32; it
+    is 16 if there is no such multiple. Except for the first part of a shard, every part starts at an image
+    number that is a multiple of the part size. The first and the last part may therefore be smaller.
     """
     group = spec.images_per_person
     size = -(-_MIN_PART_IMAGES // group) * group if group <= _MAX_PART_IMAGES else _MIN_PART_IMAGES
@@ -76,10 +76,10 @@ def list_parts(shard: Shard, spec: Spec) -> list[Part]:
     return [Part(shard.index, *ends) for ends in zip(starts, [*starts[1:], shard.stop], strict=True)]
 
 
-def shard_path(out: Path, shard: Shard, spec: Spec) -> Path:
+def shard_path(dataset_folder: Path, shard: Shard, spec: Spec) -> Path:
     """Return the path of the tar file or folder of a shard, or of a part."""
     name = f"part-{image_key(shard.first)}" if isinstance(shard, Part) else f"shard-{shard.index:05d}"
-    return out / f"{name}{'.tar' if spec.format == 'webdataset' else ''}"
+    return dataset_folder / f"{name}{'.tar' if spec.format == 'webdataset' else ''}"
 
 
 def shard_index(path: Path) -> int | None:
@@ -96,13 +96,13 @@ def image_key(image_number: int) -> str:
 class ShardWriter:
     """Context manager that writes a shard or a part, and renames it to its final path on a normal exit.
 
-    adapter : name of the adapter that renders the images, for the manifest; "" if all images are copied
+    adapter : name of the graphics adapter to record in the manifest; "" if all images are copied
 
     Raises DermisError if the shard cannot be written; the temporary file is then removed.
     """
 
-    def __init__(self, out: Path, shard: Shard, spec: Spec, adapter: str = "") -> None:
-        self._target, self._shard, self._spec = shard_path(out, shard, spec), shard, spec
+    def __init__(self, dataset_folder: Path, shard: Shard, spec: Spec, adapter: str = "") -> None:
+        self._target, self._shard, self._spec = shard_path(dataset_folder, shard, spec), shard, spec
         self._temporary = temporary_path(self._target)
         self._made_with = formats.software_versions(adapter) if adapter else {}
         self._next_number = shard.first
@@ -138,9 +138,9 @@ class ShardWriter:
         """Record in the manifest that an image could not be rendered."""
         self._left_out[image_number] = shorten(reason, _MAX_REASON_LENGTH)
 
-    def add_versions(self, made_with: Mapping[str, str]) -> None:
+    def add_versions(self, versions: Mapping[str, str]) -> None:
         """Record in the manifest the adapter and the versions with which copied images were rendered."""
-        for name, value in made_with.items():
+        for name, value in versions.items():
             known = self._made_with.get(name, value).split(_VERSION_SEPARATOR)
             merged = sorted({*known, *value.split(_VERSION_SEPARATOR)})
             self._made_with = {**self._made_with, name: _VERSION_SEPARATOR.join(merged)}
@@ -184,14 +184,14 @@ def read_manifest(path: Path) -> ShardManifest:
         return formats.parse_manifest(formats.read_tar_manifest(file)[1], path)
 
 
-def shard_exists(out: Path, shard: Shard, spec: Spec) -> bool:
+def shard_exists(dataset_folder: Path, shard: Shard, spec: Spec) -> bool:
     """Return whether a complete shard or part exists at its final path.
 
     A shard with too few images, written before the data set was enlarged, is not complete.
 
     Raises DermisError for a shard of another data set.
     """
-    path = shard_path(out, shard, spec)
+    path = shard_path(dataset_folder, shard, spec)
     try:
         manifest = read_manifest(path)
     except DermisError:
@@ -203,32 +203,32 @@ def shard_exists(out: Path, shard: Shard, spec: Spec) -> bool:
     return manifest.stop == shard.stop
 
 
-def is_intact(out: Path, shard: Shard, spec: Spec) -> bool:
+def is_intact(dataset_folder: Path, shard: Shard, spec: Spec) -> bool:
     """Read a shard or part completely, and return whether it exists and matches its SHA-256.
 
     Raises DermisError for a shard of another data set.
     """
-    if not shard_exists(out, shard, spec):
+    if not shard_exists(dataset_folder, shard, spec):
         return False
-    path = shard_path(out, shard, spec)
+    path = shard_path(dataset_folder, shard, spec)
     with suppress(DermisError, OSError):
         return shard_sha256(path) == read_manifest(path).sha256
     return False
 
 
-def part_files(out: Path) -> dict[int, Path]:
+def part_files(dataset_folder: Path) -> dict[int, Path]:
     """Return the file or folder of each complete part in a data set, by the part's first image number."""
-    found = {path: _PART_NAME_PATTERN.fullmatch(path.name) for path in out.iterdir()}
+    found = {path: _PART_NAME_PATTERN.fullmatch(path.name) for path in dataset_folder.iterdir()}
     return {int(match[1]): path for path, match in found.items() if match}
 
 
-def remove_unfinished_files(out: Path, removable_names: Collection[str] | None = None) -> None:
+def remove_unfinished_files(dataset_folder: Path, removable_names: Collection[str] | None = None) -> None:
     """Remove the temporary files that interrupted runs have left in a data set.
 
     removable_names : names of shards and parts that no other run is writing; temporary files of other shards
         and parts are kept. None if there is no other run
     """
-    for path, name in unfinished_files(out).items():
+    for path, name in unfinished_files(dataset_folder).items():
         is_images = _SHARD_NAME_PATTERN.fullmatch(name) or _PART_NAME_PATTERN.fullmatch(name)
         if removable_names is None or name in removable_names or not is_images:
             remove_path(path)

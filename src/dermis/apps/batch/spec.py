@@ -22,7 +22,7 @@ from dermis.base.quantities import checked_integer
 from dermis.base.reading import checked_path, is_file, read_file, read_toml
 from dermis.human.expressions import EXPRESSIONS, expand_targets
 from dermis.human.landmarks.sets import LANDMARK_SETS
-from dermis.scene.field_errors import InvalidFieldsError, Reason
+from dermis.scene.field_errors import BoundsReason, InvalidFieldsError
 from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.outputs import check_outputs
 from dermis.scene.settings import Settings
@@ -59,23 +59,23 @@ P = TypeVar("P", bound=FrozenModel)
 class Spec(FrozenModel):
     """Specification of a data set, read from a TOML file."""
 
-    count: Annotated[int, Field(ge=1, le=MAX_IMAGES), Reason("a billion images")] = 1000
+    count: Annotated[int, Field(ge=1, le=MAX_IMAGES), BoundsReason("a billion images")] = 1000
     """Number of images."""
-    seed: Annotated[int, Field(ge=0, le=2**32 - 1), Reason("32 bits")] = 0
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1), BoundsReason("32 bits")] = 0
     """Seed of all random numbers."""
     generator: Annotated[
         int,
         Field(ge=GENERATOR_NUMBER, le=GENERATOR_NUMBER),
-        Reason("this version makes other images from a spec"),
+        BoundsReason("this version makes other images from a spec"),
     ] = GENERATOR_NUMBER
     """Number of the rules by which seeds become pictures; data sets of another number are not continued."""
-    images_per_person: Annotated[int, Field(ge=1, le=10**6), Reason("a million of each")] = 1
+    images_per_person: Annotated[int, Field(ge=1, le=10**6), BoundsReason("a million of each")] = 1
     """Number of consecutive images that show the same person."""
     outputs: tuple[str, ...] = ()
     """Outputs written for each image beside the picture, as in `dermis render --outputs`."""
     landmarks: tuple[str, ...] = ("ibug-68",)
     """Landmark sets, or tables of name,vertex for your own meshes (.csv, in the spec's folder)."""
-    shard_size: Annotated[int, Field(ge=1, le=10**6), Reason("a million in a file")] = 1000
+    shard_size: Annotated[int, Field(ge=1, le=10**6), BoundsReason("a million in a file")] = 1000
     """Images per shard."""
     format: Literal["webdataset", "folder"] = "webdataset"
     """Shards as tar files (webdataset) or as folders."""
@@ -144,19 +144,19 @@ class Spec(FrozenModel):
 
     @property
     def pose_targets(self) -> frozenset[str]:
-        """Return the morph targets that the [pose] table names, directly or as a pair of left and right."""
+        """Return the morph targets in the [pose] table, which names each target or a left and right pair."""
         return frozenset(expand_targets(self.pose))
 
-    def parameters(self, k: int) -> Parameters:
-        """Return the sampled parameters of image k by name: texts, and numbers with six significant digits.
+    def parameters(self, image_number: int) -> Parameters:
+        """Return the sampled parameters of an image, by name; numbers are rounded to six significant digits.
 
         The parameters are the same on every machine and for any order of images. Changing or adding the
         distribution of one parameter does not change the samples of the others. Parameters that an image does
         not use, such as the parameters of unused lamps, are omitted.
 
-        Raises DermisError if k is not the number of an image.
+        Raises DermisError if the data set has no image with this number.
         """
-        return self._sampler.parameters(checked_integer("image", k, 0, self.count - 1))
+        return self._sampler.parameters(checked_integer("image", image_number, 0, self.count - 1))
 
     def to_toml(self) -> str:
         """Return the spec as canonical TOML with all values, from which `parse_spec` makes an equal spec."""
@@ -196,7 +196,8 @@ def load_spec(path: str | Path, **values: object) -> Spec:
 
     values : `count`, `seed`, `size` or `format`, replacing the values in the file
 
-    Raises DermisError, naming table and key, for values that cannot be rendered; also for missing files.
+    Raises DermisError for missing files, and for values that cannot be rendered; the message states their
+    table and key.
     """
     path = checked_path(path, "a spec of a data set in TOML")
     data = read_toml(path, "a spec of a data set in TOML")

@@ -1,4 +1,4 @@
-"""Checks of a spec: that its tables are consistent, its names exist, and models accept its values."""
+"""Checks of a spec: its tables must be consistent, its names must exist, and its values must be valid."""
 
 from __future__ import annotations
 

@@ -55,14 +55,14 @@ class NumberField(DistributionField):
     """Annotation of a field whose samples are numbers between two bounds.
 
     low, high : bounds of the samples
-    reason : unit or reason of the bounds, shown in messages
+    reason : unit or explanation of the bounds, shown in error messages
     """
 
     def __init__(self, lower_bound: float, upper_bound: float, reason: str = "") -> None:
         self.ge, self.le, self.reason = lower_bound, upper_bound, reason
 
     def check_support(self, distribution: Distribution) -> None:
-        """Raise ValueError if the distribution can give texts, or numbers that are out of bounds."""
+        """Raise ValueError if the distribution can give strings, or numbers that are out of bounds."""
         if any(isinstance(bound, str) or not self.ge <= bound <= self.le for bound in distribution.support):
             reason = f" ({self.reason})" if self.reason else ""
             note = "" if isinstance(distribution, Constant) else _DISTRIBUTION_RANGE_NOTE
@@ -70,7 +70,7 @@ class NumberField(DistributionField):
 
 
 class NameField(DistributionField):
-    """Annotation of a field whose samples are names from a list, or any names or files if there is no list.
+    """Annotation of a field whose samples are names from a list, or any names if there is no list.
 
     allowed_names : function that returns the list; None if there is no list
     """
@@ -93,7 +93,7 @@ _CorrelationCoefficient = Annotated[float, Field(ge=-1, le=1)]
 
 
 class CorrelationGroup(FrozenModel):
-    """Correlated parameters: a Gaussian copula, which preserves the distribution of each parameter.
+    """Parameters correlated by a Gaussian copula, which preserves the distribution of each parameter.
 
     For each parameter, a standard normal number is drawn; the numbers of different parameters are correlated.
     The parameter's sample is the quantile of its distribution at the cumulative probability of this number. A
@@ -106,7 +106,7 @@ class CorrelationGroup(FrozenModel):
     """Correlation of all pairs, or a symmetric matrix with one row per name."""
 
     @model_validator(mode="after")
-    def _check_matrix(self) -> CorrelationGroup:
+    def _check_correlation_matrix(self) -> CorrelationGroup:
         count = len(self.of)
         require(
             2 <= len(set(self.of)) == count <= _MAX_CORRELATED_PARAMETERS,
@@ -172,7 +172,7 @@ _Distributions = dict[str, Annotated[Distribution, DistributionField()]]
 
 
 class PersonTable(FrozenModel):
-    """Spec table of people: random people, whose seed determines all omitted keys, or heads by name."""
+    """Spec table of people. All omitted keys are sampled at random, unless `head` names existing heads."""
 
     head: Annotated[Distribution | None, NameField()] = None
     """Heads in place of sampled people: names as in `dermis render`, or files of people (.json), meshes

@@ -70,10 +70,10 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class WorkerSlot:
-    """Adapter and thread count with which one worker renders.
+    """Graphics adapter and number of threads with which one worker renders.
 
-    adapter : name or number of the adapter, as for `Renderer`
-    threads : threads of a software adapter; 0 for the default of the adapter
+    adapter : name or number of the graphics adapter, as for `Renderer`
+    threads : number of threads if the adapter is a software renderer; 0 for the adapter's default
     """
 
     adapter: str
@@ -119,11 +119,13 @@ class _PlannedImage(NamedTuple):
 
 
 class Worker:
-    """Renderer of parts on one device; an image depends only on the spec and on the image's number.
+    """Worker that renders parts of shards on one device.
+
+    Each image depends only on the spec and on the image's number.
 
     The device is opened when the first image is rendered.
 
-    adapter : name or number of the adapter, as for `Renderer`
+    adapter : name or number of the graphics adapter, as for `Renderer`
     """
 
     def __init__(self, adapter: str, options: RunOptions) -> None:
@@ -208,22 +210,22 @@ class Worker:
         return join_parts(self._options.out, shard_at(part.index, spec), spec)
 
     def _encoder_jobs(
-        self, numbers: Iterator[int], failures: list[Failure]
+        self, image_numbers: Iterator[int], failures: list[Failure]
     ) -> Iterator[tuple[int, Observation, Parameters, SkinTone | None]]:
         """Render images; yield the number, observation, parameters and skin tone of each, in order.
 
         An observation holds the picture and the output arrays of an image.
 
-        numbers : numbers of the images to render
+        image_numbers : numbers of the images to render
         failures : list that receives the images that could not be rendered
         """
-        groups = deque([numbers])
+        groups = deque([image_numbers])
         while groups:
-            numbers, in_flight = groups.popleft(), deque[_PlannedImage]()
+            image_numbers, in_flight = groups.popleft(), deque[_PlannedImage]()
             try:
-                for observation in self._render_images(self._plan_images(numbers, in_flight, failures)):
+                for observation in self._render_images(self._plan_images(image_numbers, in_flight, failures)):
                     done = in_flight.popleft()
-                    yield done.number, observation, done.parameters, _head_tone(done.scene.head)
+                    yield done.number, observation, done.parameters, _head_skin_tone(done.scene.head)
             except DeviceError:
                 raise
             except DermisError as fault:
@@ -234,18 +236,18 @@ class Worker:
                     single = []
                 else:  # it is unknown which one failed: render them again one by one
                     single = [iter([plan.number]) for plan in in_flight]
-                groups.extendleft(reversed([*single, numbers]))
+                groups.extendleft(reversed([*single, image_numbers]))
 
     def _plan_images(
-        self, numbers: Iterator[int], in_flight: deque[_PlannedImage], failures: list[Failure]
+        self, image_numbers: Iterator[int], images_in_flight: deque[_PlannedImage], failures: list[Failure]
     ) -> Iterator[_PlannedImage]:
-        """Yield each image whose scene can be built, after appending the image to `in_flight`.
+        """Yield each image whose scene can be built, after appending the image to `images_in_flight`.
 
-        numbers : numbers of the images still to plan
-        in_flight : queue of the images that are being rendered
+        image_numbers : numbers of the images still to plan
+        images_in_flight : queue of the images that are being rendered
         failures : list that receives the images whose scenes could not be built
         """
-        for number in numbers:
+        for number in image_numbers:
             parameters = self._options.spec.parameters(number)
             try:
                 scene, settings = self._builder.build(parameters)
@@ -255,16 +257,18 @@ class Worker:
                     raise DermisError(f"image {number}: {fault}") from fault
                 failures.append(Failure(number, str(fault)))
                 continue
-            in_flight.append(plan)
+            images_in_flight.append(plan)
             yield plan
 
-    def _render_images(self, plans: Iterable[_PlannedImage]) -> Iterator[Observation]:
+    def _render_images(self, planned_images: Iterable[_PlannedImage]) -> Iterator[Observation]:
         """Render the planned images; yield the picture and the output arrays of each.
 
         Images without a background get an alpha channel.
         """
         spec = self._options.spec
-        for alpha, group in itertools.groupby(plans, lambda plan: plan.settings.background == "none"):
+        for alpha, group in itertools.groupby(
+            planned_images, lambda plan: plan.settings.background == "none"
+        ):
             copies = itertools.tee(group, 3)
             yield from self._renderer.observe(
                 (plan.scene for plan in copies[0]),
@@ -296,7 +300,7 @@ def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
     if slot.threads:
         os.environ["LP_NUM_THREADS"] = str(slot.threads)  # read when the driver is loaded
     with warnings.catch_warnings():
-        _forward_notes(lambda text: pipe.send(WorkerEvent(note=text)))
+        _forward_warnings(lambda text: pipe.send(WorkerEvent(note=text)))
         try:
             with closing(Worker(slot.adapter, options)) as worker:
                 while True:
@@ -314,15 +318,15 @@ def available_tasks(pipe: Connection) -> Iterator[Shard]:
         yield pipe.recv()
 
 
-def _forward_notes(forward_note: Callable[[str], None]) -> None:
-    """Redirect the package's warnings to a function; other warnings are shown as usual."""
+def _forward_warnings(forward_message: Callable[[str], None]) -> None:
+    """Redirect the warnings of this package to a function; other warnings are shown as usual."""
     default = warnings.showwarning
 
     def forward_or_show(
         message: Warning | str, category: type[Warning], *warning_arguments: Any, **warning_options: Any
     ) -> None:
         if issubclass(category, DermisWarning):
-            forward_note(str(message))
+            forward_message(str(message))
         else:
             default(message, category, *warning_arguments, **warning_options)
 
@@ -330,13 +334,17 @@ def _forward_notes(forward_note: Callable[[str], None]) -> None:
     warnings.showwarning = forward_or_show
 
 
-def _head_tone(head: Head) -> SkinTone | None:
+def _head_skin_tone(head: Head) -> SkinTone | None:
     """Return the description of the mean colour of a head's skin; None for a head without a skin colour."""
     colour = head.maps.mean_colour
     return None if colour is None else skin_tone(colour)
 
 
 def _encode_image(
-    spec: Spec, image_number: int, observation: Observation, parameters: Parameters, tone: SkinTone | None
+    spec: Spec,
+    image_number: int,
+    observation: Observation,
+    parameters: Parameters,
+    skin_tone: SkinTone | None,
 ) -> EncodedImage:
-    return image_number, encode_record(image_number, observation, parameters, spec, tone)
+    return image_number, encode_record(image_number, observation, parameters, spec, skin_tone)

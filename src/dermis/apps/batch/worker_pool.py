@@ -22,7 +22,7 @@ _MAX_ENCODERS_PER_WORKER = 8  # per worker: more would wait for the renderer
 
 @dataclass(frozen=True)
 class SlotRequest:
-    """Requested number and adapters of the workers; None selects a default for this machine.
+    """Requested number of workers, and their graphics adapters; None selects a default for this machine.
 
     adapter : "auto", "cpu", a number such as "#1", or a part of an adapter's name; if several adapters match,
         all that are of the same kind as the best one are used
@@ -122,7 +122,8 @@ class _PoolState:
     def receive(self, worker: _WorkerProcess) -> WorkerEvent:
         """Return the next event of a worker; then send the worker a task, replace the worker, or stop it.
 
-        Raises DermisError for a refusal, and for a part that failed `MAX_TASK_ATTEMPTS` times.
+        Raises DermisError if the event requires the run to end, or if a task failed `MAX_TASK_ATTEMPTS`
+        times.
         """
         try:
             event: WorkerEvent = worker.child.pipe.recv()
@@ -146,9 +147,9 @@ class _PoolState:
     def _gets_another_task(self, worker: _WorkerProcess) -> bool:
         """Return whether to send a worker another task.
 
-        A worker without tasks gets one if the queue is not empty. A worker with one task gets a second one,
-        to avoid a pause between tasks, if the first task never failed before and the queue has at least as
-        many tasks as there are workers.
+        A worker without tasks gets one if the queue is not empty. A worker with one task gets a second one if
+        the first task never failed before, and if the queue has at least as many tasks as there are workers.
+        The second task avoids a pause between tasks.
         """
         if not worker.tasks:
             return bool(self._queue)

@@ -1,4 +1,4 @@
-"""Fitting of other programs' diffusion profiles to a skin's reference profile, and errors of the fits."""
+"""Fits of other programs' diffusion profiles to a skin's reference profile, and the errors of these fits."""
 
 from __future__ import annotations
 
@@ -33,27 +33,28 @@ _RELATIVE_CDF_RADII = np.geomspace(1e-4, 1e4, 2000)
 _LOG_LENGTH_BOUND, _LOG_LENGTH_TOLERANCE = 2.0, 1e-4  # search range and tolerance of least squares fits
 
 
-def burley_curve(d_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
+def cumulative_burley_profile(burley_width_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
     """Return the cumulative form of Burley's profile R(r) = A (exp(-r/d) + exp(-r/3d)) / (8 pi d r).
 
-    d_mm : (3,) width d of each channel [mm]
+    burley_width_mm : (3,) width d of each channel [mm]
     energy : (3,) total energy A of each channel: emerging light per incident light [-]
     """
-    d = np.maximum(np.asarray(d_mm, np.float64), _MIN_WIDTH_MM)
+    d = np.maximum(np.asarray(burley_width_mm, np.float64), _MIN_WIDTH_MM)
     return CumulativeProfile.from_function(BurleyProfile(np.ones(3), 1.0 / d).energy_within, energy)
 
 
-def fit_burley_width(curve: CumulativeProfile) -> Floats:
+def fit_burley_width(profile: CumulativeProfile) -> Floats:
     """Return the widths d (3,) of the Burley profiles closest to a cumulative profile [mm].
 
-    For each channel, the largest difference between the cumulative Burley profile and `curve` is minimised. A
-    sum of squared differences would depend on the spacing of the radii.
+    For each channel, the largest difference between the cumulative Burley profile and `profile` is minimised.
     """
-    median = np.array([np.interp(0.5, curve.fraction[:, i], curve.radii_mm) for i in range(3)])
+    median = np.array([np.interp(0.5, profile.fraction[:, i], profile.radii_mm) for i in range(3)])
     middle = np.log(median / _BURLEY_MEDIAN_RADIUS)
 
-    def cdf_difference(log_d: Floats) -> Floats:
-        return BurleyProfile(np.ones(3), np.exp(-log_d)).energy_within(curve.radii_mm) - curve.fraction
+    def cdf_difference(log_width: Floats) -> Floats:
+        return (
+            BurleyProfile(np.ones(3), np.exp(-log_width)).energy_within(profile.radii_mm) - profile.fraction
+        )
 
     return _bisect_minimax(
         cdf_difference,
@@ -63,13 +64,15 @@ def fit_burley_width(curve: CumulativeProfile) -> Floats:
     )
 
 
-def gaussian_curve(variance_mm2: Floats, gaussian_weight: Floats, energy: Floats) -> CumulativeProfile:
+def cumulative_gaussian_profile(
+    variance_mm2: Floats, gaussian_weight: Floats, energy: Floats
+) -> CumulativeProfile:
     """Return the cumulative profile of a sum of Gaussians.
 
     variance_mm2 : (n,) variances of the Gaussians [mm2]
     gaussian_weight : (n, 3) weight of each Gaussian in red, green and blue; only the ratios of the weights
         matter [-]
-    energy : (3,) total energy of the curve: emerging light per incident light [-]
+    energy : (3,) total energy of the profile: emerging light per incident light [-]
     """
     fraction = gaussian_weight / gaussian_weight.sum(axis=0)
 
@@ -94,14 +97,16 @@ def scale_radii(unit_profile: CumulativeProfile, scale_mm: ArrayLike) -> Cumulat
     return CumulativeProfile.from_function(fraction_within, unit_profile.energy)
 
 
-def fit_radius_scale(curve: CumulativeProfile, unit_profile: CumulativeProfile) -> Floats:
-    """Return the lengths (3,) by which the radii of `unit_profile` are multiplied to match `curve` [mm].
+def fit_radius_scale(reference_profile: CumulativeProfile, unit_profile: CumulativeProfile) -> Floats:
+    """Return the lengths (3,) by which a profile's radii are multiplied to match a reference profile [mm].
 
-    In each channel, the largest difference between `curve` and the scaled `unit_profile` is minimised.
+    In each channel, the largest difference between the scaled and the reference profile is minimised.
+
+    unit_profile : cumulative profile to scale, whose radii are in units of the returned lengths
     """
-    middle = np.log(curve.radius_at_fraction(0.5) / unit_profile.radius_at_fraction(0.5))
+    middle = np.log(reference_profile.radius_at_fraction(0.5) / unit_profile.radius_at_fraction(0.5))
     return _fit_radius_scale_in_range(
-        curve, unit_profile, middle, _LOG_LENGTH_SEARCH_RANGE, _LENGTH_BISECTION_STEPS - 1
+        reference_profile, unit_profile, middle, _LOG_LENGTH_SEARCH_RANGE, _LENGTH_BISECTION_STEPS - 1
     )
 
 
@@ -120,33 +125,38 @@ class HomogeneousMedium:
 
 
 def fit_homogeneous_medium(
-    curve: CumulativeProfile, energy: Floats | None = None, half_space_kind: HalfSpaceKind = "skin"
+    reference_profile: CumulativeProfile,
+    energy: Floats | None = None,
+    half_space_kind: HalfSpaceKind = "skin",
 ) -> HomogeneousMedium:
     """Return the homogeneous medium whose cumulative profile is closest to a reference profile.
 
-    curve : reference profile
-    energy : (3,) light that leaves the medium per incident light; by default the energy of `curve` [-]
+    energy : (3,) light that leaves the medium per incident light [-]; by default the energy of the reference
+        profile
     half_space_kind : surface and illumination of the half-space, see `half_space`
     """
-    albedo = tabulated_albedo(half_space_kind, curve.energy if energy is None else energy)
+    albedo = tabulated_albedo(half_space_kind, reference_profile.energy if energy is None else energy)
     unit = half_space(half_space_kind, albedo, np.ones(3))
-    middle = np.log(fit_burley_width(curve) / fit_burley_width(unit))  # ratio of Burley widths
-    mfp = _fit_radius_scale_in_range(curve, unit, middle, 2.0, _MEDIUM_BISECTION_STEPS)
+    middle = np.log(fit_burley_width(reference_profile) / fit_burley_width(unit))  # ratio of Burley widths
+    mfp = _fit_radius_scale_in_range(reference_profile, unit, middle, 2.0, _MEDIUM_BISECTION_STEPS)
     return HomogeneousMedium(albedo, mfp, half_space(half_space_kind, albedo, mfp))
 
 
 def _fit_radius_scale_in_range(
-    curve: CumulativeProfile,
+    reference_profile: CumulativeProfile,
     unit_profile: CumulativeProfile,
-    middle_log_length: Floats,
-    log_range: float,
+    centre_log_length: Floats,
+    log_length_range: float,
     bisection_steps: int,
 ) -> Floats:
     def cdf_difference(log_scale: Floats) -> Floats:
-        return scale_radii(unit_profile, np.exp(log_scale)).fraction - curve.fraction
+        return scale_radii(unit_profile, np.exp(log_scale)).fraction - reference_profile.fraction
 
     return _bisect_minimax(
-        cdf_difference, middle_log_length - log_range, middle_log_length + log_range, bisection_steps
+        cdf_difference,
+        centre_log_length - log_length_range,
+        centre_log_length + log_length_range,
+        bisection_steps,
     )
 
 
@@ -156,13 +166,13 @@ def _bisect_minimax(
     max_log_length: Floats,
     bisection_steps: int,
 ) -> Floats:
-    """Return the lengths (3,) by which a cumulative profile is scaled to match a reference profile.
+    """Return the lengths (3,) by which a profile's radii are multiplied to match a reference profile.
 
-    The largest absolute difference between the cumulative profiles is minimised in each channel. At the best
-    length, the largest positive difference equals the largest negative difference; bisection finds it.
+    In each channel, the length that minimises the largest absolute difference between the cumulative profiles
+    is found by bisection. At this length, the largest positive and negative differences have equal magnitude.
 
-    cdf_difference : function that takes the logarithms of the lengths (3,) and returns the scaled cumulative
-        profile minus the reference profile, at n radii (n, 3)
+    cdf_difference : function that takes the logarithms of the lengths (3,) and returns the differences (n, 3)
+        between the scaled and the reference cumulative profile, at n radii
     min_log_length, max_log_length : (3,) bounds of the logarithms of the lengths
     bisection_steps : number of times that the interval between the bounds is halved
     """
@@ -178,22 +188,21 @@ def _bisect_minimax(
 
 
 def fit_length_scale(
-    curve: CumulativeProfile, colour_channel: int, unit_cdf: Callable[[Floats], Floats]
+    reference_profile: CumulativeProfile, colour_channel: int, unit_cdf: Callable[[Floats], Floats]
 ) -> float:
-    """Return the length by which a profile's radii are multiplied to match one channel of `curve` [mm].
+    """Return the length by which a profile's radii are multiplied to match a reference profile [mm].
 
-    The sum of squared differences between the cumulative profiles is minimised, at radii spaced evenly in log
-    r.
+    The sum of squared differences is minimised at radii that are spaced evenly on a logarithmic scale.
 
-    colour_channel : index of the channel of `curve`, 0 for red
-    unit_cdf : cumulative profile for a length of 1: a function that takes radii (n,) and returns the fraction
-        of light (n,) within each radius
+    colour_channel : channel of the reference profile that is matched, 0 for red
+    unit_cdf : cumulative profile to scale, for a length of 1: a function that takes radii (n,) and returns
+        the fraction of light (n,) within each radius
     """
     from scipy.optimize import minimize_scalar
 
-    median = float(curve.radius_at_fraction(0.5)[colour_channel])
+    median = float(reference_profile.radius_at_fraction(0.5)[colour_channel])
     r = median * np.geomspace(_MIN_RELATIVE_RADIUS, _MAX_RELATIVE_RADIUS, _RADIUS_SAMPLE_COUNT)
-    reference = curve.fraction_within(r)[:, colour_channel]
+    reference = reference_profile.fraction_within(r)[:, colour_channel]
     middle = np.log(median / float(np.interp(0.5, unit_cdf(_RELATIVE_CDF_RADII), _RELATIVE_CDF_RADII)))
 
     def squared_error(log_length: float) -> float:
@@ -207,11 +216,11 @@ def fit_length_scale(
 
 
 @dataclass(frozen=True)
-class CurveError:
+class ProfileError:
     """Errors of the profile that a program renders, relative to the reference profile, by colour channel.
 
     cdf : (3,) largest difference between the fractions of light within the same radius [-]
-    edge : (3,) largest difference in brightness, after diffusion, near a straight shadow edge [-]
+    edge : (3,) largest difference in brightness across a straight shadow edge blurred by the profile [-]
     energy : (3,) relative error of the total energy [-]
     """
 
@@ -224,18 +233,20 @@ class CurveError:
         return {name: [round(float(x), 6) for x in getattr(self, name)] for name in ("cdf", "edge", "energy")}
 
 
-def curve_error(reference_curve: CumulativeProfile, curve: CumulativeProfile) -> CurveError:
+def profile_error(reference_profile: CumulativeProfile, rendered_profile: CumulativeProfile) -> ProfileError:
     """Return the errors of a cumulative profile relative to a reference profile."""
     steps = np.geomspace(1e-3, 1.0, _EDGE_SAMPLE_COUNT)
     widest = _MAX_RELATIVE_EDGE_DISTANCE * np.maximum(
-        reference_curve.radius_at_fraction(0.5), curve.radius_at_fraction(0.5)
+        reference_profile.radius_at_fraction(0.5), rendered_profile.radius_at_fraction(0.5)
     )
     edge = np.zeros(3)
     for i in range(3):
         x = widest[i] * steps
-        edge[i] = np.abs(curve.edge_response(x) - reference_curve.edge_response(x))[:, i].max()
-    return CurveError(
-        cdf=np.abs(curve.fraction_within(reference_curve.radii_mm) - reference_curve.fraction).max(axis=0),
+        edge[i] = np.abs(rendered_profile.edge_response(x) - reference_profile.edge_response(x))[:, i].max()
+    return ProfileError(
+        cdf=np.abs(
+            rendered_profile.fraction_within(reference_profile.radii_mm) - reference_profile.fraction
+        ).max(axis=0),
         edge=edge,
-        energy=curve.energy / np.maximum(reference_curve.energy, SMALLEST_FLOAT) - 1.0,
+        energy=rendered_profile.energy / np.maximum(reference_profile.energy, SMALLEST_FLOAT) - 1.0,
     )

@@ -1,4 +1,4 @@
-"""Export of a skin or head to another program, with a report of the errors in its skin rendering."""
+"""Export of a skin or head to another program, with a report of the predicted errors of the rendered skin."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dermis.apps.export.fitting import CurveError, curve_error, fit_burley_width
+from dermis.apps.export.fitting import ProfileError, fit_burley_width, profile_error
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import ModelName, Subject, load_subject
 from dermis.apps.export.target import Parameters, ParameterValue, Target
@@ -24,8 +24,8 @@ _ERROR_MEANINGS = {
     "edge": "largest error beside an edge of light",
     "energy": "relative error of the total light",
 }
-REPORT_FILE = "export.json"
-_REPORT_PAGE = "README.md"
+REPORT_JSON_FILE = "export.json"
+_REPORT_MARKDOWN_FILE = "README.md"
 _DEFAULT_MAP_SIDE = 2048
 
 
@@ -33,15 +33,15 @@ _DEFAULT_MAP_SIDE = 2048
 class ExportReport:
     """Report of one export.
 
-    target, title, version, variant : name, title, version and variant of the target program; the variant is
-        empty if the target has no variants
+    target, variant : name and variant of the export target; the variant is "" if there are no variants
+    title, version : displayed name and version of the program
     subject : name of the exported skin or head
     model : name of the model from which the skin's reference profile was computed
     parameters : exported parameters
     naive_parameters : parameters that a user might choose without knowing their meaning in the program
     d_mm : (3,) width of the Burley profile closest to the reference profile [mm]
-    error, naive_error : errors of the profile that the program renders with the exported parameters, and with
-        the naive parameters; predicted by the formulas of the program
+    error, naive_error : predicted errors of the profile that the program renders, with the exported
+        parameters and with the naive parameters
     limitations : sentences on what the program cannot reproduce
     untested : whether the export has never been tried in the program itself
     files : paths of all written files
@@ -56,8 +56,8 @@ class ExportReport:
     parameters: Parameters
     naive_parameters: Parameters
     d_mm: Floats
-    error: CurveError
-    naive_error: CurveError
+    error: ProfileError
+    naive_error: ProfileError
     limitations: str
     untested: bool
     files: tuple[Path, ...] = ()
@@ -93,11 +93,12 @@ class ExportReport:
         if with_naive_parameters:
             lines += ["", "naive parameters", *_parameter_table_lines(self.naive_parameters)]
         lines += ["", f"{'':12}" + "".join(f"{name:>9}" for name in _CHANNEL_NAMES)]
-        lines.append(f"{'d [mm]':12}{_format_channels(self.d_mm)}  width of the fitted Burley profile")
+        lines.append(f"{'d [mm]':12}{_format_colour_channels(self.d_mm)}  width of the fitted Burley profile")
         for name, meaning in _ERROR_MEANINGS.items():
-            lines.append(f"{name:12}{_format_channels(getattr(self.error, name))}  {meaning}")
+            lines.append(f"{name:12}{_format_colour_channels(getattr(self.error, name))}  {meaning}")
             lines.append(
-                f"{'  naive':12}{_format_channels(getattr(self.naive_error, name))}  of naive parameters"
+                f"{'  naive':12}{_format_colour_channels(getattr(self.naive_error, name))}"
+                "  of naive parameters"
             )
         return [*lines, "", *self.limitation_texts()]
 
@@ -128,14 +129,14 @@ def _parameter_table_lines(parameters: Parameters) -> Sequence[str]:
     return ["  ".join([*map(str.ljust, row[:3], widths), row[3]]) for row in rows]
 
 
-def format_parameter(value: ParameterValue) -> str:
+def format_parameter(parameter_value: ParameterValue) -> str:
     """Return the value of a parameter as text, with four significant digits."""
-    if isinstance(value, tuple):
-        return ", ".join(f"{x:.4g}" for x in value)
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    if isinstance(parameter_value, tuple):
+        return ", ".join(f"{x:.4g}" for x in parameter_value)
+    return f"{parameter_value:.4g}" if isinstance(parameter_value, float) else str(parameter_value)
 
 
-def _format_channels(channel_values: Floats) -> str:
+def _format_colour_channels(channel_values: Floats) -> str:
     return "".join(f"{x:9.4f}" for x in channel_values)
 
 
@@ -158,7 +159,7 @@ def export_skin(
     adapter: str = "auto",
     **head: Any,
 ) -> ExportReport:
-    """Write a skin or a head for another program, and report the remaining error.
+    """Write a skin or a head for another program, and report the predicted errors of the rendered skin.
 
     Parameters
     ----------
@@ -211,7 +212,7 @@ def export_skin(
     """
     target = replace(TARGETS[to].with_variant(variant), side=side, adapter=adapter)
     target = target if library is None else target.with_library(library)
-    resolved, path = target.resolve_version(version), _checked_output(target, output)
+    resolved, path = target.resolve_version(version), _check_output_path(target, output)
     options = {"model": model, "profile": profile, **head}
     if not isinstance(subject, Subject):
         subject = load_subject(subject, **options)
@@ -230,11 +231,11 @@ def export_skin(
 
 
 def evaluate_export(subject: Subject, target: Target, version: str) -> ExportReport:
-    """Return the report of an export without writing any file: parameters and predicted errors."""
+    """Return a report with the parameters and predicted errors of an export, without writing any file."""
     part_limitations = () if subject.part_pictures is None else (target.part_limitations,)
     parameters, naive = target.parameters(subject, version), target.naive_parameters(subject, version)
     errors = [
-        curve_error(subject.curve, target.predicted_curve(one, subject, version))
+        profile_error(subject.curve, target.predicted_profile(one, subject, version))
         for one in (parameters, naive)
     ]
     return ExportReport(
@@ -254,7 +255,7 @@ def evaluate_export(subject: Subject, target: Target, version: str) -> ExportRep
     )
 
 
-def _checked_output(target: Target, output: str | Path) -> Path:
+def _check_output_path(target: Target, output: str | Path) -> Path:
     """Return the output path; raise DermisError if the target cannot write files with this suffix."""
     path = Path(output)
     if path.suffix.lower() not in target.suffixes:
@@ -268,18 +269,18 @@ def _checked_output(target: Target, output: str | Path) -> Path:
 def _staging_path(output: Path) -> Iterator[Path]:
     """Yield a temporary path for `Target.write`, and move the written files to `output` on success."""
     if not output.suffix:
-        with atomic_folder(output, REPORT_FILE) as folder:
+        with atomic_folder(output, REPORT_JSON_FILE) as folder:
             yield folder
         return
     with temporary_folder(output) as folder:
         yield folder / output.name
         for file in sorted(folder.iterdir(), key=lambda file: file.name == output.name):  # the output last
-            _move_into_place(file, output.with_name(file.name))
+            _move_written_files(file, output.with_name(file.name))
 
 
-def _move_into_place(staged_path: Path, output_path: Path) -> None:
+def _move_written_files(staged_path: Path, output_path: Path) -> None:
     if staged_path.is_dir():
-        with atomic_folder(output_path, REPORT_FILE) as folder:
+        with atomic_folder(output_path, REPORT_JSON_FILE) as folder:
             folder.rmdir()
             staged_path.replace(folder)
         return
@@ -290,8 +291,8 @@ def _move_into_place(staged_path: Path, output_path: Path) -> None:
 def _write_report(report: ExportReport, output: Path) -> list[Path]:
     """Write the report as two files, beside the output file or into the output folder; return their paths."""
     single = bool(output.suffix)
-    page = output.with_name(f"{output.name}.md") if single else output / _REPORT_PAGE
-    data_file = output.with_name(f"{output.name}.json") if single else output / REPORT_FILE
+    page = output.with_name(f"{output.name}.md") if single else output / _REPORT_MARKDOWN_FILE
+    data_file = output.with_name(f"{output.name}.json") if single else output / REPORT_JSON_FILE
     page.write_text(report.markdown(), encoding="utf-8")
     data_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
     return [page, data_file]

@@ -1,4 +1,4 @@
-"""Lights that other renderers support, and triangle meshes as PLY files."""
+"""Replacement of lights that a program does not support, and encoding of triangle meshes as PLY files."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def supported_lights(
     ]
 
 
-def _as_supported_light(light: Light, supported_kinds: Container[str], message_start: str) -> Light:
+def _as_supported_light(light: Light, supported_kinds: Container[str], warning_start: str) -> Light:
     if light.kind in supported_kinds:
         return light
     bases = (one for one in type(light).__mro__ if issubclass(one, Light))
     base = next(one for one in bases if one.model_fields["kind"].default in supported_kinds)
     replacement = base(**{name: getattr(light, name) for name in base.model_fields if name != "kind"})
-    notify(f"{message_start} has no {light.kind} light, so it becomes a {replacement.kind} light")
+    notify(f"{warning_start} has no {light.kind} light, so it becomes a {replacement.kind} light")
     return replacement
 
 

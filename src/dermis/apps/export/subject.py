@@ -13,7 +13,7 @@ import numpy as np
 
 from dermis.base.errors import format_value, refuse
 from dermis.base.reading import checked_path
-from dermis.formats.gltf.materials import skin_pictures
+from dermis.formats.gltf.materials import encode_skin_maps
 from dermis.formats.mesh_formats import find_format
 from dermis.formats.part_pictures import PartPictures
 from dermis.formats.samples import SAMPLES
@@ -78,12 +78,12 @@ class Subject:
 
     @cached_property
     def part_pictures(self) -> PartPictures | None:
-        """Return the pictures of the head's parts that are not skin, or None if no part has pictures."""
-        return None if self.head is None else PartPictures.of(self.head)
+        """Return the texture images of the parts of the head that are not skin; None if there are none."""
+        return None if self.head is None else PartPictures.from_head(self.head)
 
     @property
     def identifier(self) -> str:
-        """Return the name for files and materials, reduced to ASCII letters, digits and underscores."""
+        """Return the subject's name in ASCII letters, digits and underscores, for files and materials."""
         name = re.sub(r"[^A-Za-z0-9]+", "_", Path(self.name).stem or self.name).strip("_")[
             :_MAX_IDENTIFIER_LENGTH
         ]
@@ -98,15 +98,17 @@ class Subject:
         """Return the albedo (3,) clipped to the interval from `min_albedo` to 1."""
         return np.clip(self.albedo, min_albedo, 1.0)
 
-    def rescale_energy(self, curve: CumulativeProfile) -> CumulativeProfile:
-        """Return `curve` with its energy scaled for comparison with the reference profile.
+    def rescale_energy(self, rendered_profile: CumulativeProfile) -> CumulativeProfile:
+        """Return a rendered profile with its energy scaled for comparison with the reference profile.
 
-        The program renders `curve` for the subject's albedo, which may differ from the energy of the
-        reference profile. The energy of `curve` is multiplied by (energy of the reference profile) / albedo.
+        The subject's albedo may differ from the energy of its reference profile. The energy of the rendered
+        profile is therefore multiplied by (energy of the reference profile) / albedo.
 
-        curve : cumulative profile that the program renders for the subject's albedo
+        rendered_profile : cumulative profile that the program renders for the subject's albedo
         """
-        return curve.with_energy(self.curve.energy * curve.energy / np.maximum(self.albedo, _MIN_ALBEDO))
+        return rendered_profile.with_energy(
+            self.curve.energy * rendered_profile.energy / np.maximum(self.albedo, _MIN_ALBEDO)
+        )
 
     def eye_pictures(self) -> EyeTextures | None:
         """Return the painted textures of the eyes, or None if there are no eyes."""
@@ -117,12 +119,12 @@ class Subject:
         return None if eyes is None else run_on_device("auto", lambda device: paint_eye(device, eyes.look))
 
     def with_painted_maps(self, map_side: int, adapter: str) -> Subject:
-        """Return a copy whose head has arrays of texels, painted on a device, in place of procedural maps.
+        """Return a copy of the subject in which the head's procedural maps are replaced by arrays of texels.
 
         If the head has no procedural maps, the subject itself is returned.
 
         map_side : side of the maps, a power of two from 256 to 4096 [texel]
-        adapter : adapter that paints the maps
+        adapter : graphics adapter on which the maps are computed
         """
         head = self.head
         if self.scene is None or head is None or not head.maps.is_painted:
@@ -134,80 +136,85 @@ class Subject:
         return replace(self, scene=replace(self.scene, head=painted))
 
     def encode_maps(self) -> dict[str, bytes]:
-        """Return a dictionary from role to PNG file for the maps of the head.
+        """Return the maps of the head as PNG files, by role.
 
-        The roles are colour, normal, roughness, specular and height.
-
-        The colour is sRGB, and the green channel of the normal map points up. Roughness, which is Beckmann's
-        m, and specular strength are linear. Heights are stored in 16 bits: 0 is the lowest height of the map,
-        and 65535 the highest.
+        The roles are colour, normal, roughness, specular and height. Colours are sRGB, and the green channel
+        of the normal map points up. Roughness (Beckmann's m) and specular strength are linear. Heights have
+        16 bits: 0 is the lowest height of the map, and 65535 the highest.
         """
         if self.head is None:
             return {}
-        pictures, _ = skin_pictures(self.head.maps, relief_slopes(self.head))
+        pictures, _ = encode_skin_maps(self.head.maps, relief_slopes(self.head))
         return {role: pictures[role] for role in _MAP_ROLES if role in pictures}
 
 
 def load_subject(
-    source: str | Path, *, profile: str | Path | None = None, model: ModelName | None = None, **head: Any
+    name_or_file: str | Path,
+    *,
+    profile: str | Path | None = None,
+    model: ModelName | None = None,
+    **head: Any,
 ) -> Subject:
     """Load a skin or a head, given by name or file, and return it with the reference profile of its skin.
 
-    source : name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv) of a profile, or a head:
+    name_or_file : name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv) of a profile, or a head:
         "human", "human:7", a person's .json file, the name of a sample, or a mesh file (.glb, .obj, .usdz,
         ...)
     profile : name or file of the profile of a head's skin; by default, the skin of a parametric person has
         the pigments of that person, and other heads have the default skin
-    model : model of the reference profile, see `reference_curve`
+    model : model of the reference profile, see `reference_profile`
     head : options of `load_head`
 
-    Raises DermisError for an unknown name, and for options of heads if `source` is a skin.
+    Raises DermisError for an unknown name, and for options of heads if `name_or_file` is a skin.
     """
-    path = checked_path(source, "a skin or a head")
-    name = str(source)
+    path = checked_path(name_or_file, "a skin or a head")
+    name = str(name_or_file)
     if not (is_person_name(name) or name in SAMPLES or find_format(path)):
         return _load_skin(name, model, head if profile is None else ("profile",))
-    loaded = load_head(source, **head)
+    loaded = load_head(name_or_file, **head)
     if profile is not None:
         skin = Skin(profile=str(profile))
     else:
         skin = skin_of(load_person(name)) if is_person_name(name) else Skin()
-    curve, used_model, tissue = reference_curve(skin, model)
+    curve, used_model, tissue = reference_profile(skin, model)
     albedo = curve.energy if loaded.maps.mean_colour is None else loaded.maps.mean_colour
     return Subject(path.name, curve, albedo, used_model, tissue, Scene(loaded, skin=skin))
 
 
-def _load_skin(skin_name: str, model: ModelName | None, head_options: Iterable[str]) -> Subject:
+def _load_skin(skin_name: str, profile_model: ModelName | None, head_options: Iterable[str]) -> Subject:
     for option in head_options:
         refuse(option, "a head", f"got the skin {skin_name}", "Omit this option, or name a head")
-    curve, used_model, tissue = reference_curve(Skin(profile=skin_name), model)
+    curve, used_model, tissue = reference_profile(Skin(profile=skin_name), profile_model)
     return Subject(Path(skin_name).name, curve, curve.energy, used_model, tissue)
 
 
-def reference_curve(
-    skin: Skin, model: ModelName | None = None
+def reference_profile(
+    skin: Skin, profile_model: ModelName | None = None
 ) -> tuple[CumulativeProfile, str, Tissue | None]:
     """Return the cumulative reference profile of a skin, the name of its model, and its tissue.
 
-    model : by default, tabulated Monte Carlo for the built-in homogeneous media, and layered diffusion for
-        other tissue; a profile that is given as a table of Gaussians needs no model
+    profile_model : by default, tabulated Monte Carlo for the built-in homogeneous media, and layered
+        diffusion for other tissue; a profile that is given as a table of Gaussians needs no model
 
     Raises DermisError for an unknown model, and for a model requested for a table of Gaussians.
     """
-    if model is not None and model not in PROFILE_MODELS:
+    if profile_model is not None and profile_model not in PROFILE_MODELS:
         refuse(
-            "model", f"one of {', '.join(PROFILE_MODELS)}", f"got {format_value(model)}", "Choose one of them"
+            "model",
+            f"one of {', '.join(PROFILE_MODELS)}",
+            f"got {format_value(profile_model)}",
+            "Choose one of them",
         )
     table = None if skin.overrides_tissue else find_gaussians(skin.profile)
     if table is not None:
-        if model is not None:
+        if profile_model is not None:
             refuse("model", "a tissue", f"{skin.profile} is a table of Gaussians", "Omit this option")
         return CumulativeProfile.from_radial_profile(gaussian_radial_profile(table)), "table", None
     tissue = skin_tissue(skin)
-    may_be_tabulated = tissue.rgb is None and model in (None, "montecarlo")
+    may_be_tabulated = tissue.rgb is None and profile_model in (None, "montecarlo")
     if may_be_tabulated and (tabulated := tabulated_cumulative(tissue.medium)) is not None:
         return tabulated, "montecarlo", tissue
-    used_model: ModelName = model or "layered"
+    used_model: ModelName = profile_model or "layered"
     transmitted = 1.0 if tissue.rgb is None else 1.0 - normal_reflectance(tissue.medium.eta)
     return (
         CumulativeProfile.from_radial_profile(_model_profile(tissue, used_model), transmitted),
@@ -216,9 +223,9 @@ def reference_curve(
     )
 
 
-def _model_profile(tissue: Tissue, model: ModelName) -> RadialProfile:
-    if model != "montecarlo":
-        return tissue.profile(model)
+def _model_profile(tissue: Tissue, profile_model: ModelName) -> RadialProfile:
+    if profile_model != "montecarlo":
+        return tissue.profile(profile_model)
     from dermis.apps.truths.slab_mc import monte_carlo_profile
 
     return monte_carlo_profile(tissue.medium, tissue.rgb, _PHOTON_COUNT)

@@ -60,11 +60,11 @@ def flat_tuple(numbers: ArrayLike) -> tuple[float, ...]:
     return tuple(np.ravel(np.asarray(numbers, np.float64)).tolist())
 
 
-def write_files(folder: Path, contents: Iterable[tuple[str, bytes]]) -> list[Path]:
+def write_files(output_folder: Path, names_and_contents: Iterable[tuple[str, bytes]]) -> list[Path]:
     """Write files, given as pairs of name and content, into a folder, and return their paths."""
     written = []
-    for name, content in contents:
-        written.append(folder / name)
+    for name, content in names_and_contents:
+        written.append(output_folder / name)
         written[-1].parent.mkdir(exist_ok=True)
         written[-1].write_bytes(content)
     return written
@@ -148,12 +148,12 @@ class Target(ABC):
             refuse("variant", expected, f"got {format_value(variant)}", "Correct it")
         return replace(self, variant=variant)
 
-    def with_library(self, folder: str | Path) -> Target:
+    def with_library(self, node_modules_folder: str | Path) -> Target:
         """Return a copy of the target that embeds an installed JavaScript library in the page.
 
         Parameters
         ----------
-        folder : str or Path
+        node_modules_folder : str or Path
             npm folder node_modules that contains the library.
 
         Returns
@@ -166,7 +166,12 @@ class Target(ABC):
         DermisError
             If the target uses no library.
         """
-        refuse("library", f"none for {self.name}", f"got {format_value(str(folder))}", "Omit this option")
+        refuse(
+            "library",
+            f"none for {self.name}",
+            f"got {format_value(str(node_modules_folder))}",
+            "Omit this option",
+        )
 
     def resolve_version(self, version: str | None) -> str:
         """Return the requested version if it is supported; None selects the newest.
@@ -255,7 +260,7 @@ class Target(ABC):
         """
 
     @abstractmethod
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile that the program renders, predicted by the formulas of the program.
 
         Parameters
@@ -297,13 +302,13 @@ class Target(ABC):
 
 
 class JsonTarget(Target):
-    """Base class of targets that write a JSON file of parameters, which were not tested in the program."""
+    """Base class of targets that only write a JSON file of parameters and were not tested in the program."""
 
     suffixes = (".json", "")
     untested = True
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the parameters with units and meanings as JSON, marked as not tested."""
+        """Write a JSON file of the parameters with their units and meanings, and the remark "not run"."""
         file = self.main_file(output, subject)
         rows = {p.name: {"value": p.value, "unit": p.unit, "meaning": p.meaning} for p in parameters}
         content = {

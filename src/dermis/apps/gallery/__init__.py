@@ -1,1 +1,1 @@
-"""Gallery of pictures that explain the technique: short scripts, and a page with all pictures."""
+"""Gallery of pictures that explain skin rendering: scripts that draw them, and a page that shows them."""

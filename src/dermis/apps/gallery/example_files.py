@@ -69,7 +69,7 @@ class _Glb:
         views, accessors = self._tree["bufferViews"], self._tree["accessors"]
         self._buffer = BufferBuilder(bytearray(encoded_glb[28 + length :]), views, accessors)
 
-    def add(self, mesh_name: str, surface: _Surface, picture: Bytes, roughness: float) -> None:
+    def add_mesh(self, mesh_name: str, surface: _Surface, picture: Bytes, roughness: float) -> None:
         """Add a mesh textured with a picture (h, w, 4); where alpha is low, the mesh is invisible."""
         add_rows = self._buffer.add_accessor
         attributes = {
@@ -78,17 +78,19 @@ class _Glb:
             "TEXCOORD_0": add_rows(surface.uv.astype("<f4")),
         }
         view = self._buffer.add_view(encode_png(picture))
-        image = self._append("images", bufferView=view, mimeType="image/png")
-        texture = {"index": self._append("textures", source=image)}
+        image = self._append_entry("images", bufferView=view, mimeType="image/png")
+        texture = {"index": self._append_entry("textures", source=image)}
         model = {"baseColorTexture": texture, "metallicFactor": 0.0, "roughnessFactor": roughness}
         options = {"alphaMode": "MASK", "doubleSided": True}
         primitive = {
             "attributes": attributes,
             "indices": self._buffer.add_triangles(surface.triangles, len(surface.points_mm)),
-            "material": self._append("materials", name=mesh_name, pbrMetallicRoughness=model, **options),
+            "material": self._append_entry(
+                "materials", name=mesh_name, pbrMetallicRoughness=model, **options
+            ),
         }
-        mesh = self._append("meshes", name=mesh_name, primitives=[primitive])
-        self._tree["scenes"][0]["nodes"].append(self._append("nodes", name=mesh_name, mesh=mesh))
+        mesh = self._append_entry("meshes", name=mesh_name, primitives=[primitive])
+        self._tree["scenes"][0]["nodes"].append(self._append_entry("nodes", name=mesh_name, mesh=mesh))
 
     def write(self, path: Path) -> Path:
         """Write the file and return its path."""
@@ -96,7 +98,7 @@ class _Glb:
         path.write_bytes(glb_bytes(self._tree, self._buffer.data))
         return path
 
-    def _append(self, list_name: str, **json_entry: Any) -> int:
+    def _append_entry(self, list_name: str, **json_entry: Any) -> int:
         """Append an entry to a list in the JSON of the file, and return the index of the entry.
 
         list_name : name of the list, such as "meshes"
@@ -114,10 +116,10 @@ def write_avatar(studio: Studio, folder: Path) -> Path:
     painted, eyes = paint_head(studio.renderer.device, plain, 1024)
     file = _Glb(encode_head(replace(painted, strands=None, hair=None), roughness=0.3, eyes=eyes))
     hair = _hair_card_picture((0.045, 0.022, 0.012), 26, (512, 1024), seed=1)
-    file.add("hair", _hair_cards(*_scalp_hair_paths(plain), width_mm=7.0), hair, roughness=0.9)
+    file.add_mesh("hair", _hair_cards(*_scalp_hair_paths(plain), width_mm=7.0), hair, roughness=0.9)
     fringe = _hair_card_picture((0.02, 0.01, 0.006), 4, (128, 256), seed=2, taper_fraction=0.7)
-    file.add("lashes", _hair_cards(*_brow_and_lash_paths(plain), width_mm=0.5), fringe, roughness=0.6)
-    file.add("sweater", _sweater(plain), _sweater_picture(), roughness=0.9)
+    file.add_mesh("lashes", _hair_cards(*_brow_and_lash_paths(plain), width_mm=0.5), fringe, roughness=0.6)
+    file.add_mesh("sweater", _sweater_surface(plain), _sweater_picture(), roughness=0.9)
     return file.write(folder / "avatar.glb")
 
 
@@ -140,12 +142,12 @@ def write_three_meshes(head: Head, folder: Path) -> Path:
         surface = _Surface(mesh.positions[used], mesh.normals[used], uv, triangles.reshape(-1, 3))
         picture = colour[low[1] : high[1], low[0] : high[0]]
         opaque = np.full((*picture.shape[:2], 1), 255, np.uint8)
-        file.add(name, surface, np.concatenate([picture, opaque], axis=2), roughness=0.5)
+        file.add_mesh(name, surface, np.concatenate([picture, opaque], axis=2), roughness=0.5)
     return file.write(folder / "three.glb")
 
 
 def write_vertex_colours(head: Head, folder: Path) -> Path:
-    """Write a head with vertex colours, and without uv, as a .ply file; return the path of the file."""
+    """Write a head as a .ply file with vertex colours and no uv coordinates; return the path of the file."""
     mesh, colour = head.mesh, _colour_map_srgb(head)
     y, x = (mesh.uv[:, ::-1] * np.array(colour.shape[:2]) - 0.5).clip(0).astype(int).T
     kinds = [f"property float {axis}" for axis in "xyz"]
@@ -176,22 +178,22 @@ def _is_skin(head: Head) -> Mask:
 
 
 def _colour_map_srgb(head: Head) -> Bytes:
-    """Return the colour map of a head in 8-bit sRGB."""
+    """Return the colour map (h, w, 3) of a head in 8-bit sRGB."""
     assert head.maps.colour is not None
     return encode_srgb8(head.maps.colour)
 
 
-def _hair_cards(paths: Doubles, outward: Doubles, width_mm: float) -> _Surface:
+def _hair_cards(hair_paths: Doubles, outward_directions: Doubles, width_mm: float) -> _Surface:
     """Return hair cards: ribbons along paths, each textured with a random card of `_hair_card_picture`.
 
-    paths : (n, k, 3) points of each path from root to tip [mm]
-    outward : (n, k, 3) outward directions at these points
+    hair_paths : (n, k, 3) points of each path from root to tip [mm]
+    outward_directions : (n, k, 3) outward directions at these points
     """
-    count, knots = paths.shape[:2]
-    along = np.gradient(paths, axis=1)
-    side = _normalise(np.cross(along, outward))
+    count, knots = hair_paths.shape[:2]
+    along = np.gradient(hair_paths, axis=1)
+    side = _normalise(np.cross(along, outward_directions))
     normals = _normalise(np.cross(side, along))
-    edges = np.stack([paths - 0.5 * width_mm * side, paths + 0.5 * width_mm * side], axis=2)
+    edges = np.stack([hair_paths - 0.5 * width_mm * side, hair_paths + 0.5 * width_mm * side], axis=2)
     column = np.random.default_rng(0).integers(_HAIR_CARD_COLUMNS, size=(count, 1))
     u = (column + np.array([0.02, 0.98])) / _HAIR_CARD_COLUMNS
     uv = np.stack(np.broadcast_arrays(u[:, None, :], np.linspace(0.01, 0.99, knots)[None, :, None]), axis=3)
@@ -295,7 +297,7 @@ def _brow_and_lash_paths(head: Head) -> tuple[Doubles, Doubles]:
     return paths, np.broadcast_to(facing, paths.shape)
 
 
-def _sweater(head: Head) -> _Surface:
+def _sweater_surface(head: Head) -> _Surface:
     """Return the sweater: the surface of the shoulders and the neck, moved outwards."""
     mesh = head.mesh
     corner = mesh.triangles[mesh.material == 0]

@@ -32,7 +32,7 @@ _TEX_SYMBOLS = {
 
 
 def write_page(path: Path, pictures: Sequence[GalleryPicture], head: str, adapter: str) -> None:
-    """Write the HTML page with all pictures, either completely or not at all.
+    """Write the HTML page with all pictures, atomically.
 
     pictures : pictures in the order of the page
     head : name of the head in the pictures
@@ -86,9 +86,9 @@ def _panels_html(picture: GalleryPicture) -> str:
     return f'{comparison}<div class="panels" style="--columns: {columns}">{figures}</div>'
 
 
-def _slider_html(captions: tuple[str, str], webps: Sequence[bytes]) -> str:
+def _slider_html(captions: tuple[str, str], webp_files: Sequence[bytes]) -> str:
     before, after = (html.escape(caption) for caption in captions)
-    below, above = (_data_url(file) for file in webps)
+    below, above = (_data_url(file) for file in webp_files)
     label = f"{before} on the left, {after} on the right"
     return (
         f'<figure class="slider"><img src="{above}" alt="{after}">'
@@ -98,13 +98,13 @@ def _slider_html(captions: tuple[str, str], webps: Sequence[bytes]) -> str:
     )
 
 
-def _figure_html(caption: str, webp: bytes) -> str:
+def _figure_html(caption: str, webp_file: bytes) -> str:
     text = html.escape(caption)
-    return f'<figure><img src="{_data_url(webp)}" alt="{text}"><figcaption>{text}</figcaption></figure>'
+    return f'<figure><img src="{_data_url(webp_file)}" alt="{text}"><figcaption>{text}</figcaption></figure>'
 
 
-def _data_url(webp: bytes) -> str:
-    return "data:image/webp;base64," + base64.b64encode(webp).decode("ascii")
+def _data_url(webp_file: bytes) -> str:
+    return "data:image/webp;base64," + base64.b64encode(webp_file).decode("ascii")
 
 
 def _picture_facts(picture: GalleryPicture) -> str:
@@ -179,9 +179,9 @@ def _bibtex_fields(bibtex_entry: str) -> Iterator[tuple[str, str]]:
         yield found[1].lower(), bibtex_entry[found.end() : at - 1]
 
 
-def _without_tex(tex: str) -> str:
+def _without_tex(tex_text: str) -> str:
     """Convert TeX accents and symbols to Unicode, and remove braces."""
-    text = tex.replace("{", "").replace("}", "")
+    text = tex_text.replace("{", "").replace("}", "")
     for markup, character in _TEX_SYMBOLS.items():
         text = text.replace(markup, character)
     text = _TEX_ACCENT.sub(lambda found: found[2] + _COMBINING_ACCENTS[found[1]], text)

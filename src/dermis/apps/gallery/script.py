@@ -106,18 +106,18 @@ def _matches_selection(script: Script, number_or_text: str) -> bool:
     return number_or_text != "" and number_or_text in script.name
 
 
-def draw_script(draw: Callable[[Studio], Panels]) -> None:
+def draw_script(draw_panels: Callable[[Studio], Panels]) -> None:
     """Draw the picture of the gallery script that calls this function, and write it as PNG.
 
     The file and the head are read from the command line: python gallery/NN_name.py OUTPUT [HEAD].
 
-    draw : function of the script that returns its panels
+    draw_panels : function of the script that returns its panels
     """
     from dermis.images.io import write_png
 
     output, head = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else None
     with import_extra("matplotlib.style", "the gallery").context("dark_background"):
-        panels = draw(Studio(head))
+        panels = draw_panels(Studio(head))
     write_png(output, panel_sheet(panels, read_script(Path(sys.argv[0])).columns))
 
 

@@ -21,7 +21,7 @@ _SCANNED_HEAD_NAME = "lee_perry_smith"
 
 
 class Studio:
-    """Renderer for gallery pictures, and the head that they show; passed to each script.
+    """Renderer and head with which gallery scripts draw their pictures.
 
     name : name of the head; by default the scan lee_perry_smith if it was downloaded, otherwise the human
     side : width and height of a panel [pixel]
@@ -51,7 +51,7 @@ class Studio:
         return self._load(head_name or self.name, subdivide=1, **options)
 
     def coloured_head(self) -> Head:
-        """Return the gallery's head with a colour map, which is painted first if the maps are procedural."""
+        """Return the gallery's head with a colour map; procedural maps are painted into textures."""
         head = self.head()
         return with_painted_maps(self.renderer.device, head, 1024) if head.maps.is_painted else head
 
@@ -78,12 +78,12 @@ class Studio:
         scale : width and height of the image, relative to those of a gallery panel [-]
         settings : fields of `Settings`
         """
-        from dermis.apps.viewer.state import PART_VIEWS
+        from dermis.apps.viewer.state import LIGHT_COMPONENT_VIEWS
         from dermis.apps.viewer.views import IntermediateViews
         from dermis.gpu import download
 
-        if view in ("picture", *PART_VIEWS):
-            return self.render(scene, scale, parts=PART_VIEWS.get(view, "all"), **settings)
+        if view in ("picture", *LIGHT_COMPONENT_VIEWS):
+            return self.render(scene, scale, parts=LIGHT_COMPONENT_VIEWS.get(view, "all"), **settings)
 
         def draw_view() -> NDArray[np.uint8]:
             self._draw(scene, scale, settings)
@@ -95,7 +95,7 @@ class Studio:
     def light_map(self, scene: Scene, pyramid_level: int, **settings: Any) -> NDArray[np.float32]:
         """Return the blurred irradiance (n, n, 3) in the atlas, divided by pi.
 
-        pyramid_level : 0 for the light as it enters the skin, higher for light blurred more strongly
+        pyramid_level : 0 for unblurred light; higher levels are blurred more strongly
         settings : fields of `Settings`
         """
         from dermis.gpu import download
@@ -112,7 +112,7 @@ class Studio:
         return self.renderer.reopening_device.run(read_light)
 
     def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
-        """Return the settings with which a panel is rendered.
+        """Return the settings for rendering a gallery panel.
 
         scale : width and height of the image, relative to those of a gallery panel [-]
         settings : fields of `Settings` that replace the defaults of the gallery

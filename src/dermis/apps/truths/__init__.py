@@ -1,1 +1,1 @@
-"""Reference solutions that share no assumption with the renderer: Monte Carlo, path tracing, diffusion."""
+"""Reference solutions by Monte Carlo simulation, path tracing and diffusion, independent of the renderer."""

@@ -51,12 +51,12 @@ _MAX_STARTUP_S, _MAX_SECONDS_PER_PATH = 300.0, 5e-4
 
 @dataclass(frozen=True, eq=False)
 class CyclesPass:
-    """Rendering by Cycles with a given number of paths per pixel, black outside the head.
+    """Image rendered by Cycles with a given number of paths per pixel, black outside the head.
 
     image : (h, w, 3) radiance, linear Rec. 709
     coverage : (h, w) fraction of each pixel that the head covers
     samples : paths per pixel
-    seconds : elapsed time; for the first pass including the construction of the scene [s]
+    seconds : elapsed time; that of the first pass includes the construction of the scene [s]
     core_seconds : CPU time, summed over all cores [s]
     version : version of Blender
     """
@@ -82,7 +82,7 @@ def cycles_render(
 
     The parameters are those of `cycles_passes`, except:
 
-    samples : smallest total number of paths per pixel
+    samples : smallest number of paths per pixel, summed over all passes
     """
     _check_samples(samples)
     samples_per_pass = -(-int(samples) // _PASS_COUNT)
@@ -111,12 +111,12 @@ def cycles_passes(
 ) -> list[CyclesPass]:
     """Render the scene by Cycles on the CPU, once for each number of samples, in one process.
 
-    There is no clamping, denoising or surface reflection.
+    Radiance is not clamped, and images are not denoised. Media and `Lambertian` have no surface reflection.
 
     medium : material of the skin: a `Lambertian`, `BeckmannSurface` or `PrincipledSkin`, or a medium with a
-        single layer. The medium's index of refraction is ignored, as Cycles' random walks end at an
-        index-matched surface. Cycles gets the medium's diffuse reflectance as subsurface colour, and 4 pi
-        mean free paths as subsurface radius
+        single layer. The medium's index of refraction is ignored, because Cycles' random walks cross the
+        surface without refraction. Cycles gets the medium's diffuse reflectance as subsurface colour, and
+        4 pi mean free paths as subsurface radius
     samples : paths per pixel of each pass
     settings : settings of the frame, of which only the size is used
     method : subsurface method of Cycles
@@ -158,7 +158,7 @@ def read_passes(folder: Path, samples: Sequence[int], picture_size: tuple[int, i
     samples : paths per pixel of each pass
     picture_size : width and height [pixel]
 
-    Raises DermisError when files are missing or have another size.
+    Raises DermisError when a file is missing or an image has another size.
     """
     try:
         report = json.loads((folder / "done.json").read_text(encoding="utf-8"))
@@ -179,11 +179,11 @@ def read_passes(folder: Path, samples: Sequence[int], picture_size: tuple[int, i
 
 @dataclass(frozen=True)
 class BeckmannSurface:
-    """Skin with surface reflection alone, by Beckmann facets with an index of refraction of 1.4.
+    """Skin that only reflects light at its surface, by Beckmann facets with an index of refraction of 1.4.
 
     Light that enters the skin is absorbed. The head's normal map is applied.
 
-    roughness : Beckmann's m [-]
+    roughness : Beckmann roughness m [-]
     """
 
     roughness: float
@@ -193,12 +193,12 @@ class BeckmannSurface:
 class PrincipledSkin:
     """Skin as Blender users model it: a Principled BSDF with random-walk subsurface scattering.
 
-    Its surface has GGX facets with an index of refraction of 1.4; light that they do not reflect enters the
-    skin. The head's normal map is applied.
+    The surface consists of GGX facets with an index of refraction of 1.4. Light that is not reflected enters
+    the skin. The head's normal map is applied.
 
     colour : (h, w, 3) diffuse reflectance, linear Rec. 709 [-]
     radius_mm : (3,) subsurface radius of Cycles, 4 pi mean free paths [mm]
-    roughness : roughness m of the boundary [-]
+    roughness : GGX roughness m of the surface [-]
     """
 
     colour: NDArray[np.float32]
@@ -214,9 +214,9 @@ CYCLES_METHOD_NAMES = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 def describe_scene(
     scene: Scene, medium: SkinMaterial, subsurface_method: str, picture_size: tuple[int, int]
 ) -> tuple[SceneDict, dict[str, NumericArray]]:
-    """Return the contents of the files scene.json and arrays.npz for Cycles, apart from the list of passes.
+    """Return the contents of the files scene.json and arrays.npz, from which Cycles renders the scene.
 
-    The second result is a dictionary from name to array.
+    The first result lacks the list of passes. The second result is a dictionary from name to array.
 
     picture_size : width and height of the picture [pixel]
     """
@@ -269,8 +269,9 @@ def _skin_material(medium: SkinMaterial, subsurface_method: str) -> SceneDict:
     """Return the description of the skin's material for Cycles, with colour and subsurface radius.
 
     The colour is the diffuse reflectance of the medium, and the radius is 4 pi mean free paths. From these,
-    Cycles' random walk recovers the mean free path and, by a fit that is accurate within 1 %, the albedo. The
-    method "burley" uses the profile of [ChristensenBurley2015] for the same colour and radius.
+    Cycles' random walk computes the mean free path and, by a fit that is accurate within 1 %, the
+    single-scattering albedo. The method "burley" uses the profile of [ChristensenBurley2015] for the same
+    colour and radius.
 
     In Cycles, light enters and leaves through a Lambertian surface. The reflectance of a ball under uniform
     light differs from the given colour by up to 3 % with the random walk, and by up to 0.5 % with "burley".

@@ -32,7 +32,7 @@ def main(folder: Path) -> None:
         add_light(light)
     set_world(description["world"], arrays.get("panorama"))
     set_camera(description["camera"])
-    set_render(description)
+    set_render_options(description)
     times = [render_pass(folder / f"pass_{k}.exr", **one) for k, one in enumerate(description["passes"])]
     done = {"version": bpy.app.version_string, "times": times}
     (folder / "done.json").write_text(json.dumps(done), encoding="utf-8")
@@ -60,50 +60,52 @@ def add_mesh(arrays: dict[str, Any], materials: list[Any]) -> None:
     add_object("head", mesh)
 
 
-def make_material(description: dict[str, Any], maps: dict[str, Any]) -> Any:
-    """Return a new material.
+def make_material(material_description: dict[str, Any], maps: dict[str, Any]) -> Any:
+    """Return a new Blender material with the shader and the parameters of a description.
 
-    description : shader and parameters of the material
+    material_description : shader and parameters of the material
     maps : dictionary from name to image array
     """
-    material = bpy.data.materials.new(description["name"])
+    material = bpy.data.materials.new(material_description["name"])
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
-    if description["method"] == "BECKMANN":
+    if material_description["method"] == "BECKMANN":
         shader = nodes.new("ShaderNodeBsdfGlass")  # transmitted light is lost, as there is one bounce
         shader.distribution = "BECKMANN"
-        shader.inputs["Roughness"].default_value = description["roughness"]
-        shader.inputs["IOR"].default_value = description["ior"]
+        shader.inputs["Roughness"].default_value = material_description["roughness"]
+        shader.inputs["IOR"].default_value = material_description["ior"]
         connect_normal_map(nodes, links, maps, shader)
-    elif description["method"] == "PRINCIPLED":
-        shader = principled_shader(nodes, links, maps, description)
+    elif material_description["method"] == "PRINCIPLED":
+        shader = principled_shader(nodes, links, maps, material_description)
         connect_normal_map(nodes, links, maps, shader)
-    elif description["method"] == "DIFFUSE":
+    elif material_description["method"] == "DIFFUSE":
         shader = nodes.new("ShaderNodeBsdfDiffuse")
     else:
         shader = nodes.new("ShaderNodeSubsurfaceScattering")
-        shader.falloff = description["method"]
+        shader.falloff = material_description["method"]
         shader.inputs["Scale"].default_value = 1.0
-        shader.inputs["Radius"].default_value = description["radius"]
+        shader.inputs["Radius"].default_value = material_description["radius"]
         if "Roughness" in shader.inputs:
             shader.inputs["Roughness"].default_value = 1.0
     if "Color" in shader.inputs:
-        shader.inputs["Color"].default_value = (*description.get("colour", (1.0, 1.0, 1.0)), 1.0)
+        shader.inputs["Color"].default_value = (*material_description.get("colour", (1.0, 1.0, 1.0)), 1.0)
     links.new(shader.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     return material
 
 
-def principled_shader(nodes: Any, links: Any, maps: dict[str, Any], description: dict[str, Any]) -> Any:
+def principled_shader(
+    nodes: Any, links: Any, maps: dict[str, Any], material_description: dict[str, Any]
+) -> Any:
     """Return a Principled BSDF node with random-walk subsurface scattering and a colour map."""
     shader = nodes.new("ShaderNodeBsdfPrincipled")
     shader.distribution = "GGX"
     shader.subsurface_method = "RANDOM_WALK"
     numbers = {"Subsurface Weight": 1.0, "Subsurface Scale": 1.0, "Specular IOR Level": 0.5}
-    numbers |= {"IOR": description["ior"], "Roughness": description["roughness"]}
+    numbers |= {"IOR": material_description["ior"], "Roughness": material_description["roughness"]}
     for name, value in numbers.items():
         shader.inputs[name].default_value = value
-    shader.inputs["Subsurface Radius"].default_value = description["radius"]
+    shader.inputs["Subsurface Radius"].default_value = material_description["radius"]
     texture, node = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeUVMap")
     node.uv_map = "uv"
     links.new(node.outputs["UV"], texture.inputs["Vector"])
@@ -137,17 +139,17 @@ def pack_image(image_name: str, texel_rows: Any) -> Any:
     return image
 
 
-def add_light(description: dict[str, Any]) -> None:
+def add_light(light_description: dict[str, Any]) -> None:
     """Add a light to the scene.
 
-    description : kind and parameters of the light
+    light_description : kind and parameters of the light
     """
-    light = bpy.data.lights.new("light", description["type"])
-    for name, value in description["set"].items():
+    light = bpy.data.lights.new("light", light_description["type"])
+    for name, value in light_description["set"].items():
         setattr(light, name, value)
-    if "stripe" in description:
-        shape_stripe(light, description["stripe"])
-    add_object("light", light).matrix_world = Matrix(description["to_world"])
+    if "stripe" in light_description:
+        shape_stripe(light, light_description["stripe"])
+    add_object("light", light).matrix_world = Matrix(light_description["to_world"])
 
 
 def shape_stripe(light: Any, stripe: dict[str, Any]) -> None:
@@ -197,42 +199,42 @@ def set_inputs(links: Any, node: Any, inputs: Any) -> Any:
     return node.outputs[0]
 
 
-def set_world(description: dict[str, Any], panorama: Any) -> None:
+def set_world(world_description: dict[str, Any], panorama: Any) -> None:
     """Set the world to a uniform environment, or to a panorama with its rotation."""
     world = bpy.data.worlds.new("world")
     bpy.context.scene.world = world
     world.use_nodes = True
     nodes, links = world.node_tree.nodes, world.node_tree.links
     background = next(node for node in nodes if node.type == "BACKGROUND")
-    background.inputs["Strength"].default_value = description["strength"]
+    background.inputs["Strength"].default_value = world_description["strength"]
     background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
     if panorama is None:
         return
     texture, mapping = nodes.new("ShaderNodeTexEnvironment"), nodes.new("ShaderNodeMapping")
     texture.image = pack_image("panorama", panorama)
-    mapping.inputs["Rotation"].default_value = Matrix(description["turn"]).to_euler()
+    mapping.inputs["Rotation"].default_value = Matrix(world_description["turn"]).to_euler()
     links.new(nodes.new("ShaderNodeTexCoord").outputs["Generated"], mapping.inputs["Vector"])
     links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
     links.new(texture.outputs["Color"], background.inputs["Color"])
 
 
-def set_camera(description: dict[str, Any]) -> None:
+def set_camera(camera_description: dict[str, Any]) -> None:
     """Add the camera, and make this camera the active camera of the scene."""
     camera = bpy.data.cameras.new("camera")
     camera.sensor_fit = "VERTICAL"
     camera.sensor_height = 24.0
-    camera.lens = 12.0 / description["half_tangent"]
+    camera.lens = 12.0 / camera_description["half_tangent"]
     camera.clip_start, camera.clip_end = 1e-3, 1e5
     camera_object = add_object("camera", camera)
-    camera_object.matrix_world = Matrix(description["to_world"])
+    camera_object.matrix_world = Matrix(camera_description["to_world"])
     bpy.context.scene.camera = camera_object
 
 
-def set_render(description: dict[str, Any]) -> None:
+def set_render_options(scene_description: dict[str, Any]) -> None:
     """Set the resolution, the file format and the settings of Cycles."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
-    scene.render.resolution_x, scene.render.resolution_y = description["size"]
+    scene.render.resolution_x, scene.render.resolution_y = scene_description["size"]
     scene.render.resolution_percentage = 100
     scene.render.film_transparent = True
     scene.render.use_persistent_data = True
@@ -245,7 +247,7 @@ def set_render(description: dict[str, Any]) -> None:
     cycles.pixel_filter_type = "BOX"
     # The defaults give less noise but a biased, darker image.
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = cycles.light_sampling_threshold = 0.0
-    if description["direct"]:
+    if scene_description["direct"]:
         cycles.max_bounces = 0
 
 

@@ -1,4 +1,4 @@
-"""Closed-form reflection of an index-matched, isotropically scattering half-space."""
+"""Exact reflection of light by an index-matched, isotropically scattering half-space."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
     cosine : cosines of angles to the normal, an array of any shape
     albedo : single-scattering albedo, below 1 [-]
 
-    Source: [Chandrasekhar1960] section 38: the form of the integral equation in which no digits cancel,
-    solved by iteration at Gaussian nodes.
+    The integral equation is solved by iteration at Gaussian nodes.
+
+    Source: [Chandrasekhar1960] section 38, in the form of the equation that avoids cancellation of digits.
     """
     if not 0.0 <= albedo < 1.0:
         refuse("half-space", "an albedo from 0 to below 1", f"got {albedo:g}", "Correct it")
@@ -57,7 +58,8 @@ def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: floa
     cosine_out : cosine of the angle between view and normal
     albedo : single-scattering albedo [-]
 
-    Source: [Chandrasekhar1960] section 33: S / (4 pi cosine_in cosine_out), with his scattering function S.
+    Source: [Chandrasekhar1960] section 33; the ratio is S / (4 pi cosine_in cosine_out), with the scattering
+    function S.
     """
     mu, view = np.asarray(cosine_in, np.float64), np.asarray(cosine_out, np.float64)
     H = h_function(mu, albedo) * h_function(view, albedo)

@@ -1,4 +1,4 @@
-"""Irradiance samples at the corners of small triangles of a mesh, denser where the light changes."""
+"""Irradiance samples at the corners of small triangles on a mesh, denser where the irradiance varies."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ IrradianceFunction = Callable[[MeshPoints], Floats]
 
 @dataclass(frozen=True)
 class IrradianceSamples:
-    """Irradiance on a surface of small triangles, interpolated linearly on each triangle.
+    """Irradiance on a surface that is divided into small triangles, linear on each triangle.
 
     positions : (n, 3) sample positions [mm]
     triangles : (m, 3) sample indices of the corners; the triangles cover the surface without overlaps
-    irradiance : (n, 3) irradiance at each sample, 0 or more
+    irradiance : (n, 3) irradiance at each sample, never negative
     """
 
     positions: Floats
@@ -53,19 +53,20 @@ class IrradianceSamples:
 
 def sample_irradiance(
     mesh: Mesh,
-    light: IrradianceFunction,
+    irradiance_at: IrradianceFunction,
     spacing_mm: float,
     min_spacing_mm: float | None = None,
     contrast_threshold: float = 0.05,
 ) -> IrradianceSamples:
     """Return irradiance samples at the corners of small triangles that subdivide the skin of a mesh.
 
-    light : function of `MeshPoints` that returns irradiance (n, 3); called for new points only
-    spacing_mm : longest side of a small triangle [mm]
-    min_spacing_mm : lower limit of the side lengths where sides of high contrast are halved further; None for
-        no further halving [mm]
-    contrast_threshold : contrast above which a side is halved further: the difference of the irradiance at
-        its ends, relative to the largest irradiance [-]
+    Sides longer than `spacing_mm` are halved. Then sides of high contrast are halved further. The contrast of
+    a side is the difference between the irradiances at its ends, relative to the largest irradiance.
+
+    irradiance_at : function that returns the irradiance (n, 3) at `MeshPoints`; called once for each point
+    spacing_mm : greatest side length of the small triangles [mm]
+    min_spacing_mm : smallest side length that the further halving may yield; None for no further halving [mm]
+    contrast_threshold : contrast above which a side is halved further [-]
 
     Source: [JensenBuhler2002] for sampling the irradiance on the surface.
     """
@@ -77,9 +78,9 @@ def sample_irradiance(
         actual = f"got {spacing_mm}, {min_spacing_mm} and {contrast_threshold}"
         refuse("irradiance samples", "spacing >= finest > 0 and a contrast above 0", actual, "Correct them")
     subdivision = _subdivide_to(_skin_triangles(mesh), spacing_mm)
-    irradiance = light(_sample_points(subdivision))
+    irradiance = irradiance_at(_sample_points(subdivision))
     while min_spacing_mm is not None:
-        ends, side, length = _edge_lengths(subdivision)
+        ends, side, length = _edges_with_lengths(subdivision)
         contrast_across = np.abs(irradiance[ends[:, 0]] - irradiance[ends[:, 1]]).max(axis=1)
         high_contrast = (length >= 2 * min_spacing_mm) & (
             contrast_across > contrast_threshold * irradiance.max()
@@ -88,7 +89,7 @@ def sample_irradiance(
             break
         known_count = len(irradiance)
         subdivision = _halve_edges(subdivision, side, _add_longest_sides(side, length, high_contrast))
-        irradiance = np.vstack((irradiance, light(_sample_points(subdivision, known_count))))
+        irradiance = np.vstack((irradiance, irradiance_at(_sample_points(subdivision, known_count))))
     return IrradianceSamples(_sample_points(subdivision).positions, subdivision.corners, irradiance)
 
 
@@ -127,13 +128,13 @@ def _skin_triangles(mesh: Mesh) -> _Subdivision:
 
 def _subdivide_to(subdivision: _Subdivision, spacing_mm: float) -> _Subdivision:
     while True:
-        _, side, length = _edge_lengths(subdivision)
+        _, side, length = _edges_with_lengths(subdivision)
         if not (length > spacing_mm).any():
             return subdivision
         subdivision = _halve_edges(subdivision, side, length > spacing_mm)
 
 
-def _edge_lengths(subdivision: _Subdivision) -> tuple[Index, Index, Floats]:
+def _edges_with_lengths(subdivision: _Subdivision) -> tuple[Index, Index, Floats]:
     return triangle_edges(_sample_points(subdivision).positions, subdivision.corners)
 
 

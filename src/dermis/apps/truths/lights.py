@@ -32,7 +32,7 @@ from dermis.scene.lights import (
 )
 
 Floats = NDArray[np.float64]
-_DISTANT_LIGHT_MM = 2e5
+_DISTANT_LIGHT_DISTANCE_MM = 2e5
 """Distance of the source of nearly parallel light: irradiance changes by 0.1 % in 100 mm, and a stripe is
 positioned within 0.02 mm in single precision."""
 _SPOT_SLIDE_SIDE = 1024
@@ -71,13 +71,13 @@ def _check_shadows(light: Light, light_number: int, renderer: str) -> None:
         )
 
 
-def mitsuba_point(mi: Mitsuba, light: PointLight, label: str) -> SceneDict:
+def mitsuba_point(mi: Mitsuba, light: PointLight, light_label: str) -> SceneDict:
     """Return Mitsuba's description of a point light."""
     intensity = np.multiply(light.irradiance, _target_distance_mm(light) ** 2)
     return {"type": "point", "position": list(light.position), "intensity": mitsuba_rgb(intensity)}
 
 
-def mitsuba_spot(mi: Mitsuba, light: SpotLight, label: str) -> SceneDict:
+def mitsuba_spot(mi: Mitsuba, light: SpotLight, light_label: str) -> SceneDict:
     """Return a Mitsuba projector in place of a spot light; Mitsuba's own spot light has no smooth edge."""
     tangent = np.tan(np.radians(light.outer_degrees))
     along = tangent * ((np.arange(_SPOT_SLIDE_SIDE) + 0.5) / _SPOT_SLIDE_SIDE * 2.0 - 1.0)
@@ -88,7 +88,7 @@ def mitsuba_spot(mi: Mitsuba, light: SpotLight, label: str) -> SceneDict:
     return mitsuba_projector(mi, slide, cosine, mitsuba_look_at(mi, light.position, light.target), tangent)
 
 
-def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, label: str) -> SceneDict:
+def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, light_label: str) -> SceneDict:
     """Return Mitsuba's description of a rectangle light: a rectangle of uniform radiance."""
     sides = [0.5 * light.width_mm, 0.5 * light.height_mm, 1.0]
     to_world = mitsuba_look_at(mi, light.position, light.target).scale(sides)
@@ -96,7 +96,7 @@ def mitsuba_rectangle(mi: Mitsuba, light: RectangleLight, label: str) -> SceneDi
     return mitsuba_shape("rectangle", np.divide(light.irradiance, unit_irradiance), to_world=to_world)
 
 
-def mitsuba_sphere(mi: Mitsuba, light: SphereLight, label: str) -> SceneDict:
+def mitsuba_sphere(mi: Mitsuba, light: SphereLight, light_label: str) -> SceneDict:
     """Return Mitsuba's description of a sphere light: a sphere of uniform radiance."""
     unit_irradiance = np.pi * (light.radius_mm / _target_distance_mm(light)) ** 2
     return mitsuba_shape(
@@ -107,20 +107,20 @@ def mitsuba_sphere(mi: Mitsuba, light: SphereLight, label: str) -> SceneDict:
     )
 
 
-def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, label: str) -> SceneDict:
+def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, light_label: str) -> SceneDict:
     """Return Mitsuba's directional light, or a distant disc for a light with an angular diameter."""
     if light.angle_degrees == 0:
         irradiance = mitsuba_rgb(light.irradiance)
         return {"type": "directional", "direction": list(light.direction), "irradiance": irradiance}
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
     half = 0.5 * np.radians(light.angle_degrees)
-    to_world = mitsuba_look_at(mi, -_DISTANT_LIGHT_MM * direction, (0.0, 0.0, 0.0)).scale(
-        float(_DISTANT_LIGHT_MM * np.tan(half))
+    to_world = mitsuba_look_at(mi, -_DISTANT_LIGHT_DISTANCE_MM * direction, (0.0, 0.0, 0.0)).scale(
+        float(_DISTANT_LIGHT_DISTANCE_MM * np.tan(half))
     )
     return mitsuba_shape("disk", np.divide(light.irradiance, np.pi * np.sin(half) ** 2), to_world=to_world)
 
 
-def mitsuba_stripe(mi: Mitsuba, light: StripeLight, label: str) -> SceneDict:
+def mitsuba_stripe(mi: Mitsuba, light: StripeLight, light_label: str) -> SceneDict:
     """Return Mitsuba's description of a stripe light: a distant slide projector whose slide is the stripe."""
     width, length = light.width_mm, light.length_mm
     size = np.array([2.0 * _STRIPE_SLIDE_HALF_WIDTHS * width, length])
@@ -128,7 +128,7 @@ def mitsuba_stripe(mi: Mitsuba, light: StripeLight, label: str) -> SceneDict:
     texel = max(texel, float(np.sqrt(size.prod() / _MAX_STRIPE_SLIDE_TEXELS)))
     if width < 10.0 * texel:
         actual = f"it is {length:g} mm long and {width:g} mm wide"
-        refuse(label, "a stripe less slender, for path tracing", actual, "Shorten it")
+        refuse(light_label, "a stripe less slender, for path tracing", actual, "Shorten it")
     columns, rows = np.ceil(size / texel).astype(int)
     # The slide's texels are square; those added by rounding up are dark.
     across = ((np.arange(columns) + 0.5) - 0.5 * columns) * texel / (0.5 * width)
@@ -136,11 +136,13 @@ def mitsuba_stripe(mi: Mitsuba, light: StripeLight, label: str) -> SceneDict:
     with np.errstate(under="ignore"):
         profile = np.exp(-2.0 * across**2)
     falloff = (1.0 - _smoothstep((np.abs(along) - 0.95) / 0.05))[:, None] * profile[None, :]
-    slide = falloff[..., None] * np.multiply(light.irradiance, _DISTANT_LIGHT_MM**2)
+    slide = falloff[..., None] * np.multiply(light.irradiance, _DISTANT_LIGHT_DISTANCE_MM**2)
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
-    to_world = mitsuba_look_at(mi, light.position - _DISTANT_LIGHT_MM * direction, light.position, light.up)
+    to_world = mitsuba_look_at(
+        mi, light.position - _DISTANT_LIGHT_DISTANCE_MM * direction, light.position, light.up
+    )
     return mitsuba_projector(
-        mi, slide, np.ones((rows, columns)), to_world, 0.5 * columns * texel / _DISTANT_LIGHT_MM
+        mi, slide, np.ones((rows, columns)), to_world, 0.5 * columns * texel / _DISTANT_LIGHT_DISTANCE_MM
     )
 
 
@@ -150,7 +152,7 @@ def cycles_point(light: PointLight) -> SceneDict:
 
 
 def cycles_spot(light: SpotLight) -> SceneDict:
-    """Return Cycles' spot light; its edge falls off smoothly in the cosine, as in dermis."""
+    """Return Cycles' spot light; its intensity falls off smoothly at the edge of the cone, as in dermis."""
     inner, outer = (float(np.cos(np.radians(a))) for a in (light.inner_degrees, light.outer_degrees))
     size, blend = 2.0 * np.radians(light.outer_degrees), (inner - outer) / (1.0 - outer)
     return _cycles_point_light("SPOT", light, spot_size=size, spot_blend=blend)
@@ -173,7 +175,7 @@ def cycles_rectangle(light: RectangleLight) -> SceneDict:
 
 
 def cycles_directional(light: DirectionalLight) -> SceneDict:
-    """Return Cycles' sun with the angular diameter of a directional light."""
+    """Return Cycles' description of a directional light: a sun lamp with the same angular diameter."""
     angle = float(np.radians(light.angle_degrees))
     return cycles_light("SUN", light.irradiance, 1.0, (0, 0, 0), light.direction, angle=angle)
 
@@ -181,15 +183,15 @@ def cycles_directional(light: DirectionalLight) -> SceneDict:
 def cycles_stripe(light: StripeLight) -> SceneDict:
     """Return a distant point light, which cycles_script.py turns into a stripe light by shader nodes."""
     across, along, forward = camera_axes(light.direction, light.up)
-    power = 4.0 * np.pi * (_DISTANT_LIGHT_MM / CYCLES_UNIT_MM) ** 2
-    source = light.position - _DISTANT_LIGHT_MM * forward
+    power = 4.0 * np.pi * (_DISTANT_LIGHT_DISTANCE_MM / CYCLES_UNIT_MM) ** 2
+    source = light.position - _DISTANT_LIGHT_DISTANCE_MM * forward
     distant = cycles_light("POINT", light.irradiance, power, source, light.direction, shadow_soft_size=0.0)
     axes = {
         "forward": (-forward).tolist(),
         "across": (across / (0.5 * light.width_mm)).tolist(),
         "along": (along / (0.5 * light.length_mm)).tolist(),
     }
-    return distant | {"stripe": {**axes, "distance": _DISTANT_LIGHT_MM}}
+    return distant | {"stripe": {**axes, "distance": _DISTANT_LIGHT_DISTANCE_MM}}
 
 
 def _cycles_point_light(

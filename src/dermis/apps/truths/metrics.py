@@ -85,7 +85,7 @@ def relative_rmse(
         refuse("relative error", "a reference brighter than its noise", "it is darker", "Trace more paths")
     E = float((D**2 - s2 - v).sum()) / energy
     U = 4 * s2 * (D + E * T) ** 2 - 2 * (1 - E) ** 2 * s2**2 + 4 * v * D**2
-    error = _sum_standard_error(U) / energy
+    error = _standard_error_of_sum(U) / energy
     E = max(E, 0.0)
     low, root, high = np.sqrt([max(E - error, 0.0), E, E + error])
     return Estimate(float(root), float(max(high - root, root - low)))
@@ -105,10 +105,10 @@ def energy_ratio(
     if total <= 0:
         refuse("energy ratio", "a reference with light in it", "its sum is not above 0", "Check the mask")
     ratio = float(I.sum()) / total
-    return Estimate(ratio, abs(ratio) * _sum_standard_error(s2) / total)
+    return Estimate(ratio, abs(ratio) * _standard_error_of_sum(s2) / total)
 
 
-def _sum_standard_error(variance: Floats) -> float:
+def _standard_error_of_sum(variance: Floats) -> float:
     """Return an upper bound of the standard error of a sum over pixels whose channels may be correlated.
 
     variance : (n, c) variance of each pixel and channel

@@ -38,12 +38,12 @@ _RELATIVE_INTERFACE_GAP = 0.97
 second hit of the same surface. That offset skips 0.01 mm of medium on a head, which makes skin with a mean
 free path of 1 mm up to 1 % darker. With two surfaces, an inward ray hits the upper one and skips the lower
 one, an outward ray hits the lower one and skips the upper one, so that only the gap is skipped."""
-_REPORTED_FOLDED_FRACTION = 1e-3  # folded fraction of a surface above which a note reports it
+_MIN_REPORTED_FOLDED_FRACTION = 1e-3  # folded fraction of a surface above which a note reports it
 
 
 @dataclass(frozen=True)
 class Lambertian:
-    """Lambertian skin without scattering or interreflection, to be used in place of a medium.
+    """Lambertian skin without subsurface scattering or interreflection, to be used in place of a medium.
 
     albedo : diffuse reflectance, linear Rec. 709 [-]
     """
@@ -61,7 +61,7 @@ def load_mitsuba() -> Mitsuba:
 
 @contextmanager
 def mitsuba_variant(mi: Mitsuba, variant_name: str) -> Iterator[None]:
-    """Set a variant of Mitsuba during a context, and restore the previous variant afterwards."""
+    """Set a variant of Mitsuba inside a `with` block, and restore the previous variant afterwards."""
     before = mi.variant()
     mi.set_variant(variant_name)
     try:
@@ -234,7 +234,7 @@ def inner_interfaces(
             surface, folded = offset_inwards(skin_surface, offset_mm, head_name)
             shapes[f"below_{k}_{side}"] = interface_mesh(mi, surface, {"exterior": above, "interior": below})
         depth = depth + gap
-        if folded > _REPORTED_FOLDED_FRACTION:
+        if folded > _MIN_REPORTED_FOLDED_FRACTION:
             notes.append(f"{folded:.1%} of the face under layer {k} is folded")
     return shapes, tuple(notes)
 

@@ -63,9 +63,10 @@ def offset_inwards(
     depth_mm : (p,) depth of each point; negative for an offset outwards [mm]
     head_name : name of the head, for messages
 
-    Raises DermisError when more than 2 % of the surface folds over, or no volume is left. All parts must be
-    thicker than twice the depth; thinner parts, whose opposite sides cross after the offset, are not
-    detected.
+    The enclosed body must be thicker than twice the depth everywhere. Where it is thinner, its opposite sides
+    cross after the offset, and this is not detected.
+
+    Raises DermisError when more than 2 % of the surface folds over, or when no volume is left.
     """
     shifted = (closed_surface.positions - depth_mm[:, None] * _mitre_vectors(closed_surface)).astype(
         np.float32
@@ -116,9 +117,9 @@ def _close_openings(positions: Floats, triangles: Index) -> ClosedSurface:
 
 
 def _boundary_edges(triangles: Index, point_count: int) -> NDArray[np.int64]:
-    """Return the directed edges (n, 2) that triangles use more often than their reverses.
+    """Return the directed edges (n, 2) of a triangle mesh that lack an edge in the opposite direction.
 
-    An edge is repeated as often as its reverse is missing.
+    An edge is listed once for each opposite edge that is missing.
 
     point_count : number of points
     """

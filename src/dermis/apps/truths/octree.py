@@ -18,10 +18,11 @@ _MAX_OCTREE_DEPTH = 20  # levels of three bits each, so that keys have 60 bits
 
 
 class Octree(NamedTuple):
-    """Octree of n nodes in depth-first order over m triangles, which are sorted in the order of the nodes.
+    """Octree of n nodes in depth-first order; its m triangles are sorted in the order of the nodes.
 
-    Three points with a flux approximate the light of all triangles of a node. `second_moment`, `moment_error`
-    and `centroid_error` bound the error of this approximation, each in its worst channel.
+    In each node, three points, each with a flux, approximate the light of all triangles of the node. The
+    fields `second_moment`, `moment_error` and `centroid_error` bound the error of this approximation. Each
+    of them is the maximum over the channels.
 
     first : (n,) index of the node's first triangle
     end : (n,) index after the node's last triangle
@@ -57,8 +58,8 @@ class Octree(NamedTuple):
 def build_octree(samples: IrradianceSamples) -> Octree:
     """Return the octree over the triangles of irradiance samples.
 
-    Source: [JensenBuhler2002]. Here, three points replace the light of a node, and error bounds decide
-    whether the children of a node are visited.
+    Source: [JensenBuhler2002]. In contrast to the source, each node has three points instead of one, and
+    bounds of the error decide whether the children of a node are visited.
     """
     middle = np.mean(samples.positions, axis=0)  # moments about a distant origin would lose precision
     corners = (np.asarray(samples.positions, np.float64) - middle)[samples.triangles]
@@ -158,7 +159,7 @@ def _point_approximation(
     eigenvalues, axes = np.linalg.eigh(sum(second_moments) / total[:, None, None])
     # A patch of surface is nearly flat, so its two longer axes are enough.
     axis_lengths, axes = np.sqrt(eigenvalues[:, 1:].clip(0)), axes[..., 1:]
-    offsets = np.einsum("kj,nj,naj->nka", _TRIANGLE_POINTS, axis_lengths, axes)
+    offsets = np.einsum("kj,nj,naj->nka", _UNIT_VARIANCE_POINTS, axis_lengths, axes)
     point_flux = _point_flux(flux, first_moments, axis_lengths, axes)
     safe_flux = np.where(flux > 0, flux, np.inf)
     bounds = np.zeros((3, len(flux), 3))
@@ -172,8 +173,8 @@ def _point_approximation(
     return centre, centre[:, None] + offsets, point_flux, second_moment, moment_error, centroid_error
 
 
-_TRIANGLE_ANGLES = 2 * np.pi / 3 * np.arange(3)
-_TRIANGLE_POINTS = np.sqrt(2) * np.column_stack((np.sin(_TRIANGLE_ANGLES), np.cos(_TRIANGLE_ANGLES)))
+_POINT_ANGLES = 2 * np.pi / 3 * np.arange(3)
+_UNIT_VARIANCE_POINTS = np.sqrt(2) * np.column_stack((np.sin(_POINT_ANGLES), np.cos(_POINT_ANGLES)))
 
 
 def _central_moments(
@@ -181,8 +182,9 @@ def _central_moments(
 ) -> tuple[Floats, list[Floats], list[Floats]]:
     """Return the moments of orders 0, 1 and 2 of the light in each of n nodes, about the node's centre.
 
-    The results are the flux (n, 3) by channel; a list with the first moments (n, 3) of each channel and, as
-    last entry, the centres (n, 3); and a list with the second moments (n, 3, 3) of each channel.
+    The first result is the flux (n, 3) by channel. The second is a list of four arrays (n, 3): the first
+    moments of each of the three channels, and the centres of the nodes. The third is a list of the second
+    moments (n, 3, 3) of each channel.
     """
     moments = [_triangle_moments(corners, irradiance[..., c], area) for c in range(3)]
     sums = [
@@ -203,15 +205,14 @@ def _central_moments(
 
 
 def _triangle_moments(corners: Floats, irradiance: Floats, area: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return three integrals over each triangle: of irradiance E, of E times position x, of E times x xᵀ.
+    """Return the integrals of E, E x and E x xᵀ over each triangle, with irradiance E and position x.
 
     corners : (m, 3, 3) corner positions
     irradiance : (m, 3) irradiance of one channel at the corners
     area : (m,) areas of the triangles
-
-    The integral of a product of three barycentric weights is 1/10 of the area if all three are the same, 1/30
-    if two are the same, and 1/60 if all differ. For two weights, it is 1/6 if they are the same, else 1/12.
     """
+    # The integral of a product of three barycentric weights is 1/10 of the area if all three are the same,
+    # 1/30 if two are the same, and 1/60 if all differ. For two weights: 1/6 if they are the same, else 1/12.
     sum_light, sum_position = irradiance.sum(axis=1), corners.sum(axis=1)
     weighted = (irradiance[:, None] @ corners)[:, 0]
     cross = weighted[:, :, None] * sum_position[:, None]
@@ -225,10 +226,10 @@ def _triangle_moments(corners: Floats, irradiance: Floats, area: Floats) -> tupl
 def _point_flux(
     flux: Floats, first_moments: list[Floats], axis_lengths: Floats, principal_axes: Floats
 ) -> Floats:
-    """Return the flux (n, 3, 3) of each node's points by channel.
+    """Return the flux (n, 3, 3) of each of the three points of each node, by channel.
 
-    In each channel, the points have the flux of the node and, in their plane, the centroid of the node's
-    light.
+    In each channel, the points have the same total flux as the node. In the plane of the points, they also
+    have the same centroid as the node's light.
 
     flux : (n, 3) flux of each node by channel
     first_moments : first moments (n, 3) of each channel about the node's centre
@@ -238,7 +239,7 @@ def _point_flux(
     moment = np.einsum("cna,naj->ncj", np.array(first_moments), principal_axes)
     lengths = axis_lengths[:, None]
     ratio = np.divide(moment, lengths, where=lengths > 1e-9, out=np.zeros_like(moment))
-    return np.asarray((flux[:, None] + np.einsum("kj,ncj->nkc", _TRIANGLE_POINTS, ratio)) / 3)
+    return np.asarray((flux[:, None] + np.einsum("kj,ncj->nkc", _UNIT_VARIANCE_POINTS, ratio)) / 3)
 
 
 def _reduce_nodes(

@@ -39,7 +39,7 @@ class TriangleStack(NamedTuple):
 
 @compiled
 def gather_exitance(
-    points: Floats, tree: Octree, profile_table: ProfileTable, error_bound: float, exitance: Floats
+    points: Floats, octree: Octree, profile_table: ProfileTable, error_bound: float, exitance: Floats
 ) -> int:
     """Add the exitance at each point to `exitance`; return the number of nodes and triangles visited.
 
@@ -52,16 +52,16 @@ def gather_exitance(
     visit_count = 0
     for i in range(len(points)):
         node_index = 0
-        while node_index < len(tree.first):
+        while node_index < len(octree.first):
             visit_count += 1
-            if _node_is_far(points[i], node_index, tree, profile_table, error_bound):
-                _add_node(points[i], node_index, tree, profile_table, exitance[i])
-                node_index = tree.next_node[node_index]
+            if _node_is_far(points[i], node_index, octree, profile_table, error_bound):
+                _add_node_light(points[i], node_index, octree, profile_table, exitance[i])
+                node_index = octree.next_node[node_index]
                 continue
-            if tree.next_node[node_index] == node_index + 1:
-                for t in range(tree.first[node_index], tree.end[node_index]):
+            if octree.next_node[node_index] == node_index + 1:
+                for t in range(octree.first[node_index], octree.end[node_index]):
                     visit_count += _gather_triangle(
-                        points[i], t, tree, profile_table, error_bound, stack, exitance[i]
+                        points[i], t, octree, profile_table, error_bound, stack, exitance[i]
                     )
             node_index += 1
     return visit_count
@@ -69,31 +69,34 @@ def gather_exitance(
 
 @compiled
 def _node_is_far(
-    point: Floats, node_index: int, tree: Octree, profile_table: ProfileTable, error_bound: float
+    point: Floats, node_index: int, octree: Octree, profile_table: ProfileTable, error_bound: float
 ) -> bool:
     distance = _distance(
-        point, tree.centre[node_index, 0], tree.centre[node_index, 1], tree.centre[node_index, 2]
+        point, octree.centre[node_index, 0], octree.centre[node_index, 1], octree.centre[node_index, 2]
     )
-    near, far = _table_rows(distance, tree.radius[node_index], profile_table)
+    near, far = _bracketing_rows(distance, octree.radius[node_index], profile_table)
     error = (
-        profile_table.curvature[near] * tree.second_moment[node_index]
-        + profile_table.slope[near] * tree.centroid_error[node_index]
+        profile_table.curvature[near] * octree.second_moment[node_index]
+        + profile_table.slope[near] * octree.centroid_error[node_index]
     )
     return bool(error <= error_bound * profile_table.error_density[far])
 
 
 @compiled
-def _add_node(
-    point: Floats, node_index: int, tree: Octree, profile_table: ProfileTable, exitance: Floats
+def _add_node_light(
+    point: Floats, node_index: int, octree: Octree, profile_table: ProfileTable, exitance: Floats
 ) -> None:
     for k in range(3):
         distance = _distance(
-            point, tree.points[node_index, k, 0], tree.points[node_index, k, 1], tree.points[node_index, k, 2]
+            point,
+            octree.points[node_index, k, 0],
+            octree.points[node_index, k, 1],
+            octree.points[node_index, k, 2],
         )
         red, green, blue = (
-            tree.flux[node_index, k, 0],
-            tree.flux[node_index, k, 1],
-            tree.flux[node_index, k, 2],
+            octree.flux[node_index, k, 0],
+            octree.flux[node_index, k, 1],
+            octree.flux[node_index, k, 2],
         )
         _add_flux(distance, red, green, blue, profile_table, exitance)
 
@@ -102,7 +105,7 @@ def _add_node(
 def _gather_triangle(
     point: Floats,
     triangle_index: int,
-    tree: Octree,
+    octree: Octree,
     profile_table: ProfileTable,
     error_bound: float,
     triangle_stack: TriangleStack,
@@ -110,12 +113,12 @@ def _gather_triangle(
 ) -> int:
     """Add to `exitance` the light that reaches a point from a triangle; return the number of parts visited.
 
-    The triangle is split until each part is small enough for its distance from the point.
+    The triangle is split until the light of each part is approximated well by points at its side midpoints.
     """
     triangle_stack.corners[0], triangle_stack.irradiance[0], triangle_stack.area[0] = (
-        tree.corners[triangle_index],
-        tree.irradiance[triangle_index],
-        tree.area[triangle_index],
+        octree.corners[triangle_index],
+        octree.irradiance[triangle_index],
+        octree.area[triangle_index],
     )
     count, visit_count = 1, 0
     while count > 0:
@@ -141,7 +144,7 @@ def _triangle_is_far(point: Floats, corners: Floats, profile_table: ProfileTable
         distance2 = (corners[k, 0] - x) ** 2 + (corners[k, 1] - y) ** 2 + (corners[k, 2] - z) ** 2
         sum_distance2 += distance2
         max_distance2 = max(max_distance2, distance2)
-    near, far = _table_rows(_distance(point, x, y, z), math.sqrt(max_distance2), profile_table)
+    near, far = _bracketing_rows(_distance(point, x, y, z), math.sqrt(max_distance2), profile_table)
     # Upper bound of the mean square distances of linear light and of the midpoints from the centroid.
     second_moment = (sum_distance2 + 2.0 * max_distance2) / 20.0 + max_distance2 / 4.0
     return bool(
@@ -213,7 +216,7 @@ def _distance(point: Floats, x: float, y: float, z: float) -> float:
 
 
 @compiled
-def _table_rows(distance: float, ball_radius: float, profile_table: ProfileTable) -> tuple[int, int]:
+def _bracketing_rows(distance: float, ball_radius: float, profile_table: ProfileTable) -> tuple[int, int]:
     """Return the rows of the profile's table that bracket the distances of all points of a ball.
 
     distance : distance of the ball's centre from the point at which light is gathered [mm]

@@ -75,18 +75,18 @@ def path_trace(
     """Return the path-traced image of a scene with a medium inside its skin.
 
     Maps, diffusion profile and surface reflection of the scene are ignored. Light passes the surface without
-    refraction, so that paths can connect to point lights from inside the medium. Such images are comparable
-    with the real-time renderer's if its profile has eta 1. Lights are invisible and cast no shadows on one
-    another.
+    refraction, so that paths can connect to point lights from inside the medium. The image is comparable with
+    an image of the real-time renderer if the renderer's diffusion profile has an index of refraction of 1.
+    Lights are invisible and cast no shadows on one another.
 
     medium : index-matched (eta 1), isotropically scattering medium with three channels; the interfaces
-        between its layers are copies of the skin, offset inwards by the depths of the layers. Or a
-        `Lambertian`, for directly lit skin without scattering
+        between its layers are copies of the skin, offset inwards by the depths of the layers. A
+        `Lambertian` gives directly lit skin without subsurface scattering
     samples : smallest number of paths per pixel; each pass traces 4. Passes are cached on disk under a hash
         of the scene, so a later call with more samples only adds the missing passes
     settings : settings of the frame, of which only the size is used
     variant : variant of Mitsuba; "llvm_ad_rgb" takes half the time for many samples but needs a recent LLVM
-        (14 and 15 end the process), and "cuda_ad_rgb" needs an NVIDIA GPU
+        (versions 14 and 15 crash), and "cuda_ad_rgb" needs an NVIDIA GPU
     use_cache : whether to read and write passes on disk; without the cache, `PathTraced.seconds` is the
         duration of this call
     progress : function called with the number of finished passes and the number of all passes
@@ -100,7 +100,7 @@ def path_trace(
     check_traceable(medium)
     mi, size = load_mitsuba(), (settings or Settings()).size
     trace_settings = f"{mi.__version__} {variant} {SAMPLES_PER_PASS} {RUSSIAN_ROULETTE_DEPTH}"
-    key = scene_key(scene, medium, size, trace_settings) if use_cache else None
+    key = scene_cache_key(scene, medium, size, trace_settings) if use_cache else None
     return render_passes(
         mi,
         variant,
@@ -119,24 +119,26 @@ def render_passes(
     min_pass_count: int,
     picture_size: tuple[int, int],
     cache_key: str | None,
-    build_radiance: Callable[[], tuple[MitsubaObject, tuple[str, ...]]],
-    build_coverage: Callable[[], MitsubaObject],
+    build_radiance_scene: Callable[[], tuple[MitsubaObject, tuple[str, ...]]],
+    build_coverage_scene: Callable[[], MitsubaObject],
     progress: ProgressCallback | None,
 ) -> PathTraced:
     """Return the mean of at least `min_pass_count` passes of Mitsuba, including cached ones.
 
     cache_key : name of the cached passes; None for no cache
-    build_radiance : function that builds the Mitsuba scene that renders radiance, and returns notes with it
-    build_coverage : function that builds the Mitsuba scene whose image is the skin's coverage of each pixel
+    build_radiance_scene : function that returns the Mitsuba scene for radiance, and notes on changes made to
+        the head
+    build_coverage_scene : function that returns the Mitsuba scene whose image is the skin's coverage of each
+        pixel
     """
     passes = load_passes(cache_key, picture_size) if cache_key else None
     if passes is None or passes.count < min_pass_count:
         with mitsuba_variant(mi, variant):
-            built_scene, notes = build_radiance()
+            built_scene, notes = build_radiance_scene()
             if passes is None:
-                mask = np.array(mi.render(build_coverage(), spp=_COVERAGE_SAMPLES_PER_PIXEL), np.float32)[
-                    ..., 0
-                ]
+                mask = np.array(
+                    mi.render(build_coverage_scene(), spp=_COVERAGE_SAMPLES_PER_PIXEL), np.float32
+                )[..., 0]
                 passes = PassStatistics.empty(picture_size, np.clip(mask, 0.0, 1.0), notes)
             add_passes(mi, built_scene, passes, min_pass_count, cache_key, progress)
     return PathTraced(
@@ -149,21 +151,26 @@ def render_passes(
     )
 
 
-def pass_count(samples: int) -> int:
-    """Return the number of passes that have at least `samples` paths per pixel in total.
+def pass_count(samples_per_pixel: int) -> int:
+    """Return the number of passes needed for at least `samples_per_pixel` paths per pixel in total.
 
-    Raises DermisError when `samples` is below 1 or too large.
+    Raises DermisError when `samples_per_pixel` is below 1 or too large.
     """
-    if not (isinstance(samples, int | np.integer) and 1 <= samples <= _MAX_SAMPLES_PER_PIXEL):
+    if not (
+        isinstance(samples_per_pixel, int | np.integer) and 1 <= samples_per_pixel <= _MAX_SAMPLES_PER_PIXEL
+    ):
         refuse(
-            "samples", f"a whole number from 1 to {_MAX_SAMPLES_PER_PIXEL}", f"got {samples}", "Correct it"
+            "samples",
+            f"a whole number from 1 to {_MAX_SAMPLES_PER_PIXEL}",
+            f"got {samples_per_pixel}",
+            "Correct it",
         )
-    return max(_MIN_PASS_COUNT, -(-samples // SAMPLES_PER_PASS))
+    return max(_MIN_PASS_COUNT, -(-samples_per_pixel // SAMPLES_PER_PASS))
 
 
 def add_passes(
     mi: Mitsuba,
-    built_scene: MitsubaObject,
+    loaded_scene: MitsubaObject,
     passes: PassStatistics,
     min_pass_count: int,
     cache_key: str | None,
@@ -177,9 +184,9 @@ def add_passes(
     try:
         while passes.count < min_pass_count:
             started = time.perf_counter()
-            image = np.array(mi.render(built_scene, spp=SAMPLES_PER_PASS, seed=passes.count), np.float64)
+            image = np.array(mi.render(loaded_scene, spp=SAMPLES_PER_PASS, seed=passes.count), np.float64)
             ended = time.perf_counter()
-            passes.add(image, ended - started)
+            passes.add_pass(image, ended - started)
             if progress is not None:
                 progress(passes.count, min_pass_count)
             if cache_key and ended - last_save > _CACHE_SAVE_INTERVAL_S and passes.count < min_pass_count:
@@ -218,7 +225,7 @@ class PassStatistics:
     def empty(
         cls, picture_size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]
     ) -> PassStatistics:
-        """Return statistics from before the first pass.
+        """Return the statistics of a rendering before its first pass.
 
         picture_size : width and height of the image [pixel]
         """
@@ -230,7 +237,7 @@ class PassStatistics:
         """Return the variance (h, w, 3) of the mean of all passes."""
         return self.spread / (self.count * (self.count - 1))
 
-    def add(self, image: Doubles, seconds: float) -> None:
+    def add_pass(self, image: Doubles, seconds: float) -> None:
         """Add the image (h, w, 3) of a pass to the mean and to the squared deviations, by [Welford1962]."""
         self.count += 1
         self.seconds += seconds
@@ -255,7 +262,7 @@ def hash_medium(digest: hashlib._Hash, medium: Medium) -> None:
         digest.update(np.ascontiguousarray([layer.sigma_a, layer.sigma_s_prime], np.float64).tobytes())
 
 
-def scene_key(
+def scene_cache_key(
     scene: Scene, medium: Medium | Lambertian, picture_size: tuple[int, int], trace_settings: str
 ) -> str:
     """Return a hash of all inputs of a path-traced image, used as the name of its cached passes.

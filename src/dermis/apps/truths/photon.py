@@ -23,7 +23,7 @@ MAX_PHOTON_EVENTS = 100_000
 
 
 class LayerStack(NamedTuple):
-    """Optical properties of each layer and of the air on both sides, and the depths of the faces.
+    """Optical properties of each layer and of the air on both sides, and the depths of the layers' faces.
 
     The properties are arrays of the shape (layers + 2,), and the depths have the shape (layers + 1,).
     """
@@ -36,12 +36,12 @@ class LayerStack(NamedTuple):
 
 
 class PhotonTally(NamedTuple):
-    """Numbers of photons whose walk ended in each of several ways.
+    """Numbers of photons by the way in which their walks ended.
 
-    reflected : (rings + 1,) photons that left above after scattering, by the ring around the axis in which
-        they left; the last entry counts photons that left beyond the last ring
-    transmitted : (rings + 1,) photons that left below after scattering, counted in the same way
-    unscattered : (2,) photons that left above and below without scattering
+    reflected : (rings + 1,) photons that left through the top after scattering, counted by the ring around
+        the axis in which they left; the last entry counts those outside all rings
+    transmitted : (rings + 1,) photons that left through the bottom after scattering, counted in the same way
+    unscattered : (2,) photons that left through the top and the bottom without scattering
     absorbed : (layers,) photons that were absorbed in each layer
     unfinished : (1,) photons that were dropped after `MAX_PHOTON_EVENTS` events
     """

@@ -12,7 +12,7 @@ from dermis.base.errors import refuse
 
 Floats = NDArray[np.float64]
 
-TABLE_ROWS = 8192
+PROFILE_TABLE_ROWS = 8192
 """Rows evenly spaced in the square root of the radius; linear interpolation has an error of 5e-6."""
 
 _RELATIVE_GAUSSIAN_CUTOFF = 1e-12  # relative to the peak of a Gaussian
@@ -83,14 +83,15 @@ Profile = GaussianSum | RadialTable
 class ProfileTable(NamedTuple):
     """Diffusion profile R(r) in rows evenly spaced in the square root of r, with bounds of its derivatives.
 
-    Each bound holds for this and all larger radii and for all channels, relative to the channel's energy.
+    Each bound holds at the radius of its row and at all larger radii, for the profile of each channel divided
+    by the channel's energy.
 
     rows_per_root : number of rows per unit of the square root of the radius [mm^(-1/2)]
     R : (rows, 3) profile, 0 in the last row [mm^-2]
     slope : (rows,) upper bound of |dR/dr| [mm^-3]
     curvature : (rows,) upper bound of half the second derivative in any direction [mm^-4]
-    error_density : (rows,) share of the permitted error per area at this radius; it decreases with the
-        radius, and its integral over the plane is 1 [mm^-2]
+    error_density : (rows,) fraction of the total permitted error that a unit of area at the row's radius may
+        cause; it decreases with the radius, and its integral over the plane is 1 [mm^-2]
     """
 
     rows_per_root: float
@@ -101,13 +102,13 @@ class ProfileTable(NamedTuple):
 
 
 def tabulate_profile(profile: Profile) -> ProfileTable:
-    """Return the table of a profile, with the permitted error distributed over the radii.
+    """Return the table of a profile, with bounds of its derivatives and the permitted error at each radius.
 
-    The permitted error is mainly proportional to the square root of the curvature, which keeps the number
-    of surface patches small.
+    The permitted error is mainly proportional to the square root of the curvature. As a result, a surface
+    integral evaluates the profile for a small number of surface patches.
     """
     end = profile.end_mm
-    root = np.linspace(0.0, np.sqrt(end), TABLE_ROWS)
+    root = np.linspace(0.0, np.sqrt(end), PROFILE_TABLE_ROWS)
     r = root**2
     # The tangential second derivative is R'/r, which tends to R'' on the axis.
     off_axis = np.maximum(r, r[1])
@@ -116,12 +117,12 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
     nonzero = energy > 0
     if not nonzero.any():
         refuse("profile", "light in at least one channel", "it is 0 everywhere", "Correct it")
-    slope = _bound_from_radius_on(np.abs(dR), energy, nonzero)
+    slope = _bound_beyond_radius(np.abs(dR), energy, nonzero)
     bend = np.maximum(np.abs(ddR), np.abs(dR) / off_axis[:, None])
-    curvature = _bound_from_radius_on(0.5 * bend, energy, nonzero)
+    curvature = _bound_beyond_radius(0.5 * bend, energy, nonzero)
     R[-1] = 0.0
     return ProfileTable(
-        (TABLE_ROWS - 1) / np.sqrt(end),
+        (PROFILE_TABLE_ROWS - 1) / np.sqrt(end),
         np.ascontiguousarray(R),
         slope,
         curvature,
@@ -129,10 +130,10 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
     )
 
 
-def _bound_from_radius_on(radial_values: Floats, energy: Floats, has_energy: NDArray[np.bool_]) -> Floats:
-    """Return for each row the largest value (rows,) that any channel has at this or a larger radius.
+def _bound_beyond_radius(radial_values: Floats, energy: Floats, has_energy: NDArray[np.bool_]) -> Floats:
+    """Return for each row the largest value (rows,) that any channel has in this row or in a later row.
 
-    radial_values : (rows, 3) function of the radius by channel
+    radial_values : (rows, 3) function of the radius by channel, in order of increasing radius
     energy : (3,) energy of the profile by channel; the values of each channel are divided by it
     has_energy : (3,) mask of channels with energy
     """
@@ -151,7 +152,7 @@ def _error_density(curvature: Floats, radius_mm: Floats) -> Floats:
 
 
 def _plane_integral(radial_values: Floats, radius_mm: Floats) -> Floats:
-    """Return the integrals (k,) of k radial functions f over the plane, of 2 pi r f(r) over r.
+    """Return the integrals (k,) of k radial functions f(r) over the plane: of 2 pi r f(r) over r.
 
     radial_values : (rows, k) values of k functions at the radii
     radius_mm : (rows,) radii r [mm]

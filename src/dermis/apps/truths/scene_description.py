@@ -117,8 +117,8 @@ def cycles_light(
     """Return Cycles' description of a light.
 
     lamp_type : Cycles' type of the light
-    irradiance : (3,) irradiance of the light in dermis
-    energy_per_irradiance : factor from irradiance to Cycles' energy of the light
+    irradiance : (3,) field `irradiance` of the light in dermis
+    energy_per_irradiance : factor from this irradiance to Cycles' energy of the light
     lamp_properties : further properties of the light
     """
     brightest = float(max(irradiance))

@@ -30,11 +30,11 @@ MAX_PHOTONS = 10**10
 
 _MAX_SEED = 2**63 - 1
 _PHOTONS_PER_CALL = 20_000  # between two checks for Ctrl-C
-_REPORTED_UNFINISHED_FRACTION = 1e-3  # fraction of dropped photons from which on a warning reports it
+_MIN_REPORTED_UNFINISHED_FRACTION = 1e-3  # fraction of dropped photons from which on a warning reports it
 
 
 def default_ring_edges() -> Floats:
-    """Return the default radii of ring edges: 0, then 0.001 mm, then each 12 % larger, up to 40 mm [mm]."""
+    """Return the default radii of ring edges: 0, and a geometric series from 0.001 mm to 40 mm [mm]."""
     return np.concatenate([[0.0], np.geomspace(1e-3, 40.0, 93)])
 
 
@@ -55,7 +55,7 @@ def trace_slab(
 
     Source: [Wang1995].
     """
-    photons = _checked_photons(layers, photons, seed)
+    photons = _checked_photon_count(layers, photons, seed)
     edges = default_ring_edges() if edges_mm is None else _checked_edges(edges_mm)
     tally = _trace_batches(_layer_stack(layers), photons, seed, edges, progress)
     return _slab_result(tally, photons, edges, layers[0].eta)
@@ -132,17 +132,17 @@ def monte_carlo_profile(
 
 def _unfinished_warnings(channel_results: Sequence[SlabResult]) -> list[str]:
     lost = max(run.relative_to_entering.unfinished for run in channel_results)
-    if lost < _REPORTED_UNFINISHED_FRACTION:
+    if lost < _MIN_REPORTED_UNFINISHED_FRACTION:
         return []
     return [f"{lost:.1%} of the light was dropped after very many scatterings and is missing from the total"]
 
 
-def _scattering_layer(layer: Layer, channel: int, g: float, eta: float) -> ScatteringLayer:
-    sigma_s = float(layer.sigma_s_prime[channel]) / (1.0 - g)
-    return ScatteringLayer(float(layer.sigma_a[channel]), sigma_s, layer.thickness_mm, g, eta)
+def _scattering_layer(layer: Layer, channel_index: int, g: float, eta: float) -> ScatteringLayer:
+    sigma_s = float(layer.sigma_s_prime[channel_index]) / (1.0 - g)
+    return ScatteringLayer(float(layer.sigma_a[channel_index]), sigma_s, layer.thickness_mm, g, eta)
 
 
-def _checked_photons(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> int:
+def _checked_photon_count(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> int:
     if not layers:
         refuse("slab", "at least one layer", "got none", "Add one")
     if np.isinf([layer.thickness_mm for layer in layers[:-1]]).any():
@@ -163,20 +163,20 @@ def _checked_edges(edges_mm: ArrayLike) -> Floats:
 def _layer_stack(layers: Sequence[ScatteringLayer]) -> LayerStack:
     from dermis.apps.truths.photon import LayerStack
 
-    def between_air(air_value: float, layer_values: list[float]) -> Floats:
+    def padded_with_air(air_value: float, layer_values: list[float]) -> Floats:
         return np.array([air_value, *layer_values, air_value])
 
     return LayerStack(
-        eta=between_air(1.0, [layer.eta for layer in layers]),
-        sigma_t=between_air(0.0, [layer.sigma_t for layer in layers]),
-        albedo=between_air(0.0, [layer.albedo for layer in layers]),
-        g=between_air(0.0, [layer.g for layer in layers]),
+        eta=padded_with_air(1.0, [layer.eta for layer in layers]),
+        sigma_t=padded_with_air(0.0, [layer.sigma_t for layer in layers]),
+        albedo=padded_with_air(0.0, [layer.albedo for layer in layers]),
+        g=padded_with_air(0.0, [layer.g for layer in layers]),
         face_mm=np.cumsum([0.0, *(layer.thickness_mm for layer in layers)]),
     )
 
 
 def _trace_batches(
-    layer_stack: LayerStack, photons: int, seed: int, edges: Floats, progress: ProgressCallback | None
+    layer_stack: LayerStack, photons: int, seed: int, ring_edges_mm: Floats, progress: ProgressCallback | None
 ) -> PhotonTally:
     from numba import config
 
@@ -185,13 +185,15 @@ def _trace_batches(
     stop = Event()
 
     def trace_batch(photon_count: int, seeds: np.random.SeedSequence) -> PhotonTally:
-        lengths = (len(edges), len(edges), 2, len(layer_stack.eta) - 2, 1)
+        lengths = (len(ring_edges_mm), len(ring_edges_mm), 2, len(layer_stack.eta) - 2, 1)
         tally = PhotonTally(*(np.zeros(length, np.int64) for length in lengths))
         rng = seeds.generate_state(4, np.uint64).astype(np.uint64)
         for done in range(0, photon_count, _PHOTONS_PER_CALL):
             if stop.is_set():
                 break
-            trace_photons(min(_PHOTONS_PER_CALL, photon_count - done), layer_stack, edges**2, rng, tally)
+            trace_photons(
+                min(_PHOTONS_PER_CALL, photon_count - done), layer_stack, ring_edges_mm**2, rng, tally
+            )
         return tally
 
     sizes = [
@@ -211,11 +213,11 @@ def _trace_batches(
     return PhotonTally(*(np.sum(parts, axis=0) for parts in zip(*tallies, strict=True)))
 
 
-def _slab_result(tally: PhotonTally, photons: int, edges: Floats, eta: float) -> SlabResult:
+def _slab_result(tally: PhotonTally, photons: int, ring_edges_mm: Floats, eta: float) -> SlabResult:
     from dermis.apps.truths.photon import refract
 
     specular = refract(1.0, 1.0 / eta)[0]
-    ring_areas = np.pi * np.diff(edges**2)
+    ring_areas = np.pi * np.diff(ring_edges_mm**2)
 
     def power_fraction(photon_counts: Counts) -> Floats:
         return (1.0 - specular) * photon_counts / photons
@@ -227,7 +229,7 @@ def _slab_result(tally: PhotonTally, photons: int, edges: Floats, eta: float) ->
     reflected, transmitted = tally.reflected, tally.transmitted
     return SlabResult(
         photons=photons,
-        edges_mm=edges,
+        edges_mm=ring_edges_mm,
         specular=specular,
         reflectance=power_fraction(reflected[:-1]) / ring_areas,
         reflectance_se=standard_error(reflected[:-1]) / ring_areas,
@@ -298,18 +300,19 @@ class ScatteringLayer:
 
 @dataclass(frozen=True, eq=False)
 class SlabResult:
-    """Reflected, transmitted and absorbed fractions of the beam's power; `_se` marks standard errors [-].
+    """Reflected, transmitted and absorbed fractions of the beam's power, with standard errors [-].
 
-    The specular, total, unscattered, absorbed and unfinished fractions sum to 1. The standard errors are
-    those of a binomial distribution, and 0 where no photon was counted.
+    The specular, total, unscattered, absorbed and unfinished fractions sum to 1. Names that end in `_se` are
+    standard errors. They are those of a binomial distribution, and 0 where no photon was counted.
 
     photons : number of photons traced, all of which entered the stack
     edges_mm : (n + 1,) radii of the ring edges, from 0 [mm]
     specular : fraction that the top face reflects
     reflectance, transmittance : (n,) R(r) and T(r) of scattered light, averaged over each ring [1/mm2]
-    total_reflectance, total_transmittance : fractions that scatter and leave above and below, at any radius
-    overflow_reflectance, overflow_transmittance : parts of these totals that leave beyond the last ring
-    unscattered_reflectance, unscattered_transmittance : fractions that leave above and below on the axis,
+    total_reflectance, total_transmittance : fractions that leave through the top and the bottom after
+        scattering, at any radius
+    overflow_reflectance, overflow_transmittance : the part of each total that leaves outside all rings
+    unscattered_reflectance, unscattered_transmittance : fractions that leave through the top and the bottom
         without scattering
     absorbed : (layers,) fraction absorbed in each layer
     unfinished : fraction dropped after `MAX_PHOTON_EVENTS` events; above 0 only where almost nothing absorbs

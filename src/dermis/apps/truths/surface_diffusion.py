@@ -58,7 +58,7 @@ def diffuse_on_surface(
     Source: [Bank1985] for TR-BDF2, [BobenkoSpringborn2007] for the Laplacian.
     """
     vertices, corners = _checked_surface(positions, triangles)
-    checked_values = _checked_values(vertex_values, len(vertices))
+    checked_values = _checked_vertex_values(vertex_values, len(vertices))
     added_variances = np.diff(_checked_variances(variances_mm2), prepend=0.0)
     _check_resolution(vertices, corners, variances_mm2, step_count)
     mass, stiffness = mass_and_stiffness(
@@ -66,7 +66,7 @@ def diffuse_on_surface(
     )
     levels = [checked_values]
     for variance in added_variances:
-        levels.append(_diffuse(mass, stiffness, levels[-1], float(variance), step_count))
+        levels.append(_diffuse_vertex_values(mass, stiffness, levels[-1], float(variance), step_count))
     return np.stack(levels[1:])
 
 
@@ -98,9 +98,9 @@ def resolved_levels(variances_mm2: ArrayLike, edge_mm: float) -> NDArray[np.bool
 
 
 def max_edge_mm(variances_mm2: ArrayLike) -> float:
-    """Return the largest edge length of a mesh that resolves all given Gaussian blurs [mm].
+    """Return the largest edge length at which a mesh resolves all given Gaussian blurs [mm].
 
-    It is half the smallest standard deviation that a blur adds to the next smaller blur.
+    This length is half the smallest standard deviation that a blur adds to the next smaller blur.
 
     variances_mm2 : (k,) increasing variances of the blurs, above 0 [mm2]
     """
@@ -109,16 +109,16 @@ def max_edge_mm(variances_mm2: ArrayLike) -> float:
 
 
 def patch_margin_mm(variances_mm2: ArrayLike) -> float:
-    """Return by how much a patch must extend beyond the ball where blurred light is valid [mm].
+    """Return how far a surface patch must extend beyond the ball in which its blurred values are valid [mm].
 
-    It is four standard deviations of the widest blur.
+    This margin is four standard deviations of the widest blur.
 
     variances_mm2 : (k,) increasing variances of the blurs [mm2]
     """
     return PATCH_MARGIN_SIGMAS * float(np.sqrt(_checked_variances(variances_mm2)[-1]))
 
 
-def _diffuse(
+def _diffuse_vertex_values(
     mass: csc_array, stiffness: csc_array, vertex_values: Floats, variance_mm2: float, step_count: int
 ) -> Floats:
     """Return vertex values after diffusion by the heat equation for the time `variance_mm2` / 2.
@@ -160,7 +160,7 @@ def _checked_surface(positions: ArrayLike, triangles: ArrayLike) -> tuple[Floats
     return vertices, corners
 
 
-def _checked_values(values_at_vertices: ArrayLike, vertex_count: int) -> Floats:
+def _checked_vertex_values(values_at_vertices: ArrayLike, vertex_count: int) -> Floats:
     vertex_values = np.asarray(values_at_vertices, dtype=np.float64)
     if not (
         vertex_values.ndim == 2 and len(vertex_values) == vertex_count and np.isfinite(vertex_values).all()
@@ -240,8 +240,8 @@ def intrinsic_triangulation(positions: Floats, triangles: Index) -> IntrinsicTri
     return IntrinsicTriangulation(triangles, side, length + missing)
 
 
-def intrinsic_delaunay(surface: IntrinsicTriangulation) -> IntrinsicTriangulation:
-    """Return the intrinsic Delaunay triangulation of a surface, by edge flips.
+def intrinsic_delaunay(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
+    """Return the intrinsic Delaunay triangulation of the same surface, computed by edge flips.
 
     The two angles opposite each edge then sum to at most pi, so heat flows from hot to cold along every edge,
     even if the mesh has obtuse angles. An edge is not flipped if it lies on a border, if more than two
@@ -249,10 +249,14 @@ def intrinsic_delaunay(surface: IntrinsicTriangulation) -> IntrinsicTriangulatio
 
     Source: [BobenkoSpringborn2007]; [Fisher2007] for flips by lengths.
     """
-    corners, side, length = surface.corners.copy(), surface.side.copy(), surface.length.copy()
+    corners, side, length = (
+        triangulation.corners.copy(),
+        triangulation.side.copy(),
+        triangulation.length.copy(),
+    )
     flipped = IntrinsicTriangulation(corners, side, length)
     flippable = _interior_edges(corners, side, len(length))
-    # Each flip lowers the Dirichlet energy of every function on the surface, so the loop ends.
+    # Each flip lowers the Dirichlet energy of every function on the triangulation, so the loop ends.
     for _ in range(_MAX_FLIP_SWEEPS):
         weight = sum_by_index(side.ravel(), flipped.cotangents().reshape(-1, 1), len(length))[:, 0]
         illegal = flippable & (weight < -_COTANGENT_FLIP_TOLERANCE)
@@ -336,7 +340,9 @@ def _apex_coordinates(
     return along, np.sqrt(np.maximum(start_side_length**2 - along**2, 0))
 
 
-def mass_and_stiffness(surface: IntrinsicTriangulation, vertex_count: int) -> tuple[csc_array, csc_array]:
+def mass_and_stiffness(
+    triangulation: IntrinsicTriangulation, vertex_count: int
+) -> tuple[csc_array, csc_array]:
     """Return the mass matrix M [mm2] and the stiffness matrix K [-] of linear finite elements, each (n, n).
 
     The heat equation is M du/dt = -K u for vertex values u. M is the mean of the lumped and the consistent
@@ -349,12 +355,12 @@ def mass_and_stiffness(surface: IntrinsicTriangulation, vertex_count: int) -> tu
     """
     from scipy.sparse import coo_array, diags_array
 
-    start = surface.corners
+    start = triangulation.corners
     end = np.roll(start, -1, axis=1)
-    conductance = surface.cotangents() / 2
-    corner_area = np.repeat(surface.areas()[:, None], 3, axis=1)
+    conductance = triangulation.cotangents() / 2
+    corner_area = np.repeat(triangulation.areas()[:, None], 3, axis=1)
 
-    def assemble(off_diagonal: Floats, diagonal: Floats) -> csc_array:
+    def assemble_matrix(off_diagonal: Floats, diagonal: Floats) -> csc_array:
         """Return a sparse symmetric matrix (n, n), summed over the sides of all triangles.
 
         off_diagonal : (f, 3) entry between the vertices at the start and the end of each side
@@ -365,7 +371,7 @@ def mass_and_stiffness(surface: IntrinsicTriangulation, vertex_count: int) -> tu
         values = np.concatenate([entry.ravel() for entry in (off_diagonal, off_diagonal, diagonal)])
         return coo_array((values, (rows, columns)), shape=(vertex_count, vertex_count)).tocsc()
 
-    stiffness = assemble(-conductance, conductance + np.roll(conductance, 1, axis=1))
+    stiffness = assemble_matrix(-conductance, conductance + np.roll(conductance, 1, axis=1))
     isolated = np.bincount(start.ravel(), minlength=vertex_count) == 0
     identity = diags_array(isolated.astype(np.float64))
-    return (assemble(corner_area / 24, corner_area / 4) + identity).tocsc(), stiffness
+    return (assemble_matrix(corner_area / 24, corner_area / 4) + identity).tocsc(), stiffness

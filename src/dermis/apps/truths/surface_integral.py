@@ -27,14 +27,14 @@ def integrate_exitance(
 ) -> Floats:
     """Return the radiant exitance (n, 3) at points x: the integral of R(|x - y|) E(y) dA over the surface.
 
-    points : (n, 3) positions x on the surface [mm]
-    samples : irradiance E, linear on small triangles; the caller chooses them small enough for the light
-    profile : profile R, a function of the Euclidean distance, so light also passes through thin parts
-    relative_error : expected root mean square error of the integral divided by its mean, 1e-5 to 0.05 [-]
-
     Irradiance is gathered from an octree. A node or triangle is replaced by three points if the remainder of
-    Taylor's theorem is small enough; otherwise it is divided. Most of these errors cancel, so the limit of
-    the remainder is derived from `relative_error` by a measured relation.
+    Taylor's theorem is below a limit, and is divided otherwise. Most of these errors cancel in the sum, so
+    the limit is derived from `relative_error` by a measured relation.
+
+    points : (n, 3) positions x on the surface [mm]
+    samples : irradiance E, linear on triangles that must be small enough for shadows and other details
+    profile : profile R, a function of the Euclidean distance, so light also passes through ears
+    relative_error : expected root mean square error of the integral divided by its mean, 1e-5 to 0.05 [-]
 
     Source: [JensenBuhler2002], but with Taylor's remainder as criterion in place of the solid angle.
     """
@@ -68,7 +68,7 @@ def integrate_exitance(
     return exitance
 
 
-def _weight_error_bounds(tree: Octree, error_weight: float) -> Octree:
+def _weight_error_bounds(octree: Octree, error_weight: float) -> Octree:
     """Return the octree with larger bounds for errors that hardly cancel in the sum over nodes.
 
     `centroid_error` is multiplied by a weight, and `moment_error` times this weight is added to
@@ -76,5 +76,5 @@ def _weight_error_bounds(tree: Octree, error_weight: float) -> Octree:
 
     error_weight : weight of both bounds
     """
-    second_moment = tree.second_moment + error_weight * tree.moment_error
-    return tree._replace(second_moment=second_moment, centroid_error=error_weight * tree.centroid_error)
+    second_moment = octree.second_moment + error_weight * octree.moment_error
+    return octree._replace(second_moment=second_moment, centroid_error=error_weight * octree.centroid_error)

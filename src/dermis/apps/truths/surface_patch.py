@@ -13,7 +13,7 @@ from dermis.base.errors import refuse
 from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.mesh import Mesh
 
-MAX_TRIANGLES = 8_000_000
+MAX_PATCH_TRIANGLES = 8_000_000
 _BARYCENTRIC_TOLERANCE = 1e-9
 
 
@@ -156,8 +156,8 @@ def _triangles_in_reach(
     edge_mm : largest edge length after splitting [mm]
 
     Raises DermisError when no triangle is within reach, or when splitting the triangles entirely within reach
-    would result in too many triangles. Their number is estimated for equilateral triangles, which need the
-    fewest.
+    would result in too many triangles. The number is estimated as if all triangles were equilateral, which
+    gives the smallest number.
     """
     midpoint = corners.mean(axis=1)
     size = np.linalg.norm(corners - midpoint[:, None], axis=2).max(axis=1)
@@ -167,7 +167,7 @@ def _triangles_in_reach(
         refuse("patch", "surface around its centre", f"there is none at {centre.tolist()}", "Move the centre")
     within = triangle_areas(corners[distance + size <= reach_mm]).sum()
     count = within / (np.sqrt(3) / 4 * edge_mm**2)
-    if count > MAX_TRIANGLES:
-        actual = f"edges of {edge_mm:g} mm make more than {MAX_TRIANGLES}"
+    if count > MAX_PATCH_TRIANGLES:
+        actual = f"edges of {edge_mm:g} mm make more than {MAX_PATCH_TRIANGLES}"
         refuse("patch", "a few million triangles", actual, "Take longer edges or a smaller radius")
     return in_reach

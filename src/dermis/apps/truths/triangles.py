@@ -10,7 +10,7 @@ from dermis.mesh.geometry import edges
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_SPLIT_PATTERNS = (
+_TRIANGLE_SPLIT_PATTERNS = (
     [[0, 1, 2]],
     [[0, 3, 2], [3, 1, 2]],
     [[3, 1, 4], [0, 3, 4], [0, 4, 2]],
@@ -39,7 +39,7 @@ def triangle_edges(positions: Floats, corners: Index) -> tuple[Index, Index, Flo
 def split_triangles(
     corners: Index, barycentric: Floats, side_midpoints: Index, positions: Floats | None = None
 ) -> tuple[Index, Index, Floats]:
-    """Split triangles at halved sides; return the new triangles with their parents and weights.
+    """Split triangles at halved sides; return the new triangles, and where they lie in the old triangles.
 
     The results are the vertex indices (m, 3) of the new triangles; the index (m,) of the triangle that each
     of them is a part of; and the barycentric weights (m, 3, 3) of their corners, defined as in `barycentric`.
@@ -64,9 +64,9 @@ def split_triangles(
     if positions is not None:
         diagonals = positions[vertices[:, [0, 3]]] - positions[vertices[:, [4, 2]]]
         first_longer = np.subtract(*np.square(diagonals).sum(axis=2).T) > 0
-        pattern_index = np.where((count == 2) & first_longer, len(_SPLIT_PATTERNS) - 1, count)
+        pattern_index = np.where((count == 2) & first_longer, len(_TRIANGLE_SPLIT_PATTERNS) - 1, count)
     parts = []
-    for index, pattern in enumerate(_SPLIT_PATTERNS):
+    for index, pattern in enumerate(_TRIANGLE_SPLIT_PATTERNS):
         parent = np.flatnonzero(pattern_index == index)
         new_triangles = vertices[parent][:, pattern].reshape(-1, 3)
         new_weights = vertex_weights[parent][:, pattern].reshape(-1, 3, 3)

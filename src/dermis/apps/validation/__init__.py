@@ -1,1 +1,1 @@
-"""Measurements of accuracy and speed: errors against references, other renderers, benchmarks."""
+"""Measurements of accuracy and speed: comparisons with references and other renderers, and benchmarks."""

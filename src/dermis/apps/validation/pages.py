@@ -91,7 +91,7 @@ def write_results(path: Path, results: Mapping[str, Any], digits: int | None = N
     results : measured values, JSON-compatible
     digits : significant digits of floats; None for all digits
     """
-    values = results if digits is None else _rounded(results, digits)
+    values = results if digits is None else _round_floats(results, digits)
     with atomic_file(path) as file:
         file.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
 
@@ -101,13 +101,13 @@ def read_results(path: Path) -> Any:
     return json.loads(require_in_checkout(path).read_text(encoding="utf-8"))
 
 
-def _rounded(nested_value: object, digits: int) -> object:
+def _round_floats(nested_value: object, digits: int) -> object:
     if isinstance(nested_value, float):
         return float(f"{nested_value:.{digits}g}")
     if isinstance(nested_value, Mapping):
-        return {str(key): _rounded(one, digits) for key, one in nested_value.items()}
+        return {str(key): _round_floats(one, digits) for key, one in nested_value.items()}
     return (
-        [_rounded(one, digits) for one in nested_value]
+        [_round_floats(one, digits) for one in nested_value]
         if isinstance(nested_value, list | tuple)
         else nested_value
     )

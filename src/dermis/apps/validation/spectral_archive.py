@@ -53,14 +53,14 @@ class Archive(NamedTuple):
         """Return the CIELAB colours (n, 3) of the spectra under D65."""
         return lab(self.spectra @ rgb_weights(WAVELENGTHS_NM).T)
 
-    def select_rows(self, selection: NDArray[np.bool_] | NDArray[np.int64]) -> Archive:
-        """Return selected measurements, by a mask or by indices."""
-        columns: Any = (column[selection] for column in self)
+    def select_rows(self, row_selection: NDArray[np.bool_] | NDArray[np.int64]) -> Archive:
+        """Return the measurements that a mask or indices select."""
+        columns: Any = (column[row_selection] for column in self)
         return Archive(*columns)
 
-    def sample_rows(self, count: int, seed: int = 0) -> Archive:
-        """Return at most `count` measurements, chosen at random."""
-        return self.select_rows(np.random.default_rng(seed).permutation(len(self.spectra))[:count])
+    def sample_rows(self, row_count: int, seed: int = 0) -> Archive:
+        """Return at most `row_count` measurements, chosen at random."""
+        return self.select_rows(np.random.default_rng(seed).permutation(len(self.spectra))[:row_count])
 
 
 @cache

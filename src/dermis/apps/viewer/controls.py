@@ -24,8 +24,9 @@ _DIVIDER_GRAB_RADIUS_PX = 8.0  # distance from the divider within which a pointe
 
 
 class Controls:
-    """Conversion of input events to steps of the undo history.
+    """Handler of pointer, touch and keyboard input over the picture, which changes the viewer state.
 
+    history : undo history, which receives the changed states
     displayed_state : function that returns the state on screen, which differs from the current state of the
         history while a motion plays
     light : index of the light that Shift-drag moves; an index after the last light selects the environment
@@ -61,7 +62,7 @@ class Controls:
             )
             self._zoom(math.exp(wheel_step), (event["x"], event["y"]), picture_size, "wheel")
         elif kind == "double_click":
-            self._focus(event, picture_size)
+            self._focus_camera(event, picture_size)
         elif kind == "key_down":
             self._on_key(str(event["key"]), event.get("modifiers", ()))
 
@@ -79,7 +80,7 @@ class Controls:
         self._pinch = _measure_pinch(event)
 
     def _release(self, event: Event, picture_size: Point) -> None:
-        """End a drag where the pointer was released, which may differ from its last reported position."""
+        """End a drag at the position at which the pointer was released."""
         if self._pressed_button and not self._pinch and (event["x"], event["y"]) != self._pointer_position:
             self._drag(event, picture_size)
         self._pressed_button, self._pinch = 0, None
@@ -102,7 +103,7 @@ class Controls:
         self.history.change(new_state, f"drag {self._gesture_count}")
 
     def _pan_and_zoom(self, pinch: tuple[float, float, float] | None, picture_size: Point) -> None:
-        """Pan and zoom by moving two fingers; when one of them is lifted, the picture does not jump.
+        """Pan and zoom by the motion of two fingers since the last event; do nothing when a finger is lifted.
 
         pinch : midpoint (x, y) and distance of the two fingers [logical pixel]; None for fewer than two
             fingers
@@ -139,7 +140,7 @@ class Controls:
         """
         return max(1.0, min(picture_size) if self.history.state.view == ATLAS_VIEW_NAME else picture_size[1])
 
-    def _focus(self, event: Event, picture_size: Point) -> None:
+    def _focus_camera(self, event: Event, picture_size: Point) -> None:
         state, (width, height) = self.history.state, picture_size
         if state.view == ATLAS_VIEW_NAME:
             self.history.change(state.with_atlas_view(AtlasView(state.atlas_view.layer)))
@@ -173,23 +174,25 @@ class SplitView:
         self.is_dragged = False
 
     def freeze(self, state: ViewerState) -> None:
-        """Show a divider, with the given state to its left."""
+        """Freeze a state, and show it to the left of a divider."""
         self.frozen_state = state
 
     def release(self) -> None:
         """Remove the divider, so that only the live state is shown."""
         self.frozen_state, self.is_dragged = None, False
 
-    def handle(self, event: Event, width: float) -> bool:
+    def handle(self, event: Event, picture_width: float) -> bool:
         """Process a pointer event; return whether it drags the divider.
 
-        width : logical width of the picture
+        picture_width : logical width of the picture
         """
         kind = event["event_type"]
         if kind == "pointer_down" and self.frozen_state:
-            self.is_dragged = abs(event["x"] - self.divider_position * width) <= _DIVIDER_GRAB_RADIUS_PX
+            self.is_dragged = (
+                abs(event["x"] - self.divider_position * picture_width) <= _DIVIDER_GRAB_RADIUS_PX
+            )
         elif kind in ("pointer_move", "pointer_up") and self.is_dragged:
-            self.divider_position = min(1.0, max(0.0, event["x"] / max(1.0, width)))
+            self.divider_position = min(1.0, max(0.0, event["x"] / max(1.0, picture_width)))
             self.is_dragged = kind == "pointer_move"
             return True
         return self.is_dragged

@@ -45,14 +45,14 @@ def orbit(camera: Camera, yaw_rad: float, pitch_rad: float) -> Camera:
     return _with_position_and_target(camera, np.array(camera.target) + offset, camera.target)
 
 
-def pan(camera: Camera, right: float, up: float) -> Camera:
+def pan(camera: Camera, right_shift: float, up_shift: float) -> Camera:
     """Shift the camera and its target parallel to the image plane.
 
-    right : shift to the right, as a fraction of the visible height
-    up : shift upwards, as a fraction of the visible height
+    right_shift : shift to the right, as a fraction of the visible height
+    up_shift : shift upwards, as a fraction of the visible height
     """
     x, y, _ = camera_axes(camera)
-    shift = camera.frame_mm * (right * x + up * y)
+    shift = camera.frame_mm * (right_shift * x + up_shift * y)
     return _with_position_and_target(camera, camera.position + shift, camera.target + shift)
 
 
@@ -72,33 +72,35 @@ def dolly(camera: Camera, distance_factor: float) -> Camera:
     return _with_position_and_target(camera, position, camera.target, frame_mm=frame_mm)
 
 
-def focus(camera: Camera, point: ArrayLike) -> Camera:
-    """Shift the camera so that a point becomes its target, without changing its direction or distance."""
-    shift = np.subtract(point, camera.target)
-    return _with_position_and_target(camera, np.array(camera.position) + shift, point)
+def focus(camera: Camera, new_target: ArrayLike) -> Camera:
+    """Shift the camera so that a point becomes its target; direction and distance stay the same."""
+    shift = np.subtract(new_target, camera.target)
+    return _with_position_and_target(camera, np.array(camera.position) + shift, new_target)
 
 
 class CameraEasing:
-    """Smooth motion of the displayed camera towards the state's camera, independent of the frame rate."""
+    """Smooth motion of the displayed camera towards a target camera, independent of the frame rate."""
 
     def __init__(self, camera: Camera) -> None:
         self.camera = camera
 
-    def advance(self, target: Camera, seconds: float) -> Camera:
+    def advance(self, target_camera: Camera, elapsed_s: float) -> Camera:
         """Move the displayed camera towards another camera, and return the displayed camera.
 
-        target : camera to approach
-        seconds : time since the last call [s]
+        target_camera : camera to approach
+        elapsed_s : time since the last call [s]
         """
-        if self.camera != target:
-            self.camera = interpolate_cameras(self.camera, target, -math.expm1(-seconds / _EASING_TIME_S))
+        if self.camera != target_camera:
+            self.camera = interpolate_cameras(
+                self.camera, target_camera, -math.expm1(-elapsed_s / _EASING_TIME_S)
+            )
         return self.camera
 
 
 def interpolate_cameras(start_camera: Camera, end_camera: Camera, fraction: float) -> Camera:
     """Interpolate between two cameras; return `end_camera` itself if the result would look the same.
 
-    The direction is interpolated by rotation, and the distance and visible height by scaling.
+    Targets and directions are interpolated linearly, the distance and the visible height geometrically.
 
     fraction : position between the cameras, from 0 (start) to 1 (end)
     """
@@ -129,7 +131,7 @@ def interpolate_cameras(start_camera: Camera, end_camera: Camera, fraction: floa
     return end_camera if _cameras_nearly_equal(camera, end_camera) else camera
 
 
-def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Floats | None:
+def pick(scene: Scene, camera: Camera, x: float, y: float, aspect_ratio: float) -> Floats | None:
     """Return the surface point [mm] at a position in the image; None if no surface is visible there.
 
     The point is relative to the centre of the head.
@@ -138,12 +140,12 @@ def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Flo
     camera : camera to use instead of the scene's camera
     x : horizontal position in the image, from -1 (left) to 1 (right)
     y : vertical position in the image, from -1 (bottom) to 1 (top)
-    aspect : ratio of image width to height [-]
+    aspect_ratio : ratio of image width to height [-]
 
     Source: [MollerTrumbore1997].
     """
     right, up, forward = camera_axes(camera)
-    half_size, shift = camera.window(aspect)
+    half_size, shift = camera.window(aspect_ratio)
     ray = forward + (x + shift[0]) * half_size[0] * right + (y + shift[1]) * half_size[1] * up
     head, positions = scene.head, posed_positions(scene)
     origin = np.array(camera.position) + head.centre_mm
@@ -218,8 +220,10 @@ def _clamped_tuple(position_mm: ArrayLike) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _interpolate(start: ArrayLike, end: ArrayLike, fraction: float) -> Floats:
-    return (1.0 - fraction) * np.array(start, dtype=np.float64) + fraction * np.array(end, dtype=np.float64)
+def _interpolate(start_values: ArrayLike, end_values: ArrayLike, fraction: float) -> Floats:
+    return (1.0 - fraction) * np.array(start_values, dtype=np.float64) + fraction * np.array(
+        end_values, dtype=np.float64
+    )
 
 
 def _rotation_matrix(axis: Floats, angle_rad: float) -> Floats:

@@ -1,4 +1,4 @@
-"""Playback of a motion in the viewer; when it pauses, its pose becomes a step of the undo history."""
+"""Playback of a motion in the viewer; pausing the motion adds the current pose to the undo history."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class MotionFile:
 class MotionPlayer:
     """Player of a motion, which knows the current time in the motion and the state to display.
 
-    While the motion plays, its current pose is displayed instead of the pose of the state; the rest of the
-    state can still be changed. When the motion pauses or ends, its current pose becomes a step of the undo
-    history.
+    While the motion plays, its current pose is displayed instead of the pose of the viewer state; everything
+    else in the state can be changed. When the motion pauses or ends, its current pose becomes a step of the
+    undo history.
 
     motion : motion to play; None if there is no motion
     clock : function that returns the time [s]
@@ -169,13 +169,13 @@ class MotionPlayer:
             self._seconds = clip.duration_s
             self.pause()
 
-    def state_at(self, seconds: float) -> ViewerState:
+    def state_at(self, time_in_motion_s: float) -> ViewerState:
         """Stop playing, and return the state with the pose that the motion has at a given time.
 
-        seconds : time in the motion [s]
+        time_in_motion_s : time in the motion [s]
 
         Raises DermisError if the frame at that time cannot be read.
         """
         self.stop()
         clip, state = self.clip, self._history.state
-        return state if clip is None else state.with_motion(clip, seconds)
+        return state if clip is None else state.with_motion(clip, time_in_motion_s)

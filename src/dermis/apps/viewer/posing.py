@@ -1,4 +1,4 @@
-"""Edits of the pose: morph target weights, bone angles, and the return to the rest pose."""
+"""Edits of a head's pose: morph target weights, bone angles, and the return to the rest pose."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from dermis.apps.viewer.controls import Controls, SplitView
 from dermis.apps.viewer.player import MotionFile, MotionPlayer
 from dermis.apps.viewer.state import (
-    PART_VIEWS,
+    LIGHT_COMPONENT_VIEWS,
     PICTURE_VIEW_NAME,
     UndoHistory,
     ViewerState,
@@ -53,7 +53,7 @@ class HeadLoader:
         self._name = ""
 
     @property
-    def note(self) -> str:
+    def loading_message(self) -> str:
         """Return a message that names the head being loaded; empty if no head is being loaded."""
         return f"opening {self.display_name(self._name)} ..." if self._future else ""
 
@@ -65,21 +65,21 @@ class HeadLoader:
         """Return the original name of an uploaded file, given its path; return other names unchanged."""
         return self._original_names.get(name_or_path, name_or_path)
 
-    def open(self, name_or_path: str, uploaded_as: str = "") -> None:
+    def open(self, name_or_path: str, original_name: str = "") -> None:
         """Load a head or a scene in the background, and cancel earlier requests that have not started.
 
         name_or_path : name of a built-in head or sample, or path of a mesh or scene file
-        uploaded_as : original name of an uploaded file
+        original_name : original name of an uploaded file
         """
         if self._future:
             self._future.cancel()
         self._name = str(Path(name_or_path).resolve()) if Path(name_or_path).is_file() else name_or_path
-        if uploaded_as:
-            self._original_names[self._name] = uploaded_as
+        if original_name:
+            self._original_names[self._name] = original_name
         self._future = self._executor.submit(_load_head_or_scene, self._name)
         self._future.add_done_callback(lambda _: self.request_frame())
 
-    def take_loaded(self, state: ViewerState) -> ViewerState | None:
+    def take_loaded_state(self, state: ViewerState) -> ViewerState | None:
         """Return the state with a newly loaded head or scene; None if none was loaded since the last call.
 
         state : current state; a loaded head replaces the head of this state, a loaded scene the whole state
@@ -129,8 +129,8 @@ def built_in_heads() -> tuple[str, ...]:
     return (HUMAN, *samples)
 
 
-_MAX_REASON_CHARACTERS = 160
-_log = logging.getLogger(__name__)
+_MAX_ERROR_CHARACTERS = 160
+_LOGGER = logging.getLogger(__name__)
 
 
 class Session:
@@ -140,8 +140,8 @@ class Session:
     clock : function that returns the time [s]
 
     split : before/after comparison
-    status : text over the picture about the adapter
-    message : text over the picture about the last action
+    status : message about the graphics adapter, shown over the picture
+    message : message about the last action, shown over the picture
     scene_file : file name of the scene, typed in the panel
     picture_file : file name of screenshots, typed in the panel
     picture_size : size of screenshots; (0, 0) for the size of the view [pixel]
@@ -189,24 +189,24 @@ class Session:
         """Return the state on screen: the current state, posed by the motion while the motion plays."""
         return self.player.displayed_state
 
-    def change(self, state: ViewerState, gesture: str = "") -> None:
+    def change(self, state: ViewerState, gesture_name: str = "") -> None:
         """Set a new state as a step of the undo history.
 
-        gesture : name of the gesture; consecutive changes by one gesture are undone together
+        gesture_name : name of the gesture; consecutive changes by one gesture are undone together
         """
-        self.history.change(state, gesture)
+        self.history.change(state, gesture_name)
         self.message = ""
 
-    def report_error(self, failure: str, error: Exception) -> None:
+    def report_error(self, failure_text: str, error: Exception) -> None:
         """Report an unexpected error once, as text over the picture and with its traceback in the log.
 
-        failure : what cannot be done, such as "The head cannot be opened"
+        failure_text : what cannot be done, such as "The head cannot be opened"
         """
-        message = f"{failure} ({type(error).__name__}: {_shorten(str(error))})"
+        message = f"{failure_text} ({type(error).__name__}: {_shorten_message(str(error))})"
         if message not in self._reported_errors:
             self._reported_errors.add(message)
             self.message = message
-            _log.error(message, exc_info=error)
+            _LOGGER.error(message, exc_info=error)
 
     def save(self, path: Path) -> None:
         """Write the displayed state to a scene file, or offer the file as a download.
@@ -217,7 +217,7 @@ class Session:
         if "name" in state.head:  # the scene refers to an uploaded file by its original name
             name = self.heads.uploaded_name(str(state.head["name"]))
             state = replace(state, head={**state.head, "name": name})
-        self._write_or_offer(path, lambda target: save_state(target, state))
+        self._write_or_offer_download(path, lambda target: save_state(target, state))
         self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:
@@ -230,10 +230,10 @@ class Session:
         self.change(state)
         self.message = f"loaded {path}"
 
-    def take_head(self) -> None:
+    def show_loaded_head(self) -> None:
         """Show the head that was loaded in the background, or the reason why it cannot be loaded."""
         try:
-            state = self.heads.take_loaded(self.state)
+            state = self.heads.take_loaded_state(self.state)
         except DermisError as error:
             self.message = str(error)
             return
@@ -268,15 +268,15 @@ class Session:
                 f"got {picture_path.name!r}",
                 "Rename it",
             )
-        if suffix == ".exr" and view not in (PICTURE_VIEW_NAME, *PART_VIEWS):
+        if suffix == ".exr" and view not in (PICTURE_VIEW_NAME, *LIGHT_COMPONENT_VIEWS):
             refuse(f"view {view} as .exr", "a view of linear light", "it shows display colours", "Use .png")
-        self._write_or_offer(
+        self._write_or_offer_download(
             picture_path,
             lambda target: self.view_renderer.screenshot(target, self.displayed_state, picture_size),
         )
         self.message = f"wrote {picture_path}, {picture_size[0]} x {picture_size[1]}"
 
-    def _write_or_offer(self, path: Path, write_file: Callable[[Path], None]) -> None:
+    def _write_or_offer_download(self, path: Path, write_file: Callable[[Path], None]) -> None:
         if self.offer_download is None:
             write_file(path)
             return
@@ -286,17 +286,18 @@ class Session:
             self.offer_download(path.name, target.read_bytes())
 
 
-def _shorten(message: str) -> str:
+def _shorten_message(message: str) -> str:
     line = " ".join(message.split())
-    return line if len(line) <= _MAX_REASON_CHARACTERS else f"{line[:_MAX_REASON_CHARACTERS]} ..."
+    return line if len(line) <= _MAX_ERROR_CHARACTERS else f"{line[:_MAX_ERROR_CHARACTERS]} ..."
 
 
-def apply_regions(
+def with_region_table(
     state: ViewerState, table_name: str, known_states: Iterable[ViewerState] = ()
 ) -> ViewerState:
-    """Return the state with the roughness and specular maps of a table of face regions, or without them.
+    """Return the state with roughness and specular maps that a table of face regions defines.
 
-    table_name : name or file of the table, "auto" or "none"
+    table_name : name or file of the table; "auto" for the package's table if the regions of the head are
+        known; "none" for no such maps
     known_states : states whose heads are reused if they already have these maps
 
     Raises DermisError for heads without known regions and for heads created in memory.

@@ -45,14 +45,14 @@ class AtlasView:
     centre: tuple[float, float] = (0.5, 0.5)
     span: float = 1.05
 
-    def panned(self, right: float, down: float) -> AtlasView:
+    def panned(self, right_shift: float, down_shift: float) -> AtlasView:
         """Return the view moved by a drag of the pointer.
 
-        right : motion of the pointer to the right, as a fraction of the picture's shorter side
-        down : motion of the pointer downwards, as a fraction of the picture's shorter side
+        right_shift : motion of the pointer to the right, as a fraction of the picture's shorter side
+        down_shift : motion of the pointer downwards, as a fraction of the picture's shorter side
         """
         u, v = self.centre
-        return self._with_centre(u - self.span * right, v - self.span * down)
+        return self._with_centre(u - self.span * right_shift, v - self.span * down_shift)
 
     def zoomed(self, span_factor: float, x: float, y: float) -> AtlasView:
         """Return the view zoomed around the cursor.
@@ -65,15 +65,15 @@ class AtlasView:
         (u, v), reduction = self.centre, self.span - span
         return replace(self, span=span)._with_centre(u + reduction * x, v + reduction * y)
 
-    def _with_centre(self, u: float, v: float) -> AtlasView:
-        return replace(self, centre=(min(1.0, max(0.0, u)), min(1.0, max(0.0, v))))
+    def _with_centre(self, centre_u: float, centre_v: float) -> AtlasView:
+        return replace(self, centre=(min(1.0, max(0.0, centre_u)), min(1.0, max(0.0, centre_v))))
 
 
 P = TypeVar("P", bound=FrozenModel)
 Table = Mapping[str, Any]
 """The [head] table of a scene file."""
 PICTURE_VIEW_NAME = "picture"
-PART_VIEWS = {"diffuse": "diffuse", "specular": "specular"}
+LIGHT_COMPONENT_VIEWS = {"diffuse": "diffuse", "specular": "specular"}
 """Views that show a part of the reflected light, with the value of `Settings.parts` for each."""
 
 
@@ -156,15 +156,15 @@ class ViewerState:
         """Return a copy with another pose, where None means the rest pose."""
         return self._with_scene(pose=pose)
 
-    def with_motion(self, clip: Clip, seconds: float) -> ViewerState:
+    def with_motion(self, clip: Clip, time_in_motion_s: float) -> ViewerState:
         """Return a copy posed by a motion; morph targets and bones not in the motion keep their values.
 
-        seconds : time in the motion [s]
+        time_in_motion_s : time in the motion [s]
 
         Raises DermisError if a frame cannot be read.
         """
-        pose = merge_poses(clip.pose_at(seconds), self.scene.pose)
-        return replace(self.with_pose(pose), seconds=seconds)
+        pose = merge_poses(clip.pose_at(time_in_motion_s), self.scene.pose)
+        return replace(self.with_pose(pose), seconds=time_in_motion_s)
 
     def with_head(self, head: Head, head_table: Table, rho_s: float) -> ViewerState:
         """Return a copy with another head, or with other maps for the same head.
@@ -208,11 +208,11 @@ def save_state(path: Path, state: ViewerState) -> None:
     """
     if not state.head:
         refuse(path, "a head from a file or a sample", "it was created in memory", "Write it to a file first")
-    parts = state.view if state.view in PART_VIEWS else state.settings.parts
+    parts = state.view if state.view in LIGHT_COMPONENT_VIEWS else state.settings.parts
     save_scene(path, state.scene, validated_copy(state.settings, parts=parts), state.head_table)
 
 
-def _load_named_state(name_or_path: str) -> ViewerState:
+def _load_state_by_name(name_or_path: str) -> ViewerState:
     """Return the state of a scene file, or of a built-in head, a sample or a mesh file in studio light."""
     if Path(name_or_path).suffix.lower() == ".toml":
         return load_state(Path(name_or_path))
@@ -239,19 +239,21 @@ def make_state(subject: Head | Human | Scene | ViewerState | str | os.PathLike[s
     if not isinstance(subject, str | os.PathLike):
         actual = f"got a {type(subject).__name__}"
         refuse("view", "a head, a person, a scene or a name", actual, "Try dermis.Human()")
-    return _load_named_state(os.fspath(subject))
+    return _load_state_by_name(os.fspath(subject))
 
 
-def load_state(path: Path, current: ViewerState | None = None) -> ViewerState:
+def load_state(path: Path, current_state: ViewerState | None = None) -> ViewerState:
     """Return the state of a scene file.
 
-    current : state whose head is reused if it was loaded from an equal [head] table
+    current_state : state whose head is reused if it was loaded from an equal [head] table
 
     Raises DermisError if the file is not a scene.
     """
     table = head_table(path)
-    same_table = current is not None and table in (current.head, current.head_table)
-    known_head = current.scene.head if current and same_table and not has_region_table(table) else None
+    same_table = current_state is not None and table in (current_state.head, current_state.head_table)
+    known_head = (
+        current_state.scene.head if current_state and same_table and not has_region_table(table) else None
+    )
     scene, scene_settings = load_scene(path, known_head)
     settings = Settings(**{**PHOTOGRAPHIC_SETTINGS, **scene_settings.model_dump(exclude_unset=True)})
     return initial_state(scene, settings, table, rig_name="" if scene.lights else NO_LIGHTS)
@@ -266,7 +268,7 @@ def initial_state(scene: Scene, settings: Settings, head_table: Table, rig_name:
     head_table : table from which the head was loaded, with the keys of the [head] table of a scene file
     rig_name : name of the light preset; empty for custom lights
     """
-    view = settings.parts if settings.parts in PART_VIEWS else PICTURE_VIEW_NAME
+    view = settings.parts if settings.parts in LIGHT_COMPONENT_VIEWS else PICTURE_VIEW_NAME
     return ViewerState(scene, validated_copy(settings, parts="all"), head_table, view, rig_name)
 
 
@@ -304,19 +306,19 @@ class UndoHistory:
         """Return whether there is an undone state that can be restored."""
         return bool(self._undone)
 
-    def change(self, state: ViewerState, gesture: str = "") -> None:
+    def change(self, state: ViewerState, gesture_name: str = "") -> None:
         """Add a state; within one gesture, the new state replaces the last state.
 
-        gesture : name of the gesture; empty for a change that is undone separately
+        gesture_name : name of the gesture; empty for a change that is undone separately
         """
         if states_equal(state, self.state):
             return
-        if gesture and gesture == self._gesture:
+        if gesture_name and gesture_name == self._gesture:
             self._past[-1] = state
         else:
             self._past.append(state)
             del self._past[: -_MAX_UNDO_STEPS - 1]
-        self._gesture = gesture
+        self._gesture = gesture_name
         self._undone.clear()
 
     def end_gesture(self) -> None:

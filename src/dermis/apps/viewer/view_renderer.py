@@ -1,4 +1,4 @@
-"""Rendering of viewer states: images, adaptive quality in motion, and preparation of new heads."""
+"""Rendering of viewer states, at reduced quality while the picture changes; preparation of new heads."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.viewer.state import (
     ATLAS_VIEW_NAME,
-    PART_VIEWS,
+    LIGHT_COMPONENT_VIEWS,
     PICTURE_VIEW_NAME,
     ViewerState,
     states_equal,
@@ -43,7 +43,7 @@ _FRAME_STREAK_LENGTH = (
 
 @dataclass(frozen=True)
 class Quality:
-    """Upper limits of render settings for frames in motion; still frames are rendered without limits.
+    """Upper limits of render settings while the picture changes; a still picture has no limits.
 
     scale : factor by which the width and height of the image are multiplied [-]
     samples, atlas, shadow_size : maximum values of the fields of `Settings` with these names
@@ -55,9 +55,9 @@ class Quality:
     shadow_size: int
 
 
-_UNLIMITED_SIZE = 1 << 14
+_NO_LIMIT = 1 << 14
 QUALITY_LEVELS = (
-    Quality(1.0, _UNLIMITED_SIZE, _UNLIMITED_SIZE, _UNLIMITED_SIZE),
+    Quality(1.0, _NO_LIMIT, _NO_LIMIT, _NO_LIMIT),
     Quality(1.0, 2, 1024, 1024),
     Quality(1.0, 1, 512, 512),
     Quality(0.75, 1, 512, 512),
@@ -68,7 +68,7 @@ _BEST_QUALITY_LEVEL_ON_CPU = 2
 
 
 class QualityController:
-    """Controller that adapts the quality of frames in motion to the time that the last frames took.
+    """Controller that adapts the quality of a changing picture to the time that the last frames took.
 
     software : whether the adapter renders on the CPU
     """
@@ -81,11 +81,11 @@ class QualityController:
 
     @property
     def quality(self) -> Quality:
-        """Return the quality limits of the next frame in motion."""
+        """Return the quality limits of the next frame if the picture is changing."""
         return QUALITY_LEVELS[self._level]
 
     def record_frame_time(self, frame_ms: float) -> None:
-        """Record how long a frame in motion took; after several slow or fast frames, change the quality.
+        """Record the time of a frame of a changing picture; change the quality after slow or fast frames.
 
         frame_ms : time taken by the frame, without its setup [ms]
         """
@@ -140,7 +140,7 @@ class ViewRenderer:
 
     adapter : "auto", "cpu" or part of an adapter's name
 
-    is_preparing : whether `prepare` is running; nothing else may be drawn during that time
+    is_preparing : whether `prepare` is running; no other method may render during that time
     """
 
     def __init__(self, adapter: str = "auto") -> None:
@@ -160,7 +160,7 @@ class ViewRenderer:
         self._atlas_state: tuple[ViewerState, str] | None = None
 
     def prepare(self, state: ViewerState, on_resources_ready: Callable[[], None] = lambda: None) -> None:
-        """Create all resources and shaders for a state by rendering small images, in motion and still.
+        """Create all resources and shaders for a state by rendering small images of it.
 
         on_resources_ready : function called when the resources of the head have been created
 
@@ -169,7 +169,9 @@ class ViewRenderer:
         self.is_preparing = True
         try:
             for moving in (True, False):
-                self.renderer.prepare(state.scene, self._settings(state, _PREPARATION_FRAME_SIZE, moving))
+                self.renderer.prepare(
+                    state.scene, self._frame_settings(state, _PREPARATION_FRAME_SIZE, moving)
+                )
             on_resources_ready()
             for moving in (True, False):
                 self.render_image(state, state.scene.camera, _PREPARATION_FRAME_SIZE, moving)
@@ -207,7 +209,7 @@ class ViewRenderer:
         Raises DermisError if the state cannot be rendered or the device fails.
         """
         self._size = view_size
-        settings = self._settings(state, view_size, is_moving)
+        settings = self._frame_settings(state, view_size, is_moving)
         inputs = self._image_inputs
         is_cached = inputs and inputs[0] is state and inputs[1:] == (camera, settings)
         if is_cached and self.last_image is not None:
@@ -226,8 +228,8 @@ class ViewRenderer:
         self, frozen_state: ViewerState, camera: Camera, view_size: tuple[int, int], is_moving: bool
     ) -> Texture:
         """Return a copy of the image of the frozen state, reused until the camera or the settings change."""
-        settings, frozen = self._settings(frozen_state, view_size, is_moving), self._frozen
-        still_settings = self._settings(frozen_state, view_size, is_moving=False)
+        settings, frozen = self._frame_settings(frozen_state, view_size, is_moving), self._frozen
+        still_settings = self._frame_settings(frozen_state, view_size, is_moving=False)
         is_cached = frozen and frozen.state is frozen_state and frozen.camera == camera
         if frozen and is_cached and frozen.settings in (settings, still_settings):
             return frozen.image
@@ -237,19 +239,22 @@ class ViewRenderer:
         self._frozen = FrozenImage(frozen_state, camera, settings, image_copy)
         return image_copy
 
-    def _settings(self, state: ViewerState, view_size: tuple[int, int], is_moving: bool) -> Settings:
-        """Return the settings of a frame; in motion, their quality is limited, except in the atlas view."""
+    def _frame_settings(self, state: ViewerState, view_size: tuple[int, int], is_moving: bool) -> Settings:
+        """Return the settings of a frame, with limited quality while the picture changes.
+
+        In the atlas view, the quality is never limited.
+        """
         return self.quality_controller.limited_settings(
             state.settings, view_size, is_moving and state.view != ATLAS_VIEW_NAME
         )
 
     @property
-    def is_current(self) -> bool:
+    def has_full_quality(self) -> bool:
         """Return whether the last image has the full quality of a still image."""
         if not self._image_inputs:
             return False
         state, _, settings = self._image_inputs
-        return self._settings(state, self._size, is_moving=False) == settings
+        return self._frame_settings(state, self._size, is_moving=False) == settings
 
     def screenshot(self, picture_path: Path, state: ViewerState, picture_size: tuple[int, int]) -> None:
         """Render the view of a state to a file: .png (tone-mapped) or .exr (linear).
@@ -263,15 +268,15 @@ class ViewRenderer:
         image = self._draw(state.with_settings(size=picture_size))
         self._image_inputs = None
         is_linear, rendered = picture_path.suffix.lower() == ".exr", self.rendered
-        if not rendered or state.view not in (PICTURE_VIEW_NAME, *PART_VIEWS):
-            write_png(picture_path, self.read(image))
+        if not rendered or state.view not in (PICTURE_VIEW_NAME, *LIGHT_COMPONENT_VIEWS):
+            write_png(picture_path, self.download_image(image))
         elif state.settings.background == "none":
             write_image(picture_path, rendered.linear_rgba()) if is_linear else write_png(
                 picture_path, rendered.rgba8()
             )
         else:
             write_image(picture_path, rendered.linear()) if is_linear else write_png(
-                picture_path, self.read(image)
+                picture_path, self.download_image(image)
             )
 
     @property
@@ -279,28 +284,28 @@ class ViewRenderer:
         """Return the exposure factor of the last frame, whether metered or fixed [-]."""
         return self.rendered.exposure if self.rendered else 1.0
 
-    def read(self, image: Texture) -> NDArray[np.uint8]:
+    def download_image(self, image: Texture) -> NDArray[np.uint8]:
         """Download an image from the device, and return it as sRGB bytes (h, w, 3)."""
         return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
 
     def _draw(self, state: ViewerState, divider_side: str = "") -> Texture:
-        parts = PART_VIEWS.get(state.view, state.settings.parts)
+        parts = LIGHT_COMPONENT_VIEWS.get(state.view, state.settings.parts)
         settings = self.settings = validated_copy(state.settings, parts=parts)
-        if state.view == ATLAS_VIEW_NAME and self._has_atlas_light(state, divider_side):
+        if state.view == ATLAS_VIEW_NAME and self._atlas_shows_state(state, divider_side):
             return self._views.draw_atlas(state.scene, settings, state.atlas_view, divider_side)
         self._atlas_state = None
         self.rendered = self.renderer.draw(state.scene, settings, view=divider_side)
         self._atlas_state = state, divider_side
-        if state.view in (PICTURE_VIEW_NAME, *PART_VIEWS):
+        if state.view in (PICTURE_VIEW_NAME, *LIGHT_COMPONENT_VIEWS):
             return self.rendered.picture.bytes
         if state.view == ATLAS_VIEW_NAME:
             return self._views.draw_atlas(state.scene, settings, state.atlas_view, divider_side)
         return self._views.draw(state.scene, settings, state.view, divider_side)
 
-    def _has_atlas_light(self, state: ViewerState, divider_side: str) -> bool:
-        """Return whether the atlas already holds the light of a state, so no frame needs to be rendered.
+    def _atlas_shows_state(self, state: ViewerState, divider_side: str) -> bool:
+        """Return whether the maps in the atlas belong to a state already, so no frame needs to be rendered.
 
-        divider_side : name of the side of the divider that shows the state; empty for the live side
+        divider_side : "before" for the frozen state left of the divider, "" for the live state
         """
         if self._atlas_state is None or self._atlas_state[1] != divider_side:
             return False
@@ -328,9 +333,9 @@ T = TypeVar("T")
 class HeadPreparation:
     """Preparation of new heads for rendering, one at a time, in a separate thread.
 
-    Nothing else is drawn while a head is being prepared.
+    No frame is drawn while a head is being prepared.
 
-    request_frame : function that requests a frame, called from that thread when a preparation ends
+    request_frame : function that requests a frame, called from the separate thread after each preparation
     """
 
     def __init__(self, request_frame: Callable[[], None]) -> None:
@@ -346,7 +351,7 @@ class HeadPreparation:
         return self._future is not None
 
     def reset(self) -> None:
-        """Discard the prepared meshes and the image shown during preparation, for a new renderer."""
+        """Discard the prepared meshes and the image shown during preparation."""
         self._ready_mesh = self._future = self._next_mesh = self._held_image = None
 
     def prepare_head(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:

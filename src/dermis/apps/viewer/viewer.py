@@ -159,24 +159,24 @@ class Viewer:
         """Return whether the picture on screen is final, so no frame is needed until something changes."""
         state, view_renderer = self.session.displayed_state, self.session.view_renderer
         is_settled = self._last_state is state and self._easing.camera == state.scene.camera
-        is_final = view_renderer.is_current or self._rejected_state is state
+        is_final = view_renderer.has_full_quality or self._rejected_state is state
         is_ready = not self._preparation.is_running
         return is_ready and is_settled and is_final and not self._is_moving(self._clock())
 
-    def _draw(self, now: float) -> None:
+    def _draw(self, now_s: float) -> None:
         session, size = self.session, self._picture_size()
-        session.take_head()
+        session.show_loaded_head()
         session.player.advance()
-        state, elapsed = session.displayed_state, min(now - self._last_draw, _MAX_EASING_STEP_S)
+        state, elapsed = session.displayed_state, min(now_s - self._last_draw, _MAX_EASING_STEP_S)
         old_camera = self._easing.camera
         camera = self._easing.advance(state.scene.camera, elapsed)
         if state is not self._last_state or camera != old_camera or size != self._last_size:
-            self._last_change, self._last_state, self._last_size = now, state, size
-        self._last_draw, session.view_size = now, size
-        images = self._render_images(state, camera, size, self._is_moving(now))
+            self._last_change, self._last_state, self._last_size = now_s, state, size
+        self._last_draw, session.view_size = now_s, size
+        images = self._render_images(state, camera, size, self._is_moving(now_s))
         session.status = self._status_text(size)
         target = self._context.get_current_texture().create_view()
-        self._blit.draw(self._patches(*images, size), target)
+        self._blit.draw(self._image_patches(*images, size), target)
         self.panel.draw(target, self.canvas.get_logical_size(), self.canvas.get_pixel_ratio())
 
     def _panel_width(self) -> int:
@@ -189,7 +189,7 @@ class Viewer:
         width, height = self.canvas.get_physical_size()
         return max(1, width - self._panel_width()), max(1, height)
 
-    def _patches(
+    def _image_patches(
         self, live_image: Texture, frozen_image: Texture | None, picture_size: tuple[int, int]
     ) -> list[Patch]:
         """Return patches that show the live image and, if there is one, the frozen image left of the divider.
@@ -243,8 +243,8 @@ class Viewer:
         self._rejected_state = state
         self.session.message = message
 
-    def _is_moving(self, now: float) -> bool:
-        return self.session.player.is_playing or now - self._last_change < _STILL_FRAME_DELAY_S
+    def _is_moving(self, now_s: float) -> bool:
+        return self.session.player.is_playing or now_s - self._last_change < _STILL_FRAME_DELAY_S
 
     def _status_text(self, picture_size: tuple[int, int]) -> str:
         view_renderer = self.session.view_renderer
@@ -256,7 +256,7 @@ class Viewer:
             return ""
         width, height = settings.size
         text = f"software adapter, no GPU: {width} x {height}"
-        if view_renderer.is_current and settings.size == picture_size:
+        if view_renderer.has_full_quality and settings.size == picture_size:
             return text
         return f"{text}, atlas {settings.atlas} while moving, refined when still"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.apps.viewer.state import ATLAS_VIEW_NAME, PART_VIEWS, AtlasView
+from dermis.apps.viewer.state import ATLAS_VIEW_NAME, LIGHT_COMPONENT_VIEWS, AtlasView
 from dermis.base.errors import refuse
 from dermis.frame.features.post.meter import read_meter
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
@@ -36,10 +36,10 @@ BLUR_LEVELS_BY_VIEW = {"irradiance": 0} | {f"blur {k}": k for k in range(1, 7)}
 ATLAS_LAYERS = (*BLUR_LEVELS_BY_VIEW, "stretch", "thickness")
 """Names of the atlas maps that the view "atlas" can show."""
 
-VIEW_NAMES = ("picture", *PART_VIEWS, *ATLAS_LAYERS, "shadow", "normals", ATLAS_VIEW_NAME)
+VIEW_NAMES = ("picture", *LIGHT_COMPONENT_VIEWS, *ATLAS_LAYERS, "shadow", "normals", ATLAS_VIEW_NAME)
 """Names of all views."""
 
-_INTERMEDIATE_SHADER = Path(__file__).parent / "intermediate.wgsl"
+_INTERMEDIATE_SHADER_PATH = Path(__file__).parent / "intermediate.wgsl"
 _SHADER_QUANTITY_NUMBERS = {
     "stretch": 1,
     "thickness": 2,
@@ -64,14 +64,14 @@ class IntermediateViews:
         """Return an image of sRGB bytes that shows an intermediate result of the last frame on the head.
 
         view_name : name of the view, one of `VIEW_NAMES`
-        divider_side : name of the side of the divider that is drawn; empty for the live side
+        divider_side : "before" for the frozen state left of the divider, "" for the live state
 
         Raises DermisError if the technique does not compute the intermediate result.
         """
         inputs = self._renderer.prepare(scene, settings, divider_side)
         unused = ("ENVIRONMENT", "HALF_SPACE", "INTERREFLECTION", "STRANDS")  # not declared by the shader
         constants = tuple(switch for switch in inputs.light_constants if switch[0] not in unused)
-        shader = program(self._renderer.device, _INTERMEDIATE_SHADER, constants)
+        shader = program(self._renderer.device, _INTERMEDIATE_SHADER_PATH, constants)
         layer, scale = self._atlas_layer(inputs, view_name, settings)
         view_fields = ("eye", "forward", "right", "up", "shift", "samples", "jitter")
         record = shader.record("ViewParameters", **{name: inputs.view[name] for name in view_fields})
@@ -82,14 +82,14 @@ class IntermediateViews:
             "visibility_buffer": inputs.resources.visibility.texture,
             "layer": layer,
         }
-        return self._render(shader, bindings, settings.size)
+        return self._run_image_shader(shader, bindings, settings.size)
 
     def draw_atlas(
         self, scene: Scene, settings: Settings, atlas_view: AtlasView, divider_side: str = ""
     ) -> Texture:
         """Return an image of sRGB bytes that shows a part of the atlas of the last frame.
 
-        divider_side : name of the side of the divider that is drawn; empty for the live side
+        divider_side : "before" for the frozen state left of the divider, "" for the live state
 
         Raises DermisError if the technique does not compute the displayed map.
         """
@@ -98,9 +98,13 @@ class IntermediateViews:
         values = {"centre": atlas_view.centre, "span": atlas_view.span, "scale": scale}
         quantity = _SHADER_QUANTITY_NUMBERS.get(atlas_view.layer, 0)
         record = self._atlas_shader.record("AtlasView", quantity=quantity, **values)
-        return self._render(self._atlas_shader, {"atlas_view": record, "layer": layer}, settings.size)
+        return self._run_image_shader(
+            self._atlas_shader, {"atlas_view": record, "layer": layer}, settings.size
+        )
 
-    def _render(self, shader: ComputeProgram, bindings: Bindings, image_size: tuple[int, int]) -> Texture:
+    def _run_image_shader(
+        self, shader: ComputeProgram, bindings: Bindings, image_size: tuple[int, int]
+    ) -> Texture:
         """Run a shader that writes an image to its binding `bytes`, and return the image's texture."""
         device = self._renderer.device
         if self._image is None or self._image.size[:2] != image_size:
@@ -112,7 +116,7 @@ class IntermediateViews:
         return self._image
 
     def _atlas_layer(
-        self, inputs: FrameInputs, layer_name: str, settings: Settings
+        self, frame_inputs: FrameInputs, layer_name: str, settings: Settings
     ) -> tuple[TextureOrView, float]:
         """Return the texture of an atlas layer, and a scale for displaying it.
 
@@ -120,7 +124,7 @@ class IntermediateViews:
         the layer "stretch", it is the mean number of texels per mm; for other layers, it is 1.
         """
         if layer_name in BLUR_LEVELS_BY_VIEW:
-            level, blur = BLUR_LEVELS_BY_VIEW[layer_name], next(iter(inputs.blurs), None)
+            level, blur = BLUR_LEVELS_BY_VIEW[layer_name], next(iter(frame_inputs.blurs), None)
             count = len(blur.profile_levels) if blur else 0
             if blur is None or level >= count:
                 refuse(
@@ -130,20 +134,22 @@ class IntermediateViews:
                     _MISSING_BLUR_ADVICE,
                 )
             layer = blur.profile_levels[level]
-            texture = inputs.resources.diffusion.levels.layer(layer, blur.halvings[layer])
-            return texture, self._exposure(inputs) / blur.scale
+            texture = frame_inputs.resources.diffusion.levels.layer(layer, blur.halvings[layer])
+            return texture, self._exposure(frame_inputs) / blur.scale
         if layer_name == "stretch":
-            stretch = inputs.layouts[0].atlas.resources["stretch_map"]
-            return stretch, self._mean_density(stretch)
-        return self._thickness(inputs) if layer_name == "thickness" else self._empty_texture, 1.0
+            stretch = frame_inputs.layouts[0].atlas.resources["stretch_map"]
+            return stretch, self._mean_texel_density(stretch)
+        return self._thickness_texture(
+            frame_inputs
+        ) if layer_name == "thickness" else self._empty_texture, 1.0
 
-    def _exposure(self, inputs: FrameInputs) -> float:
+    def _exposure(self, frame_inputs: FrameInputs) -> float:
         """Return the exposure factor of the last frame, whether metered or fixed [-]."""
-        meter, exposure = inputs.resources.post.meter, inputs.settings.exposure
+        meter, exposure = frame_inputs.resources.post.meter, frame_inputs.settings.exposure
         return read_meter(self._renderer.device, meter) if meter else float(exposure)
 
-    def _thickness(self, inputs: FrameInputs) -> Texture:
-        translucency = inputs.layouts[0].translucency
+    def _thickness_texture(self, frame_inputs: FrameInputs) -> Texture:
+        translucency = frame_inputs.layouts[0].translucency
         if translucency is None:
             refuse("view thickness", "a scene with translucency", "it is off", "Set transmission to thin")
         if translucency.pairs not in self._thickness_maps:
@@ -154,22 +160,22 @@ class IntermediateViews:
             self._thickness_maps[translucency.pairs] = texture
         return draw_thickness(self._renderer.device, translucency, self._thickness_maps[translucency.pairs])
 
-    def _mean_density(self, stretch: Texture) -> float:
-        """Return the geometric mean of all texel densities in a stretch map [texels/mm]."""
-        if stretch not in self._density:
-            metric = download(self._renderer.device, stretch)[..., :2].astype(np.float64)
+    def _mean_texel_density(self, stretch_map: Texture) -> float:
+        """Return the geometric mean of the texel density that a stretch map contains [texels/mm]."""
+        if stretch_map not in self._density:
+            metric = download(self._renderer.device, stretch_map)[..., :2].astype(np.float64)
             covered = metric[(metric > 0.0).all(axis=-1)]
-            self._density[stretch] = float(np.exp(np.log(covered).mean())) if len(covered) else 1.0
-        return self._density[stretch]
+            self._density[stretch_map] = float(np.exp(np.log(covered).mean())) if len(covered) else 1.0
+        return self._density[stretch_map]
 
 
 def draw_thickness(device: Device, translucency: Translucency, target_texture: Texture) -> Texture:
-    """Fill a texture with the tissue thickness at each cell of the coarse atlas [mm]; return the texture.
+    """Fill a texture with the tissue thickness at each texel of the coarse atlas [mm]; return the texture.
 
-    Light that is transmitted to a cell enters the tissue at source cells. The thickness is the smallest depth
-    of the cell below the tangent plane of a source cell, but at most the search radius for source cells.
+    Light that leaves the skin at a texel has entered it at other texels, the sources. The thickness is the
+    smallest depth of the texel below the tangent plane of a source, but at most the search radius.
 
-    target_texture : texture to fill, with one texel per cell; cells without source cells are unchanged
+    target_texture : texture with the size of the coarse atlas; texels without sources are left unchanged
     """
     pairs, shader = translucency.pairs, program(device, Path(__file__).parent / "thickness.wgsl")
     count = pairs.receivers[1]

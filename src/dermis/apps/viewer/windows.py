@@ -48,7 +48,7 @@ def show_window(
     viewer = Viewer(state, canvas, adapter, motion=motion)
     with _without_signal_handlers():
         backend.loop.run()
-    _raise_failure(viewer)
+    _raise_viewer_failure(viewer)
 
 
 @contextmanager
@@ -87,7 +87,7 @@ def serve(
     """
     _load_backend("http", ("uvicorn", "websockets"), "viewer")
     from dermis.apps.viewer.browser.canvas import PageCanvas
-    from dermis.apps.viewer.browser.request_filter import is_local
+    from dermis.apps.viewer.browser.request_filter import is_local_host
     from dermis.apps.viewer.browser.server import bind, make_server, prepare_viewer, run_server
 
     listener, address = bind(host, port, require_token=require_token)
@@ -97,12 +97,12 @@ def serve(
         http_server = make_server(address, canvas, Path(folder))
         # rendercanvas handles Ctrl+C by closing the canvas; the server must stop too.
         canvas.add_event_handler(lambda event: setattr(http_server, "should_exit", True), "close")
-        announce_url(address.url, not is_local(host))
+        announce_url(address.url, not is_local_host(host))
         viewer = run_server(
             http_server, listener, lambda: prepare_viewer(http_server, canvas, load_state, adapter)
         )
     if viewer:
-        _raise_failure(viewer)
+        _raise_viewer_failure(viewer)
 
 
 @renamed_keywords(shown="subject")
@@ -146,7 +146,7 @@ def view(
     >>> widget.viewer.session.state.view  # doctest: +SKIP
     'picture'
     """
-    canvas = _notebook_canvas(_load_backend("anywidget", ("anywidget",), "notebook"))
+    canvas = _notebook_canvas_class(_load_backend("anywidget", ("anywidget",), "notebook"))
     state = make_state(subject)
     motion_file = MotionFile(motion) if motion else None
     widget = canvas(size=size, max_fps=_MAX_FPS)
@@ -154,10 +154,10 @@ def view(
     return widget
 
 
-def _notebook_canvas(backend: Any) -> Any:
+def _notebook_canvas_class(backend_module: Any) -> Any:
     """Return the notebook widget class of rendercanvas, with workarounds for two bugs in rendercanvas."""
 
-    class NotebookCanvas(backend.AnywidgetRenderCanvas):  # type: ignore[misc]
+    class NotebookCanvas(backend_module.AnywidgetRenderCanvas):  # type: ignore[misc]
         def _rfb_handle_msg(self, widget: object, content: Event, buffers: list[bytes]) -> None:
             kind = content.get("type")
             super()._rfb_handle_msg(widget, content, buffers)
@@ -172,25 +172,25 @@ def _notebook_canvas(backend: Any) -> Any:
     return NotebookCanvas
 
 
-def _load_backend(module_name: str, required_packages: tuple[str, ...], extra: str) -> Any:
+def _load_backend(module_name: str, required_packages: tuple[str, ...], extra_name: str) -> Any:
     """Import and return a module of rendercanvas; raise DermisError if packages are missing.
 
     required_packages : import names of the packages that the module needs
-    extra : extra of dermis that installs these packages, named in the error message
+    extra_name : extra of dermis that installs these packages, named in the error message
     """
     for package in (*required_packages, "imgui_bundle", "rendercanvas"):
         try:
             importlib.import_module(package)
         except ImportError:
-            advice = f'Install it: pip install "dermis[{extra}]"'
+            advice = f'Install it: pip install "dermis[{extra_name}]"'
             refuse("viewer", f"the package {package.replace('_', '-')}", "it is not installed", advice)
     return importlib.import_module(f"rendercanvas.{module_name}")
 
 
-def _raise_no_display(reason: object) -> NoReturn:
-    refuse("window", "a display", f"none can be opened ({reason})", "Set DISPLAY, or use --browser")
+def _raise_no_display(failure_reason: object) -> NoReturn:
+    refuse("window", "a display", f"none can be opened ({failure_reason})", "Set DISPLAY, or use --browser")
 
 
-def _raise_failure(viewer: Viewer) -> None:
+def _raise_viewer_failure(viewer: Viewer) -> None:
     if viewer.failure:
         raise viewer.failure

@@ -18,7 +18,7 @@ from dermis.atlas.stitched.coverage import (
 )
 from dermis.atlas.stitched.gutter import GutterWidth, Packing, find_border
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps
-from dermis.atlas.stitched.pack import MAX_CELLS_PER_SIDE, PieceLayout, find_layout, pack_pieces
+from dermis.atlas.stitched.pack import MAX_CELLS_PER_SIDE, PieceLayout, find_piece_layout, pack_pieces
 from dermis.atlas.stitched.surface import FlatSurface, flat_surface
 from dermis.atlas.unwrap.charts import connected_pieces
 from dermis.base.arrays import Doubles, Index, Mask
@@ -38,7 +38,7 @@ LAYOUT_ARRAY_NAMES = "piece", "scale", "origins"
 """Names of the arrays of `find_stitched_layout`."""
 
 
-def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
+def find_chart_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
     """Divide charts into pieces; return a piece index (f,) and a uv scale (f,) for each triangle.
 
     A piece is a chart, or a part of a chart whose uv is mirrored. Triangles in no piece have the index -1.
@@ -48,7 +48,7 @@ def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
     neighbour = surface.uv_neighbour
     chart = connected_pieces(np.zeros(len(mirrored), np.int64), neighbour)
     piece = connected_pieces(2 * chart + mirrored, neighbour)
-    piece = _merge_specks(surface, chart, piece)
+    piece = _merge_small_pieces(surface, chart, piece)
     piece = np.where(surface.valid, piece, -1)
     density, mean = _uv_density(surface, piece)
     piece[density < _MIN_RELATIVE_UV_DENSITY * mean] = -1
@@ -65,7 +65,7 @@ def renumber_pieces(triangle_piece: Index) -> Index:
     return np.asarray(index.reshape(-1) - np.count_nonzero(numbers < 0), dtype=np.int64)
 
 
-def _merge_specks(surface: FlatSurface, triangle_chart: Index, triangle_piece: Index) -> Index:
+def _merge_small_pieces(surface: FlatSurface, triangle_chart: Index, triangle_piece: Index) -> Index:
     """Merge pieces (parts of charts) of less than 1 mm2 into the largest piece of their chart."""
     area = np.bincount(triangle_piece, surface.area_mm2 * surface.valid)
     order = np.argsort(area[triangle_piece], kind="stable")
@@ -97,10 +97,10 @@ def build_stitched(mesh: Mesh, atlas_side: int, gutter_mm: float) -> Atlas | Non
     gutter_mm : width of the gutters [mm]
     """
     surface = flat_surface(mesh)
-    piece, scale = find_pieces(surface)
+    piece, scale = find_chart_pieces(surface)
     width = GutterWidth(gutter_mm, _MAX_GUTTER_FRACTION * atlas_side)
     shipped = (
-        shipped_arrays(mesh, layout_table(gutter_mm), LAYOUT_ARRAY_NAMES)
+        shipped_arrays(mesh, layout_table_name(gutter_mm), LAYOUT_ARRAY_NAMES)
         if atlas_side >= MAX_CELLS_PER_SIDE
         else None
     )
@@ -120,26 +120,26 @@ def build_stitched(mesh: Mesh, atlas_side: int, gutter_mm: float) -> Atlas | Non
     return _assemble_atlas(surface, packing, coverage, piece >= 0)
 
 
-def layout_table(gutter_mm: float) -> str:
-    """Return the name of the table that contains a mesh's stitched layout, for `shipped_arrays`.
+def layout_table_name(gutter_mm: float) -> str:
+    """Return the name under which the package stores the stitched layout of a mesh, for `shipped_arrays`.
 
-    The layout is that of maps of at least 512 x 512 texels: the pieces of the charts and their positions.
+    The stored layout consists of the chart pieces and their positions in maps of at least 512 x 512 texels.
     """
     return f"layout {_LAYOUT_VERSION} {gutter_mm:g}"
 
 
 def find_stitched_layout(mesh: Mesh, gutter_mm: float) -> dict[str, NDArray[Any]]:
-    """Return the piece indices (f,) of a mesh's triangles, and scale and origins of the `PieceLayout`.
+    """Compute the stitched layout of a mesh as arrays, which the package stores for its own head.
 
-    These are the arrays of the table that `layout_table` names.
+    Returns three arrays: the piece index (f,) of each triangle, and scale and origins of the `PieceLayout`.
 
     Raises ValueError if the charts do not fit.
     """
     surface = flat_surface(mesh)
-    piece, scale = find_pieces(surface)
+    piece, scale = find_chart_pieces(surface)
     piece = cut_overlaps(surface, piece, gutter_mm)
     width = GutterWidth(gutter_mm, _MAX_GUTTER_FRACTION * MAX_CELLS_PER_SIDE)
-    layout = find_layout(surface, piece, scale, MAX_CELLS_PER_SIDE, width)
+    layout = find_piece_layout(surface, piece, scale, MAX_CELLS_PER_SIDE, width)
     if layout is None:
         raise ValueError("the charts do not fit")
     values = piece.astype(np.int16), np.float64(layout.scale), layout.origins

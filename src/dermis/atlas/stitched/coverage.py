@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.raster import run_lengths
+from dermis.atlas.raster import connected_run_lengths
 from dermis.atlas.stitched.gutter import Border, GutterTexels, GutterWidth, Packing, trace_gutter
 from dermis.atlas.stitched.surface import FlatSurface, interpolate_corners
 from dermis.atlas.stitched.texels import (
     AnchoredTexels,
     anchors_diverge,
-    centre_weights,
     gap_limit_mm,
     mostly_hidden_triangles,
     rasterise_texel_triangles,
+    texel_centre_weights,
     unconnected_pairs,
 )
 from dermis.base.arrays import Floats, Index, Ints, Mask
@@ -33,7 +33,7 @@ class Coverage:
     weights : (h, w, 2) barycentric weights of that triangle's second and third corner
     anchor_triangle : (h, w) index of the anchor's triangle, -1 if there is none
     anchor_weights : (h, w, 2) barycentric weights of the anchor in its triangle
-    piece : (h, w) piece to which the texel belongs, -1 if there is none
+    piece : (h, w) index of the piece to which the texel belongs, -1 if there is none
     gutter : (h, w) mask of gutter texels, into which light is copied
     distance_mm : (h, w) distance of the texel from the piece, measured on the surface [mm]
     """
@@ -66,7 +66,7 @@ def compute_coverage(
     owner = rasterise_texel_triangles(
         packing.corners, _drawing_order(surface, triangle_piece, member_triangles), grid_shape
     )
-    weights = centre_weights(packing.corners, owner)
+    weights = texel_centre_weights(packing.corners, owner)
     coverage = Coverage(
         owner,
         weights,
@@ -93,7 +93,7 @@ def _add_gutters(coverage: Coverage, triangle_piece: Index, texels: GutterTexels
     ended[y, x] = ~texels.complete
     incomplete = ~texels.complete & ~texels.rim
     coverage.triangle[y[incomplete], x[incomplete]] = -1
-    _repeat_edge(coverage, triangle_piece, ended, y[incomplete], x[incomplete])
+    _extend_surface_edge(coverage, triangle_piece, ended, y[incomplete], x[incomplete])
     # gutters end where the surface has no texels in the atlas
     unlit = coverage.gutter & ((coverage.triangle < 0) | (triangle_piece[coverage.triangle] < 0))
     for grid in (coverage.triangle, coverage.anchor_triangle):
@@ -134,7 +134,9 @@ def _mirrored_triangles(surface: FlatSurface, member_piece: Index, member_triang
     return np.asarray(np.sign(total)[member_piece] != np.sign(surface.area_uv[member_triangles]))
 
 
-def _repeat_edge(coverage: Coverage, triangle_piece: Index, beyond_end: Mask, y: Index, x: Index) -> None:
+def _extend_surface_edge(
+    coverage: Coverage, triangle_piece: Index, beyond_end: Mask, y: Index, x: Index
+) -> None:
     """Copy neighbouring texels to gutter texels just beyond an edge at which the surface ends.
 
     A blur along the edge then reads the same light from a gutter as from the rim of a piece.
@@ -171,7 +173,7 @@ def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> 
 def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -> NDArray[np.uint16]:
     """Return how far each texel's piece and gutter extend left, right, up and down, (h, w, 4) [texel].
 
-    A piece also ends at a gap: between adjacent texels whose surface points are far apart, see `_has_gap`.
+    A piece also ends at a gap: between adjacent texels whose surface points are far apart.
     """
     anchor = coverage.anchor_triangle
     owner = np.where(anchor >= 0, np.where(coverage.distance_mm > 0, -1, anchor), -2)
@@ -182,13 +184,15 @@ def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -
         here[:] = (before[1:] >= 0) & (before[1:] == before[:-1])
         first, second = unconnected_pairs(surface, owner, axis)
         same = joined.ravel()[second]
-        joined.ravel()[second[same]] = ~_has_gap(surface, packing, coverage, first[same], second[same], axis)
-        runs = run_lengths(np.moveaxis(joined, 1 - axis, 1))
+        joined.ravel()[second[same]] = ~_pairs_with_gap(
+            surface, packing, coverage, first[same], second[same], axis
+        )
+        runs = connected_run_lengths(np.moveaxis(joined, 1 - axis, 1))
         distance[..., 2 * axis], distance[..., 2 * axis + 1] = (np.moveaxis(one, 1, 1 - axis) for one in runs)
     return distance
 
 
-def _has_gap(
+def _pairs_with_gap(
     surface: FlatSurface,
     packing: Packing,
     coverage: Coverage,
@@ -198,7 +202,8 @@ def _has_gap(
 ) -> Mask:
     """Return the mask of pairs of adjacent texels whose surface points are not adjacent on the surface.
 
-    A pair has a gap if both `anchors_diverge` and `gap_limit_mm` say so.
+    There is a gap if `anchors_diverge` is true for a pair, and its surface points are more than
+    `gap_limit_mm` apart.
 
     first_texels, second_texels : (n,) flat indices of the texels
     axis : 0 for pairs along x, 1 along y

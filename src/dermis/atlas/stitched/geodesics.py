@@ -70,7 +70,7 @@ class GeodesicEnds(NamedTuple):
         third_weight: Doubles,
         reached_target: bool,
     ) -> None:
-        """Store where some geodesics end.
+        """Store the end points of some geodesics.
 
         rays : geodesics that end in their current triangle
         first_corner : corner (0, 1, 2) of the triangle with the weight 1 - second_weight - third_weight
@@ -127,7 +127,7 @@ def _leave_first_triangle(
 
 
 def _cross_edge(adjacency: Adjacency, rays: Geodesics, ends: GeodesicEnds) -> Geodesics:
-    """Continue geodesics into the next triangle; store in `ends` where geodesics end there."""
+    """Continue geodesics into the next triangle; return those that go on, and store the others in `ends`."""
     neighbour = adjacency.neighbour[rays.triangle, rays.exit_side]
     ended = (neighbour < 0) | ~adjacency.passable[neighbour]
     if ended.any():

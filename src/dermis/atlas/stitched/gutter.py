@@ -150,7 +150,11 @@ def trace_gutter(
 
 
 def trace_from_border(
-    surface: FlatSurface, border: Border, sides: BorderSides, nearest: NearestPoints, texels: NDArray[Any]
+    surface: FlatSurface,
+    border: Border,
+    sides: BorderSides,
+    nearest_points: NearestPoints,
+    texels: NDArray[Any],
 ) -> tuple[GeodesicEnds, Doubles]:
     """Trace a geodesic from the nearest border point of each texel to the surface point that the texel shows.
 
@@ -158,34 +162,34 @@ def trace_from_border(
     the second and third corner of the border triangle.
 
     sides : border sides on the texel grid
-    nearest : nearest border point of each texel
+    nearest_points : nearest border point of each texel
     texels : (n, 2) x and y of the texels
     """
-    t, anchor_triangle = nearest.fraction[:, None], border.triangle[nearest.side]
-    first, rows = border.side[nearest.side], np.arange(len(anchor_triangle))
+    t, anchor_triangle = nearest_points.fraction[:, None], border.triangle[nearest_points.side]
+    first, rows = border.side[nearest_points.side], np.arange(len(anchor_triangle))
     second = (first + 1) % 3
     corners = surface.adjacency.planar_corners
     start = _interpolate_linearly(corners[anchor_triangle, first], corners[anchor_triangle, second], t)
-    offset = texels - border_points(sides, nearest)
-    step = np.einsum("ns,nsa->na", offset, border_steps(sides, nearest))
+    offset = texels - border_points(sides, nearest_points)
+    step = np.einsum("ns,nsa->na", offset, border_texel_steps(sides, nearest_points))
     corner = np.zeros((len(anchor_triangle), 3))
     corner[rows, first], corner[rows, second] = 1 - t[:, 0], t[:, 0]
     return trace_geodesics(surface.adjacency, anchor_triangle, start, start + step), corner[:, 1:]
 
 
-def border_points(sides: BorderSides, nearest: NearestPoints) -> Doubles:
+def border_points(sides: BorderSides, nearest_points: NearestPoints) -> Doubles:
     """Return the positions (n, 2) of nearest border points on the texel grid [texel]."""
-    first, second = np.moveaxis(sides.ends[nearest.side], 1, 0)
-    return _interpolate_linearly(first, second, nearest.fraction[:, None])
+    first, second = np.moveaxis(sides.ends[nearest_points.side], 1, 0)
+    return _interpolate_linearly(first, second, nearest_points.fraction[:, None])
 
 
-def border_steps(sides: BorderSides, nearest: NearestPoints) -> Doubles:
-    """Return the surface vectors (n, 2, 2) of a step of one texel right, and of one down, at border points.
+def border_texel_steps(sides: BorderSides, nearest_points: NearestPoints) -> Doubles:
+    """Return the surface vectors (n, 2, 2) [mm] of a step by one texel at each of n border points.
 
-    The unit is mm.
+    The first vector belongs to a step to the right, the second to a step down.
     """
-    first, second = np.moveaxis(sides.steps[nearest.side], 1, 0)
-    return _interpolate_linearly(first, second, nearest.fraction[:, None, None])
+    first, second = np.moveaxis(sides.steps[nearest_points.side], 1, 0)
+    return _interpolate_linearly(first, second, nearest_points.fraction[:, None, None])
 
 
 def _interpolate_linearly(start_values: Doubles, end_values: Doubles, fraction: Doubles) -> Doubles:

@@ -50,7 +50,8 @@ class _SideMetric(NamedTuple):
 
     x, y, down : (k,) coefficients; the length of an offset (dx, dy) on the surface is that of the vector
         (x dx + y dy, down dy) [mm]
-    along : (k, 2) distance along the side of a texel step in x and of one in y, as a fraction of the side
+    along : (k, 2) lengths of a texel step in x and of one in y when projected onto the side, as fractions of
+        the side's length
     half_extent : (k, 2) margin in x and y around the side's bounding box, wide enough for the gutter [texel]
     """
 
@@ -78,7 +79,7 @@ def nearest_border_points(sides: BorderSides, inside_mask: Mask) -> NearestPoint
     fraction = np.clip((metric.along[k].T * offset).sum(axis=0), 0.0, 1.0)
     v = offset - fraction * along
     distance2 = (metric.x[k] * v[0] + metric.y[k] * v[1]) ** 2 + (metric.down[k] * v[1]) ** 2
-    rim = _within_a_texel(offset, along)
+    rim = _within_texel_of_segment(offset, along)
     near = np.flatnonzero(rim | (distance2 < sides.gutter_mm[k] ** 2))
     nearest2 = np.full(inside_mask.size, np.inf)
     np.minimum.at(nearest2, texel[near], distance2[near])
@@ -109,7 +110,7 @@ def _side_metric(sides: BorderSides) -> _SideMetric:
 def _candidate_texels(
     sides: BorderSides, metric: _SideMetric, grid_shape: tuple[int, ...]
 ) -> tuple[Index, Index, Index]:
-    """Return candidates for gutter texels, as three arrays (n,): border side, x and y."""
+    """Return texels that may be in a gutter, as three arrays (n,): index of the border side, x and y."""
     height, width = grid_shape
     low = np.ceil(sides.ends.min(axis=1) - metric.half_extent)
     high = np.floor(sides.ends.max(axis=1) + metric.half_extent)
@@ -120,7 +121,7 @@ def _candidate_texels(
     return k[row], x, y[row]
 
 
-def _within_a_texel(offset: Doubles, along: Doubles) -> Mask:
+def _within_texel_of_segment(offset: Doubles, along: Doubles) -> Mask:
     """Return the mask of offsets (2, n) that are within a texel of the segment from 0 to `along` (2, n)."""
     low, high = np.minimum(along, 0.0), np.maximum(along, 0.0)
     found = np.asarray(((offset > low - _RIM_WIDTH_TEXELS) & (offset < high + _RIM_WIDTH_TEXELS)).all(axis=0))

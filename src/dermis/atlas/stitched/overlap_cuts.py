@@ -13,7 +13,7 @@ from dermis.atlas.stitched.gutter import (
     Packing,
     border_points,
     border_sides,
-    border_steps,
+    border_texel_steps,
     find_border,
     trace_from_border,
 )
@@ -73,7 +73,7 @@ class Conflicts(NamedTuple):
 
 
 class _PieceGrid(NamedTuple):
-    """Texel grid with one piece and its gutters.
+    """Texel grid with one chart piece and its gutters.
 
     owner : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
     row : (h, w) index of each texel in `anchored`
@@ -93,7 +93,7 @@ class _PieceGrid(NamedTuple):
     nearest: NearestPoints
 
 
-def find_conflicts(
+def find_gutter_conflicts(
     surface: FlatSurface, mapped_triangles: Mask, member_triangles: Index, gutter_mm: float
 ) -> Conflicts:
     """Find where gutters of one chart piece meet, by drawing the piece on a separate texel grid.
@@ -116,7 +116,7 @@ def find_conflicts(
     piece = np.where(mapped_triangles, 1, -1)
     piece[member_triangles] = 0
     packing, shape = Packing(corners, texels_per_uv * ones, ones / texel_mm), (int(rows), int(columns))
-    grid = _draw_grid(
+    grid = _draw_piece_grid(
         surface,
         find_border(surface, piece, member_triangles),
         packing,
@@ -129,7 +129,7 @@ def find_conflicts(
     return Conflicts(first.anchors + origin, second.anchors + origin, inside, texels_per_uv, texel_mm)
 
 
-def _draw_grid(
+def _draw_piece_grid(
     surface: FlatSurface, border: Border, packing: Packing, gutter_width: GutterWidth, texel_triangle: Ints
 ) -> _PieceGrid:
     sides = border_sides(surface, border, packing, gutter_width)
@@ -142,7 +142,7 @@ def _draw_grid(
     texels = np.column_stack(np.divmod(texel, texel_triangle.shape[1])[::-1]).astype(np.float64)
     anchors = np.concatenate((texels[: len(covered)], border_points(sides, nearest)))
     steps = surface.uv_metric[f, 0, :2] / packing.texels_per_uv[f, None]
-    step_mm = np.concatenate((steps, np.linalg.norm(border_steps(sides, nearest), axis=2)))
+    step_mm = np.concatenate((steps, np.linalg.norm(border_texel_steps(sides, nearest), axis=2)))
     return _PieceGrid(labels, row, AnchoredTexels(texels, anchors, step_mm), packing, border, sides, nearest)
 
 
@@ -228,18 +228,18 @@ def _cut_length_mm(surface: FlatSurface, member_triangles: Index, part_of_triang
 def _cut_piece(
     surface: FlatSurface, mapped_triangles: Mask, member_triangles: Index, gutter_mm: float
 ) -> Index | None:
-    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), or None if uncut.
+    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), None for no cut.
 
     member_triangles : (t,) indices of the piece's triangles
     """
-    conflicts = find_conflicts(surface, mapped_triangles, member_triangles, gutter_mm)
+    conflicts = find_gutter_conflicts(surface, mapped_triangles, member_triangles, gutter_mm)
     reach = gutter_mm / conflicts.texel_mm
     part = np.zeros(len(member_triangles), np.int64)
     for row, cluster in enumerate(_conflict_clusters(conflicts, reach), start=1):
         if len(cluster) * conflicts.texel_mm < _MIN_CONFLICT_GUTTER_WIDTHS * gutter_mm:
             continue
         overlap = conflicts._replace(first=conflicts.first[cluster], second=conflicts.second[cluster])
-        normal, offset, separated = _best_line(overlap, reach)
+        normal, offset, separated = _best_cut_line(overlap, reach)
         half = surface.uv[member_triangles].mean(axis=1) * conflicts.texels_per_uv @ normal > offset
         across = float(np.count_nonzero(np.abs(conflicts.inside @ normal - offset) < 0.5))
         around = float(separated + 2 * reach)
@@ -251,13 +251,13 @@ def _cut_piece(
     return _connected_parts(surface, member_triangles, part, gutter_mm)
 
 
-def _conflict_clusters(conflicts: Conflicts, gutter_texels: float) -> list[Index]:
+def _conflict_clusters(conflicts: Conflicts, gutter_width_texels: float) -> list[Index]:
     """Group neighbouring conflicts between gutters; return the indices of the conflicts in each group.
 
-    gutter_texels : gutter width [texel]
+    gutter_width_texels : gutter width [texel]
     """
     cells = np.floor(
-        (conflicts.first + conflicts.second) / 2 / (_CLUSTER_CELL_GUTTER_WIDTHS * gutter_texels)
+        (conflicts.first + conflicts.second) / 2 / (_CLUSTER_CELL_GUTTER_WIDTHS * gutter_width_texels)
     ).astype(np.int64)
     cells, cell_of = np.unique(cells, axis=0, return_inverse=True)
     adjacent = np.abs(cells[:, None] - cells).max(axis=2) <= 1
@@ -265,12 +265,12 @@ def _conflict_clusters(conflicts: Conflicts, gutter_texels: float) -> list[Index
     return [np.flatnonzero(label == k) for k in range(label.max(initial=-1) + 1)]
 
 
-def _within_reach(points: Doubles, target_points: Doubles, reach: float) -> Mask:
-    """Return the mask (...) of points (..., 2) within about `reach` of any target point.
+def _near_any_target(points: Doubles, target_points: Doubles, max_distance: float) -> Mask:
+    """Return the mask (...) of points (..., 2) within about `max_distance` of any target point.
 
     target_points : (n, 2) points to which the distances are measured
     """
-    cell = reach / _CELLS_PER_GUTTER
+    cell = max_distance / _CELLS_PER_GUTTER
     low = np.floor(target_points.min(axis=0) / cell) - _CELLS_PER_GUTTER - 1
     disc = np.argwhere(
         np.hypot(*(np.indices((2 * _CELLS_PER_GUTTER + 1,) * 2) - _CELLS_PER_GUTTER)) <= _CELLS_PER_GUTTER
@@ -284,32 +284,44 @@ def _within_reach(points: Doubles, target_points: Doubles, reach: float) -> Mask
 
 
 def _conflict_strip(
-    surface: FlatSurface, member_triangles: Index, conflicts: Conflicts, half_mask: Mask, gutter_texels: float
+    surface: FlatSurface,
+    member_triangles: Index,
+    conflicts: Conflicts,
+    one_side_mask: Mask,
+    gutter_width_texels: float,
 ) -> Mask:
-    """Return the mask (t,) of triangles near conflicts between gutters, on one side of a line.
+    """Return the mask (t,) of a piece's triangles near conflicts between gutters, on one side of a line.
 
-    The line divides the piece. The result is on the side where the triangles near conflicts have less area.
+    Of the two sides of the line, this is the side where such triangles have less area.
 
-    half_mask : (t,) mask of triangles on one side of the line
-    gutter_texels : gutter width [texel]
+    one_side_mask : (t,) mask of the triangles on one side of the line; the result may be on the other side
+    gutter_width_texels : gutter width [texel]
     """
     corners = surface.uv[member_triangles] * conflicts.texels_per_uv
     points = np.concatenate((corners, corners.mean(axis=1, keepdims=True)), axis=1)
     near = np.asarray(
-        _within_reach(points, np.concatenate((conflicts.first, conflicts.second)), gutter_texels).any(axis=1)
+        _near_any_target(
+            points, np.concatenate((conflicts.first, conflicts.second)), gutter_width_texels
+        ).any(axis=1)
     )
     area = surface.area_mm2[member_triangles]
-    return near & (half_mask if area[near & half_mask].sum() < area[near & ~half_mask].sum() else ~half_mask)
+    return near & (
+        one_side_mask
+        if area[near & one_side_mask].sum() < area[near & ~one_side_mask].sum()
+        else ~one_side_mask
+    )
 
 
-def _best_line(conflicts: Conflicts, gutter_texels: float) -> tuple[Doubles, float, int]:
+def _best_cut_line(conflicts: Conflicts, gutter_width_texels: float) -> tuple[Doubles, float, int]:
     """Return the line that separates the most conflicts relative to the length of a cut along the line.
 
     A line separates a conflict if the two border points of the conflict are on different sides. Returns the
     line's normal and offset, and the number of separated conflicts.
     """
     close = conflicts.inside[
-        _within_reach(conflicts.inside, np.concatenate((conflicts.first, conflicts.second)), gutter_texels)
+        _near_any_target(
+            conflicts.inside, np.concatenate((conflicts.first, conflicts.second)), gutter_width_texels
+        )
     ]
     best, line = -1.0, (np.array([1.0, 0.0]), 0.0, 0)
     for angle in np.arange(_LINE_DIRECTION_COUNT) * np.pi / _LINE_DIRECTION_COUNT:

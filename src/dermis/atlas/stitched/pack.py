@@ -52,38 +52,38 @@ def place_shapes(shapes: Sequence[Sequence[CellRun]], cells_per_side: int) -> li
     return corners
 
 
-def _free_positions(occupied_cells: int, spans: Sequence[CellRun], cells_per_side: int) -> int:
+def _free_positions(occupied_cells: int, shape_runs: Sequence[CellRun], cells_per_side: int) -> int:
     """Return the free positions for the upper left cell of a shape, as a bit mask of n x n cells.
 
     occupied_cells : bit mask of the occupied cells
-    spans : cells of the shape as runs, see `place_shapes`
+    shape_runs : cells of the shape as runs, see `place_shapes`
     """
-    height = 1 + max(row for row, _, _ in spans)
-    width = 1 + max(last for _, _, last in spans)
+    height = 1 + max(row for row, _, _ in shape_runs)
+    width = 1 + max(last for _, _, last in shape_runs)
     if max(height, width) > cells_per_side:
         return 0
     blocked, ahead = (
         0,
         [occupied_cells],
     )  # ahead: cells from which one of the next 1, 2, 4, ... cells is occupied
-    for row, first, last in spans:
+    for row, first, last in shape_runs:
         length = last - first + 1
         step = length.bit_length() - 1
         while len(ahead) <= step:
             ahead.append(ahead[-1] | ahead[-1] >> (1 << len(ahead) - 1))
         blocked |= (ahead[step] | ahead[step] >> length - (1 << step)) >> row * cells_per_side + first
-    rows = _row_starts(cells_per_side) & ((1 << cells_per_side * (cells_per_side - height + 1)) - 1)
+    rows = _row_start_mask(cells_per_side) & ((1 << cells_per_side * (cells_per_side - height + 1)) - 1)
     return rows * ((2 << cells_per_side - width) - 1) & ~blocked
 
 
 @cache
-def _row_starts(cells_per_side: int) -> int:
+def _row_start_mask(cells_per_side: int) -> int:
     """Return a bit mask of n x n cells in which the first cell of each row is set."""
     return ((1 << cells_per_side * cells_per_side) - 1) // ((1 << cells_per_side) - 1)
 
 
 class _Piece(NamedTuple):
-    """Piece of the layout, prepared for packing.
+    """Chart, or part of a chart, prepared for packing.
 
     surface : triangles of the piece
     uv : (t, 3, 2) uv of the corners, scaled and moved so that the lowest coordinates are 0
@@ -102,7 +102,7 @@ class _Piece(NamedTuple):
 
 
 class _PieceMask(NamedTuple):
-    """Cells that a piece with its gutter occupies at one scale.
+    """Grid cells that a chart piece with its gutter occupies at one scale.
 
     spans : (m, 3) row, first and last column of each run of cells
     margin : (2,) distance from the first column and row to the origin of the piece's uv [cell]
@@ -115,9 +115,9 @@ class _PieceMask(NamedTuple):
 
 
 class PieceLayout(NamedTuple):
-    """Positions of packed pieces on a grid of cells.
+    """Positions of packed chart pieces on a square grid of cells.
 
-    The grid has 512 x 512 cells for maps of at least 512 x 512 texels.
+    The grid has one cell per texel of the map, but at most 512 x 512 cells.
 
     scale : cells per unit of the pieces' scaled uv
     origins : (p, 2) position of the origin of each piece's uv [cell]
@@ -141,13 +141,13 @@ def pack_pieces(
     uv_scale : (f,) factor by which each triangle's uv is scaled so that all pieces have a similar texel
         density
     map_side : texels along each side of the map
-    layout : result of `find_layout` if it is known; None to call this slow function
+    layout : result of `find_piece_layout` if it is known; None to call this slow function
     """
     groups, pieces = _prepare_pieces(surface, triangle_piece, uv_scale)
     packing = Packing(np.zeros(surface.uv.shape), *np.zeros((2, len(triangle_piece))))
     if not pieces:
         return packing
-    found = layout or _find_layout(pieces, map_side, gutter_width)
+    found = layout or _search_piece_layout(pieces, map_side, gutter_width)
     if found is None:
         return None
     per_cell = map_side / min(map_side, MAX_CELLS_PER_SIDE)
@@ -158,17 +158,17 @@ def pack_pieces(
     return packing
 
 
-def find_layout(
+def find_piece_layout(
     surface: FlatSurface, triangle_piece: Index, uv_scale: Doubles, map_side: int, gutter_width: GutterWidth
 ) -> PieceLayout | None:
     """Search for a layout of chart pieces, to be passed to `pack_pieces`; return None if they do not fit."""
-    return _find_layout(_prepare_pieces(surface, triangle_piece, uv_scale)[1], map_side, gutter_width)
+    return _search_piece_layout(_prepare_pieces(surface, triangle_piece, uv_scale)[1], map_side, gutter_width)
 
 
 def _prepare_pieces(
     surface: FlatSurface, triangle_piece: Index, uv_scale: Doubles
 ) -> tuple[list[Index], list[_Piece]]:
-    """Return the triangles of each piece, and the pieces prepared for packing."""
+    """Return the triangle indices of each chart piece, and the pieces prepared for packing."""
     order = np.argsort(triangle_piece, kind="stable")[np.count_nonzero(triangle_piece < 0) :]
     groups = [
         members
@@ -176,11 +176,11 @@ def _prepare_pieces(
         if len(members)
     ]
     return groups, [
-        _single_piece(surface, triangle_piece, members, float(uv_scale[members[0]])) for members in groups
+        _prepare_piece(surface, triangle_piece, members, float(uv_scale[members[0]])) for members in groups
     ]
 
 
-def _single_piece(
+def _prepare_piece(
     surface: FlatSurface, triangle_piece: Index, member_triangles: Index, uv_scale: float
 ) -> _Piece:
     border = find_border(surface, triangle_piece, member_triangles)
@@ -193,7 +193,9 @@ def _single_piece(
     return _Piece(subset, uv, uv.max(axis=(0, 1)), uv_scale, uv_per_mm, border)
 
 
-def _find_layout(pieces: list[_Piece], map_side: int, gutter_width: GutterWidth) -> PieceLayout | None:
+def _search_piece_layout(
+    pieces: list[_Piece], map_side: int, gutter_width: GutterWidth
+) -> PieceLayout | None:
     """Return the layout with the largest scale that the search finds, or None if no scale fits."""
     cells = min(map_side, MAX_CELLS_PER_SIDE)
     gutter_width = gutter_width._replace(max_texels=gutter_width.max_texels * cells / map_side)
@@ -216,7 +218,8 @@ def _find_largest_scale(masks: list[_PieceMask], cells_per_side: int, max_scale:
     for order in range(_PACKING_ORDER_COUNT):
         lower = coarse.scale if coarse else 0.0
         if order == 0 or (
-            coarse and _try_scale(masks, lower * _MIN_SCALE_GAIN, cells_per_side // _COARSE_CELL_SIDE, order)
+            coarse
+            and _layout_at_scale(masks, lower * _MIN_SCALE_GAIN, cells_per_side // _COARSE_CELL_SIDE, order)
         ):
             found = _bisect_scale(
                 masks,
@@ -251,13 +254,13 @@ def _bisect_scale(
     """Return the layout with the largest scale that bisection finds, or None if no trial fits.
 
     scale_bounds : lowest and highest scale
-    order_index : index of the packing order, see `_try_scale`
+    order_index : index of the packing order, see `_layout_at_scale`
     bisection_count : number of trials
     """
     (low, high), best = scale_bounds, None
     for _ in range(bisection_count):
         middle = (low + high) / 2
-        found = _try_scale(masks, middle, cells_per_side, order_index)
+        found = _layout_at_scale(masks, middle, cells_per_side, order_index)
         if found is None:
             high = middle
         else:
@@ -265,7 +268,7 @@ def _bisect_scale(
     return best
 
 
-def _try_scale(
+def _layout_at_scale(
     masks: list[_PieceMask], scale: float, cells_per_side: int, order_index: int
 ) -> PieceLayout | None:
     """Return the layout of the pieces at one scale, or None if they do not fit.
@@ -289,12 +292,12 @@ def _try_scale(
     return PieceLayout(scale, corners + low)
 
 
-def _scaled_mask(mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
-    """Return the mask (h, w) of all cells that a piece touches after scaling, and its scaled margin.
+def _scaled_mask(piece_mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
+    """Return the mask (h, w) of all cells that a chart piece touches after scaling, and its scaled margin.
 
-    scale : factor from the scale of `mask` to the new scale
+    scale : factor from the scale of `piece_mask` to the new scale
     """
-    row, first, last = (mask.spans.T - mask.margin[[1, 0, 0], None]) * scale
+    row, first, last = (piece_mask.spans.T - piece_mask.margin[[1, 0, 0], None]) * scale
     top, bottom = np.floor(row).astype(int), np.ceil(row + scale).astype(int) - 1
     left, right = np.floor(first).astype(int), np.ceil(last + scale).astype(int) - 1
     low = np.array([left.min(), top.min()])
@@ -307,7 +310,7 @@ def _scaled_mask(mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
 
 
 def _piece_mask(piece: _Piece, scale: float, gutter_width: GutterWidth) -> _PieceMask:
-    """Return the cells in which a piece and its gutter may need a texel.
+    """Return the grid cells that a chart piece and its gutter may need.
 
     scale : cells per unit of the piece's scaled uv
     """

@@ -139,9 +139,9 @@ def _planar_corners(corners: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def side_neighbours(mesh: Mesh) -> tuple[Ints, NDArray[np.int8], Mask]:
-    """Return the neighbour across each side: triangle, side of the shared edge, and flip, (f, 3) each.
+    """Return the neighbour across each side: triangle index, side of the shared edge, and flip, (f, 3) each.
 
-    The triangle is -1 if there is no neighbour. The flip is true if the neighbour faces the opposite way.
+    The index is -1 if there is no neighbour. The flip is true if the neighbour faces the opposite way.
     """
     points, count = mesh.point[mesh.triangles].astype(np.int64), len(mesh.triangles)
     side = np.arange(3 * count)

@@ -40,7 +40,7 @@ def mostly_hidden_triangles(corners: Doubles, drawn_triangles: Index, texel_tria
     return np.asarray(owned < 0.5 * np.bincount(drawn, minlength=count))
 
 
-def centre_weights(corners: Doubles, texel_triangle: Ints) -> Floats:
+def texel_centre_weights(corners: Doubles, texel_triangle: Ints) -> Floats:
     """Return the barycentric weights (h, w, 2) of the second and third corner at each texel centre.
 
     corners : (f, 3, 2) corners of all triangles [texel]
@@ -70,7 +70,7 @@ class AnchoredTexels(NamedTuple):
 
 
 def unconnected_pairs(surface: FlatSurface, texel_triangle: Ints, axis: int) -> tuple[Index, Index]:
-    """Find pairs of adjacent texels whose triangles share no side in uv; return two flat indices (n,).
+    """Find pairs of adjacent texels whose triangles share no side in uv; return flat indices, (n,) for each.
 
     texel_triangle : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
     axis : 0 for texels adjacent along x, 1 along y
@@ -104,7 +104,7 @@ def anchors_diverge(first_texels: AnchoredTexels, second_texels: AnchoredTexels)
 
 
 def gap_limit_mm(first_texels: AnchoredTexels, second_texels: AnchoredTexels, axis: int) -> Doubles:
-    """Return the largest distance (n,) between the surface points of adjacent texels without a gap [mm].
+    """Return the distance (n,) between surface points above which two adjacent texels have a gap [mm].
 
     axis : 0 for texels adjacent along x, 1 along y
     """

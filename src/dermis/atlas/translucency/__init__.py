@@ -1,1 +1,1 @@
-"""Division of an atlas into cells, for light that passes through ears, nostrils, lips and eyelids."""
+"""Division of an atlas into cells, for translucency: light through ears, nostrils, lips and eyelids."""

@@ -1,4 +1,4 @@
-"""Division of an atlas into coarse cells and into tiles of cells, for light through thin parts."""
+"""Division of an atlas into coarse cells, and of the cells into tiles, to compute translucency."""
 
 from __future__ import annotations
 
@@ -30,7 +30,10 @@ _SAME_POINT_TEXELS = 0.1  # largest distance in the atlas at which a texel and a
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Division of an atlas into side x side cells, and of the cells into tiles, for light through thin parts.
+    """Division of an atlas into side x side cells, and of the cells into tiles, to compute translucency.
+
+    Translucency is light that enters the skin in one cell and leaves it in another, for example on the other
+    side of an ear.
 
     Cells are numbered row by row. An array that is sorted by tile comes with an array `..._first`: the
     entries of tile k start at index `..._first[k]` and end before index `..._first[k + 1]`.
@@ -79,7 +82,7 @@ class Cells:
 
 
 def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: float = 1.0) -> Cells:
-    """Divide an atlas into cells, between which light passes through thin parts.
+    """Divide an atlas into cells, between which light passes through ears, lips and other thin parts.
 
     max_sigma_mm : standard deviation of the widest Gaussian of the diffusion profiles; 10 mm is used for
         larger values [mm]
@@ -91,7 +94,7 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: flo
     stride = max(1, atlas.size // max(_MAX_AVERAGED_TEXELS_PER_SIDE, side))
     tiles = -(-side // CELLS_PER_TILE_SIDE)
     centre = _centre_texels(atlas.size, side)
-    lit = _cells_with_texels(atlas.lit[::stride, ::stride], atlas.size, side, stride)
+    lit = _cells_with_marked_texels(atlas.lit[::stride, ::stride], atlas.size, side, stride)
     triangle = atlas.triangle[np.ix_(centre, centre)]
     receiver = _dilate_cells(lit) & (triangle >= 0)
     weights = atlas.barycentric[np.ix_(centre, centre)][receiver]
@@ -126,7 +129,7 @@ def _centre_texels(atlas_side: int, cells_per_side: int) -> Index:
     return np.asarray(((np.arange(cells_per_side) + 0.5) * atlas_side / cells_per_side).astype(np.int64))
 
 
-def _cells_with_texels(texel_mask: Mask, atlas_side: int, cells_per_side: int, stride: int) -> Mask:
+def _cells_with_marked_texels(texel_mask: Mask, atlas_side: int, cells_per_side: int, stride: int) -> Mask:
     """Return the mask (cells_per_side, cells_per_side) of cells that contain a marked texel.
 
     texel_mask : mask of every `stride`-th texel of the map along each axis
@@ -144,7 +147,7 @@ def _dilate_cells(cell_mask: Mask) -> Mask:
 
 
 def _sort_by_tile(tile_of_entry: NDArray[np.integer], tiles_per_side: int) -> tuple[Index, Index]:
-    """Return the order that sorts array entries by tile, and the start of each tile's entries (t + 1,)."""
+    """Return the order that sorts entries by tile, and the index (t + 1,) of each tile's first entry."""
     order = np.argsort(tile_of_entry, kind="stable")
     return order, np.concatenate(
         [[0], np.cumsum(np.bincount(tile_of_entry, minlength=tiles_per_side * tiles_per_side))]
@@ -152,7 +155,7 @@ def _sort_by_tile(tile_of_entry: NDArray[np.integer], tiles_per_side: int) -> tu
 
 
 def _source_cells(lit_mask: Mask, tiles_per_side: int) -> tuple[Index, Index]:
-    """Return the indices of the lit cells sorted by tile, and the start of each tile's entries."""
+    """Return the fields `sources` and `source_first` of `Cells`."""
     y, x = np.nonzero(lit_mask)
     order, first = _sort_by_tile(
         (y // CELLS_PER_TILE_SIDE * tiles_per_side + x // CELLS_PER_TILE_SIDE).astype(np.int32),
@@ -162,9 +165,9 @@ def _source_cells(lit_mask: Mask, tiles_per_side: int) -> tuple[Index, Index]:
 
 
 def _tiles_of_points(atlas: Atlas, points: Words, cells_per_side: int, tiles_per_side: int) -> Ints:
-    """Return the index (m,) of the tile in which the chart of each surface point shows the point.
+    """Return the index (m,) of the tile that contains each surface point's position in the atlas.
 
-    Gutter texels, which show points of other charts, do not count.
+    This is the position in the chart of the point's triangle, not in a gutter that also shows the point.
 
     points : (m, 2) triangle index, and packed barycentric weights
     """
@@ -182,7 +185,10 @@ def _pack_words(low_halves: NDArray[np.integer], high_halves: NDArray[np.integer
 
 
 def _tile_triangles(atlas: Atlas, cells_per_side: int, tiles_per_side: int) -> tuple[Words, Words]:
-    """Return the start of each tile's entries, and the triangles whose uv bounding boxes overlap the tile."""
+    """Return the fields `triangle_first` and `triangles` of `Cells`.
+
+    A triangle overlaps a tile if its bounding box in uv does.
+    """
     index = np.flatnonzero(atlas.mapped)
     uv, margin = atlas.corner_uv[index].astype(np.float64), TILE_MARGIN_TEXELS / atlas.size
     low, high = uv.min(axis=1) - margin, uv.max(axis=1) + margin
@@ -198,7 +204,7 @@ def _tile_triangles(atlas: Atlas, cells_per_side: int, tiles_per_side: int) -> t
 
 
 def _gutter_copies(atlas: Atlas, cells_per_side: int) -> tuple[Index, Words]:
-    """Return the start of each cell's entries, and the gutter texels with the texels that they copy."""
+    """Return the fields `gutter_copy_first` and `gutter_copies` of `Cells`."""
     rim, uv = _rim_texels(atlas)
     texel = np.concatenate([atlas.gutter, rim])
     x, y = np.clip(np.rint(np.concatenate([atlas.source, uv])), 0, atlas.size - 1).astype(np.int64).T

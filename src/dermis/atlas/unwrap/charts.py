@@ -37,12 +37,20 @@ def neighbour_triangles(triangles: Index) -> Index:
 
 
 def smooth_charts(triangle_chart: Index, triangles: Index) -> Index:
-    """Smooth the borders of charts (f,), and reduce each chart to one connected piece."""
-    return merge_strays(_smooth_borders(triangle_chart, triangles), triangles)
+    """Smooth the borders of charts, and reduce each chart to one connected piece; return charts (f,).
+
+    triangle_chart : (f,) index of the chart of each triangle
+    triangles : (f, 3) vertex indices
+    """
+    return merge_stray_pieces(_smooth_chart_borders(triangle_chart, triangles), triangles)
 
 
-def merge_strays(triangle_chart: Index, triangles: Index) -> Index:
-    """Reduce each chart (f,) to its largest connected piece; merge other pieces into adjacent charts."""
+def merge_stray_pieces(triangle_chart: Index, triangles: Index) -> Index:
+    """Merge all but the largest connected piece of each chart into adjacent charts; return charts (f,).
+
+    triangle_chart : (f,) index of the chart of each triangle
+    triangles : (f, 3) vertex indices
+    """
     adjacent = neighbour_triangles(triangles)
     is_stray = _stray_triangles(triangle_chart, adjacent)
     while is_stray.any():
@@ -60,8 +68,8 @@ def merge_strays(triangle_chart: Index, triangles: Index) -> Index:
     return triangle_chart
 
 
-def _smooth_borders(triangle_chart: Index, triangles: Index) -> Index:
-    """Assign each triangle to the most frequent chart among the triangles around it, (f,)."""
+def _smooth_chart_borders(triangle_chart: Index, triangles: Index) -> Index:
+    """Return the most frequent chart (f,) among the triangles around each triangle."""
     corner = triangles.ravel()
     triangle_count = np.maximum(np.bincount(corner), 1)[:, None]
     weight = np.eye(int(triangle_chart.max()) + 1)[triangle_chart]

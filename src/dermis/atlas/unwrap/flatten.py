@@ -32,15 +32,15 @@ def planar_triangles(corners: NDArray[np.floating]) -> Complexes:
     return np.column_stack((np.zeros(len(a)), length, along + 1j * up))
 
 
-def affine_coefficients(shapes: Complexes, positions: Complexes) -> tuple[Complexes, Complexes]:
-    """Return a and b (f,) of the maps z -> a z + b conj(z) + c from `shapes` to `positions`.
+def affine_coefficients(triangle_shapes: Complexes, positions: Complexes) -> tuple[Complexes, Complexes]:
+    """Return a and b (f,) of affine maps z -> a z + b conj(z) + c of triangles in the complex plane.
 
     The singular values of a map are |a| + |b| and |a| - |b|. The second value is negative if the map mirrors
     the triangle. The nearest rotation is a / |a|.
 
-    shapes, positions : (f, 3) corners of the triangles as complex numbers, before and after the map
+    triangle_shapes, positions : (f, 3) corners of the triangles as complex numbers, before and after the map
     """
-    e1, e2 = shapes[:, 1] - shapes[:, 0], shapes[:, 2] - shapes[:, 0]
+    e1, e2 = triangle_shapes[:, 1] - triangle_shapes[:, 0], triangle_shapes[:, 2] - triangle_shapes[:, 0]
     d1, d2 = positions[:, 1] - positions[:, 0], positions[:, 2] - positions[:, 0]
     cross = e1 * np.conj(e2) - e2 * np.conj(e1)
     return (d1 * np.conj(e2) - d2 * np.conj(e1)) / cross, (e1 * d2 - e2 * d1) / cross
@@ -121,14 +121,18 @@ def flatten(points: Doubles, triangles: Index, length_ratio: Doubles, stretch_we
     is then made as rigid as possible [Liu2008], with higher weights for strongly compressed triangles, as in
     [Rabinovich2017].
     """
-    shapes = planar_triangles(points[triangles])
-    component = vertex_components(triangles, len(points))
-    z = _conformal_map(points, triangles, component, shapes)
-    scaled = shapes * length_ratio[:, None]
+    triangle_shapes = planar_triangles(points[triangles])
+    vertex_component = vertex_components(triangles, len(points))
+    z = _conformal_map(points, triangles, vertex_component, triangle_shapes)
+    scaled = triangle_shapes * length_ratio[:, None]
     for _ in range(_REWEIGHTING_COUNT):
         a, b = affine_coefficients(scaled, z[triangles])
-        z = _make_rigid(
-            z, triangles, component, scaled, stretch_weight / length_ratio**2 * _stiffness_weights(a, b)
+        z = _make_map_rigid(
+            z,
+            triangles,
+            vertex_component,
+            scaled,
+            stretch_weight / length_ratio**2 * _stiffness_weights(a, b),
         )
     return untangle(np.column_stack((z.real, z.imag)), triangles)
 
@@ -138,10 +142,10 @@ def vertex_components(triangles: Index, vertex_count: int) -> Index:
     return label_components(vertex_count, triangles.ravel(), np.roll(triangles, -1, axis=1).ravel())
 
 
-def _cotangents(shapes: Complexes) -> Doubles:
+def _cotangents(triangle_shapes: Complexes) -> Doubles:
     """Return the cotangents (f, 3) of the angles opposite to the sides 01, 12 and 20."""
-    apex = np.roll(shapes, -2, axis=1)
-    product = np.conj(shapes - apex) * (np.roll(shapes, -1, axis=1) - apex)
+    apex = np.roll(triangle_shapes, -2, axis=1)
+    product = np.conj(triangle_shapes - apex) * (np.roll(triangle_shapes, -1, axis=1) - apex)
     return np.asarray(product.real / np.maximum(np.abs(product.imag), 1e-9 * np.abs(product)))
 
 
@@ -155,7 +159,9 @@ def _laplacian(triangles: Index, weights: Doubles, vertex_count: int) -> Any:
     return coo_array((values, (rows, columns)), shape=(vertex_count, vertex_count)).tocsc()
 
 
-def _conformal_map(points: Doubles, triangles: Index, component: Index, shapes: Complexes) -> Complexes:
+def _conformal_map(
+    points: Doubles, triangles: Index, vertex_component: Index, triangle_shapes: Complexes
+) -> Complexes:
     """Return the complex positions (n,) of a least squares conformal map, which changes angles least.
 
     Two points of each connected component are fixed.
@@ -165,8 +171,8 @@ def _conformal_map(points: Doubles, triangles: Index, component: Index, shapes: 
     n, start, end = len(points), triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     # twice the signed area of all triangles is a Hermitian form of the edges
     area = coo_array((np.full(len(start), 1j), (start, end)), shape=(n, n)).tocsc()
-    energy = _laplacian(triangles, _cotangents(shapes), n) + area + area.conj().T
-    low, high = _extreme_points(points, component)
+    energy = _laplacian(triangles, _cotangents(triangle_shapes), n) + area + area.conj().T
+    low, high = _extreme_points(points, vertex_component)
     fixed = np.zeros(n, dtype=bool)
     fixed[low] = fixed[high] = True
     z = np.zeros(n, dtype=np.complex128)
@@ -175,15 +181,15 @@ def _conformal_map(points: Doubles, triangles: Index, component: Index, shapes: 
     return z
 
 
-def _extreme_points(points: Doubles, component: Index) -> tuple[Index, Index]:
+def _extreme_points(points: Doubles, vertex_component: Index) -> tuple[Index, Index]:
     """Return the first and last point (c,) of each component along the axis on which it is longest."""
-    count = int(component.max()) + 1
+    count = int(vertex_component.max()) + 1
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    np.minimum.at(low, component, points)
-    np.maximum.at(high, component, points)
+    np.minimum.at(low, vertex_component, points)
+    np.maximum.at(high, vertex_component, points)
     axis = (high - low).argmax(axis=1)
-    order = np.lexsort((points[np.arange(len(points)), axis[component]], component))
-    last = np.append(component[order][1:] != component[order][:-1], True)
+    order = np.lexsort((points[np.arange(len(points)), axis[vertex_component]], vertex_component))
+    last = np.append(vertex_component[order][1:] != vertex_component[order][:-1], True)
     return order[np.roll(last, 1)], order[last]
 
 
@@ -212,22 +218,28 @@ def _stiffness_weights(conformal_part: Complexes, mirrored_part: Complexes) -> D
     return total
 
 
-def _make_rigid(
-    positions: Complexes, triangles: Index, component: Index, shapes: Complexes, stretch_weight: Doubles
+def _make_map_rigid(
+    positions: Complexes,
+    triangles: Index,
+    vertex_component: Index,
+    triangle_shapes: Complexes,
+    stretch_weight: Doubles,
 ) -> Complexes:
-    """Make a flat map as rigid as possible, in some iterations with fixed weights; return complex positions.
+    """Make a flat map as rigid as possible [Liu2008]; return the positions (n,) as complex numbers.
 
-    shapes : (f, 3) desired shape and size of the triangles
+    positions : (n,) positions before the first iteration, as complex numbers
+    vertex_component : (n,) index of the connected component of each vertex
+    triangle_shapes : (f, 3) desired shape and size of the triangles
     stretch_weight : (f,) weight of each triangle's stretch in the minimised sum [-]
     """
-    n, cot = len(positions), _cotangents(shapes) * stretch_weight[:, None]
+    n, cot = len(positions), _cotangents(triangle_shapes) * stretch_weight[:, None]
     free = np.ones(n, dtype=bool)
-    free[np.unique(component, return_index=True)[1]] = False
+    free[np.unique(vertex_component, return_index=True)[1]] = False
     solve = _sparse_solver(_laplacian(triangles, cot, n)[free][:, free])
-    weighted_edges = cot * (np.roll(shapes, -1, axis=1) - shapes)
+    weighted_edges = cot * (np.roll(triangle_shapes, -1, axis=1) - triangle_shapes)
     start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     for _ in range(_RIGID_ITERATION_COUNT):
-        a, _ = affine_coefficients(shapes, positions[triangles])
+        a, _ = affine_coefficients(triangle_shapes, positions[triangles])
         rotated = (weighted_edges * (a / np.maximum(np.abs(a), 1e-12))[:, None]).ravel()
         axes = rotated.real, rotated.imag
         right = [np.bincount(end, axis, n) - np.bincount(start, axis, n) for axis in axes]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dermis.atlas.unwrap.charts import grow_charts, merge_strays, neighbour_triangles, opposite_sides
+from dermis.atlas.unwrap.charts import grow_charts, merge_stray_pieces, neighbour_triangles, opposite_sides
 from dermis.atlas.unwrap.flatten import flatten, vertex_components
 from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.geometry import cross_2d, label_components, uv_cross
@@ -107,7 +107,7 @@ class ChartMesh(NamedTuple):
 
         triangle_chart : (f,) chart of each triangle
 
-        A closed piece, which has no border, is opened: its first triangle becomes a separate chart.
+        A closed piece of a chart, which has no border, is opened: its first triangle becomes a chart.
         """
         corners, point = split_at_seams(self.triangles, triangle_chart)
         piece = vertex_components(corners, len(point))[corners[:, 0]]
@@ -136,25 +136,25 @@ def flatten_charts(mesh: ChartMesh, triangle_chart: Index) -> FlatCharts:
     return flat
 
 
-def _repair_charts(mesh: ChartMesh, flat_charts: FlatCharts, change_count: int) -> Index:
+def _repair_charts(mesh: ChartMesh, flat_charts: FlatCharts, repair_count: int) -> Index:
     """Return the chart of each triangle (f,) after a repair of charts with faulty triangles.
 
     The first repairs move faulty triangles to adjacent charts; later repairs split the charts.
 
-    change_count : number of repairs made so far
+    repair_count : number of repairs made so far
     """
     if not flat_charts.faulty.any():
         return flat_charts.chart
     chart = (
         _reassign_faulty_triangles(mesh, flat_charts)
-        if change_count < _MAX_REASSIGNMENTS
+        if repair_count < _MAX_REASSIGNMENTS
         else _split_faulty_charts(mesh, flat_charts)
     )
     changed = flat_charts.faulty | (chart != flat_charts.chart)
     affected = np.isin(flat_charts.chart, flat_charts.chart[changed]) | np.isin(chart, chart[changed])
     subset = mesh.subset(affected)
     chart[affected] = (
-        chart.max() + 1 + _repair_charts(subset, subset.flatten(chart[affected]), change_count + 1)
+        chart.max() + 1 + _repair_charts(subset, subset.flatten(chart[affected]), repair_count + 1)
     )
     return chart
 
@@ -163,7 +163,9 @@ def _reassign_faulty_triangles(mesh: ChartMesh, flat_charts: FlatCharts) -> Inde
     """Return charts (f,) in which faulty triangles belong to an adjacent chart, if there is one."""
     adjacent = flat_charts.chart[neighbour_triangles(mesh.triangles)]
     other = np.where(adjacent == flat_charts.chart[:, None], -1, adjacent).max(axis=1)
-    return merge_strays(np.where(flat_charts.faulty & (other >= 0), other, flat_charts.chart), mesh.triangles)
+    return merge_stray_pieces(
+        np.where(flat_charts.faulty & (other >= 0), other, flat_charts.chart), mesh.triangles
+    )
 
 
 def _split_faulty_charts(mesh: ChartMesh, flat_charts: FlatCharts) -> Index:

@@ -86,7 +86,7 @@ def _drop_charts(
     margin = int(np.ceil(padding * _GRID_CELLS_PER_SIDE / 2))
     horizon, cells = np.zeros(_GRID_CELLS_PER_SIDE, dtype=np.int64), np.zeros((len(chart_edges), 2))
     for k in chart_order:
-        low, high = _height_profile(chart_edges[k] * scale, margin)
+        low, high = _column_extents(chart_edges[k] * scale, margin)
         if len(low) > _GRID_CELLS_PER_SIDE:
             return None
         heights = (np.lib.stride_tricks.sliding_window_view(horizon, len(low)) - low).max(axis=1)
@@ -99,7 +99,7 @@ def _drop_charts(
     return cells
 
 
-def _height_profile(edges: Doubles, margin_cells: int) -> tuple[Index, Index]:
+def _column_extents(edges: Doubles, margin_cells: int) -> tuple[Index, Index]:
     """Return the lowest and highest cell of a chart in each column (w,), with a margin of empty cells.
 
     edges : (k, 2, 2) edges of the chart's border [cell]
@@ -155,7 +155,7 @@ def unwrap(
 
     Raises DermisError if a triangle has no area or if there are too many charts for one map.
     """
-    _check_areas(positions, triangles)
+    _check_triangle_areas(positions, triangles)
     flat = flatten_charts(ChartMesh(positions, triangles), triangle_chart)
     up = np.broadcast_to(np.asarray(up_direction, dtype=np.float64), (len(triangles), 3))
     first = np.unique(flat.chart, return_index=True)[1]
@@ -164,7 +164,7 @@ def unwrap(
     return UvLayout(uv, flat.corners, flat.point, flat.chart)
 
 
-def _check_areas(positions: Doubles, triangles: Index) -> None:
+def _check_triangle_areas(positions: Doubles, triangles: Index) -> None:
     degenerate = int((triangle_areas(positions[triangles]) < _MIN_TRIANGLE_AREA_MM2).sum())
     if degenerate:
         refuse("mesh", "triangles with an area", f"{degenerate} have none", "Remove them first")

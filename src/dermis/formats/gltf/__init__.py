@@ -1,1 +1,1 @@
-"""Reading and writing of glTF 2.0 heads with their deformation."""
+"""Reading and writing of glTF 2.0 files of heads, with morph targets, bones and animations."""

@@ -25,7 +25,7 @@ _SPLINE_TANGENT_IN, _SPLINE_VALUE, _SPLINE_TANGENT_OUT = range(3)
 class AnimationTrack(NamedTuple):
     """Animated property of one or more nodes or morph targets, with the curve of its values.
 
-    path : "translation", "rotation" or "scale" of nodes, or "weights" of morph targets
+    path : name of the property: "translation", "rotation" or "scale" of nodes, or "weights" of morph targets
     names : (m,) names of the nodes or morph targets
     """
 
@@ -75,13 +75,13 @@ def read_clip(path: Path, clip_name: str | None) -> Animation:
 
 
 def _document_clip_names(document: Document) -> tuple[str, ...]:
-    clips = document.items("animations")
+    clips = document.top_level_array("animations")
     return tuple(str(clip.get("name") or f"clip {k}") for k, clip in enumerate(clips))
 
 
 def _read_tracks(document: Document, clip_index: int, clip_name: str) -> list[AnimationTrack]:
     """Return the tracks of a clip; channels with equal path, interpolation and key times share one track."""
-    clip, nodes = document.item("animations", clip_index), read_nodes(document)
+    clip, nodes = document.top_level_object("animations", clip_index), read_nodes(document)
     culprit = f"{document.path}: clip {clip_name!r}"
     check_limit(culprit, len(clip["channels"]), MAX_ANIMATION_CURVES, "channels", "Export it again")
     groups: dict[tuple[object, ...], list[tuple[str, _Keyframes]]] = {}
@@ -90,7 +90,7 @@ def _read_tracks(document: Document, clip_index: int, clip_name: str) -> list[An
         target, culprit = channel["target"], f"{document.path}: clip {clip_name!r}, channel {channel_index}"
         if "node" not in target or target["path"] not in (*_PROPERTY_COMPONENT_COUNTS, "weights"):
             continue  # a target of an extension
-        _check_node(nodes, target["node"], culprit)
+        _check_node_index(nodes, target["node"], culprit)
         sampler = clip["samplers"][checked_index(channel["sampler"], len(clip["samplers"]), "samplers")]
         if target["path"] == "weights":
             tracks.append(_weight_track(document, target["node"], sampler, culprit, names))
@@ -104,26 +104,31 @@ def _read_tracks(document: Document, clip_index: int, clip_name: str) -> list[An
     return tracks + [_merge_tracks(str(path), members) for (path, *_), members in groups.items()]
 
 
-def _check_node(nodes: Nodes, node_index: int, culprit: str) -> None:
+def _check_node_index(nodes: Nodes, node_index: int, culprit: str) -> None:
     if not 0 <= node_index < len(nodes.names):
         refuse(culprit, f"a node from 0 to {len(nodes.names) - 1}", f"got node {node_index}", DAMAGED_ADVICE)
 
 
 def _weight_track(
-    document: Document, node: int, sampler: Tree, culprit: str, mesh_targets: dict[int, tuple[str, ...]]
+    document: Document,
+    mesh_node_index: int,
+    sampler: Tree,
+    culprit: str,
+    mesh_targets: dict[int, tuple[str, ...]],
 ) -> AnimationTrack:
     """Return the track of the morph target weights of a node.
 
     sampler : JSON tree of the animation sampler
-    culprit : file, clip and channel, for errors
-    mesh_targets : cache: dictionary from mesh index to the names of the mesh's morph targets
+    culprit : file, clip and channel, for error messages
+    mesh_targets : dictionary from mesh index to the names of the mesh's morph targets; used as a cache, to
+        which this function adds the mesh of the node
     """
-    mesh = document.items("nodes")[node].get("mesh")
+    mesh = document.top_level_array("nodes")[mesh_node_index].get("mesh")
     if mesh is not None and mesh not in mesh_targets:
-        mesh_targets[mesh] = target_names(document.item("meshes", mesh))
+        mesh_targets[mesh] = target_names(document.top_level_object("meshes", mesh))
     names = () if mesh is None else mesh_targets[mesh]
     if not names:
-        actual = f"node {node} has no morph targets"
+        actual = f"node {mesh_node_index} has no morph targets"
         refuse(culprit, "weights of a mesh with morph targets", actual, DAMAGED_ADVICE)
     keys = _read_keyframes(document, sampler, len(names), culprit)
     curve = AnimationCurve(keys.times_s, keys.values[..., None, :], keys.kind)
@@ -143,7 +148,9 @@ def _merge_tracks(animated_property: str, keyframes_by_name: list[tuple[str, _Ke
 
 
 def _read_keyframes(document: Document, sampler: Tree, component_count: int, culprit: str) -> _Keyframes:
-    """Read the times (k,) and values (k, n) of a sampler; cubic splines also have tangents, (k, 3, n).
+    """Read the times and values of the k keys of an animation sampler.
+
+    The values have the shape (k, n). For cubic splines they include tangents and have the shape (k, 3, n).
 
     component_count : number n of components per key
     """
@@ -185,7 +192,10 @@ class AnimationCurve:
     is_rotation: bool = False
 
     def sample(self, seconds: float) -> Doubles:
-        """Return the values (m, n) at a time [s], constant before the first and after the last key."""
+        """Return the values (m, n) at a time [s].
+
+        Before the first key and after the last key, the values are constant.
+        """
         index = int(np.searchsorted(self.times_s, seconds, side="right")) - 1
         keys = self.values[:, _SPLINE_VALUE] if self.kind == "CUBICSPLINE" else self.values
         if index < 0 or index + 1 >= len(self.times_s):

@@ -68,12 +68,12 @@ class BufferBuilder:
     def add_displacements(
         self, moved_vertex: Numbers, displacements: Sequence[Numbers], vertex_count: int
     ) -> list[int]:
-        """Append arrays (vertex_count, 3) that are mostly 0, and return the indices of their accessors.
+        """Append arrays of displacements (vertex_count, 3), and return the indices of their accessors.
 
         The arrays are stored as sparse accessors, or as dense accessors if these are smaller.
 
-        moved_vertex : (m,) indices of the rows that may differ from 0, increasing, the same for all arrays
-        displacements : for each array, the values (m, 3) of the rows in `moved_vertex`
+        moved_vertex : (m,) increasing indices of the displaced vertices, the same for all arrays
+        displacements : for each array, the displacements (m, 3) of these vertices
         vertex_count : number of vertices
         """
         if not len(moved_vertex):
@@ -132,7 +132,7 @@ def _index_dtype(vertex_count: int) -> str:
 
 
 def resolve_textures(json_value: Any, texture_indices: Mapping[str, int]) -> Any:
-    """Return a JSON tree in which references {"index": picture name} become glTF texture indices.
+    """Return a copy of a JSON tree in which {"index": picture name} becomes {"index": texture index}.
 
     texture_indices : dictionary from picture name to texture index
     """
@@ -146,11 +146,11 @@ def resolve_textures(json_value: Any, texture_indices: Mapping[str, int]) -> Any
     return json_value
 
 
-def glb_bytes(json_tree: FrozenTree, binary: bytes | bytearray) -> bytes:
+def glb_bytes(json_tree: FrozenTree, binary_chunk: bytes | bytearray) -> bytes:
     """Return the bytes of a .glb file that contains a JSON tree and one binary buffer."""
     text = json.dumps(json_tree, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
-    body = bytes(binary) + b"\0" * (-len(binary) % 4)
+    body = bytes(binary_chunk) + b"\0" * (-len(binary_chunk) % 4)
     head = struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(body))
     chunks = ((b"JSON", text), (b"BIN\0", body))
     return head + b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in chunks)

@@ -60,22 +60,24 @@ class Document:
     _buffers: dict[int, bytes] = field(default_factory=dict)
     _read_components: int = 0
 
-    def items(self, array_name: str) -> list[Tree]:
+    def top_level_array(self, array_name: str) -> list[Tree]:
         """Return a top-level array of the JSON tree, such as "nodes"; empty if the file has none."""
         listed: list[Tree] = self.tree.get(array_name, [])
         return listed
 
-    def item(self, array_name: str, object_index: object) -> Tree:
+    def top_level_object(self, array_name: str, object_index: object) -> Tree:
         """Return the object at `object_index` in a top-level array of the JSON tree, such as "meshes".
 
         Raises ValueError for an invalid index.
         """
-        return self.items(array_name)[checked_index(object_index, len(self.items(array_name)), array_name)]
+        return self.top_level_array(array_name)[
+            checked_index(object_index, len(self.top_level_array(array_name)), array_name)
+        ]
 
     def read_buffer(self, buffer_index: int) -> bytes:
         """Return the bytes of a buffer, which may be in the .glb file, in a data URI or in another file."""
         if buffer_index not in self._buffers:
-            uri = self.item("buffers", buffer_index).get("uri")
+            uri = self.top_level_object("buffers", buffer_index).get("uri")
             if uri is None and buffer_index > 0:
                 raise ValueError(f"buffer {buffer_index} has no data in the file")
             self._buffers[buffer_index] = self._read_uri(uri)
@@ -83,7 +85,7 @@ class Document:
 
     def read_view(self, view_index: int) -> memoryview:
         """Return the bytes of a buffer view."""
-        view = self.item("bufferViews", view_index)
+        view = self.top_level_object("bufferViews", view_index)
         start, length = (
             _checked_byte_or_value_count(view.get("byteOffset", 0)),
             _checked_byte_or_value_count(view["byteLength"]),
@@ -95,12 +97,15 @@ class Document:
 
     def accessor_shape(self, accessor_index: int) -> tuple[int, int]:
         """Return the number of elements of an accessor, and the number of components of an element."""
-        accessor = self.item("accessors", accessor_index)
+        accessor = self.top_level_object("accessors", accessor_index)
         return _checked_byte_or_value_count(accessor["count"]), _COMPONENT_COUNTS[accessor["type"]]
 
     def replace_values(self, accessor_index: int, new_values: Numbers) -> None:
-        """Replace the values of an accessor by an array of the same shape, converted to its type."""
-        accessor = self.item("accessors", accessor_index)
+        """Replace the values of an accessor.
+
+        new_values : array of the accessor's shape, which this function converts to the accessor's type
+        """
+        accessor = self.top_level_object("accessors", accessor_index)
         data = new_values.astype(_COMPONENT_TYPES[accessor["componentType"]]).tobytes()
         buffers, views = (self.tree.setdefault(key, []) for key in ("buffers", "bufferViews"))
         self._buffers[len(buffers)] = data
@@ -111,7 +116,10 @@ class Document:
 
     def read_values(self, accessor_index: int) -> Numbers:
         """Return the elements (n, k) of an accessor in their stored type: n elements of k components."""
-        accessor, shape = self.item("accessors", accessor_index), self.accessor_shape(accessor_index)
+        accessor, shape = (
+            self.top_level_object("accessors", accessor_index),
+            self.accessor_shape(accessor_index),
+        )
         kind = np.dtype(_COMPONENT_TYPES[accessor["componentType"]])
         self._read_components += max(shape[0] * shape[1], _MIN_COMPONENTS_PER_READ)
         if self._read_components > MAX_ACCESSOR_COMPONENTS:
@@ -121,7 +129,7 @@ class Document:
             refuse(self.path, limit, actual, advice)
         if "bufferView" in accessor:
             stride = _checked_byte_or_value_count(
-                self.item("bufferViews", accessor["bufferView"]).get("byteStride", 0)
+                self.top_level_object("bufferViews", accessor["bufferView"]).get("byteStride", 0)
             )
             values = self._view_array(accessor, shape, kind, stride)
         else:
@@ -136,7 +144,7 @@ class Document:
         Normalised integers are decoded to [0, 1] or [-1, 1].
         """
         values = self.read_values(accessor_index)
-        if not self.item("accessors", accessor_index).get("normalized", False):
+        if not self.top_level_object("accessors", accessor_index).get("normalized", False):
             return values.astype(np.float64)
         return to_floats(values)
 
@@ -153,16 +161,20 @@ class Document:
         return result
 
     def _view_array(
-        self, location: Tree, array_shape: tuple[int, int], dtype: np.dtype[np.number], stride_bytes: int = 0
+        self,
+        view_reference: Tree,
+        array_shape: tuple[int, int],
+        dtype: np.dtype[np.number],
+        stride_bytes: int = 0,
     ) -> Numbers:
         """Return an array of shape `array_shape`, (n, k), and type `dtype` from a buffer view.
 
-        location : JSON object with "bufferView" and "byteOffset"
+        view_reference : JSON object with "bufferView" and "byteOffset"
         stride_bytes : distance between the starts of rows [byte]; 0 if they are contiguous
         """
         data, start = (
-            self.read_view(location["bufferView"]),
-            _checked_byte_or_value_count(location.get("byteOffset", 0)),
+            self.read_view(view_reference["bufferView"]),
+            _checked_byte_or_value_count(view_reference.get("byteOffset", 0)),
         )
         size = dtype.itemsize
         if 0 in array_shape:
@@ -237,9 +249,9 @@ def _parse_json_tree(path: Path, json_text: bytes) -> Tree:
 
 
 def _glb_chunks(glb_data: bytes) -> list[tuple[int, bytes]]:
-    """Return the type and the bytes of each chunk of a .glb file, the last chunk first.
+    """Return the type and the bytes of each chunk of a .glb file, in reverse order.
 
-    `dict` of this list thus contains the first chunk of each type in the file.
+    A dictionary made from this list thus contains the first chunk of each type.
     """
     chunks, offset = [], 12
     while offset + 8 <= len(glb_data):

@@ -37,7 +37,7 @@ def decompress(document: Document) -> None:
     """
     found = [
         _compressed_primitive(document, one)
-        for mesh in document.items("meshes")
+        for mesh in document.top_level_array("meshes")
         for one in mesh["primitives"]
     ]
     primitives = [one for one in found if one is not None]
@@ -56,7 +56,7 @@ def decompress(document: Document) -> None:
 def _compressed_primitive(document: Document, primitive: Tree) -> _Primitive | None:
     """Return the compressed form of a primitive; None if the primitive is also stored without compression."""
     extension = (primitive.get("extensions") or {}).get(DRACO_EXTENSION)
-    positions = document.item("accessors", primitive["attributes"]["POSITION"])
+    positions = document.top_level_object("accessors", primitive["attributes"]["POSITION"])
     if extension is None or "bufferView" in positions:
         return None
     return _Primitive(primitive, extension)
@@ -64,8 +64,14 @@ def _compressed_primitive(document: Document, primitive: Tree) -> _Primitive | N
 
 def _check_sizes(document: Document, primitives: list[Tree]) -> None:
     """Refuse primitives with too many vertices or triangles in total, according to their accessors."""
-    vertices = [document.item("accessors", one["attributes"]["POSITION"])["count"] for one in primitives]
-    corners = [document.item("accessors", one["indices"])["count"] for one in primitives if "indices" in one]
+    vertices = [
+        document.top_level_object("accessors", one["attributes"]["POSITION"])["count"] for one in primitives
+    ]
+    corners = [
+        document.top_level_object("accessors", one["indices"])["count"]
+        for one in primitives
+        if "indices" in one
+    ]
     limits.check_limit(document.path, sum(vertices), limits.MAX_VERTICES, "vertices", _SIZE_ADVICE)
     limits.check_limit(document.path, sum(corners) // 3, limits.MAX_TRIANGLES, "triangles", _SIZE_ADVICE)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from dermis.base.arrays import Floats, Numbers
 from dermis.formats.gltf.document import FrozenTree, Tree
-from dermis.formats.part_pictures import PartPictures, PartRole, linear_levels, normal_levels
+from dermis.formats.part_pictures import PartPictures, PartRole, encode_linear8, encode_normals8
 from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.eyeball import EyeTextures
@@ -32,9 +32,10 @@ _DEFAULT_ROUGHNESS = 0.8
 class SkinAdditions:
     """Properties that an export adds to the glTF material of skin.
 
-    surface : members for `pbrMetallicRoughness`; unless empty, they replace the base colour texture
-    extensions : dictionary from name to member for the material's `extensions`
-    extras : dictionary from name to member for the material's `extras`
+    surface : members to add to the material's `pbrMetallicRoughness`; if there are any, the material's base
+        colour texture is removed from there
+    extensions : members to add to the material's `extensions`
+    extras : members to add to the material's `extras`
     pictures : dictionary from name to PNG file; textures reference a picture as {"index": name}
     """
 
@@ -43,7 +44,7 @@ class SkinAdditions:
     extras: FrozenTree = field(default_factory=dict)
     pictures: Mapping[str, bytes] = field(default_factory=dict)
 
-    def apply_to(self, material: FrozenTree) -> Tree:
+    def add_to_material(self, material: FrozenTree) -> Tree:
         """Return a copy of a glTF material with these properties added.
 
         If `surface` replaces the base colour texture, the texture moves to the extras.
@@ -59,13 +60,14 @@ class SkinAdditions:
         return extended | {"pbrMetallicRoughness": surface, "extras": extras}
 
 
-def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], Tree]:
-    """Return the maps of a skin as PNG files by name, and the entries of the material's extras by map role.
+def encode_skin_maps(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], Tree]:
+    """Return the maps of a skin as PNG files, and their description for the extras of the glTF material.
 
-    The extras reference pictures as {"index": name}; `embedded_materials` reads these entries.
+    The first dictionary contains the PNG file of each picture by its name. The second contains an entry
+    {"index": name of the picture} for each map by its role. `embedded_materials` reads these entries.
 
-    slopes : (n, n, 2) slopes of the relief, from which a normal map for other programs is made if `maps`
-        contains none
+    slopes : (n, n, 2) slopes of the relief, which become a normal map for other programs if `maps` contains
+        no normal map
     """
     pictures: dict[str, Numbers] = {}
     roles: Tree = {}
@@ -73,7 +75,7 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
         pictures["colour"] = encode_srgb8(maps.colour)
     displayed = slopes if maps.normal is None else maps.normal
     if displayed is not None:
-        pictures["normal"] = normal_levels(displayed)
+        pictures["normal"] = encode_normals8(displayed)
     if maps.normal is not None:
         roles["normal"] = {"index": "normal"}
     if maps.height is not None:
@@ -83,10 +85,10 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
     if maps.roughness is not None:
         perceptual = np.zeros((*maps.roughness.shape, 3), np.float32)
         perceptual[..., 1] = np.sqrt(np.clip(maps.roughness, 0.0, 1.0))
-        pictures["metallic roughness"] = linear_levels(perceptual)
+        pictures["metallic roughness"] = encode_linear8(perceptual)
     for role in ("specular", "roughness"):
         if (grey_map := getattr(maps, role)) is not None:
-            pictures[role] = linear_levels(grey_map)[..., None]
+            pictures[role] = encode_linear8(grey_map)[..., None]
     if maps.region is not None:
         pictures["region"] = maps.region[..., None]
     stored = (role for role in ("height", "specular", "roughness", "region") if role in pictures)
@@ -96,21 +98,21 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
 
 
 def surface_material(
-    material: Material, pictures: Mapping[str, bytes], roles: FrozenTree, roughness: float
+    material: Material, pictures: Mapping[str, bytes], map_entries: FrozenTree, roughness: float
 ) -> Tree:
     """Return the glTF material of skin or of another opaque surface.
 
     The textures of the material reference pictures by name, as {"index": name}.
 
-    roles : entries of the skin material's extras, see `skin_pictures`
+    map_entries : description of the maps for the extras of the skin material, see `encode_skin_maps`
     roughness : Beckmann's m of skin without a roughness map [-]
     """
     if material.kind != "skin":
         return {
             "name": material.name,
-            "pbrMetallicRoughness": _base_material(material, _usual_roughness(material)),
+            "pbrMetallicRoughness": _plain_gltf_surface(material, _roughness_from_name(material)),
         }
-    surface = _base_material(material, float(np.sqrt(roughness)))
+    surface = _plain_gltf_surface(material, float(np.sqrt(roughness)))
     if "colour" in pictures:
         del surface["baseColorFactor"]
         surface["baseColorTexture"] = {"index": "colour"}
@@ -120,31 +122,31 @@ def surface_material(
     gltf: Tree = {"name": name, "pbrMetallicRoughness": surface}
     if "normal" in pictures:
         gltf["normalTexture"] = {"index": "normal"}
-    return gltf | {"extensions": _SKIN_IOR_EXTENSION, "extras": {"dermis": dict(roles)}}
+    return gltf | {"extensions": _SKIN_IOR_EXTENSION, "extras": {"dermis": dict(map_entries)}}
 
 
-def part_pictures(parts: PartPictures) -> dict[str, bytes]:
+def encode_part_pictures(part_maps: PartPictures) -> dict[str, bytes]:
     """Return the pictures of parts that are not skin, as PNG files by name.
 
     The colour picture has an alpha channel if any part needs alpha.
     """
-    found = parts.encode(("cutout", "surface", "normal", "emission"))
+    found = part_maps.encode(("cutout", "surface", "normal", "emission"))
     if "cutout" not in found:
-        found |= parts.encode(("colour",))
+        found |= part_maps.encode(("colour",))
     names = {role: f"parts {'colour' if role == 'cutout' else role}" for role in found}
     return {names[role]: data for role, data in found.items()}
 
 
-def part_material(material: Material, parts: PartPictures) -> Tree:
-    """Return the glTF material of a part with the pictures that `part_pictures` returns.
+def part_material(material: Material, part_maps: PartPictures) -> Tree:
+    """Return the glTF material of a part that is not skin, with the pictures of `encode_part_pictures`.
 
     The textures of the material reference pictures by name, as {"index": name}.
     """
-    roles = parts.roles(material)
+    roles = part_maps.needed_roles(material)
     surface: Tree = {
         "baseColorTexture": _part_texture("colour"),
         "metallicFactor": float("metalness" in roles),
-        "roughnessFactor": 1.0 if "roughness" in roles else _usual_roughness(material),
+        "roughnessFactor": 1.0 if "roughness" in roles else _roughness_from_name(material),
     }
     if "surface" in roles:
         surface["metallicRoughnessTexture"] = _part_texture("surface")
@@ -156,7 +158,7 @@ def part_material(material: Material, parts: PartPictures) -> Tree:
     if "emission" in roles:
         gltf["emissiveTexture"] = _part_texture("emission")
     if max(material.emission) > 0.0:
-        strength, colour = parts.emission(material)
+        strength, colour = part_maps.emission_strength_and_colour(material)
         gltf["emissiveFactor"] = [min(strength, 1.0) * value for value in colour]
         if strength > 1.0:
             gltf["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
@@ -167,11 +169,11 @@ def _part_texture(role: PartRole) -> Tree:
     return {"index": f"parts {role}"}
 
 
-def eye_pictures(eyes: EyeTextures) -> dict[str, bytes]:
+def encode_eye_pictures(eyes: EyeTextures) -> dict[str, bytes]:
     """Return the colour map and the normal map of an eyeball as PNG files by name."""
     return {
         EYE_PICTURE: encode_colours_png(eyes.colour),
-        EYE_NORMAL_PICTURE: encode_png(linear_levels(0.5 * eyes.normal + 0.5)),
+        EYE_NORMAL_PICTURE: encode_png(encode_linear8(0.5 * eyes.normal + 0.5)),
     }
 
 
@@ -181,7 +183,9 @@ def eye_material(material: Material) -> Tree:
     The normal map applies to the surface below the clear coat. Programs that support clear coat show
     highlights only on the coat; other programs show highlights on the surface below the coat.
     """
-    surface = _base_material(material, _TEAR_FILM_ROUGHNESS) | {"baseColorTexture": {"index": EYE_PICTURE}}
+    surface = _plain_gltf_surface(material, _TEAR_FILM_ROUGHNESS) | {
+        "baseColorTexture": {"index": EYE_PICTURE}
+    }
     del surface["baseColorFactor"]
     coat = {"clearcoatFactor": _TEAR_FILM_CLEARCOAT_FACTOR, "clearcoatRoughnessFactor": _TEAR_FILM_ROUGHNESS}
     return {
@@ -211,12 +215,12 @@ def encode_colours_png(linear_colours: Floats) -> bytes:
     return encode_png(encode_srgb8(linear_colours))
 
 
-def _base_material(material: Material, roughness: float) -> Tree:
+def _plain_gltf_surface(material: Material, roughness: float) -> Tree:
     factor = [*(float(value) for value in material.colour), 1.0]
     return {"baseColorFactor": factor, "metallicFactor": 0.0, "roughnessFactor": round(roughness, 4)}
 
 
-def _usual_roughness(material: Material) -> float:
+def _roughness_from_name(material: Material) -> float:
     """Return a default perceptual roughness for a material, chosen by words in its name [-]."""
     matches = (value for word, value in _ROUGHNESS_BY_WORD.items() if word in material.name.casefold())
     return next(matches, _DEFAULT_ROUGHNESS)

@@ -33,9 +33,9 @@ class Nodes:
     world: Doubles
     scene_nodes: tuple[int, ...] | None
 
-    def ancestors(self, node: int) -> list[int]:
+    def node_and_ancestors(self, node_index: int) -> list[int]:
         """Return the index of a node, followed by the indices of its ancestors up to the root."""
-        path = [node]
+        path = [node_index]
         while self.parent[path[-1]] >= 0:
             path.append(self.parent[path[-1]])
         return path
@@ -46,10 +46,10 @@ def read_nodes(document: Document) -> Nodes:
 
     Raises DermisError when the nodes form a cycle, are too many, or are nested too deeply.
     """
-    nodes = document.items("nodes")
+    nodes = document.top_level_array("nodes")
     check_limit(document.path, len(nodes), MAX_NODES, "nodes", "Export the head alone")
     names, parent = node_names(nodes), _node_parents(nodes)
-    order = _parents_first(document, names, parent)
+    order = _order_parents_first(document, names, parent)
     local = np.array([_local_matrix(node) for node in nodes]).reshape(-1, 4, 4)
     world, depth = local.copy(), [0] * len(nodes)
     for index in order:
@@ -84,7 +84,9 @@ def _node_parents(nodes: list[Tree]) -> tuple[int, ...]:
     return tuple(parent)
 
 
-def _parents_first(document: Document, names: tuple[str, ...], parent: tuple[int, ...]) -> tuple[int, ...]:
+def _order_parents_first(
+    document: Document, names: tuple[str, ...], parent: tuple[int, ...]
+) -> tuple[int, ...]:
     children: dict[int, list[int]] = {}
     for index, own_parent in enumerate(parent):
         children.setdefault(own_parent, []).append(index)
@@ -102,7 +104,7 @@ def _scene_nodes(document: Document, nodes: list[Tree]) -> tuple[int, ...] | Non
     """Return the indices of the scene's nodes, parents before children; None for a file without scenes."""
     if "scenes" not in document.tree:
         return None
-    pending = list(document.item("scenes", document.tree.get("scene", 0)).get("nodes", []))
+    pending = list(document.top_level_object("scenes", document.tree.get("scene", 0)).get("nodes", []))
     visited: dict[int, None] = {}
     while pending:
         index = checked_index(pending.pop(), len(nodes), "nodes")
@@ -112,17 +114,17 @@ def _scene_nodes(document: Document, nodes: list[Tree]) -> tuple[int, ...] | Non
     return tuple(visited)
 
 
-def _local_matrix(node: Tree) -> Doubles:
+def _local_matrix(node_tree: Tree) -> Doubles:
     """Return the matrix (4, 4) from a node's space to its parent's space."""
     matrix = np.eye(4)
-    if "matrix" in node:
-        matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-    if "translation" in node:
+    if "matrix" in node_tree:
+        matrix = np.array(node_tree["matrix"], dtype=np.float64).reshape(4, 4).T
+    if "translation" in node_tree:
         translation = np.eye(4)
-        translation[:3, 3] = np.reshape(node["translation"], 3)
+        translation[:3, 3] = np.reshape(node_tree["translation"], 3)
         matrix = matrix @ translation
-    if "rotation" in node:
-        matrix = matrix @ quaternion_matrix(np.reshape(np.asarray(node["rotation"], np.float64), 4))
-    if "scale" in node:
-        matrix = matrix @ np.diag([*np.reshape(node["scale"], 3), 1.0])
+    if "rotation" in node_tree:
+        matrix = matrix @ quaternion_matrix(np.reshape(np.asarray(node_tree["rotation"], np.float64), 4))
+    if "scale" in node_tree:
+        matrix = matrix @ np.diag([*np.reshape(node_tree["scale"], 3), 1.0])
     return np.asarray(matrix, dtype=np.float64)

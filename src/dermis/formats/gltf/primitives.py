@@ -32,11 +32,11 @@ _MIN_VECTOR_LENGTH = 1e-9
 class PrimitiveSource(Protocol):
     """Geometry that can be written as a glTF primitive with morph targets."""
 
-    def add_primitive(self, binary: BufferBuilder) -> Tree:
+    def add_primitive(self, buffer_builder: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive, without material or targets."""
         ...
 
-    def add_target(self, binary: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
+    def add_target(self, buffer_builder: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
         """Append a morph target to the buffer, and return its accessor indices by attribute name."""
         ...
 
@@ -59,41 +59,44 @@ class SurfacePrimitive:
         return self.deformable.head
 
     @cached_property
-    def vertices(self) -> Ints:
+    def used_vertices(self) -> Ints:
         """Return the indices of the mesh vertices that the triangles use, (v,), in increasing order."""
         return np.unique(self._head.mesh.triangles[self.faces])
 
-    def add_primitive(self, binary: BufferBuilder) -> Tree:
+    def add_primitive(self, buffer_builder: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive, without material or targets.
 
         The extras of the primitive record whether its triangles form quads, and whether no other primitive
         shares points with it.
         """
-        used, mesh = self.vertices, self._head.mesh
-        index = binary.add_triangles(np.searchsorted(used, mesh.triangles[self.faces]), len(used))
+        used, mesh = self.used_vertices, self._head.mesh
+        index = buffer_builder.add_triangles(np.searchsorted(used, mesh.triangles[self.faces]), len(used))
         uv = mesh.uv[used] if self.eye < 0 else self._eye_uv()
         attributes = _vertex_attributes(
-            binary, self.deformable.positions_mm[used], self.deformable.normals[used], uv
+            buffer_builder, self.deformable.positions_mm[used], self.deformable.normals[used], uv
         )
-        attributes |= _bone_attributes(binary, self.deformable, used)
+        attributes |= _bone_attributes(buffer_builder, self.deformable, used)
         primitive: Tree = {"attributes": attributes, "indices": index}
         flags = {"quads": self._has_quads(), "alone": self._is_separate()}
         extras = {key: True for key, value in flags.items() if value}
         return primitive | ({"extras": {"dermis": extras}} if extras else {})
 
-    def add_target(self, binary: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
-        """Append displacements of positions and normals to the buffer; return accessor indices by name."""
-        used = np.flatnonzero(np.isin(vertex_target.vertex, self.vertices, assume_unique=True))
-        row = np.searchsorted(self.vertices, vertex_target.vertex[used])
+    def add_target(self, buffer_builder: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
+        """Append changes of positions and normals to the buffer.
+
+        Returns a dictionary from attribute name to accessor index.
+        """
+        used = np.flatnonzero(np.isin(vertex_target.vertex, self.used_vertices, assume_unique=True))
+        row = np.searchsorted(self.used_vertices, vertex_target.vertex[used])
         columns = [to_metres(vertex_target.delta_mm[used]), vertex_target.normal[used]]
-        accessors = binary.add_displacements(row, columns, len(self.vertices))
+        accessors = buffer_builder.add_displacements(row, columns, len(self.used_vertices))
         return dict(zip(("POSITION", "NORMAL"), accessors, strict=True))
 
     def _eye_uv(self) -> Floats:
         head = self._head
         assert head.eyes is not None
-        frame = head.eyes.frames(head.control, head.control.rest)[self.eye]
-        return eye_uv(head.mesh.positions[self.vertices] @ frame[:3, :3].T + frame[:3, 3])
+        frame = head.eyes.eye_matrices(head.control, head.control.rest)[self.eye]
+        return eye_uv(head.mesh.positions[self.used_vertices] @ frame[:3, :3].T + frame[:3, 3])
 
     def _has_quads(self) -> bool:
         """Return whether triangles 0 and 1, 2 and 3, and so on are the halves of quads."""
@@ -121,26 +124,30 @@ class HairPrimitive:
     def _rest_points(self) -> Doubles:
         return replace(self.deformable.head.mesh, positions=self.deformable.positions_mm).points_mm
 
-    def add_primitive(self, binary: BufferBuilder) -> Tree:
+    def add_primitive(self, buffer_builder: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive, without material or targets.
 
         The extras of the primitive mark it as hair, so that `read_gltf` skips it.
         """
         positions, normals = self.fibres.pose_vertices(self._rest_points)
-        _, uv = self.fibres.colours()
-        attributes = _vertex_attributes(binary, positions, normals.astype(np.float32), uv)
+        _, uv = self.fibres.palette_and_uv()
+        attributes = _vertex_attributes(buffer_builder, positions, normals.astype(np.float32), uv)
         attributes |= _bone_attributes(
-            binary, self.deformable, np.repeat(self.fibres.root_vertices, self.fibres.vertices_per_hair)
+            buffer_builder,
+            self.deformable,
+            np.repeat(self.fibres.root_vertices, self.fibres.vertices_per_hair),
         )
-        index = binary.add_triangles(self.fibres.triangles(), len(positions))
+        index = buffer_builder.add_triangles(self.fibres.triangles(), len(positions))
         return {"attributes": attributes, "indices": index, "extras": {"dermis": {"hair": True}}}
 
-    def add_target(self, binary: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
+    def add_target(self, buffer_builder: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
         """Append displacements of positions to the buffer; return their accessor index under "POSITION"."""
         delta, mesh = np.zeros_like(self._rest_points), self.deformable.head.mesh
         delta[mesh.point[vertex_target.vertex]] = vertex_target.delta_mm
-        vertex, displacement = self.fibres.displacements_at(self._rest_points, delta)
-        (accessor,) = binary.add_displacements(vertex, [to_metres(displacement)], self.fibres.vertex_count)
+        vertex, displacement = self.fibres.tube_displacements(self._rest_points, delta)
+        (accessor,) = buffer_builder.add_displacements(
+            vertex, [to_metres(displacement)], self.fibres.vertex_count
+        )
         return {"POSITION": accessor}
 
 
@@ -150,17 +157,17 @@ def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
 
 
 def _vertex_attributes(
-    binary: BufferBuilder, positions_mm: NDArray[np.floating], normals: Floats, uv: Floats
+    buffer_builder: BufferBuilder, positions_mm: NDArray[np.floating], normals: Floats, uv: Floats
 ) -> dict[str, int]:
     return {
-        "POSITION": binary.add_accessor(to_metres(positions_mm), VERTEX_TARGET, with_bounds=True),
-        "NORMAL": binary.add_accessor(normals, VERTEX_TARGET),
-        "TEXCOORD_0": binary.add_accessor(uv, VERTEX_TARGET),
+        "POSITION": buffer_builder.add_accessor(to_metres(positions_mm), VERTEX_TARGET, with_bounds=True),
+        "NORMAL": buffer_builder.add_accessor(normals, VERTEX_TARGET),
+        "TEXCOORD_0": buffer_builder.add_accessor(uv, VERTEX_TARGET),
     }
 
 
 def _bone_attributes(
-    binary: BufferBuilder, deformable: DeformableMesh, vertex_index: NDArray[np.integer]
+    buffer_builder: BufferBuilder, deformable_mesh: DeformableMesh, vertex_index: NDArray[np.integer]
 ) -> dict[str, int]:
     """Append joints and weights of vertices to the buffer; return accessor indices by attribute name.
 
@@ -168,18 +175,20 @@ def _bone_attributes(
 
     The result is empty for a mesh without a skeleton.
     """
-    if deformable.rig.skeleton is None:
+    if deformable_mesh.rig.skeleton is None:
         return {}
-    bone, weight = deformable.bone_influences
+    bone, weight = deformable_mesh.bone_influences
     return {
-        "JOINTS_0": binary.add_accessor(bone[vertex_index], VERTEX_TARGET),
-        "WEIGHTS_0": binary.add_accessor(weight[vertex_index], VERTEX_TARGET),
+        "JOINTS_0": buffer_builder.add_accessor(bone[vertex_index], VERTEX_TARGET),
+        "WEIGHTS_0": buffer_builder.add_accessor(weight[vertex_index], VERTEX_TARGET),
     }
 
 
 @dataclass(frozen=True, eq=False)
 class FibreTubes:
-    """Tubes around n hairs, with m vertices each; tubes do not bend, and move with the skin at their roots.
+    """Tubes around n hairs, with m vertices for each hair.
+
+    Each tube is rigid and moves with the skin at its root.
 
     mesh : mesh of the skin on which the hairs grow
     """
@@ -219,7 +228,7 @@ class FibreTubes:
 
     @property
     def vertex_count(self) -> int:
-        """Return the number of vertices of all hairs."""
+        """Return the total number of vertices of all tubes."""
         return self.vertices_per_hair * len(self.strands)
 
     @property
@@ -259,7 +268,7 @@ class FibreTubes:
         offsets, normals = (np.einsum("nic,nki->nkc", frame, part) for part in self._tube_rings)
         return (root[:, None] + offsets).reshape(-1, 3), normals.reshape(-1, 3)
 
-    def displacements_at(self, points_mm: Doubles, delta_mm: Doubles) -> tuple[Index, Doubles]:
+    def tube_displacements(self, points_mm: Doubles, delta_mm: Doubles) -> tuple[Index, Doubles]:
         """Return the tube vertices that move when the skin is displaced.
 
         Returns vertex indices (k,) and displacements (k, 3) [mm].
@@ -296,7 +305,7 @@ class FibreTubes:
         start = self.vertices_per_hair * np.arange(len(self.strands))
         return np.asarray((start[:, None, None] + np.concatenate(faces)).reshape(-1, 3), np.int64)
 
-    def colours(self) -> tuple[Floats, Floats]:
+    def palette_and_uv(self) -> tuple[Floats, Floats]:
         """Return a palette (1, c, 3) of c linear hair colours, and the uv (n m, 2) of tube vertices in it."""
         absorbance = self.strands.absorption * self.strands.radius_mm.max(axis=1, keepdims=True)
         albedo = np.exp(-_HAIR_ALBEDO_EXPONENT * np.sqrt(absorbance.astype(np.float64)))

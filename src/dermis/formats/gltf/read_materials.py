@@ -104,11 +104,16 @@ MATERIAL_EXTENSIONS = keys_of(GLTF_MATERIALS)
 
 def read_materials(document: Document) -> tuple[FileMaterial, ...]:
     """Return the materials of a file in the order of the file."""
-    return tuple(_MaterialReader(document, material).read() for material in document.items("materials"))
+    return tuple(
+        _MaterialReader(document, material).read() for material in document.top_level_array("materials")
+    )
 
 
 class _MaterialReader:
-    """Reader of one material, which also lists properties without effect for a note to the user."""
+    """Reader of one material of a glTF file.
+
+    unused : names of the material's properties that have no effect in this package
+    """
 
     def __init__(self, document: Document, material: Tree) -> None:
         self.document, self.material = document, material
@@ -116,7 +121,7 @@ class _MaterialReader:
         self.unused: list[str] = []
 
     def read(self) -> FileMaterial:
-        """Return the material."""
+        """Return the material with its textures, and list its properties without effect in `unused`."""
         own_extras = (self.material.get("extras") or {}).get("dermis")
         pbr: Tree = self.material.get("pbrMetallicRoughness") or {}
         if _GLOSS_EXTENSION in self.extensions:
@@ -157,7 +162,7 @@ class _MaterialReader:
         )
         references = {"colour": colour, **{role: extras.get(role) for role in EMBEDDED_MAP_ROLES}}
         pictures = {
-            role: self._read_texture_picture(self.document.item("textures", reference["index"]))
+            role: self._read_texture_picture(self.document.top_level_object("textures", reference["index"]))
             for role, reference in references.items()
             if reference is not None
         }
@@ -208,13 +213,13 @@ class _MaterialReader:
         """
         if reference is None:
             return None
-        entry = self.document.item("textures", reference["index"])
+        entry = self.document.top_level_object("textures", reference["index"])
         picture = self._read_texture_picture(entry)
         if picture is None:
             return None
         extension = (reference.get("extensions") or {}).get("KHR_texture_transform") or {}
         uv_set = extension["texCoord"] if "texCoord" in extension else reference.get("texCoord", 0)
-        sampler = self.document.item("samplers", entry["sampler"]) if "sampler" in entry else {}
+        sampler = self.document.top_level_object("samplers", entry["sampler"]) if "sampler" in entry else {}
         if sampler.get("magFilter") == _NEAREST_FILTER:
             self.unused.append("magnification without interpolation")
         wrap = (
@@ -245,7 +250,7 @@ def read_picture(document: Document, image_index: Any) -> EmbeddedPicture:
 
     Raises DermisError for an image file outside the folder of the document.
     """
-    image = document.item("images", image_index)
+    image = document.top_level_object("images", image_index)
     name = f"{document.path}, image {image.get('name', image_index)}"
     if "bufferView" in image:
         return EmbeddedPicture(name, bytes(document.read_view(image["bufferView"])))
@@ -257,7 +262,10 @@ def read_picture(document: Document, image_index: Any) -> EmbeddedPicture:
 
 
 def _checked_relief_mm(height_mm: object) -> float | None:
-    """Return the relief of one grey level of an embedded 8-bit height map [mm], after checking its range."""
+    """Return `height_mm` after checking that it is a plausible number; None for None.
+
+    height_mm : height difference of one grey level of an embedded 8-bit height map [mm]
+    """
     if height_mm is None:
         return None
     number = height_mm if isinstance(height_mm, int | float) and not isinstance(height_mm, bool) else 0

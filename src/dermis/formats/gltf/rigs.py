@@ -51,13 +51,15 @@ class Armature:
     bone_of_node: dict[int, int]
     static_bone: int | None
 
-    def bone_for_node(self, nodes: Nodes, node: int) -> int | None:
-        """Return the bone that moves a mesh without a skin at a node; None if no bone moves it.
+    def bone_for_node(self, nodes: Nodes, node_index: int) -> int | None:
+        """Return the index of the bone that moves the mesh of a node, if the mesh has no skin.
 
         The bone belongs to the node itself, or to the nearest ancestor that has a bone. If no ancestor has a
         bone, the result is `static_bone`.
+
+        node : index of the node that carries the mesh
         """
-        bones = (self.bone_of_node[k] for k in nodes.ancestors(node) if k in self.bone_of_node)
+        bones = (self.bone_of_node[k] for k in nodes.node_and_ancestors(node_index) if k in self.bone_of_node)
         return next(bones, self.static_bone)
 
 
@@ -66,17 +68,17 @@ def read_armature(document: Document, nodes: Nodes) -> Armature | None:
 
     Bones are joints of skins, animated nodes that carry meshes, and the ancestors of both.
     """
-    meshes = [k for k in nodes.scene_nodes or () if "mesh" in document.items("nodes")[k]]
-    skinned = [k for k in meshes if "skin" in document.items("nodes")[k]]
+    meshes = [k for k in nodes.scene_nodes or () if "mesh" in document.top_level_array("nodes")[k]]
+    skinned = [k for k in meshes if "skin" in document.top_level_array("nodes")[k]]
     rigid = [k for k in meshes if k not in set(skinned)]
     joints = {joint for k in skinned for joint in _node_skin(document, k)["joints"]}
-    mesh_ancestors = {node for k in rigid for node in nodes.ancestors(k)}
+    mesh_ancestors = {node for k in rigid for node in nodes.node_and_ancestors(k)}
     moving = joints | (_animated_nodes(document) & mesh_ancestors)
-    bone_nodes = {node for k in moving for node in nodes.ancestors(k)}
+    bone_nodes = {node for k in moving for node in nodes.node_and_ancestors(k)}
     if not bone_nodes:
         return None
     check_limit(document.path, len(bone_nodes), MAX_BONES, "bones", "Export it with fewer")
-    has_static = any(bone_nodes.isdisjoint(nodes.ancestors(k)) for k in rigid)
+    has_static = any(bone_nodes.isdisjoint(nodes.node_and_ancestors(k)) for k in rigid)
     ordered = [k for k in nodes.order if k in bone_nodes]
     bone_of_node = {node: number + has_static for number, node in enumerate(ordered)}
     names = [nodes.names[k] for k in ordered]
@@ -88,10 +90,11 @@ def read_armature(document: Document, nodes: Nodes) -> Armature | None:
 
 
 def _with_static_root(bones: Bones) -> Bones:
-    """Return the bones of a scene, preceded by a new root bone at the origin for meshes that no bone moves.
+    """Return the bones of a scene, preceded by a new root bone for meshes that no bone moves.
 
-    bones : bones of the scene; the parent indices must already be those of the result, where the new bone is
-        bone 0
+    The new bone has index 0 and lies at the origin.
+
+    bones : bones of the scene, whose parent indices must already count the new bone
     """
     name = node_names([{"name": known} for known in (*bones.names, _STATIC_BONE_NAME)])[-1]
     parent = np.concatenate([[-1], bones.parent]).astype(np.int32)
@@ -100,44 +103,44 @@ def _with_static_root(bones: Bones) -> Bones:
 
 
 def _animated_nodes(document: Document) -> set[int]:
-    channels = [channel for clip in document.items("animations") for channel in clip["channels"]]
+    channels = [channel for clip in document.top_level_array("animations") for channel in clip["channels"]]
     targets = [channel["target"] for channel in channels]
     return {
         target["node"] for target in targets if target["path"] in _NODE_ANIMATION_PATHS and "node" in target
     }
 
 
-def _node_skin(document: Document, node: int) -> Tree:
-    skin = document.item("skins", document.items("nodes")[node]["skin"])
+def _node_skin(document: Document, node_index: int) -> Tree:
+    skin = document.top_level_object("skins", document.top_level_array("nodes")[node_index]["skin"])
     joints = skin["joints"]
     check_limit(document.path, len(joints), MAX_BONES, "joints of a skin", "Export it with fewer")
     for joint in joints:
-        checked_index(joint, len(document.items("nodes")), "nodes")
+        checked_index(joint, len(document.top_level_array("nodes")), "nodes")
     return skin
 
 
 def read_influences(
-    document: Document, nodes: Nodes, armature: Armature, node: int, primitive: Tree
+    document: Document, nodes: Nodes, armature: Armature, mesh_node_index: int, primitive: Tree
 ) -> tuple[SkinInfluences, Doubles]:
     """Return the bones and weights of a skinned primitive, and the skinning matrix of each vertex at rest.
 
     The skinning matrices (v, 4, 4) map mesh space to scene space.
 
-    node : index of the node that carries the mesh and refers to its skin
+    mesh_node_index : index of the node that carries the mesh and refers to its skin
 
     Raises DermisError for invalid weights and joints.
     """
-    skin, attributes = _node_skin(document, node), primitive["attributes"]
+    skin, attributes = _node_skin(document, mesh_node_index), primitive["attributes"]
     count = max(1, sum(name.startswith("WEIGHTS_") for name in attributes))
-    culprit = f"{document.path}: {nodes.names[node]!r}"
+    culprit = f"{document.path}: {nodes.names[mesh_node_index]!r}"
     check_limit(culprit, 4 * count, MAX_BONES_PER_VERTEX, "joints of a vertex", "Export it with fewer")
     sets = [k for k in range(count) if f"JOINTS_{k}" in attributes and f"WEIGHTS_{k}" in attributes]
     if not sets:
-        actual = f"the mesh of {nodes.names[node]!r} has none"
+        actual = f"the mesh of {nodes.names[mesh_node_index]!r} has none"
         refuse(document.path, "joints and weights of a mesh with a skin", actual, DAMAGED_ADVICE)
     joint = np.hstack([document.read_values(attributes[f"JOINTS_{k}"]).astype(np.int64) for k in sets])
     weight = np.hstack([to_floats(document.read_values(attributes[f"WEIGHTS_{k}"])) for k in sets])
-    _check_weights(document, nodes.names[node], joint, weight, len(skin["joints"]))
+    _check_weights(document, nodes.names[mesh_node_index], joint, weight, len(skin["joints"]))
     joint, weight = _strongest_influences(joint, weight)
     inverse_bind = np.tile(np.eye(4), (len(skin["joints"]), 1, 1))
     if "inverseBindMatrices" in skin:
@@ -242,8 +245,10 @@ def default_weights(document: Document, nodes: Nodes) -> dict[str, float]:
     defaults: dict[str, float] = {}
     names: dict[int, tuple[str, ...]] = {}
     for index in nodes.scene_nodes or ():
-        node = document.items("nodes")[index]
-        mesh: Tree = document.item("meshes", node["mesh"]) if "mesh" in node else {"primitives": []}
+        node = document.top_level_array("nodes")[index]
+        mesh: Tree = (
+            document.top_level_object("meshes", node["mesh"]) if "mesh" in node else {"primitives": []}
+        )
         weights = node.get("weights", mesh.get("weights", []))
         if weights and id(mesh) not in names:
             names[id(mesh)] = target_names(mesh)

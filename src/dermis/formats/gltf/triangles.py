@@ -104,14 +104,14 @@ def read_gltf(path: Path) -> MeshFile:
     armature, weights = read_armature(document, nodes), default_weights(document, nodes)
     materials = read_materials(document)
     reader = _SceneReader(document, nodes, armature, weights, materials, avatar)
-    parts, bones = list(reader.parts()), armature.bones if armature else None
+    parts, bones = list(reader.read_parts()), armature.bones if armature else None
     notes = (*note_unread(document, nodes, _READ_EXTENSIONS), *avatar.notes, *reader.notes)
     return MeshFile(parts, bones, weights, materials, notes, axes=avatar.axes)
 
 
 def _refuse_extensions(document: Document) -> None:
     """Refuse a file that requires unsupported extensions, such as compressed geometry."""
-    required = map(str, document.items("extensionsRequired"))
+    required = map(str, document.top_level_array("extensionsRequired"))
     unsupported = [name for name in required if name not in _READ_EXTENSIONS]
     if unsupported:
         advice = next(
@@ -137,7 +137,7 @@ class _SceneReader:
     avatar: vrm.Avatar
     notes: dict[str, None] = field(default_factory=dict)
 
-    def parts(self) -> Iterator[MeshPart]:
+    def read_parts(self) -> Iterator[MeshPart]:
         """Yield each triangle primitive of the scene as a mesh part; check the scene's total size."""
         counts = dict.fromkeys(_MAX_SCENE_COUNTS, 0)
         for part in self._all_parts():
@@ -145,28 +145,28 @@ class _SceneReader:
             added = 1, len(part.triangles), len(part.positions), displaced
             for name, count in zip(counts, added, strict=True):
                 counts[name] += count
-                self._check_count(name, counts[name])
+                self._check_scene_count(name, counts[name])
             yield part
 
-    def _check_count(self, item_noun: str, count: int) -> None:
+    def _check_scene_count(self, item_noun: str, count: int) -> None:
         """Refuse a scene with more than the allowed number of parts, triangles, vertices or displacements.
 
-        item_noun : what is counted, a key of `_MAX_SCENE_COUNTS`
-        count : number of these
+        item_noun : plural noun for what is counted, a key of `_MAX_SCENE_COUNTS`
+        count : number of the counted items in the scene
         """
         advice = "Export the head alone, or decimated"
         limits.check_limit(self.document.path, count, _MAX_SCENE_COUNTS[item_noun], item_noun, advice)
 
     def _all_parts(self) -> Iterator[MeshPart]:
-        nodes, scene_nodes = self.document.items("nodes"), self.nodes.scene_nodes or ()
+        nodes, scene_nodes = self.document.top_level_array("nodes"), self.nodes.scene_nodes or ()
         meshes = [k for k in scene_nodes if "mesh" in nodes[k]]
         for node in meshes:
-            yield from self._mesh_parts(self.document.item("meshes", nodes[node]["mesh"]), node)
+            yield from self._mesh_parts(self.document.top_level_object("meshes", nodes[node]["mesh"]), node)
         if not meshes:  # a file with meshes but without nodes
-            for mesh in self.document.items("meshes"):
+            for mesh in self.document.top_level_array("meshes"):
                 yield from self._mesh_parts(mesh, None)
 
-    def _mesh_parts(self, mesh: Tree, node: int | None) -> Iterator[MeshPart]:
+    def _mesh_parts(self, mesh: Tree, node_index: int | None) -> Iterator[MeshPart]:
         names = target_names(mesh)
         for primitive in mesh["primitives"]:
             has_triangles = primitive.get("mode", _TRIANGLES_MODE) in (
@@ -175,23 +175,25 @@ class _SceneReader:
                 _FAN_MODE,
             )
             if has_triangles and _dermis_extras(primitive).get("hair") is not True:
-                yield self._scene_part(mesh, names, primitive, node)
+                yield self._scene_part(mesh, names, primitive, node_index)
 
     def _scene_part(
-        self, mesh: Tree, target_names: tuple[str, ...], primitive: Tree, node: int | None
+        self, mesh: Tree, target_names: tuple[str, ...], primitive: Tree, node_index: int | None
     ) -> MeshPart:
         """Return a primitive as a mesh part in scene space, transformed by its node or by its skin.
 
         target_names : names of the morph targets of the mesh
         """
         part, targets = self._read_primitive(mesh, target_names, primitive)
-        if node is None:
+        if node_index is None:
             return _transform_part(part, targets, np.eye(4))
-        if "skin" in self.document.tree["nodes"][node] and self.armature:
-            influences, matrices = read_influences(self.document, self.nodes, self.armature, node, primitive)
+        if "skin" in self.document.tree["nodes"][node_index] and self.armature:
+            influences, matrices = read_influences(
+                self.document, self.nodes, self.armature, node_index, primitive
+            )
             return _skin_part(part, targets, influences, matrices)
-        transformed = _transform_part(part, targets, _nearest_rigid(self.nodes.world[node]))
-        bone = self.armature.bone_for_node(self.nodes, node) if self.armature else None
+        transformed = _transform_part(part, targets, _nearest_rigid_transform(self.nodes.world[node_index]))
+        bone = self.armature.bone_for_node(self.nodes, node_index) if self.armature else None
         if bone is None:
             return transformed
         count = len(part.positions)
@@ -202,7 +204,9 @@ class _SceneReader:
     ) -> tuple[MeshPart, dict[str, VertexDisplacements]]:
         """Return a primitive in mesh space, with the default weights applied, and its morph targets."""
         attributes = primitive["attributes"]
-        self._check_count("vertices", self.document.item("accessors", attributes["POSITION"])["count"])
+        self._check_scene_count(
+            "vertices", self.document.top_level_object("accessors", attributes["POSITION"])["count"]
+        )
         positions = self.document.read_floats(attributes["POSITION"]).reshape(-1, 3)
         group = self._material_group(mesh, primitive)
         uv, normals, colours = (
@@ -251,8 +255,8 @@ class _SceneReader:
         """
         index = np.arange(vertex_count)
         if "indices" in primitive:
-            corners = self.document.item("accessors", primitive["indices"])["count"]
-            self._check_count("triangles", corners // 3)
+            corners = self.document.top_level_object("accessors", primitive["indices"])["count"]
+            self._check_scene_count("triangles", corners // 3)
             index = self.document.read_values(primitive["indices"]).ravel().astype(np.int64)
         mode = primitive.get("mode", _TRIANGLES_MODE)
         if mode == _TRIANGLES_MODE:
@@ -266,7 +270,7 @@ class _SceneReader:
     def _material_group(self, mesh: Tree, primitive: Tree) -> MaterialGroup:
         material: Tree = {}
         if "material" in primitive:
-            material = self.document.item("materials", primitive["material"])
+            material = self.document.top_level_object("materials", primitive["material"])
         index = primitive.get("material", -1)
         names = tuple(str(item["name"]) for item in (material, mesh) if item.get("name"))
         colour = self.materials[index].colour if index >= 0 else None
@@ -297,7 +301,7 @@ def _transform_part(
     )
 
 
-def _nearest_rigid(matrix: Doubles) -> Doubles:
+def _nearest_rigid_transform(matrix: Doubles) -> Doubles:
     """Return the rigid transform that a matrix (4, 4) approximates up to rounding errors.
 
     Matrices that are not nearly rigid are returned unchanged. Rounding errors are common, as exporters write
@@ -316,19 +320,19 @@ def _skin_part(
     mesh_part: MeshPart,
     targets: dict[str, VertexDisplacements],
     influences: SkinInfluences,
-    matrices: Doubles,
+    skinning_matrices: Doubles,
 ) -> MeshPart:
     """Return a mesh part and its morph targets with each vertex transformed by its skinning matrix.
 
-    matrices : (v, 4, 4) skinning matrices at rest
+    skinning_matrices : (v, 4, 4) skinning matrices at rest
     """
     if len(influences.bone) != len(mesh_part.positions):
         raise ValueError(f"{len(mesh_part.positions)} vertices have {len(influences.bone)} joints")
-    linear = matrices[:, :3, :3]
+    linear = skinning_matrices[:, :3, :3]
     mirrored = np.linalg.det(linear) < 0
     return replace(
         mesh_part,
-        positions=np.einsum("vij,vj->vi", linear, mesh_part.positions) + matrices[:, :3, 3],
+        positions=np.einsum("vij,vj->vi", linear, mesh_part.positions) + skinning_matrices[:, :3, 3],
         normals=None
         if mesh_part.normals is None
         else np.einsum("vij,vj->vi", _normal_matrix(linear), mesh_part.normals),

@@ -17,7 +17,7 @@ def note_unread(document: Document, nodes: Nodes, read_extensions: Collection[st
 
     read_extensions : names of extensions without a note, because they are read or noted by other functions
     """
-    listed_nodes = document.items("nodes")
+    listed_nodes = document.top_level_array("nodes")
     in_scene = [listed_nodes[k] for k in nodes.scene_nodes or ()]
     lights = sum(LIGHTS_EXTENSION in (node.get("extensions") or {}) for node in in_scene)
     if lights:
@@ -25,12 +25,14 @@ def note_unread(document: Document, nodes: Nodes, read_extensions: Collection[st
     cameras = sum("camera" in node for node in in_scene)
     if cameras:
         yield f"its cameras ({cameras}) are left out; --camera sets one"
-    modes = [one.get("mode", 4) for mesh in document.items("meshes") for one in mesh["primitives"]]
+    modes = [one.get("mode", 4) for mesh in document.top_level_array("meshes") for one in mesh["primitives"]]
     thin = sum(mode in _POINT_AND_LINE_MODES for mode in modes)
     if thin:
         yield f"points and lines ({thin} primitives) are left out"
-    if len(document.items("scenes")) > 1:
-        yield f"one of its {len(document.items('scenes'))} scenes is read"
-    unread = [name for name in map(str, document.items("extensionsUsed")) if name not in read_extensions]
+    if len(document.top_level_array("scenes")) > 1:
+        yield f"one of its {len(document.top_level_array('scenes'))} scenes is read"
+    unread = [
+        name for name in map(str, document.top_level_array("extensionsUsed")) if name not in read_extensions
+    ]
     if unread:
         yield f"these extensions are left out: {list_names(unread)}"

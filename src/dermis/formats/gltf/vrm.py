@@ -52,8 +52,8 @@ _MAX_TARGET_WEIGHT = 100.0
 class Avatar:
     """Properties that a VRM file adds to glTF; the defaults describe glTF files without VRM.
 
-    expressions : three nested dictionaries: keys are the `id` of the JSON tree of a mesh, the name of an
-        expression, and the index of a morph target; values are weights
+    expressions : weights of the morph targets of expressions, in three nested dictionaries. The keys are the
+        Python `id` of a mesh's JSON tree, the name of the expression, and the index of the morph target
     """
 
     axes: Axes = DEFAULT_AXES
@@ -116,29 +116,29 @@ class _TargetBind(NamedTuple):
     weight: float
 
 
-def _vrm_0_binds(document: Document, avatar: Tree) -> Iterator[_TargetBind]:
+def _vrm_0_binds(document: Document, vrm_extension: Tree) -> Iterator[_TargetBind]:
     """Yield the morph targets of all expressions in a VRM 0.x file, where weights are percentages.
 
-    avatar : VRM extension of the file
+    vrm_extension : VRM extension of the file
     """
-    for group in _expression_groups(avatar):
+    for group in _expression_groups(vrm_extension):
         preset = str(group.get("presetName", "")).casefold()
         name = str(group.get("name", "")) if preset in _CUSTOM_PRESET_NAMES else preset
         for bind in group.get("binds") or () if name else ():
-            mesh = document.item("meshes", bind["mesh"])
+            mesh = document.top_level_object("meshes", bind["mesh"])
             yield _TargetBind(name, mesh, int(bind["index"]), _FRACTION_PER_PERCENT * _bind_weight(bind))
 
 
-def _vrm_1_binds(document: Document, avatar: Tree) -> Iterator[_TargetBind]:
+def _vrm_1_binds(document: Document, vrm_extension: Tree) -> Iterator[_TargetBind]:
     """Yield the morph targets of all expressions in a VRM 1.0 file.
 
-    avatar : VRM extension of the file
+    vrm_extension : VRM extension of the file
     """
-    for name, expression in _expression_trees(avatar).items():
+    for name, expression in _expression_trees(vrm_extension).items():
         for bind in expression.get("morphTargetBinds") or ():
-            node = document.item("nodes", bind["node"])
+            node = document.top_level_object("nodes", bind["node"])
             if "mesh" in node:
-                mesh = document.item("meshes", node["mesh"])
+                mesh = document.top_level_object("meshes", node["mesh"])
                 yield _TargetBind(name, mesh, int(bind["index"]), _bind_weight(bind))
 
 
@@ -149,25 +149,27 @@ def _bind_weight(bind: Tree) -> float:
     return weight
 
 
-def _expression_groups(avatar: Tree) -> list[Tree]:
-    groups: list[Tree] = (avatar.get("blendShapeMaster") or {}).get("blendShapeGroups") or []
+def _expression_groups(vrm_extension: Tree) -> list[Tree]:
+    groups: list[Tree] = (vrm_extension.get("blendShapeMaster") or {}).get("blendShapeGroups") or []
     return groups
 
 
-def _expression_trees(avatar: Tree) -> Tree:
-    expressions: Tree = avatar.get("expressions") or {}
+def _expression_trees(vrm_extension: Tree) -> Tree:
+    expressions: Tree = vrm_extension.get("expressions") or {}
     return {**(expressions.get("preset") or {}), **(expressions.get("custom") or {})}
 
 
-def _avatar_notes(extensions: Tree, avatar: Tree, is_vrm_0: bool) -> Iterator[str]:
-    expressions = _expression_groups(avatar) if is_vrm_0 else list(_expression_trees(avatar).values())
+def _avatar_notes(extensions: Tree, vrm_extension: Tree, is_vrm_0: bool) -> Iterator[str]:
+    expressions = (
+        _expression_groups(vrm_extension) if is_vrm_0 else list(_expression_trees(vrm_extension).values())
+    )
     if any(one.get(key) for one in expressions for key in _MATERIAL_BIND_KEYS):
         yield "changes of materials by expressions are left out"
-    present = {*avatar, *extensions}
+    present = {*vrm_extension, *extensions}
     not_read = [text for text, keys in _UNREAD_PROPERTIES.items() if present.intersection(keys)]
     if not_read:
         yield f"these properties of the avatar are left out: {', '.join(not_read)}"
-    materials = avatar.get("materialProperties") or ()
+    materials = vrm_extension.get("materialProperties") or ()
     toon = [str(one.get("name")) for one in materials if "MToon" in str(one.get("shader"))]
     if toon:
         yield f"cartoon shading (shade colour, outline, rim light) is not drawn: {list_names(toon)}"

@@ -14,12 +14,12 @@ from dermis.formats.gltf.document import FrozenTree, Tree
 from dermis.formats.gltf.materials import (
     SkinAdditions,
     encode_colours_png,
+    encode_eye_pictures,
+    encode_part_pictures,
+    encode_skin_maps,
     eye_material,
-    eye_pictures,
     hair_material,
     part_material,
-    part_pictures,
-    skin_pictures,
     surface_material,
 )
 from dermis.formats.gltf.primitives import FibreTubes, HairPrimitive, PrimitiveSource, SurfacePrimitive
@@ -42,7 +42,7 @@ def encode_head(
     roughness: float,
     weights: Mapping[str, float] | None = None,
     slopes: Floats | None = None,
-    notes: FrozenTree | None = None,
+    asset_extras: FrozenTree | None = None,
     eyes: EyeTextures | None = None,
     skin_additions: SkinAdditions | None = None,
 ) -> bytes:
@@ -53,17 +53,17 @@ def encode_head(
     roughness : Beckmann's m of skin without a roughness map [-]
     weights : default weights of morph targets by name, which override the weights of the rest pose
     slopes : (n, n, 2) slopes of the relief, written as a normal map for programs that read no height map
-    notes : entries for the extras of the file's "asset"
+    asset_extras : entries for the extras of the file's "asset"
     eyes : maps of the eyeballs; None for eyes in a uniform colour
     skin_additions : properties to add to the material of skin
     """
     binary, deformable = BufferBuilder(), DeformableMesh(head)
-    pictures, roles = skin_pictures(head.maps, slopes)
+    pictures, roles = encode_skin_maps(head.maps, slopes)
     pictures |= {} if skin_additions is None else skin_additions.pictures
     parts, materials = _primitive_sources(deformable, pictures, roles, roughness, eyes)
     if skin_additions is not None:
         materials = [
-            skin_additions.apply_to(material) if "dermis" in material.get("extras", {}) else material
+            skin_additions.add_to_material(material) if "dermis" in material.get("extras", {}) else material
             for material in materials
         ]
     images = [
@@ -73,7 +73,7 @@ def encode_head(
     textures = {name: index for index, name in enumerate(pictures)}
     nodes, roots, skins = _gltf_nodes(head, binary)
     tree = {
-        "asset": _gltf_asset(head, notes),
+        "asset": _gltf_asset(head, asset_extras),
         "extensionsUsed": sorted({name for material in materials for name in material.get("extensions", {})}),
         "scene": 0,
         "scenes": [{"nodes": roots}],
@@ -92,41 +92,41 @@ def encode_head(
 
 
 def _primitive_sources(
-    deformable: DeformableMesh,
+    deformable_mesh: DeformableMesh,
     pictures: dict[str, bytes],
-    roles: FrozenTree,
+    map_entries: FrozenTree,
     roughness: float,
     eyes: EyeTextures | None,
 ) -> tuple[list[PrimitiveSource], list[Tree]]:
     """Return the geometry and the material of each glTF primitive, as two lists in the same order.
 
     pictures : PNG files by name; this function adds the pictures of eyes, hairs and parts that are not skin
-    roles : entries of the skin material's extras, see `skin_pictures`
+    map_entries : description of the maps for the extras of the skin material, see `encode_skin_maps`
     """
-    head = deformable.head
+    head = deformable_mesh.head
     eye_materials = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
     if eyes is not None and eye_materials:
-        pictures |= eye_pictures(eyes)
-    part_maps = PartPictures.of(head)
+        pictures |= encode_eye_pictures(eyes)
+    part_maps = PartPictures.from_head(head)
     if part_maps is not None:
-        pictures |= part_pictures(part_maps)
+        pictures |= encode_part_pictures(part_maps)
     parts, materials = list[PrimitiveSource](), list[Tree]()
     for index in np.unique(head.mesh.material).tolist():
         eye = eye_materials.index(index) if index in eye_materials else -1
-        parts.append(SurfacePrimitive(deformable, np.flatnonzero(head.mesh.material == index), eye))
+        parts.append(SurfacePrimitive(deformable_mesh, np.flatnonzero(head.mesh.material == index), eye))
         own = head.mesh.materials[index]
         if eye >= 0:
             materials.append(eye_material(own))
         elif part_maps is not None and own.has_maps:
             materials.append(part_material(own, part_maps))
         else:
-            materials.append(surface_material(own, pictures, roles, roughness))
+            materials.append(surface_material(own, pictures, map_entries, roughness))
     for name, strands in ((BROWS, head.strands), (HAIR, hair_strands(head))):
         if strands is not None and len(strands):
             fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_EXPORTED_HAIRS, _KNOTS_PER_HAIR[name])
-            parts.append(HairPrimitive(deformable, fibres))
+            parts.append(HairPrimitive(deformable_mesh, fibres))
             materials.append(hair_material(name))
-            pictures[name] = encode_colours_png(fibres.colours()[0])
+            pictures[name] = encode_colours_png(fibres.palette_and_uv()[0])
     return parts, materials
 
 
@@ -138,8 +138,8 @@ def _gltf_asset(head: Head, notes: FrozenTree | None) -> Tree:
 
 
 def _gltf_mesh(
-    deformable: DeformableMesh,
-    binary: BufferBuilder,
+    deformable_mesh: DeformableMesh,
+    buffer_builder: BufferBuilder,
     primitive_sources: list[PrimitiveSource],
     weights: Mapping[str, float],
 ) -> Tree:
@@ -148,15 +148,16 @@ def _gltf_mesh(
     primitive_sources : geometry of each primitive; primitive i has material i
     """
     primitives = [
-        source.add_primitive(binary) | {"material": number} for number, source in enumerate(primitive_sources)
+        source.add_primitive(buffer_builder) | {"material": number}
+        for number, source in enumerate(primitive_sources)
     ]
-    mesh: Tree = {"name": _mesh_name(deformable.head), "primitives": primitives}
-    names, rest = deformable.rig.targets.names, deformable.rig.targets.rest
+    mesh: Tree = {"name": _mesh_name(deformable_mesh.head), "primitives": primitives}
+    names, rest = deformable_mesh.rig.targets.names, deformable_mesh.rig.targets.rest
     if not names:
         return mesh
-    for target in deformable.targets():
+    for target in deformable_mesh.targets():
         for primitive, source in zip(primitives, primitive_sources, strict=True):
-            primitive.setdefault("targets", []).append(source.add_target(binary, target))
+            primitive.setdefault("targets", []).append(source.add_target(buffer_builder, target))
     resting = {} if rest is None else dict(zip(names, rest.tolist(), strict=True))
     values = [float({**resting, **weights}.get(name, 0.0)) for name in names]
     return mesh | {"weights": values, "extras": {"targetNames": list(names)}}
@@ -168,7 +169,7 @@ def _mesh_name(head: Head) -> str:
     return f"{name} mesh" if name in head.bones else name
 
 
-def _gltf_nodes(head: Head, binary: BufferBuilder) -> tuple[list[Tree], list[int], list[Tree]]:
+def _gltf_nodes(head: Head, buffer_builder: BufferBuilder) -> tuple[list[Tree], list[int], list[Tree]]:
     """Return the glTF nodes, the indices of the root nodes, and the list of skins.
 
     The nodes are the bones, then the mesh. There is one skin; a head without bones has no skin.
@@ -183,13 +184,13 @@ def _gltf_nodes(head: Head, binary: BufferBuilder) -> tuple[list[Tree], list[int
         roots = [len(nodes) - 1]
     skin = {"joints": list(range(len(skeleton.names))), "skeleton": roots[0]}
     rows = inverse_bind.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
-    skin["inverseBindMatrices"] = binary.add_accessor(rows)
+    skin["inverseBindMatrices"] = buffer_builder.add_accessor(rows)
     nodes.append({"name": _mesh_name(head), "mesh": 0, "skin": 0})
     return nodes, [*roots, len(nodes) - 1], [skin]
 
 
 def _bone_nodes(skeleton: Skeleton) -> tuple[list[Tree], Doubles]:
-    """Return the glTF nodes of b bones in metres, and their inverse bind matrices (b, 4, 4)."""
+    """Return the glTF nodes of b bones, and their inverse bind matrices (b, 4, 4); lengths are in metres."""
     to_file = np.diag([_METRES_PER_MM] * 3 + [1.0]) @ skeleton.to_head
     size = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
     scaled_up, scaled_down = (np.diag([factor] * 3 + [1.0]) for factor in (size, 1.0 / size))

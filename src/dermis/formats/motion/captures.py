@@ -82,7 +82,7 @@ def capture_clip(culprit: object, clip_name: str, samples: CaptureSamples, head:
     """
     target_of_name = match_targets(samples.names, head.targets)
     if not target_of_name and not samples.angles:
-        refuse_unmatched(culprit, samples.names, head)
+        refuse_unmatched_motion(culprit, samples.names, head)
     times = samples.times_s - samples.times_s[0]
     columns = [samples.names.index(name) for name in target_of_name]
     weights, targets = samples.weights[:, columns], tuple(target_of_name.values())
@@ -101,11 +101,17 @@ def capture_clip(culprit: object, clip_name: str, samples: CaptureSamples, head:
 
     unused = tuple(name for name in samples.names if name not in target_of_name) + samples.unused_names
     return Clip(
-        clip_name, float(times[-1]), frame_rate(times), targets, tuple(samples.angles), unused, sample
+        clip_name,
+        float(times[-1]),
+        estimate_frame_rate(times),
+        targets,
+        tuple(samples.angles),
+        unused,
+        sample,
     )
 
 
-def refuse_unmatched(culprit: object, capture_names: Sequence[str], head: Head) -> None:
+def refuse_unmatched_motion(culprit: object, capture_names: Sequence[str], head: Head) -> None:
     """Raise an error for a motion in which no name matches a morph target or bone of the head."""
     targets = _abbreviated_list(head.targets) if head.targets else "none"
     actual = f"it has {_abbreviated_list(capture_names)} and the head {targets}"
@@ -113,7 +119,7 @@ def refuse_unmatched(culprit: object, capture_names: Sequence[str], head: Head) 
     refuse(culprit, "names of targets or bones of the head", actual, advice)
 
 
-def frame_rate(times: Doubles) -> float | None:
+def estimate_frame_rate(times: Doubles) -> float | None:
     """Return the frame rate of times (k,) [s], rounded to a common rate; None if they are unevenly spaced."""
     steps = np.diff(times)
     steps = steps[steps > 0]
@@ -126,21 +132,23 @@ def frame_rate(times: Doubles) -> float | None:
     return nearest if abs(nearest / rate - 1) < _FRAME_RATE_TOLERANCE else rate
 
 
-def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
+def to_seconds(culprit: object, times: Doubles, unit_s: float | None) -> Doubles:
     """Return times (k,) in seconds.
 
-    unit : unit of the times [s]; None to guess the largest unit in which frames are at most 2 s apart; a note
-        tells the user of the guess
+    unit_s : unit of the times [s]; None to guess the largest unit in which frames are at most 2 s apart, and
+        to tell the user of the guess by a note
     """
-    if unit is None:
+    if unit_s is None:
         steps = np.diff(times)
         step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-        unit = next((unit for unit in _TIME_UNIT_NAMES if unit * step <= _MAX_FRAME_INTERVAL_S), 1.0)
-        notify(f"{culprit}: the unit of its times is not stated; they are taken as {_TIME_UNIT_NAMES[unit]}")
-    return times * unit
+        unit_s = next((unit_s for unit_s in _TIME_UNIT_NAMES if unit_s * step <= _MAX_FRAME_INTERVAL_S), 1.0)
+        notify(
+            f"{culprit}: the unit of its times is not stated; they are taken as {_TIME_UNIT_NAMES[unit_s]}"
+        )
+    return times * unit_s
 
 
-def assumed_rate(culprit: object, fps: float | None, default_fps: float) -> float:
+def frame_rate_or_default(culprit: object, fps: float | None, default_fps: float) -> float:
     """Return the frame rate of a capture without times: `fps`, or `default_fps` with a note to the user."""
     if fps is None:
         assumed = f"{default_fps:g} frames per second are assumed"
@@ -173,7 +181,7 @@ def fill_gaps(times_s: Doubles, channels: Doubles) -> Doubles:
     return filled
 
 
-def to_fractions(culprit: object, weights: Doubles) -> Doubles:
+def weights_as_fractions(culprit: object, weights: Doubles) -> Doubles:
     """Return blend shape weights (k, n) as fractions; weights in percent are divided by 100, with a note."""
     largest = float(np.nanmax(np.abs(weights), initial=0.0))
     if _PERCENT_WEIGHT_RANGE[0] < largest <= _PERCENT_WEIGHT_RANGE[1]:
@@ -198,7 +206,7 @@ def check_weights(culprits: Sequence[object], shape_names: Sequence[str], shape_
         refuse(culprits[row], expected, actual, "Correct or remove the line")
 
 
-def check_size(culprit: object, frame_count: int, column_count: int) -> None:
+def check_capture_size(culprit: object, frame_count: int, column_count: int) -> None:
     """Refuse a capture with too many frames or too many columns.
 
     frame_count : number of frames read so far

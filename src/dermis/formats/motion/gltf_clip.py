@@ -10,7 +10,7 @@ import numpy as np
 from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
 from dermis.formats.gltf.animations import AnimationCurve, AnimationTrack, read_clip
-from dermis.formats.motion.captures import frame_rate, refuse_unmatched
+from dermis.formats.motion.captures import estimate_frame_rate, refuse_unmatched_motion
 from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
 from dermis.mesh.pose import MAX_WEIGHT, Pose
@@ -26,12 +26,12 @@ class _BoneTransforms(NamedTuple):
     scale: Doubles
 
 
-class _UsedTrack(NamedTuple):
-    """Animation curve of a track, with the n bones or morph targets of the track that the head has.
+class _MatchedTrack(NamedTuple):
+    """Animation curve of a track, with n of its bones or morph targets: those that the head also has.
 
     path : "translation", "rotation", "scale" or "weights"
-    columns : (n,) indices of the bones or morph targets in the track
-    indices : (n,) indices of the same bones or morph targets in the result of `_used_names`
+    columns : (n,) indices of these bones or morph targets in the track
+    indices : (n,) indices of their names in the result of `_matched_names`
     """
 
     path: str
@@ -50,12 +50,14 @@ def load_gltf_clip(path: Path, head: Head, clip_name: str | None) -> Clip:
     Raises DermisError for a damaged clip, and if no name matches the head.
     """
     clip, skeleton = read_clip(path, clip_name), head.control.skeleton
-    bones = _used_names([track for track in clip.tracks if track.path != "weights"], head.bones)
-    targets = _used_names([track for track in clip.tracks if track.path == "weights"], head.targets)
+    bones = _matched_names([track for track in clip.tracks if track.path != "weights"], head.bones)
+    targets = _matched_names([track for track in clip.tracks if track.path == "weights"], head.targets)
     names = tuple(dict.fromkeys(name for track in clip.tracks for name in track.names))
     if not bones and not targets:
-        refuse_unmatched(f"{path}: clip {clip.name!r}", names, head)
-    used_tracks = [_used_track(track, targets if track.path == "weights" else bones) for track in clip.tracks]
+        refuse_unmatched_motion(f"{path}: clip {clip.name!r}", names, head)
+    used_tracks = [
+        _match_track(track, targets if track.path == "weights" else bones) for track in clip.tracks
+    ]
     rest = _rest_transforms(skeleton, bones) if skeleton is not None and bones else None
 
     def sample(seconds: float) -> Pose:
@@ -75,21 +77,23 @@ def load_gltf_clip(path: Path, head: Head, clip_name: str | None) -> Clip:
         return Pose(weight_of_target, dict(zip(bones, matrices, strict=True)))
 
     times = [track.curve.times_s for track in clip.tracks]
-    end, rate = max(float(keys[-1]) for keys in times), frame_rate(max(times, key=len))
+    end, rate = max(float(keys[-1]) for keys in times), estimate_frame_rate(max(times, key=len))
     unused = tuple(name for name in names if name not in (*bones, *targets))
     return Clip(clip.name, end, rate, tuple(targets), tuple(bones), unused, sample)
 
 
-def _used_names(tracks: list[AnimationTrack], head_names: tuple[str, ...]) -> list[str]:
+def _matched_names(tracks: list[AnimationTrack], head_names: tuple[str, ...]) -> list[str]:
     """Return the names of animated bones or morph targets that the head has, without duplicates."""
     return [
         name for name in dict.fromkeys(name for track in tracks for name in track.names) if name in head_names
     ]
 
 
-def _used_track(track: AnimationTrack, used_names: list[str]) -> _UsedTrack:
+def _match_track(track: AnimationTrack, used_names: list[str]) -> _MatchedTrack:
     columns = [k for k, name in enumerate(track.names) if name in used_names]
-    return _UsedTrack(track.path, track.curve, columns, [used_names.index(track.names[k]) for k in columns])
+    return _MatchedTrack(
+        track.path, track.curve, columns, [used_names.index(track.names[k]) for k in columns]
+    )
 
 
 def _rest_transforms(skeleton: Skeleton, bones: list[str]) -> _BoneTransforms:
@@ -103,7 +107,7 @@ def _rest_transforms(skeleton: Skeleton, bones: list[str]) -> _BoneTransforms:
 
 
 def _bone_matrices(transforms: _BoneTransforms) -> Doubles:
-    """Return the bone matrices (n, 4, 4): scale first, then rotation, then translation."""
+    """Return the bone matrices (n, 4, 4), which apply the scale first, then rotation, then translation."""
     matrices = quaternion_matrix(transforms.rotation)
     matrices[:, :3, :3] *= transforms.scale[:, None, :]
     matrices[:, :3, 3] = transforms.translation

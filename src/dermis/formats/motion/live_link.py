@@ -25,17 +25,17 @@ from dermis.formats.motion.captures import (
     SECONDS_PER_TIME_KEY,
     CaptureSamples,
     RotationBones,
-    assumed_rate,
     capture_clip,
-    check_size,
+    check_capture_size,
     check_weights,
     fill_gaps,
     find_rotation_bones,
+    frame_rate_or_default,
     head_bone_angles,
     note_lost_frames,
-    to_fractions,
     to_seconds,
     unwrap_degrees,
+    weights_as_fractions,
 )
 from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
@@ -122,13 +122,13 @@ def _read_table(path: Path, fps: float | None) -> _CaptureTable:
             times.append("" if time is None else row[time].strip().replace(",", "."))
             states_shapes.append(count is not None and row[count].strip() not in ("", "0"))
             rows.append(_row_values(culprit, header, row, columns))
-            check_size(path, len(rows), len(columns))
+            check_capture_size(path, len(rows), len(columns))
     if not rows:
         refuse(path, f"{expected} with a header and rows", "it has only its header", "Export it again")
     times_s = _row_times(path, lines, times, None if time is None else keys[time], fps)
     names = [header[k] for k in columns]
     table = _CaptureTable(names, times_s, np.array(rows))
-    return _complete_table(path, lines, table, np.array(states_shapes))
+    return _fill_table_gaps(path, lines, table, np.array(states_shapes))
 
 
 def _has_text(table_row: Sequence[str]) -> bool:
@@ -136,7 +136,9 @@ def _has_text(table_row: Sequence[str]) -> bool:
 
 
 def _check_row(culprit: str, header: Sequence[str], table_row: list[str], count_column: int | None) -> None:
-    """Refuse a row with too many or too few cells; pad a row that states that it has no blend shapes.
+    """Refuse a row with too many or too few cells.
+
+    A row whose number of blend shapes is 0 may be too short; empty cells are appended to it.
 
     count_column : index of the column that states the number of blend shapes; None if there is none
     """
@@ -151,7 +153,7 @@ def _check_row(culprit: str, header: Sequence[str], table_row: list[str], count_
 
 
 def _check_header(culprit: str, header: Sequence[str]) -> None:
-    check_size(culprit, 0, len(header))
+    check_capture_size(culprit, 0, len(header))
     folded = [name.casefold() for name in header if name]
     repeated = [name for name in header if name and folded.count(name.casefold()) > 1]
     if repeated:
@@ -177,10 +179,12 @@ def _row_values(
     return values
 
 
-def _complete_table(
+def _fill_table_gaps(
     path: Path, line_numbers: list[str], capture_table: _CaptureTable, has_shape_count: Mask
 ) -> _CaptureTable:
-    """Return a table without gaps, with weights as fractions and angles in radians.
+    """Return a table whose gaps are interpolated, with weights as fractions and angles in radians.
+
+    Columns without any value are left out.
 
     line_numbers : file and line of each row, for errors
     has_shape_count : (k,) mask of rows that state a number of blend shapes above 0
@@ -199,7 +203,7 @@ def _complete_table(
     note_lost_frames(path, int(lost.sum()), len(lost))
     if cells := np.isnan(values[~lost]).sum():
         notify(f"{path}: {cells} empty cells are interpolated between those of other frames")
-    values[:, ~is_angle] = to_fractions(path, values[:, ~is_angle])
+    values[:, ~is_angle] = weights_as_fractions(path, values[:, ~is_angle])
     if np.nanmax(np.abs(values[:, is_angle]), initial=0.0) > _MAX_ANGLE_RADIANS:
         notify(f"{path}: its angles are taken as degrees")
         values[:, is_angle] = np.radians(values[:, is_angle])
@@ -232,7 +236,7 @@ def _row_times(
     fps : frame rate of the timecode; None to estimate it
     """
     if time_column is None:
-        return np.arange(len(line_numbers)) / assumed_rate(path, fps, _APP_FRAME_RATE)
+        return np.arange(len(line_numbers)) / frame_rate_or_default(path, fps, _APP_FRAME_RATE)
     if any(":" in cell for cell in time_cells):
         codes = [_parse_timecode(line, cell) for line, cell in zip(line_numbers, time_cells, strict=True)]
         rate = fps or _timecode_rate(codes)
@@ -244,7 +248,7 @@ def _row_times(
             [_parse_time(line, cell) for line, cell in zip(line_numbers, time_cells, strict=True)]
         )
         if time_column in FRAME_NUMBER_KEYS:
-            times = times / assumed_rate(path, fps, _APP_FRAME_RATE)
+            times = times / frame_rate_or_default(path, fps, _APP_FRAME_RATE)
         else:
             times = to_seconds(path, times, _TIME_COLUMNS[time_column])
     backwards = np.flatnonzero(np.diff(times) < 0)
@@ -255,26 +259,28 @@ def _row_times(
     return times
 
 
-def _parse_timecode(culprit: str, cell: str) -> _Timecode:
-    match = _TIMECODE_PATTERN.fullmatch(cell)
+def _parse_timecode(culprit: str, timecode_cell: str) -> _Timecode:
+    match = _TIMECODE_PATTERN.fullmatch(timecode_cell)
     if match is None:
-        refuse(culprit, "a Timecode as HH:MM:SS:FF.fff", f"got {cell!r}", "Correct or remove the line")
+        refuse(
+            culprit, "a Timecode as HH:MM:SS:FF.fff", f"got {timecode_cell!r}", "Correct or remove the line"
+        )
     hours, minutes, seconds, frames = match.groups(default="0")
     return _Timecode(3600 * int(hours) + 60 * int(minutes) + float(seconds), float(frames))
 
 
-def _parse_time(culprit: str, cell: str) -> float:
+def _parse_time(culprit: str, time_cell: str) -> float:
     try:
-        return checked_number(culprit, float(cell), -MAX_STATED_TIME, MAX_STATED_TIME)
+        return checked_number(culprit, float(time_cell), -MAX_STATED_TIME, MAX_STATED_TIME)
     except ValueError:
-        actual = f"got {cell!r}"
+        actual = f"got {time_cell!r}"
         refuse(culprit, "a Timecode as HH:MM:SS:FF.fff, or a number", actual, "Correct or remove the line")
 
 
 def _timecode_rate(timecodes: Sequence[_Timecode]) -> float:
     """Estimate the frame rate of timecodes: the lowest common rate above the largest frame number.
 
-    If the recording lasts less than a second, the result is at least 60, the rate of the app.
+    If the recording lasts less than a second, the result is at least 60, the frame rate of Live Link Face.
     """
     largest = max(int(code.frames) for code in timecodes)
     seconds_advance = any(after.seconds > before.seconds for before, after in pairwise(timecodes))
@@ -285,7 +291,7 @@ def _timecode_rate(timecodes: Sequence[_Timecode]) -> float:
 def _bone_angles(
     capture_table: _CaptureTable, bones: RotationBones
 ) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Return the angles (k, 3) of bones by name [degrees], and the angle columns that fit no bone."""
+    """Return the angles (k, 3) of bones by bone name [degrees], and the angle columns without a bone."""
     columns = {plain_key(name): k for k, name in enumerate(capture_table.names)}
     angles: dict[str, Doubles] = {}
     unused: list[str] = []

@@ -23,17 +23,17 @@ from dermis.formats.motion.captures import (
     SECONDS_PER_TIME_KEY,
     CaptureSamples,
     RotationBones,
-    assumed_rate,
     capture_clip,
-    check_size,
+    check_capture_size,
     check_weights,
     fill_gaps,
     find_rotation_bones,
+    frame_rate_or_default,
     head_bone_angles,
     note_lost_frames,
     rotation_quaternions,
-    to_fractions,
     to_seconds,
+    weights_as_fractions,
 )
 from dermis.mesh.clip import Clip, check_frame_rate
 from dermis.mesh.head import Head
@@ -66,7 +66,7 @@ class _CapturedFrame(NamedTuple):
     number : number of the frame
     time : time of the frame, in the unit `unit`; NaN if the frame has none
     unit : unit of the time [s]; None if it is not stated
-    columns : (n,) column indices of the blend shapes of the frame; empty without a face
+    columns : (n,) indices of the frame's blend shapes among those of all frames; empty without a face
     weights : (n,) weights of these blend shapes
     matrix : (4, 4) facial transformation; None if the frame has none
     faces : number of faces in the frame
@@ -96,13 +96,13 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
 
     Raises DermisError for a file without a face, and for invalid frames; the message names the frame.
     """
-    rate, records = _read_records(path)
+    rate, records = _read_frame_records(path)
     columns: dict[str, int] = {}
     frames: list[_CapturedFrame] = []
     record: object = None
     for index, (culprit, record) in enumerate(records):
         frames.append(_parse_frame(culprit, index, record, columns))
-        check_size(path, len(frames), len(columns))
+        check_capture_size(path, len(frames), len(columns))
     lost, several = sum(frame.faces == 0 for frame in frames), sum(frame.faces > 1 for frame in frames)
     if lost == len(frames):
         found = ", ".join(record) if isinstance(record, dict) and record else "nothing"
@@ -117,14 +117,14 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
         if len(frame.columns):
             row[:] = 0.0
             row[frame.columns] = frame.weights
-    weights = to_fractions(path, weights)
+    weights = weights_as_fractions(path, weights)
     check_weights([frame.culprit for frame in frames], names, weights)
     angles, unused = _head_angles(path, frames, times, find_rotation_bones(head.control.skeleton))
     samples = CaptureSamples(times, names, fill_gaps(times, weights), angles, unused)
     return capture_clip(path, path.stem, samples, head)
 
 
-def _read_records(path: Path) -> tuple[float | None, Iterator[tuple[str, object]]]:
+def _read_frame_records(path: Path) -> tuple[float | None, Iterator[tuple[str, object]]]:
     """Return the frame rate that a file states, and the name (for errors) and content of each frame."""
     text = read_text(path, _EXPECTED_CONTENT, MAX_CLIP_BYTES)
     lines = ((f"{path}, line {k}", line) for k, line in enumerate(io.StringIO(text), 1) if line.strip())
@@ -143,49 +143,58 @@ def _read_records(path: Path) -> tuple[float | None, Iterator[tuple[str, object]
                 (name, parse_json(line, name, _EXPECTED_CONTENT)) for name, line in chain([second], lines)
             )
             return None, chain([(first[0], document)], rest)
-    fields = _plain_fields(document)
+    fields = _fields_by_plain_key(document)
     rate = next(
         (check_frame_rate(f"{path}: {key}", fields[key]) for key in _FRAME_RATE_KEYS if key in fields), None
     )
     return rate, ((f"{path}, frame {k}", record) for k, record in enumerate(_frame_list(document), 1))
 
 
-def _plain_fields(record: object) -> dict[str, object]:
-    return {plain_key(key): value for key, value in record.items()} if isinstance(record, dict) else {}
+def _fields_by_plain_key(json_record: object) -> dict[str, object]:
+    return (
+        {plain_key(key): value for key, value in json_record.items()} if isinstance(json_record, dict) else {}
+    )
 
 
-def _frame_list(document: object) -> list[object]:
+def _frame_list(json_document: object) -> list[object]:
     """Return the frames in a JSON document.
 
     A list contains the frames, unless it is the list of blend shapes of a single frame. An object is a single
     frame if it has blend shapes, a facial transformation or no list; otherwise its longest list contains the
     frames.
     """
-    if isinstance(document, list):
-        is_frame = bool(document) and isinstance(document[0], dict) and bool(document[0].keys() & _SCORE_KEYS)
-        return [document] if is_frame else document
-    fields = _plain_fields(document)
+    if isinstance(json_document, list):
+        is_frame = (
+            bool(json_document)
+            and isinstance(json_document[0], dict)
+            and bool(json_document[0].keys() & _SCORE_KEYS)
+        )
+        return [json_document] if is_frame else json_document
+    fields = _fields_by_plain_key(json_document)
     lists = [value for key, value in fields.items() if isinstance(value, list) and key not in _FACE_KEYS]
     lists = [value for value in lists if any(isinstance(item, dict | list) for item in value)]
     is_frame = bool(fields.keys() & {*_SHAPE_KEYS, *_MATRIX_KEYS})
-    return [document] if is_frame or not lists else max(lists, key=len)
+    return [json_document] if is_frame or not lists else max(lists, key=len)
 
 
 def _parse_frame(
     culprit: str, frame_index: int, json_record: object, shape_columns: dict[str, int]
 ) -> _CapturedFrame:
-    """Return a frame; it has no faces if its record has neither blend shapes nor a transformation.
+    """Parse the JSON record of a frame.
 
-    shape_columns : dictionary from blend shape name to column index; this function adds missing names
+    If the record has neither blend shapes nor a transformation, the number of faces is 0.
+
+    shape_columns : dictionary from the name of a blend shape to its index among the blend shapes of all
+        frames; this function adds missing names
     """
     if isinstance(json_record, list):
         json_record = {"blendshapes": json_record}
     if not isinstance(json_record, dict | None):
         refuse(culprit, "an object in JSON", f"got {format_value(json_record)}", _LINE_ADVICE)
-    fields = _plain_fields(json_record)
+    fields = _fields_by_plain_key(json_record)
     for value in tuple(fields.values()):  # the record may contain the result as one of its values
         if not fields.keys() & {*_SHAPE_KEYS, *_MATRIX_KEYS}:
-            fields = _plain_fields(value[0] if isinstance(value, list) and value else value) | fields
+            fields = _fields_by_plain_key(value[0] if isinstance(value, list) and value else value) | fields
     shapes, faces = _first_face(next((fields[key] for key in _SHAPE_KEYS if key in fields), None))
     matrix = next((fields[key] for key in _MATRIX_KEYS if key in fields), None)
     transformation = _facial_transformation(culprit, matrix)
@@ -237,24 +246,24 @@ def _wraps_blend_shapes(json_value: object) -> bool:
     )
 
 
-def _shape_scores(culprit: str, shapes: object) -> dict[str, float]:
+def _shape_scores(culprit: str, json_shapes: object) -> dict[str, float]:
     """Return the score of each blend shape by name.
 
-    shapes : {name: score}, or MediaPipe's list of {"categoryName", "score"}
+    json_shapes : {name: score}, or MediaPipe's list of {"categoryName", "score"}
     """
-    if isinstance(shapes, list):
-        categories = [_plain_fields(item) for item in shapes]
+    if isinstance(json_shapes, list):
+        categories = [_fields_by_plain_key(item) for item in json_shapes]
         names = [next((item[key] for key in _NAME_KEYS if item.get(key)), None) for item in categories]
         scores = [next((item[key] for key in _SCORE_KEYS if key in item), None) for item in categories]
         if None in names or None in scores:
             refuse(culprit, "a categoryName and a score for each blend shape", "one has none", _LINE_ADVICE)
-        shapes = {str(name): score for name, score in zip(names, scores, strict=True)}
-    if not isinstance(shapes, dict):
-        refuse(culprit, "blendshapes by name or as a list", f"got {format_value(shapes)}", _LINE_ADVICE)
-    for name, score in shapes.items():
+        json_shapes = {str(name): score for name, score in zip(names, scores, strict=True)}
+    if not isinstance(json_shapes, dict):
+        refuse(culprit, "blendshapes by name or as a list", f"got {format_value(json_shapes)}", _LINE_ADVICE)
+    for name, score in json_shapes.items():
         if type(score) not in (int, float):
             refuse(culprit, "scores as numbers", f"{name} is {format_value(score)}", _LINE_ADVICE)
-    return {name: score for name, score in shapes.items() if name != NEUTRAL_SHAPE_NAME}
+    return {name: score for name, score in json_shapes.items() if name != NEUTRAL_SHAPE_NAME}
 
 
 def _facial_transformation(culprit: str, json_matrix: object) -> Doubles | None:
@@ -272,7 +281,7 @@ def _facial_transformation(culprit: str, json_matrix: object) -> Doubles | None:
     ):
         by_columns = True
         if isinstance(json_matrix, dict):
-            fields = _plain_fields(json_matrix)
+            fields = _fields_by_plain_key(json_matrix)
             by_columns = fields.get("layout") != "ROW_MAJOR"
             json_matrix = next(
                 (fields[key] for key in _MATRIX_DATA_KEYS if key in fields), [*fields.values()]
@@ -303,7 +312,9 @@ def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None
     times = np.array([frame.time for frame in frames])
     missing = np.isnan(times)
     if missing.all():
-        times = np.array([frame.number for frame in frames]) / assumed_rate(path, fps, _DEFAULT_FRAME_RATE)
+        times = np.array([frame.number for frame in frames]) / frame_rate_or_default(
+            path, fps, _DEFAULT_FRAME_RATE
+        )
     else:
         unstated = np.array([frame.unit is None for frame in frames])
         times *= [frame.unit or 1.0 for frame in frames]
@@ -322,7 +333,7 @@ def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None
 def _head_angles(
     path: Path, frames: Sequence[_CapturedFrame], times: Doubles, bones: RotationBones
 ) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Return the angles (k, 3) of bones by name [degrees], and the rotations that fit no bone."""
+    """Return the angles (k, 3) of bones by bone name [degrees], and a name for rotations without a bone."""
     matrices = [frame.matrix for frame in frames if frame.matrix is not None]
     if not matrices or not bones.head:
         return {}, ("bone for the matrix",) if matrices else ()

@@ -45,11 +45,11 @@ def is_sequence(path: Path) -> bool:
 
 
 def frame_files(path: Path) -> list[Path]:
-    """Return the mesh files in a folder, or whose names match a pattern, sorted by number.
+    """Return the mesh files in a folder, or the mesh files whose names match a pattern.
+
+    The files are sorted by the last number in their names.
 
     path : folder, or pattern such as face_%05d.obj or face_*.obj
-
-    Files are sorted by the last number in their names.
 
     Raises DermisError when there are no files, or files of several formats.
     """
@@ -58,10 +58,10 @@ def frame_files(path: Path) -> list[Path]:
     elif _FRAME_NUMBER_FIELD.search(path.name):
         before, after = _FRAME_NUMBER_FIELD.split(path.name, maxsplit=1)
         shape = re.compile(rf"{re.escape(before)}\d+{re.escape(after)}")
-        files = [one for one in _folder_files(path.parent) if shape.fullmatch(one.name)]
+        files = [one for one in _mesh_files_in_folder(path.parent) if shape.fullmatch(one.name)]
     elif "*" in path.name:
         shape = re.compile(fnmatch.translate(path.name))
-        files = [one for one in _folder_files(path.parent) if shape.fullmatch(one.name)]
+        files = [one for one in _mesh_files_in_folder(path.parent) if shape.fullmatch(one.name)]
     else:
         files = [path]
     kinds = sorted({file.suffix.lower() for file in files})
@@ -200,7 +200,7 @@ def _unit_matching_head_size(mesh_file: Path, head: Head, reader: FrameReader) -
     return unit
 
 
-def _folder_files(sequence_folder: Path) -> list[Path]:
+def _mesh_files_in_folder(sequence_folder: Path) -> list[Path]:
     return list(sequence_folder.iterdir()) if _is_folder(sequence_folder) else []
 
 
@@ -230,7 +230,7 @@ class FrameVertices(NamedTuple):
     uv: Floats
 
 
-class _ObjPattern(NamedTuple):
+class _ObjFingerprint(NamedTuple):
     """Fingerprint of an OBJ file that does not depend on its positions and normals.
 
     digest : hash of all lines except `v` and `vn`
@@ -247,8 +247,8 @@ class _ObjPattern(NamedTuple):
 class FrameReader:
     """Reader of the mesh files of a sequence, which have the same topology.
 
-    OBJ files that differ from the first file only in positions and normals are read 20 times as fast, because
-    only the positions are parsed.
+    OBJ files that differ from the first file only in positions and normals are read 20 times as fast as
+    other files, because only their positions are parsed.
 
     unit_mm : length of the files' unit [mm]; None for the default of the format
     to_head : (3, 3) rotation from the axes of the files to the axes of the head
@@ -257,7 +257,7 @@ class FrameReader:
     unit_mm: float | None = None
     to_head: Doubles = field(default_factory=lambda: np.eye(3))
     _first: FrameVertices | None = field(default=None, init=False)
-    _pattern: _ObjPattern | None = field(default=None, init=False)
+    _first_fingerprint: _ObjFingerprint | None = field(default=None, init=False)
 
     def read(self, path: Path) -> FrameVertices:
         """Return the vertices of a mesh file.
@@ -265,8 +265,8 @@ class FrameReader:
         Raises `DermisError` when the file is missing, damaged or not a mesh, or has no uv.
         """
         unit = default_unit_mm(path) if self.unit_mm is None else float(self.unit_mm)
-        if self._pattern is not None and self._first is not None and is_file(path):
-            positions = _parse_positions(read_obj_text(path).encode(), self._pattern)
+        if self._first_fingerprint is not None and self._first is not None and is_file(path):
+            positions = _parse_positions(read_obj_text(path).encode(), self._first_fingerprint)
             if positions is not None:
                 positions_mm = self._to_head_axes(unit * positions)
                 check_arrays(positions_mm, self._first.uv, self._first.triangles, path)
@@ -274,31 +274,33 @@ class FrameReader:
         vertices = self._parse_vertices(path, unit)
         if self._first is None:
             self._first = vertices
-            self._pattern = self._read_pattern(path, unit) if path.suffix.lower() == ".obj" else None
+            self._first_fingerprint = (
+                self._read_fingerprint(path, unit) if path.suffix.lower() == ".obj" else None
+            )
         return vertices
 
-    def _parse_vertices(self, path: Path, unit: float) -> FrameVertices:
+    def _parse_vertices(self, path: Path, unit_mm: float) -> FrameVertices:
         with np.errstate(all="ignore"), parsing(path, "a mesh", *MALFORMED_DATA_ERRORS):
             part = join_parts(read_mesh_file(path).parts, path)
-            positions = self._to_head_axes(unit * part.positions)
+            positions = self._to_head_axes(unit_mm * part.positions)
             assert part.uv is not None
             check_arrays(positions, part.uv, part.triangles, path)
         used, corners = compact_vertices(part.triangles)
         return FrameVertices(positions[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
 
-    def _read_pattern(self, path: Path, unit: float) -> _ObjPattern | None:
+    def _read_fingerprint(self, path: Path, unit_mm: float) -> _ObjFingerprint | None:
         """Return the fingerprint of the first OBJ file of a sequence.
 
         Returns None if fast reading with the fingerprint gives other positions than full parsing.
         """
         assert self._first is not None
         data = read_obj_text(path).encode()
-        pattern = _find_pattern(path, data)
-        positions = _parse_positions(data, pattern)
+        fingerprint = _obj_fingerprint(path, data)
+        positions = _parse_positions(data, fingerprint)
         same = positions is not None and np.array_equal(
-            self._to_head_axes(unit * positions), self._first.positions_mm
+            self._to_head_axes(unit_mm * positions), self._first.positions_mm
         )
-        return pattern if same else None
+        return fingerprint if same else None
 
     def _to_head_axes(self, positions: Doubles) -> Floats:
         with np.errstate(over="ignore"):  # infinite positions are refused later
@@ -311,7 +313,7 @@ def _split_vertex_lines(obj_bytes: bytes) -> tuple[list[tuple[bytes, bytes, byte
     return _VERTEX_LINE.findall(obj_bytes), hashlib.sha256(others).digest()
 
 
-def _find_pattern(path: Path, obj_bytes: bytes) -> _ObjPattern:
+def _obj_fingerprint(path: Path, obj_bytes: bytes) -> _ObjFingerprint:
     """Return the fingerprint of an OBJ file.
 
     obj_bytes : text of the file in UTF-8
@@ -325,20 +327,20 @@ def _find_pattern(path: Path, obj_bytes: bytes) -> _ObjPattern:
     model = parse_obj(path, numbered.decode())
     part = join_parts([part for part in model.parts if len(part.triangles)], path)
     used = np.unique(part.triangles)
-    return _ObjPattern(digest, len(positions), part.positions[used, 0].astype(np.int64))
+    return _ObjFingerprint(digest, len(positions), part.positions[used, 0].astype(np.int64))
 
 
-def _parse_positions(obj_bytes: bytes, pattern: _ObjPattern) -> Doubles | None:
-    """Return the vertex positions (v, 3) of an OBJ file in file units; None if its fingerprint differs.
+def _parse_positions(obj_bytes: bytes, fingerprint: _ObjFingerprint) -> Doubles | None:
+    """Return the vertex positions (v, 3) of an OBJ file in file units; None if it has another fingerprint.
 
     obj_bytes : bytes of the file
-    pattern : fingerprint of the first file of the sequence
+    fingerprint : fingerprint of the first file of the sequence, which all files should have
     """
     rows, digest = _split_vertex_lines(obj_bytes)
-    if len(rows) != pattern.line_count or digest != pattern.digest:
+    if len(rows) != fingerprint.line_count or digest != fingerprint.digest:
         return None
     try:
-        positions = np.array(rows, dtype=bytes).astype(np.float64)[pattern.line_of_vertex]
+        positions = np.array(rows, dtype=bytes).astype(np.float64)[fingerprint.line_of_vertex]
     except ValueError:  # the parser raises a better error
         return None
     return positions if np.isfinite(positions).all() else None

@@ -49,7 +49,7 @@ class _Faces(NamedTuple):
     start: Index
     vertex: Index
 
-    def corner_elements(self, interpolation: str) -> Index | None:
+    def element_of_corner(self, interpolation: str) -> Index | None:
         """Return the index (c,) of the primvar element at each corner; None for an unknown interpolation."""
         corners = len(self.vertex)
         return {
@@ -208,9 +208,11 @@ class _SceneReader:
             self.materials.append(self.material_reader.read(material))
         return self.material_index[key]
 
-    def _find_uv(self, prim: Usd.Prim, faces: _Faces, materials: list[int]) -> _Primvar | None:
-        """Return the uv set that the materials name, else a uv set with a common name; None without uv."""
-        named = dict.fromkeys(one for k in materials if k >= 0 and (one := self.materials[k].get("uv")))
+    def _find_uv(self, prim: Usd.Prim, faces: _Faces, material_indices: list[int]) -> _Primvar | None:
+        """Return the uv set that the materials use, or else one with a usual name; None if there is none."""
+        named = dict.fromkeys(
+            one for k in material_indices if k >= 0 and (one := self.materials[k].get("uv"))
+        )
         if len(named) > 1:
             self.notes[_SEVERAL_UV_NOTE] = None
         primvars = self.geom.PrimvarsAPI(prim)
@@ -226,7 +228,7 @@ class _SceneReader:
         values = np.array(primvar.Get(self.time), np.float64)
         if values.size == 0 or values.shape[-1] != component_count:
             return None
-        element = faces.corner_elements(str(primvar.GetInterpolation()))
+        element = faces.element_of_corner(str(primvar.GetInterpolation()))
         if element is not None and primvar.IsIndexed():
             element = np.array(primvar.GetIndices(self.time), np.int64)[element]
         return self._checked_primvar(
@@ -252,15 +254,15 @@ class _SceneReader:
         given = mesh.GetNormalsAttr().Get(self.time)
         if found is not None or not given:
             return found
-        element = faces.corner_elements(str(mesh.GetNormalsInterpolation()))
+        element = faces.element_of_corner(str(mesh.GetNormalsInterpolation()))
         return self._checked_primvar(np.array(given, np.float64), element, mesh.GetPath())
 
     def _read_colours(
-        self, prim: Usd.Prim, faces: _Faces, materials: list[int], vertex_count: int
+        self, prim: Usd.Prim, faces: _Faces, material_indices: list[int], vertex_count: int
     ) -> tuple[list[float] | None, Doubles | None]:
         """Return the colour of a whole mesh, and vertex colours (vertex_count, 3); one or both are None."""
-        named = [one for k in materials if k >= 0 and (one := self.materials[k].get("vertex_colours"))]
-        if not named and any(k >= 0 for k in materials):
+        named = [one for k in material_indices if k >= 0 and (one := self.materials[k].get("vertex_colours"))]
+        if not named and any(k >= 0 for k in material_indices):
             return None, None
         primvars = self.geom.PrimvarsAPI(prim)
         primvar = primvars.FindPrimvarWithInheritance(named[0] if named else "displayColor")

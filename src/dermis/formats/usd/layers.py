@@ -29,19 +29,19 @@ class OpenedStage(NamedTuple):
     folder: Path
 
 
-def open_stage(file: Path, path: Path, copy_folder: Path) -> OpenedStage:
+def open_stage(absolute_path: Path, path: Path, copy_folder: Path) -> OpenedStage:
     """Open the stage of a USD file.
 
-    file : absolute path of the file
+    absolute_path : absolute path of the file
     path : path that the user typed, for error messages
     copy_folder : empty folder to which the layers of a package are copied
 
     Raises DermisError when a layer is missing, damaged, or not in the folder of the file or below it.
     """
     usd: Any = import_extra("pxr.Usd", f"{path}: USD scenes")
-    root, folder = file, file.parent
-    if file.suffix.lower() == ".usdz":
-        root, folder = _extract_layers(file, path, copy_folder.resolve()), copy_folder.resolve()
+    root, folder = absolute_path, absolute_path.parent
+    if absolute_path.suffix.lower() == ".usdz":
+        root, folder = _extract_layers(absolute_path, path, copy_folder.resolve()), copy_folder.resolve()
     _check_layers(path, root, folder)
     stage = usd.Stage.Open(str(root))
     if stage is None:
@@ -49,9 +49,9 @@ def open_stage(file: Path, path: Path, copy_folder: Path) -> OpenedStage:
     return OpenedStage(stage, folder)
 
 
-def _extract_layers(file: Path, path: Path, layer_folder: Path) -> Path:
+def _extract_layers(absolute_path: Path, path: Path, layer_folder: Path) -> Path:
     """Copy the layers of a package to a folder, and return the root layer, which is the first entry."""
-    with zipfile.ZipFile(file) as package:
+    with zipfile.ZipFile(absolute_path) as package:
         entries = package.infolist()
         layers = [one for one in entries if Path(one.filename).suffix.lower() in LAYER_SUFFIXES]
         check_limit(path, len(entries), _MAX_PACKAGE_ENTRIES, "files in the package", "Export the head alone")
@@ -110,16 +110,16 @@ def _layer_names(path: Path, layer: Sdf.Layer) -> Iterator[str]:
         refuse(path, "a scene without value clips", f"{clips[0]} has some", _LAYER_ADVICE)
 
 
-def _layer_file(layer: Path, layer_name: str, layer_folder: Path) -> Path | None:
+def _layer_file(referencing_layer: Path, layer_name: str, layer_folder: Path) -> Path | None:
     """Return the file of a layer that another layer references; None for a file outside the folder.
 
-    layer : file of the referencing layer
+    referencing_layer : file of the referencing layer
     layer_name : name of the referenced layer, as written in the referencing layer
     layer_folder : folder that must contain all layers
     """
     if any(mark in layer_name for mark in ":[`\0"):  # names with schemes, packages or expressions
         return None
-    file = (layer.parent / layer_name).resolve()
+    file = (referencing_layer.parent / layer_name).resolve()
     is_layer = file.suffix.lower() in LAYER_SUFFIXES and file.is_relative_to(layer_folder) and file.is_file()
     return file if is_layer else None
 

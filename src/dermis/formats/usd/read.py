@@ -60,17 +60,17 @@ USD_PROPERTIES = (
 
 
 def read_usd(path: Path) -> MeshFile:
-    """Read the meshes of a USD file at its first time, with their materials.
+    """Read the meshes of a USD file at its first time code, with their materials.
 
-    Raises DermisError without the package usd-core, for damaged files, and for layers outside the folder of
-    the file.
+    Raises DermisError if the package usd-core is missing, for damaged files, and for layers outside the
+    folder of the file.
     """
     data = read_file(path, "a USD file", MAX_FILE_BYTES)
     request = {"file": array_from_text(str(path.resolve())), "path": array_from_text(str(path))}
     answer = run_decoder(_DECODER_MODULE, request, len(data), path, "a valid USD file")
     scene: Tree = parse_json(text_from_array(answer["scene"]), path, "a valid USD file")
     pictures = _UsdPictures(path, data)
-    materials = tuple(pictures.material(tree) for tree in scene["materials"])
+    materials = tuple(pictures.read_material(tree) for tree in scene["materials"])
     check_pictures(path, materials)
     parts, notes = list[MeshPart](), dict.fromkeys(scene["notes"])
     for number, mesh in enumerate(scene["meshes"]):
@@ -81,12 +81,12 @@ def read_usd(path: Path) -> MeshFile:
     return MeshFile(parts, materials=materials, notes=tuple(notes), unit_mm=scene["unit_mm"], axes=axes)
 
 
-def _material_groups(mesh: Tree, materials: Sequence[FileMaterial]) -> list[MaterialGroup]:
+def _material_groups(mesh_tree: Tree, materials: Sequence[FileMaterial]) -> list[MaterialGroup]:
     """Return the groups of a mesh: one for each of its materials."""
     groups = []
-    for index in mesh["materials"]:
-        material = materials[index] if index >= 0 else FileMaterial(colour=mesh["colour"])
-        names = tuple(dict.fromkeys(name for name in (material.name, mesh["name"]) if name))
+    for index in mesh_tree["materials"]:
+        material = materials[index] if index >= 0 else FileMaterial(colour=mesh_tree["colour"])
+        names = tuple(dict.fromkeys(name for name in (material.name, mesh_tree["name"]) if name))
         groups.append(MaterialGroup(names, parse_colour(material.colour or DEFAULT_COLOUR), index))
     return groups
 
@@ -94,7 +94,9 @@ def _material_groups(mesh: Tree, materials: Sequence[FileMaterial]) -> list[Mate
 def _mesh_parts(
     path: Path, decoded_arrays: Arrays, array_prefix: str, groups: list[MaterialGroup]
 ) -> tuple[list[MeshPart], list[str]]:
-    """Return the parts of a mesh, one for each group, and notes on polygons without three corners or uv.
+    """Return the parts of a mesh, one for each group, and notes for the user.
+
+    The notes concern polygons that have fewer than three corners, and polygons without uv.
 
     decoded_arrays : arrays of all meshes, see `_SceneReader.read`
     array_prefix : prefix of the names of this mesh's arrays
@@ -121,7 +123,7 @@ def _mesh_parts(
         mesh.get("normals", none),
         mesh.get("colours"),
     )
-    return geometry.parts(groups, mesh["group"][kept][polygons], "by polygon"), notes + missing_uv_notes(
+    return geometry.mesh_parts(groups, mesh["group"][kept][polygons], "by polygon"), notes + missing_uv_notes(
         geometry
     )
 
@@ -135,18 +137,18 @@ def _select_polygons(corner_counts: Index, corners: Index, polygon_mask: Mask) -
 
 
 class _UsdPictures:
-    """Pictures of a USD file, which are in its package, or in its folder and subfolders.
+    """Pictures of a USD file: files in its package (.usdz), or in its folder and subfolders.
 
-    data : bytes of the file
+    file_bytes : bytes of the USD file
     """
 
-    def __init__(self, path: Path, data: bytes) -> None:
+    def __init__(self, path: Path, file_bytes: bytes) -> None:
         self.path, self.package = path, None
         if path.suffix.lower() == _PACKAGE_SUFFIX:
-            self.package = zipfile.ZipFile(io.BytesIO(data))
+            self.package = zipfile.ZipFile(io.BytesIO(file_bytes))
             self.sizes = {one.filename: one.file_size for one in self.package.infolist()}
 
-    def material(self, material_tree: Tree) -> FileMaterial:
+    def read_material(self, material_tree: Tree) -> FileMaterial:
         """Return a material; pictures that are missing are left out, with a note.
 
         material_tree : material as returned by `MaterialReader.read`

@@ -1,4 +1,4 @@
-"""Materials of USD scenes: UsdPreviewSurface with its textures, as plain values."""
+"""Reading of the materials of USD scenes: UsdPreviewSurface shaders with their textures."""
 
 from __future__ import annotations
 
@@ -99,43 +99,45 @@ class MaterialReader:
         self._list_unused_inputs(tree, surface)
         return _emission_to_colour(tree)
 
-    def _add_source(self, tree: Tree, input_name: str, role: str, input_source: _InputSource) -> None:
+    def _add_source(
+        self, material_tree: Tree, input_name: str, role: str, input_source: _InputSource
+    ) -> None:
         """Add to a material tree the texture or vertex colours to which an input is connected."""
         kind = str(input_source.shader.GetIdAttr().Get())
         if kind.startswith("UsdPrimvarReader_float") and role == "colour":
-            tree |= {
+            material_tree |= {
                 "vertex_colours": self._text_value(input_source.shader, "varname"),
                 "colour": [1.0, 1.0, 1.0],
             }
         elif kind != "UsdUVTexture":
-            tree["unused"].append(f"{input_name} from {kind}")
+            material_tree["unused"].append(f"{input_name} from {kind}")
         else:
-            texture = self._texture_tree(input_source, tree)
-            tree["textures"][role] = texture
+            texture = self._texture_tree(input_source, material_tree)
+            material_tree["textures"][role] = texture
             factor, bias = texture.pop("scale"), texture.pop("bias")
             if role == "normal":
-                tree["normal_scale"] = 0.5 * factor[0] if bias[0] else 1.0
+                material_tree["normal_scale"] = 0.5 * factor[0] if bias[0] else 1.0
             elif any(bias[: len(factor)]):
-                tree["unused"].append(f"bias of the picture of {input_name}")
+                material_tree["unused"].append(f"bias of the picture of {input_name}")
             if role in ("colour", "emission"):
-                tree[role] = factor[:3]
+                material_tree[role] = factor[:3]
             elif role != "normal":
                 key = "stated_metalness" if role == "metalness" else role
-                tree[key] = factor[texture["channel"] or 0]
+                material_tree[key] = factor[texture["channel"] or 0]
 
-    def _texture_tree(self, input_source: _InputSource, tree: Tree) -> Tree:
+    def _texture_tree(self, input_source: _InputSource, material_tree: Tree) -> Tree:
         shader = input_source.shader
         wraps = [self._text_value(shader, f"wrap{axis}") for axis in "ST"]
         if "black" in wraps:
-            tree["unused"].append("black beyond the edges of pictures")
+            material_tree["unused"].append("black beyond the edges of pictures")
         if self._text_value(shader, "sourceColorSpace") == "raw" and input_source.output == "rgb":
-            tree["unused"].append("colour space raw of pictures, except for that of normals")
+            material_tree["unused"].append("colour space raw of pictures, except for that of normals")
         coordinates, transform = self._connected_source(shader, "st"), [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
         if coordinates is not None and coordinates.shader.GetIdAttr().Get() == "UsdTransform2d":
             transform = self._uv_transform(coordinates.shader)
             coordinates = self._connected_source(coordinates.shader, "in")
         if coordinates is not None:
-            tree.setdefault("uv", self._text_value(coordinates.shader, "varname"))
+            material_tree.setdefault("uv", self._text_value(coordinates.shader, "varname"))
         return {
             "file": self._picture_name(shader),
             "transform": transform,
@@ -156,13 +158,15 @@ class MaterialReader:
         a, b, d, e = cos * scale_x, -sin * scale_y, sin * scale_x, cos * scale_y
         return [a, -b, b + x, -d, e, 1.0 - e - y]
 
-    def _add_opacity(self, tree: Tree, surface: UsdShade.Shader, input_values: Mapping[str, Any]) -> None:
+    def _add_opacity(
+        self, material_tree: Tree, surface_shader: UsdShade.Shader, input_values: Mapping[str, Any]
+    ) -> None:
         """Add the opacity to a material tree.
 
         A picture of the opacity is only supported if it is the alpha channel of the colour picture.
         """
-        source, cutoff = self._connected_source(surface, "opacity"), input_values["opacityThreshold"]
-        colour = tree["textures"].get("colour")
+        source, cutoff = self._connected_source(surface_shader, "opacity"), input_values["opacityThreshold"]
+        colour = material_tree["textures"].get("colour")
         if source is not None:
             file = (
                 self._picture_name(source.shader)
@@ -170,21 +174,24 @@ class MaterialReader:
                 else None
             )
             if colour is None or source.output != "a" or colour["file"] != file:
-                tree["unused"].append("picture of the opacity")
+                material_tree["unused"].append("picture of the opacity")
                 return
         elif input_values["opacity"] >= 1.0:
             return
-        tree |= {"alpha": 1.0 if source is not None else input_values["opacity"]}
-        tree |= {"alpha_mode": "mask" if cutoff > 0 else "blend", "alpha_cutoff": cutoff or 0.5}
+        material_tree |= {"alpha": 1.0 if source is not None else input_values["opacity"]}
+        material_tree |= {"alpha_mode": "mask" if cutoff > 0 else "blend", "alpha_cutoff": cutoff or 0.5}
 
-    def _list_unused_inputs(self, tree: Tree, surface: UsdShade.Shader) -> None:
+    def _list_unused_inputs(self, material_tree: Tree, surface_shader: UsdShade.Shader) -> None:
         for name, (text, neutral) in _INPUTS_WITHOUT_EFFECT.items():
-            value = self._constant_value(surface, name, neutral)
-            if value != neutral or self._connected_source(surface, name) is not None:
-                tree["unused"].append(text)
+            value = self._constant_value(surface_shader, name, neutral)
+            if value != neutral or self._connected_source(surface_shader, name) is not None:
+                material_tree["unused"].append(text)
 
     def _picture_name(self, texture: UsdShade.Shader) -> str:
-        """Return a picture's name relative to the folder of the layers, unchanged if it is elsewhere."""
+        """Return a picture's name relative to the folder of the layers.
+
+        If the picture is outside this folder, its name is returned as it is in the file.
+        """
         for attribute in self._value_attributes(texture, "file"):
             layer, asset = attribute.GetPropertyStack(self.time)[0].layer, attribute.Get(self.time)
             name = str(asset.path) if asset else ""
@@ -222,11 +229,11 @@ class MaterialReader:
         return str(next((value for value in values if value is not None), ""))
 
 
-def _emission_to_colour(tree: Tree) -> Tree:
+def _emission_to_colour(material_tree: Tree) -> Tree:
     """Use the emission picture as the colour picture if the colour is black, as in unlit scans."""
-    textures = tree["textures"]
-    if "emission" in textures and "colour" not in textures and tuple(tree["colour"]) == _BLACK:
-        textures["colour"], tree["colour"] = textures.pop("emission"), tree["emission"]
-        tree["emission"] = list(_BLACK)
-        tree["unused"].append("unlit colours, which are taken for the reflectance")
-    return tree
+    textures = material_tree["textures"]
+    if "emission" in textures and "colour" not in textures and tuple(material_tree["colour"]) == _BLACK:
+        textures["colour"], material_tree["colour"] = textures.pop("emission"), material_tree["emission"]
+        material_tree["emission"] = list(_BLACK)
+        material_tree["unused"].append("unlit colours, which are taken for the reflectance")
+    return material_tree

@@ -1,4 +1,4 @@
-"""Environment on the device: a prefiltered panorama, whose suns are rendered as lights."""
+"""Environment on the device: a prefiltered panorama, and the suns in it, which are rendered as lights."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MAX_BACKGROUND_ROWS = 2048  # limit of a panorama in the background
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentMap:
-    """Prefiltered panorama on the device, and the suns that were cut out of the panorama.
+    """Prefiltered panorama on the device, and the suns that were removed from the panorama.
 
     panorama : texture whose first layer holds irradiance, and whose further layers hold reflections for
         increasing roughness; black without an environment
@@ -47,21 +47,30 @@ def load_environment_map(device: Device, environment_name: str | None) -> Enviro
         )
     prefiltered = prefilter(environment_name)
     return EnvironmentMap(
-        _upload_layers(device, prefiltered.layers), prefiltered.suns, float(prefiltered.layers[0].max())
+        _upload_panorama_layers(device, prefiltered.layers),
+        prefiltered.suns,
+        float(prefiltered.layers[0].max()),
     )
 
 
 def unfiltered_panorama(device: Device, environment_name: str) -> Texture:
-    """Upload an unfiltered panorama, suns included, for sharp backgrounds; a second layer is black."""
+    """Upload an unfiltered panorama, suns included, for sharp backgrounds.
+
+    The texture has a second layer, which is black.
+    """
     radiance = load_panorama(environment_name, max_rows=_MAX_BACKGROUND_ROWS).astype(np.float32)
-    return _upload_layers(device, [radiance, np.zeros_like(radiance)])
+    return _upload_panorama_layers(device, [radiance, np.zeros_like(radiance)])
 
 
-def _upload_layers(device: Device, layers: Sequence[NDArray[np.float32]] | NDArray[np.float32]) -> Texture:
-    height, width = layers[0].shape[:2]
+def _upload_panorama_layers(
+    device: Device, panorama_layers: Sequence[NDArray[np.float32]] | NDArray[np.float32]
+) -> Texture:
+    height, width = panorama_layers[0].shape[:2]
     size = width + 2, height + 2
-    texture = make_texture(device, size, "rgba16float", layer_count=len(layers), content_source="map")
-    for index, layer in enumerate(layers):
+    texture = make_texture(
+        device, size, "rgba16float", layer_count=len(panorama_layers), content_source="map"
+    )
+    for index, layer in enumerate(panorama_layers):
         texels = np.dstack([_with_border(layer), np.ones(size[::-1])])
         upload(device, texture, np.minimum(texels, _MAX_HALF_FLOAT), layer=index)
     return texture
@@ -92,7 +101,7 @@ def add_suns(memo: Memo, scene: Scene, environment_map: EnvironmentMap) -> Scene
 def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
     """Return an upper bound of the irradiance in a scene [-].
 
-    A surface would receive it if it faced every light and the brightest part of the environment.
+    It is the irradiance of a surface that faces all lights and the brightest part of the environment.
 
     scene : scene whose lights include the suns of its environment
     """
@@ -101,21 +110,21 @@ def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
 
 
 def environment_record(
-    program: ComputeProgram,
+    shading_program: ComputeProgram,
     environment: Environment | None,
     skin: Skin,
     albedo: NDArray[np.float64],
     has_occlusion: bool,
 ) -> UniformRecord:
-    """Return the uniform record of the environment: rotation, exposure and lobes of reflections.
+    """Return the uniform record of the environment, which holds its rotation, exposure and reflection lobes.
 
     albedo : (3,) albedo of skin where its colour map is white [-]
     has_occlusion : whether the head hides parts of the environment from its own skin
     """
     if environment is None:
-        return program.record("Environment")
+        return shading_program.record("Environment")
     angle = np.radians(environment.rotation_degrees)
-    return program.record(
+    return shading_program.record(
         "Environment",
         turn=(np.cos(angle), np.sin(angle)),
         exposure=environment.exposure,

@@ -1,4 +1,4 @@
-"""Interface of a kind of light in the frame; each kind is a module with a WGSL file beside it."""
+"""Interface of the kinds of lights; each kind is a module with a WGSL file beside it."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from dermis.scene.lights import Light, PointLight
 
 Members = dict[str, ArrayLike]
 """Members of a shader struct, by name."""
-L = TypeVar("L", bound=Light)
+LightT = TypeVar("LightT", bound=Light)
 
 
-class Kind(Generic[L]):
-    """Kind of light in the frame; this base class is a punctual light that sets no further shader members.
+class Kind(Generic[LightT]):
+    """Kind of light. This base class is a punctual light that needs no shader members of its own.
 
     The shader has the name of the module, with the suffix .wgsl. It defines the following function, where
     NAME is the name of the kind in scene files, with hyphens replaced by underscores:
@@ -34,9 +34,10 @@ class Kind(Generic[L]):
     punctual : bool
         Whether all light comes from one position or from one direction; False for area lights.
     round : bool
-        Whether the light appears as a disc from the head, instead of as a rectangle.
+        Whether the light has the shape of a disc as seen from the head; False for a rectangle.
     sheet : bool
-        Whether irradiance is a Gaussian along the shader member `half_u`, so that it can be blurred exactly.
+        Whether the light is a thin sheet, whose irradiance is a Gaussian along the shader member `half_u` and
+        can be blurred exactly.
 
     Examples
     --------
@@ -55,7 +56,7 @@ class Kind(Generic[L]):
         """Return the path of the WGSL file that computes the light at a point."""
         return Path(inspect.getfile(type(self))).with_suffix(".wgsl")
 
-    def has_size(self, light: L) -> bool:
+    def has_size(self, light: LightT) -> bool:
         """Return whether shadows of the light soften with the distance from the occluder.
 
         Parameters
@@ -65,8 +66,8 @@ class Kind(Generic[L]):
         """
         return not self.punctual
 
-    def parts(self, light: L) -> list[Light]:
-        """Divide a light into parts that together equal the light; each part has a shadow map.
+    def parts(self, light: LightT) -> list[Light]:
+        """Divide a light into parts that together equal the light; each part gets a shadow map of its own.
 
         Parameters
         ----------
@@ -76,11 +77,11 @@ class Kind(Generic[L]):
         Returns
         -------
         list of Light
-            The parts; the light itself for kinds that are not divided.
+            The parts. For kinds that are not divided, the only part is the light itself.
         """
         return [light]
 
-    def check(self, light: L, head: Head, culprit: str) -> None:
+    def check(self, light: LightT, head: Head, culprit: str) -> None:
         """Check that the light has a valid position.
 
         Parameters
@@ -98,7 +99,7 @@ class Kind(Generic[L]):
             When the light cannot be at its position.
         """
 
-    def members(self, light: L, centre: Triple, distance: float) -> Members:
+    def members(self, light: LightT, centre: Triple, distance: float) -> Members:
         """Return the members of the shader struct `Light` that only this kind sets.
 
         Parameters
@@ -146,7 +147,7 @@ def area_light_members(
     }
 
 
-def override_name(kind_name: str) -> str:
+def kind_constant_name(kind_name: str) -> str:
     """Return the name of the pipeline constant that enables a kind of light in shaders.
 
     kind_name : name of the kind in scene files
@@ -155,10 +156,10 @@ def override_name(kind_name: str) -> str:
 
 
 def light_shaders() -> list[ShaderListMember]:
-    """Return the shaders of all kinds of lights, in the order that lights.wgsl numbers them."""
+    """Return the shaders of all kinds of lights, in the order of their numbers in lights.wgsl."""
     return [
         ShaderListMember(
-            name, kind.shader, (("override", override_name(name)), ("always", str(kind.always).lower()))
+            name, kind.shader, (("override", kind_constant_name(name)), ("always", str(kind.always).lower()))
         )
         for name, kind in KINDS.items()
     ]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.environment.panorama import Sun
-from dermis.frame.lights.kind import KINDS, Members, override_name
+from dermis.frame.lights.kind import KINDS, Members, kind_constant_name
 from dermis.frame.projection import (
     ShadowView,
     Triple,
@@ -67,17 +67,17 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
     used_kinds = sorted({light.kind for kind, light in each if not kind.always})
     flags = {
         "SHAPES": any(kind.has_size(light) for kind, light in each),
-        **dict.fromkeys(map(override_name, used_kinds), True),
+        **dict.fromkeys(map(kind_constant_name, used_kinds), True),
         "ENVIRONMENT": scene.environment,
         "HALF_SPACE": scene.skin.direction != "lambertian",
     }
     return tuple((name, 1) for name, value in flags.items() if value)
 
 
-def oblique_constants(constants: Constants) -> Constants:
-    """Return `constants`; if they contain HALF_SPACE, add the constant that enables oblique incidence.
+def with_oblique_constant(constants: Constants) -> Constants:
+    """Return `constants`, and add the constant for oblique incidence if they contain HALF_SPACE.
 
-    The result is only for passes that know the shape of the surface around a point.
+    Use the result only for passes that know the shape of the surface around a point.
     """
     return (*constants, ("OBLIQUE", 1)) if ("HALF_SPACE", 1) in constants else constants
 
@@ -88,7 +88,7 @@ def light_part_counts(scene: Scene) -> tuple[int, ...]:
 
 
 def light_shadow_views(scene: Scene, outline: Outline, map_side: int) -> list[ShadowView | None]:
-    """Return, for each part of each light, the view of the shadow map, None for lights without shadows.
+    """Return the views of the shadow maps: one for each part of each light, None if the light has no shadows.
 
     outline : outline of the head's shape
     map_side : side of the shadow maps [texels]
@@ -111,22 +111,22 @@ def light_shadow_views(scene: Scene, outline: Outline, map_side: int) -> list[Sh
     points = [(culprit, light) for culprit, light in shadowed if not isinstance(light, DirectionalLight)]
     point_views = iter(point_shadow_views(points, head.centre_mm, outline, map_side))
 
-    def view(light: Light) -> ShadowView:
+    def shadow_view(light: Light) -> ShadowView:
         if isinstance(light, DirectionalLight):
             return parallel_shadow_view(np.array(light.direction), outline, map_side)
         return next(point_views)
 
-    return [view(light) if light.shadows else None for _, light in numbered]
+    return [shadow_view(light) if light.shadows else None for _, light in numbered]
 
 
 def light_records(
-    program: ComputeProgram, scene: Scene, shadow_views: list[ShadowView | None]
+    shading_program: ComputeProgram, scene: Scene, shadow_views: list[ShadowView | None]
 ) -> UniformRecord:
     """Return the uniform record `Lights` of all lights of the scene.
 
     shadow_views : result of `light_shadow_views`
     """
-    record = program.record("Lights", sample_points=light_sample_points())
+    record = shading_program.record("Lights", sample_points=light_sample_points())
     lights = record["light"]
     each = [KINDS[light.kind].parts(light) for light in scene.lights]
     divided = [(part, len(parts)) for parts in each for part in parts]
@@ -142,7 +142,7 @@ def light_records(
 
 @cache
 def light_sample_points() -> Floats:
-    """Return 64 evenly spread sample points of area lights, (64, 4) [Roberts2018].
+    """Return (64, 4) evenly spread sample points of area lights [Roberts2018].
 
     A row holds the coordinates x and y of a point on the unit disc, then x and y of a point on the square
     from -1 to 1.
@@ -154,7 +154,7 @@ def light_sample_points() -> Floats:
 
 
 def _light_members(light: Light, centre: Triple, shadow_view: ShadowView | None, part_count: int) -> Members:
-    """Return the members of the shader struct `Light`; members that are left out are 0.
+    """Return the members of the shader struct `Light` for a light; members that are left out are 0.
 
     light : light, or one part of a divided light
     part_count : number of parts of the light, 1 if it is not divided

@@ -1,4 +1,4 @@
-"""Rectangular lights, which are divided into parts with one shadow map each."""
+"""Rectangular lights, which are divided into parts, each with its own shadow map."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class _Rectangle(Kind[RectangleLight]):
     round = False
 
     def parts(self, light: RectangleLight) -> list[Light]:
-        """Divide the rectangle into parts whose sides are at most 0.35 of the distance to its target.
+        """Divide the rectangle into parts whose sides are at most 0.35 of the distance from light to target.
 
-        At most 3 x 3 parts are made, even if they are larger.
+        There are at most 3 x 3 parts, even if their sides are longer then.
         """
         path = vector_between(light.position, light.target)
         distance = math.hypot(*path)
@@ -74,7 +74,8 @@ def facing_irradiance(width_mm: float, height_mm: float, distance_mm: float) -> 
     width_mm, height_mm : sides of the rectangle [mm]
     distance_mm : distance of the point from the centre [mm]
 
-    Source: [Baum1989], for the four quarters of the rectangle, which have a corner opposite the point.
+    Source: [Baum1989] for a point opposite the corner of a rectangle, applied to the four quarters of this
+    rectangle.
     """
     a, b = 0.5 * width_mm / distance_mm, 0.5 * height_mm / distance_mm
     across, along = math.hypot(1.0, a), math.hypot(1.0, b)

@@ -1,4 +1,4 @@
-"""Thin sheet of parallel light, which draws a stripe on the skin."""
+"""Thin sheet of parallel light, which illuminates a stripe on the skin."""
 
 from __future__ import annotations
 

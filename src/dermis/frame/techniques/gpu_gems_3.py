@@ -1,4 +1,4 @@
-"""Texture-space diffusion of GPU Gems 3 (2007), as a baseline.
+"""Texture-space diffusion as published in GPU Gems 3 (2007), the baseline for comparisons.
 
 The technique blurs with seven taps and half floats, and blurs the stretch map together with the light.
 """
@@ -69,7 +69,7 @@ class GpuGems3(AtlasTechnique):
         return (0,) * (len(split.blurred_mm2) + 1)
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
-        """Declare the passes that fill level k with the light of level 0 blurred by the k-th Gaussian."""
+        """Declare the passes that fill each level k with level 0, blurred by the k-th Gaussian."""
         assert isinstance(levels, StretchedLevels) and levels.stretch is not None
         shaders = [
             self.blur_program(graph.device, (("AXIS", axis), ("SKIPPED", blur.edge == "skipped")))

@@ -1,4 +1,4 @@
-"""Single blur of the light map, the state of the art before 2007."""
+"""Single Gaussian blur of the light map, the state of the art before 2007."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from dermis.scene.settings import Settings
 
 
 class OneBlur(TextureSpace):
-    """Blur by one Gaussian instead of the profile, with the same width in texels everywhere."""
+    """Technique that blurs with a single Gaussian instead of the profile.
+
+    The width of the Gaussian in texels is the same everywhere.
+    """
 
     sources = ("Borshukov2003", "Green2004")
     stitches_seams = False
@@ -22,11 +25,11 @@ class OneBlur(TextureSpace):
         return single_gaussian(profile)
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Split a profile into one Gaussian that blurs, without corrections for light within a texel."""
+        """Return a split with one blurred Gaussian; light that varies within a texel is not corrected."""
         return AtlasTechnique.split(self, profile, normalise_weights)
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
-        """Return False: no unblurred light replaces the narrowest Gaussian, because all light is blurred."""
+        """Return False, because all light is blurred."""
         return False
 
     def stretch(self, settings: Settings) -> str:

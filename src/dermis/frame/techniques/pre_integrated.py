@@ -22,7 +22,7 @@ MAX_CURVATURE_PER_MM = 0.5
 
 _COSINE_COUNT = 257  # odd, so that one column is N.L = 0, where incident light begins
 _CURVATURE_ROWS, _SHADOW_EDGE_ROWS = 33, 9  # as in pre_integrated.wgsl
-_QUADRATURE_NODES = 48
+_QUADRATURE_NODE_COUNT = 48
 _INTEGRATION_SIGMAS = 7.0  # standard deviations over which a Gaussian is integrated
 _SHADOW_TAIL_FRACTION = (
     0.01  # fraction of the light that scatters farther across a shadow edge than the table covers
@@ -34,8 +34,8 @@ _MAX_PENUMBRA_MM = 8.0
 class PreIntegratedTables(TechniqueResources):
     """Tables of scattered light for a profile, which the shading pass reads.
 
-    table : texture with the rows of `sphere_table`, followed by a result of `shadow_edge_row` for each of
-        several widths of the shadow filter
+    table : texture with the rows of `sphere_irradiance_table`, followed by one row of `shadow_edge_row` for
+        each of several widths of the shadow filter
     penumbra_width_mm : distance over which light scatters across the edge of a shadow [mm]
     relief_mm : (3,) standard deviations of the Gaussians that smooth the relief for red, green and blue [mm]
     """
@@ -46,7 +46,7 @@ class PreIntegratedTables(TechniqueResources):
 
 
 class PreIntegratedSkin(Technique):
-    """Scattering that is read from tables: one for curved surfaces, and one for the edges of shadows."""
+    """Technique that reads scattered light from tables: one for curved surfaces, and one for shadow edges."""
 
     sources = ("Penner2011",)
     needs_curvature = True
@@ -61,7 +61,7 @@ class PreIntegratedSkin(Technique):
     def write_view_record(
         self, view: UniformRecord, shade: ComputeProgram, resources: TechniqueResources | None
     ) -> None:
-        """Write the largest curvature, the penumbra width and the relief smoothing to the shading record."""
+        """Write the largest curvature, the penumbra width and the relief widths to the shading record."""
         assert isinstance(resources, PreIntegratedTables)
         scales = {
             "max_curvature": MAX_CURVATURE_PER_MM,
@@ -87,14 +87,14 @@ def make_pre_integrated_tables(device: Device, profile: GaussianSum) -> PreInteg
     edges = [
         shadow_edge_row(profile, penumbra, width) for width in np.linspace(0.0, penumbra, _SHADOW_EDGE_ROWS)
     ]
-    rows = np.concatenate([sphere_table(profile), np.stack(edges)])
+    rows = np.concatenate([sphere_irradiance_table(profile), np.stack(edges)])
     table = np.concatenate([rows, np.zeros((*rows.shape[:2], 1))], axis=-1)
     return PreIntegratedTables(
         texture_from_array(device, table, "rgba32float"), penumbra, half_light_sigma_mm(profile)
     )
 
 
-def sphere_table(profile: GaussianSum) -> Floats:
+def sphere_irradiance_table(profile: GaussianSum) -> Floats:
     """Return the irradiance max(N.L, 0) after scattering on spheres, (n, m, c) [-].
 
     N is the normal and L the direction to the light. The n rows are for curvatures from 0 to
@@ -115,7 +115,7 @@ def sphere_table(profile: GaussianSum) -> Floats:
 def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
     """Return max(N.L, 0) convolved on the sphere with the normalised kernel exp(k cos a) [-].
 
-    The angle a is the angle at the centre of the sphere.
+    The angle a is the angle between two points of the sphere, as seen from its centre.
 
     cosines : values of N.L at which the result is evaluated [-]
     concentration : k, the squared radius of the sphere divided by the variance of the Gaussian [-]
@@ -125,7 +125,7 @@ def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
     theta = np.arccos(np.asarray(cosines, dtype=np.float64))
     extent = _INTEGRATION_SIGMAS / np.sqrt(concentration)
     low, high = np.clip(theta - extent, 0.0, 0.5 * np.pi), np.clip(theta + extent, 0.0, 0.5 * np.pi)
-    x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)
+    x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODE_COUNT)
     half = 0.5 * (high - low)[..., None]
     lit, theta = low[..., None] + half * (1.0 + x), theta[..., None]
     ring = i0e(concentration * np.sin(theta) * np.sin(lit))  # the kernel over all azimuths
@@ -135,14 +135,16 @@ def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
 
 
 def shadow_edge_row(profile: GaussianSum, radius_mm: float, half_width_mm: float = 0.0) -> Floats:
-    """Return the light scattered across a straight shadow edge, at m points from dark to lit, (m, c) [-].
+    """Return the (m, c) light near a straight shadow edge after scattering [-].
+
+    The m points are evenly spaced from the dark to the lit side, and c is the number of colour channels.
 
     radius_mm : distance of the first point and of the last point from the edge [mm]
     half_width_mm : half width of the tent filter that already softens the edge [mm]
     """
     kernel = preintegrated_kernel(profile)
     distance = radius_mm * np.linspace(-1.0, 1.0, _COSINE_COUNT)
-    x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)
+    x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODE_COUNT)
     x, w = 0.5 + 0.5 * x, w * (0.5 - 0.5 * x)  # one half of the tent, normalised
     ends = half_width_mm * np.concatenate([x, -x])
     lit = np.concatenate([0.5 * w, 0.5 * w]) @ kernel.half_line_integral(distance[:, None] - ends)
@@ -159,9 +161,10 @@ def penumbra_width_mm(profile: GaussianSum) -> float:
 
 
 def half_light_sigma_mm(profile: GaussianSum) -> Floats:
-    """Return the (c,) standard deviations of Gaussians with the profile's half-light radii [mm].
+    """Return (c,) standard deviations, one for each colour channel of a profile [mm].
 
-    The half-light radius is the radius within which half of the light emerges.
+    A Gaussian with this standard deviation has the same half-light radius as the profile. The half-light
+    radius is the radius within which half of the light emerges.
     """
     radius = np.geomspace(1e-3, 100.0, 2048)
     within = profile.energy_within(radius) / profile.albedo

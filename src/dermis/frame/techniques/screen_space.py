@@ -40,8 +40,8 @@ _KERNEL_ENTRY_COUNT = 256
 class SubsurfaceLayers(TechniqueResources):
     """Textures of the subsurface light in the picture, and textures with which this light is diffused.
 
-    layers : texture of two layers: subsurface light, with the depth of the surface [mm] as alpha; and the
-        fraction of this light that leaves towards the camera
+    layers : texture of two layers. The first holds subsurface light, with the depth of the surface [mm] as
+        alpha; the second holds the fraction of this light that leaves the skin towards the camera
     subsurface : view of the first layer
     transmittance : view of the second layer
     scratch : texture for light that is diffused along rows, but not yet along columns
@@ -54,12 +54,12 @@ class SubsurfaceLayers(TechniqueResources):
     transmittance: TextureView
     scratch: Texture
     result: Texture | None
-    kernel: Kernel | None
+    kernel: KernelTexture | None
 
 
 @dataclass(frozen=True, eq=False)
-class Kernel:
-    """Texture of the integrals of the diffusion kernel from 0 to several distances, see `kernel_table`.
+class KernelTexture:
+    """Texture of a diffusion kernel, stored as integrals from 0 to increasing distances.
 
     reach_mm : distance of the last entry [mm]
     """
@@ -82,7 +82,7 @@ class ScreenSpace(Technique):
         return replace(layers, kernel=memo.get(make_kernel, device, profile))
 
     def make_subsurface_layers(self, memo: Memo, device: Device, settings: Settings) -> SubsurfaceLayers:
-        """Return textures for diffusing subsurface light for outputs, without `result` and `kernel`."""
+        """Return the textures in which subsurface light is diffused for outputs."""
         return memo.get(make_subsurface_layers, device, settings.size, False, caller_name="outputs")
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
@@ -100,8 +100,8 @@ class ScreenSpace(Technique):
     ) -> tuple[TextureOrView, TextureOrView]:
         """Declare the passes that diffuse the subsurface light for outputs.
 
-        Returns texture views of the diffused light, and of the fraction of this light that leaves towards the
-        camera.
+        Return texture views of the diffused light, and of the fraction of this light that leaves the skin
+        towards the camera.
         """
         layers, picture_layers = inputs.resources.output_layers, inputs.resources.technique
         assert isinstance(layers, SubsurfaceLayers) and isinstance(picture_layers, SubsurfaceLayers)
@@ -127,46 +127,52 @@ def make_subsurface_layers(
     return SubsurfaceLayers(layers, subsurface, transmittance, scratch, result, None)
 
 
-def make_kernel(device: Device, profile: GaussianSum) -> Kernel:
+def make_kernel(device: Device, profile: GaussianSum) -> KernelTexture:
     """Compute the diffusion kernel of a profile, and upload it."""
-    table, reach_mm = kernel_table(preintegrated_kernel(profile))
-    return Kernel(texture_from_array(device, table, "rgba32float"), reach_mm)
+    table, reach_mm = kernel_integral_table(preintegrated_kernel(profile))
+    return KernelTexture(texture_from_array(device, table, "rgba32float"), reach_mm)
 
 
 def draw(
-    graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window: Window, surface_light: Texture
+    graph: Recorder,
+    subsurface_layers: SubsurfaceLayers,
+    kernel: KernelTexture,
+    window: Window,
+    surface_light: Texture,
 ) -> Texture:
-    """Declare the passes that diffuse the light of `layers`, and return the picture with this light.
+    """Declare the passes that diffuse the subsurface light, and return the picture with this light.
 
     window : rectangle of the image plane that the picture shows
     surface_light : shaded picture without the subsurface light
     """
-    assert layers.result is not None
-    draw_blur(graph, layers, kernel, window)
+    assert subsurface_layers.result is not None
+    draw_blur(graph, subsurface_layers, kernel, window)
     bound: MutableBindings = {
         "surface": surface_light,
-        "subsurface": layers.subsurface,
-        "transmittance": layers.transmittance,
-        "picture": layers.result,
+        "subsurface": subsurface_layers.subsurface,
+        "transmittance": subsurface_layers.transmittance,
+        "picture": subsurface_layers.result,
     }
     shader = program(graph.device, TECHNIQUES_FOLDER / "resurface.wgsl")
     graph.compute("screen space", shader, bound, surface_light.size[:2])
-    return layers.result
+    return subsurface_layers.result
 
 
-def draw_blur(graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window: Window) -> None:
-    """Declare the passes that diffuse the light of `layers` along rows, then along columns.
+def draw_blur(
+    graph: Recorder, subsurface_layers: SubsurfaceLayers, kernel: KernelTexture, window: Window
+) -> None:
+    """Declare the passes that diffuse the subsurface light along rows, then along columns.
 
     window : rectangle of the image plane that the picture shows
     """
-    device, size = graph.device, layers.scratch.size[:2]
+    device, size = graph.device, subsurface_layers.scratch.size[:2]
     programs = [
         program(device, TECHNIQUES_FOLDER / "screen_space.wgsl", (("AXIS", axis),)) for axis in (0, 1)
     ]
     record = programs[0].record("Blur", half=window.half, shift=window.shift, reach=kernel.reach_mm)
     passes: tuple[tuple[TextureOrView, TextureOrView], ...] = (
-        (layers.subsurface, layers.scratch),
-        (layers.scratch, layers.subsurface),
+        (subsurface_layers.subsurface, subsurface_layers.scratch),
+        (subsurface_layers.scratch, subsurface_layers.subsurface),
     )
     for shader, (source, blurred) in zip(programs, passes, strict=True):
         bound: MutableBindings = {
@@ -178,8 +184,8 @@ def draw_blur(graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window:
         graph.compute("screen space", shader, bound, size)
 
 
-def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
-    """Return (1, n, 4) integrals of the kernel from 0 to each of n distances, and the last distance [mm].
+def kernel_integral_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
+    """Return (1, n, 4) integrals of the kernel from 0 to each of n distances, and the largest distance [mm].
 
     The square roots of the distances are evenly spaced.
     """
@@ -190,9 +196,9 @@ def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
 
 
 def _kernel_reach_mm(kernel: SeparableKernel) -> float:
-    """Return the distance from the kernel's centre to where at most 0.05 % of the light lies beyond [mm].
+    """Return the distance from the centre of the kernel beyond which at most 0.05 % of the light lies [mm].
 
-    The limit holds for each channel and each side.
+    The limit holds for each colour channel and for each side of the centre.
     """
     distance = np.geomspace(_MIN_KERNEL_REACH_MM, _MAX_KERNEL_REACH_MM, 4096)
     beyond = (0.5 - kernel.half_line_integral(distance)).max(axis=1) > _MAX_TAIL_FRACTION

@@ -33,7 +33,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.scene.settings import Settings
 
 # Narrower Gaussians are finer than texels and pores: they are relit in the picture, not blurred.
-_RELIT_VARIANCE_MM2 = 0.1**2
+_MAX_RELIT_VARIANCE_MM2 = 0.1**2
 
 
 class Technique(TechniqueTraits):
@@ -57,15 +57,16 @@ class Technique(TechniqueTraits):
         return make_levels(device, atlas_side, halvings, FLOAT_TEXEL_FORMAT)
 
     def make_sum(self, device: Device, atlas_side: int) -> Texture:
-        """Create the texture for the exitance of scattered light, of side x side texels."""
+        """Create the square texture for the exitance of scattered light, as large as the atlas."""
         return combine.make_blur_sum(device, atlas_side)
 
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and their level indices.
+        """Insert intermediate levels of weight 0, which make the chain of blurs cheaper.
 
-        In this base class, no Gaussians are inserted.
+        Return the new split of the profile, and the indices of the inserted levels. This base class inserts
+        none.
 
         edge_mode : filter mode at the edges of charts
         """
@@ -81,13 +82,13 @@ class Technique(TechniqueTraits):
     def make(
         self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum
     ) -> TechniqueResources | None:
-        """Return the tables and textures of the technique, cached by the memo; None if there are none."""
+        """Return the tables and textures of the technique from the cache `memo`, None if there are none."""
         return None
 
     def make_subsurface_layers(
         self, memo: Memo, device: Device, settings: Settings
     ) -> TechniqueResources | None:
-        """Return textures for diffusing subsurface light for output images, None if none are needed."""
+        """Return textures in which subsurface light is diffused for outputs, None if none are needed."""
         return None
 
     def write_view_record(
@@ -120,17 +121,18 @@ class Technique(TechniqueTraits):
     ) -> tuple[TextureOrView, TextureOrView]:
         """Declare the passes that diffuse the light in the textures of `make_subsurface_layers`.
 
-        Returns textures of the diffused light, and of the fraction of this light that leaves towards the
-        camera.
+        Return textures of the diffused light, and of the fraction of this light that leaves the skin towards
+        the camera.
         """
         raise NotImplementedError
 
     def sum_translucency(
         self, graph: Graph, inputs: FrameInputs, atlas_textures: tuple[Texture, ...]
     ) -> Texture:
-        """Fill textures with only the light through thin parts; return the texture that combines all layouts.
+        """Declare the passes that fill textures with only the light through thin parts of the head.
 
-        Outputs that separate this light from the rest of the picture need these textures.
+        Return the texture that combines all layouts. The textures are for outputs that separate this light
+        from the rest of the picture.
 
         atlas_textures : textures of the atlas, one for each layout and, if there are several layouts, one for
             their blend
@@ -139,20 +141,20 @@ class Technique(TechniqueTraits):
 
 
 class AtlasTechnique(Technique):
-    """Technique that lights the atlas, blurs the light by each Gaussian, and sums the blurred levels."""
+    """Technique that lights the atlas, blurs the light with each Gaussian, and sums the blurred levels."""
 
     uses_atlas = True
 
     def gaussians(self, profile: GaussianSum) -> GaussianSum:
-        """Return the Gaussians by which the technique approximates a profile; here the profile itself."""
+        """Return the Gaussians with which the technique approximates a profile; here the profile itself."""
         return profile
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
-        """Return whether unblurred light, evaluated per pixel, replaces the narrowest Gaussian."""
-        return bool(profile.variance_mm2[0] <= _RELIT_VARIANCE_MM2)
+        """Return whether light evaluated at each pixel replaces the narrowest Gaussian."""
+        return bool(profile.variance_mm2[0] <= _MAX_RELIT_VARIANCE_MM2)
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Split a profile into the narrow Gaussian that is relit (if any) and the Gaussians that blur.
+        """Split a profile into Gaussians that are blurred and, if narrow enough, one evaluated at each pixel.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
@@ -180,11 +182,11 @@ class AtlasTechnique(Technique):
 
         edge_mode : filter mode at the edges of charts
         """
-        max_halvings = len(atlas.mips_for(edge_mode)) - 1
+        max_halvings = len(atlas.mips_for_blurs(edge_mode)) - 1
         return choose_halvings(split.blurred_mm2, atlas.median_texels_per_mm, max_halvings)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
-        """Declare the passes that light, blur and sum each atlas layout, and blend two layouts."""
+        """Declare the passes that light, blur and sum the atlas in each layout, and blend two layouts."""
         resources = inputs.resources
         levels, layouts, mixture = resources.diffusion.levels, inputs.layouts, resources.diffusion.mixture
         if not inputs.blurs:
@@ -217,7 +219,7 @@ class AtlasTechnique(Technique):
         return resources.scattered
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
-        """Declare the passes that fill level k with the light of level 0 blurred by the k-th Gaussian."""
+        """Declare the passes that fill each level k with level 0, blurred by the k-th Gaussian."""
         raise NotImplementedError
 
     def sum_exitance(
@@ -228,9 +230,10 @@ class AtlasTechnique(Technique):
         thin_parts: Translucency | None,
         exitance_texture: TextureOrView,
     ) -> None:
-        """Declare the passes that sum the blurred levels as exitance, including light through thin parts.
+        """Declare the passes that sum the blurred levels to the exitance, including light through thin parts.
 
-        thin_parts : resources of the light through thin parts, None if no light crosses thin parts
+        thin_parts : resources of the light through thin parts of the head, None if the scene has no such
+            light
         exitance_texture : texture for the exitance
         """
         through = translucency.draw(graph, levels, blur, thin_parts) if thin_parts else None
@@ -267,7 +270,10 @@ class AtlasTechnique(Technique):
     def sum_translucency(
         self, graph: Graph, inputs: FrameInputs, atlas_textures: tuple[Texture, ...]
     ) -> Texture:
-        """Fill textures with only the light through thin parts; the blurred levels get weights of 0."""
+        """Declare the passes that fill textures with the light through thin parts of the head only.
+
+        The blurred levels are summed with weights of 0. Return the texture that combines all layouts.
+        """
         layouts, levels = inputs.layouts, inputs.resources.diffusion.levels
         for layout, blur, texture in zip(layouts, inputs.blurs, atlas_textures, strict=False):
             unblurred, thin = replace(blur, weight=np.zeros_like(blur.weight)), layout.translucency

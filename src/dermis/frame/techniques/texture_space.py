@@ -1,4 +1,4 @@
-"""Texture-space diffusion by a hierarchy of Gaussian blurs, stitched across the seams of the atlas."""
+"""Texture-space diffusion by a pyramid of Gaussian blurs, which carry light across the seams of the atlas."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ class TextureSpace(AtlasTechnique):
     mixes_profiles = True
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Split a profile into relit and blurred Gaussians; `fine` corrects light that varies within a texel.
+        """Split a profile into a Gaussian evaluated at each pixel (relit), and Gaussians that are blurred.
+
+        The member `fine` of the result corrects light that varies within a texel.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
@@ -37,11 +39,13 @@ class TextureSpace(AtlasTechnique):
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and their level indices.
+        """Insert intermediate levels of weight 0, which make the chain of blurs cheaper.
+
+        Return the new split of the profile, and the indices of the inserted levels.
 
         edge_mode : filter mode at the edges of charts
         """
-        max_halvings = len(atlas.mips_for(edge_mode)) - 1
+        max_halvings = len(atlas.mips_for_blurs(edge_mode)) - 1
         variances, steps = add_intermediate_levels(
             split.blurred_mm2, atlas.median_texels_per_mm, max_halvings
         )
@@ -55,7 +59,7 @@ class TextureSpace(AtlasTechnique):
         return replace(with_all_levels(split), others=tuple(map(with_all_levels, split.others))), steps
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
-        """Declare the passes that fill level k with the light of level 0 blurred by the k-th Gaussian."""
+        """Declare the passes that fill each level k with level 0, blurred by the k-th Gaussian."""
         diffuse.draw(graph, levels, atlas, blur)
 
 

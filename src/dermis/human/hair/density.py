@@ -20,7 +20,9 @@ from dermis.mesh.strands import Roots, interpolate_quads, quad_corners
 
 HEAD_AXIS_Z = -72.0
 """Position of the vertical axis around which the hairline is defined [mm]."""
-_SEQUENCE_STEPS = np.array([0.7548776662, 0.5698402909])  # of a low-discrepancy sequence in the unit square
+_R2_SEQUENCE_STEPS = np.array(
+    [0.7548776662, 0.5698402909]
+)  # of a low-discrepancy sequence in the unit square
 _SCALP_BOTTOM_Y = -80.0  # lower end of the hair of the head [mm]
 _HAIRLINE_FADE_MM = (-3.0, 11.0)  # heights above the hairline between which density rises from 0 to 1
 _LIP_FADE_MM = (1.5, 4.5)  # distances from the lips between which the density of the beard rises
@@ -35,9 +37,9 @@ _MIN_BEARD_AMOUNT = 0.02  # zone amount above which quads may have a beard
 class HairDensity(NamedTuple):
     """Relative density of scalp hair or beard over the skin.
 
-    relative : function from points (n, 4) to their relative density (n,), 0 to 1; the columns of the points
-        are a position on the average person and the distance inside the border of the lips [mm]
-    candidates : (p,) mask of the control points near hair; no hair grows on quads without such a point
+    relative : function that returns the relative density (n,), 0 to 1, at n skin points; its argument is an
+        array (n, 4) with the columns of `average_points`
+    candidates : (p,) mask of the control points near hair; quads without any such corner are skipped
     """
 
     relative: Callable[[Doubles], Doubles]
@@ -62,7 +64,7 @@ def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.rando
     ends = np.cumsum(counts)[near]
     threshold_index = np.arange(len(quad_index)) + np.repeat(ends - np.cumsum(counts[near]), counts[near])
     step = threshold_index - (np.cumsum(counts) - counts)[quad_index]
-    position = starts.take(quad_index, axis=0) + step[:, None] * _SEQUENCE_STEPS
+    position = starts.take(quad_index, axis=0) + step[:, None] * _R2_SEQUENCE_STEPS
     position -= np.floor(position)
     values = average_points().T.take(corner_points.T.take(quad_index, axis=1), axis=1)
     relative = density.relative(interpolate_quads(position, values).T)
@@ -93,9 +95,9 @@ def hairline_waves(points: Doubles) -> Doubles:
 
 
 def recession_effect(amount_name: str, recession: float, points: Doubles) -> Doubles:
-    """Return how much a receding hairline changes an amount, such as hair density, at points, (n,).
+    """Return by how much (n,) a receding hairline changes an amount, such as hair density, at given points.
 
-    amount_name : one of `ZONE_AMOUNTS`
+    amount_name : one of `ZONE_AMOUNTS`, such as "hair"
     recession : recession of the hairline, 0 to 1, see `SkinLook`
     points : (n, 3 or more) positions on the average person [mm]
     """
@@ -146,27 +148,27 @@ def _beard_amount(points: Doubles) -> Doubles:
 
 
 def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
-    """Return a smooth Hermite transition of x from 0 at `low` to 1 at `high`."""
+    """Return a smooth cubic transition of x from 0 at `low` to 1 at `high`, constant outside."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
-def quad_areas_cm2(control_mesh: Mesh, quad: Index) -> Doubles:
+def quad_areas_cm2(control_mesh: Mesh, quad_index: Index) -> Doubles:
     """Return the areas (n,) of quads of a control mesh [cm2].
 
-    quad : (n,) indices of the quads
+    quad_index : (n,) indices of the quads
     """
-    corner_points = control_mesh.points_mm.T.take(quad_corners(control_mesh, quad).T, axis=1)
+    corner_points = control_mesh.points_mm.T.take(quad_corners(control_mesh, quad_index).T, axis=1)
     a, b, c, d = corner_points.swapaxes(0, 1)
     across = cross_columns(c - a, d - b)
     return np.asarray(np.sqrt(dot_columns(across, across)) / 200.0)
 
 
 def _sum_zones(amount_name: str, zone_rows: Floats, points: Doubles) -> Doubles:
-    """Return an amount, such as hair density, at points, (n,): a sum of Gaussians, one for each zone.
+    """Return an amount (n,), such as hair density, at points, as a sum of one Gaussian for each face zone.
 
-    amount_name : one of `ZONE_AMOUNTS`
-    zone_rows : (k, 24) zones of the face, from `zone_table`
+    amount_name : one of `ZONE_AMOUNTS`, such as "hair"
+    zone_rows : (k, 24) parameters of the zones, from `zone_table`
     points : (n, 3 or more) positions on the average person [mm]
     """
     column, total = _amount_column(amount_name), np.zeros(len(points))
@@ -178,11 +180,8 @@ def _sum_zones(amount_name: str, zone_rows: Floats, points: Doubles) -> Doubles:
 
 
 @cache
-def skin_vertices_near_hair(root_finder: RootFinder) -> Index:
-    """Return the indices of the vertices of the subdivided mesh that brow hairs may touch.
-
-    A `SkinSurface` for brow hairs needs only these vertices.
-    """
+def skin_vertices_near_brows(root_finder: RootFinder) -> Index:
+    """Return the indices of the vertices of the subdivided mesh that brow hairs may touch."""
     from scipy.spatial import cKDTree
 
     brow_points = quad_corners(root_finder.mesh, root_finder.brow_grid_roots.quad)
@@ -201,7 +200,7 @@ def _amount_column(amount_name: str) -> int:
 def average_points() -> Doubles:
     """Return the control points (p, 4) of the average person.
 
-    The columns are the position and the distance inside the border of the lips [mm].
+    The columns are x, y, z and the signed distance to the border of the lips, positive on the lips [mm].
     """
     points_mm, distances = average_surface()
     lips = distances[:, BORDER_FIELDS.index("lips")]

@@ -14,13 +14,13 @@ import numpy as np
 from dermis.base.arrays import Doubles
 from dermis.human.hair import brows, lashes
 from dermis.human.hair.brows import BrowSurface
-from dermis.human.hair.density import skin_vertices_near_hair
+from dermis.human.hair.density import skin_vertices_near_brows
 from dermis.human.hair.head_hair import make_groom
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.root_finder import SIDE_SIGNS, RootFinder, eye_centres
 from dermis.human.hair.skin_surface import GrowthSurface, HairGroup, RootFrames, SkinSurface
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Roots, Strands, to_frames
+from dermis.mesh.strands import Roots, Strands, offsets_in_frames
 from dermis.specular.hair import absorption_per_mm
 
 _LASH_PIGMENT_FACTOR = 1.6
@@ -30,7 +30,7 @@ def add_hair(
     head: Head,
     control_head: Head,
     root_finder: RootFinder,
-    look: HairLook,
+    hair_look: HairLook,
     recession: float = 0.0,
     hair_fraction: float = 1.0,
 ) -> Head:
@@ -38,34 +38,34 @@ def add_hair(
 
     head, control_head : the subdivided head, and the same head before subdivision
     root_finder : root finder of the mean person, on whom brows and lashes are defined
-    look : length, density, curl and colour of the hair
+    hair_look : length, density, curl and colour of the hair
     recession : recession of the hairline, 0 to 1, see `SkinLook`
     hair_fraction : fraction of scalp and beard hairs to generate; the hairs are widened by the inverse of
         this fraction, so that coverage stays the same
     """
-    near = skin_vertices_near_hair(root_finder)
+    near = skin_vertices_near_brows(root_finder)
     skin = SkinSurface(head.mesh.positions[near], head.mesh.normals[near])
     surface = GrowthSurface(head, control_head.mesh, skin, hair_fraction)
-    rngs = [np.random.default_rng((look.seed, int(side > 0))) for side in SIDE_SIGNS]
-    left, right = _grow_brows(surface, root_finder, look, rngs)
+    rngs = [np.random.default_rng((hair_look.seed, int(side > 0))) for side in SIDE_SIGNS]
+    left, right = _grow_brows(surface, root_finder, hair_look, rngs)
     rows = list(_grow_lashes(surface, root_finder, eye_centres(control_head.mesh), rngs))
     groups = [left, *rows[:2], right, *rows[2:]]
-    strands = _join_groups(groups, _fine_hair_absorption(groups, look))
-    groom = make_groom(look, recession, root_finder, head.levels, hair_fraction)
+    strands = _join_groups(groups, _fine_hair_absorption(groups, hair_look))
+    groom = make_groom(hair_look, recession, root_finder, head.levels, hair_fraction)
     return replace(head, strands=strands, hair=groom)
 
 
 def _grow_brows(
-    surface: GrowthSurface, root_finder: RootFinder, look: HairLook, rngs: list[np.random.Generator]
+    surface: GrowthSurface, root_finder: RootFinder, hair_look: HairLook, rngs: list[np.random.Generator]
 ) -> Iterator[HairGroup]:
-    """Yield the hairs of the left and then of the right brow, which are computed in one batch for speed."""
+    """Yield the hairs of the left brow and then those of the right brow."""
     roots, parameters = [], []
     for side, rng in zip(SIDE_SIGNS, rngs, strict=True):
         u, v, x, y = brows.sample_positions(rng)
         found, hit = root_finder.front_roots(side * x, y)
-        index = np.flatnonzero(hit)[: brows.hair_count(look)]
+        index = np.flatnonzero(hit)[: brows.hair_count(hair_look)]
         roots.append(Roots(found.quad[index], found.position[index]))
-        shape = brows.sample_shapes(u[index], v[index], rng, look)
+        shape = brows.sample_shapes(u[index], v[index], rng, hair_look)
         parameters.append(np.vstack([np.full(len(index), side), x[index], y[index], shape]))
     frames, hair = surface.root_frames(_concatenate_roots(roots)), np.concatenate(parameters, axis=1)
     grid_mm = surface.root_frames(root_finder.brow_grid_roots).positions_mm
@@ -77,7 +77,7 @@ def _grow_brows(
 def _grow_lashes(
     surface: GrowthSurface, root_finder: RootFinder, eyes: Doubles, rngs: list[np.random.Generator]
 ) -> Iterator[HairGroup]:
-    """Yield the upper and lower lashes of the left, then of the right eye, computed in one batch for speed.
+    """Yield the upper lashes and the lower lashes of the left eye, then those of the right eye.
 
     eyes : (2, 3) centres of the left and the right eye [mm]
     """
@@ -95,51 +95,54 @@ def _grow_lashes(
     yield from _split_group(group, [len(part.quad) for part in roots])
 
 
-def _split_group(group: HairGroup, counts: list[int]) -> Iterator[HairGroup]:
-    """Yield consecutive slices of a hair group; `counts` holds the number of hairs in each slice."""
-    for end, count in zip(np.cumsum(counts).tolist(), counts, strict=True):
+def _split_group(hair_group: HairGroup, hair_counts: list[int]) -> Iterator[HairGroup]:
+    """Yield consecutive slices of a hair group; `hair_counts` holds the number of hairs in each slice."""
+    for end, count in zip(np.cumsum(hair_counts).tolist(), hair_counts, strict=True):
         part = slice(end - count, end)
-        roots = Roots(group.roots.quad[part], group.roots.position[part])
-        yield group._replace(roots=roots, knots=group.knots[part], radius=group.radius[part])
+        roots = Roots(hair_group.roots.quad[part], hair_group.roots.position[part])
+        yield hair_group._replace(roots=roots, knots=hair_group.knots[part], radius=hair_group.radius[part])
 
 
 def _hair_group(
-    frames: RootFrames, knots_mm: Doubles, radius_mm: Doubles, pigment_factor: float
+    root_frames: RootFrames, knots_mm: Doubles, radius_mm: Doubles, pigment_factor: float
 ) -> HairGroup:
     """Return a hair group, with knots converted from the coordinates of the head to the root frames.
 
     knots_mm, radius_mm : (n, k, 3) positions and (n, k) radii of the knots [mm]
     """
-    offsets = to_frames(frames.frame, knots_mm - frames.positions_mm[:, None])
-    return HairGroup(frames.roots, offsets, radius_mm.astype(np.float32), pigment_factor)
+    offsets = offsets_in_frames(root_frames.frame, knots_mm - root_frames.positions_mm[:, None])
+    return HairGroup(root_frames.roots, offsets, radius_mm.astype(np.float32), pigment_factor)
 
 
-def _join_groups(groups: list[HairGroup], absorption: Doubles) -> Strands:
+def _join_groups(hair_groups: list[HairGroup], absorption: Doubles) -> Strands:
     """Return the strands of several hair groups as one object.
 
     absorption : (n, 3) absorption coefficients of single hairs [1/mm]; a strand that represents several hairs
         gets a lower coefficient
     """
-    roots = _concatenate_roots(group.roots for group in groups)
-    knots, radius = (np.concatenate([group[k] for group in groups]) for k in (1, 2))
-    hairs_per_strand, cover = (_repeat_per_hair(groups, name) for name in ("hairs_per_strand", "cover"))
+    roots = _concatenate_roots(group.roots for group in hair_groups)
+    knots, radius = (np.concatenate([group[k] for group in hair_groups]) for k in (1, 2))
+    hairs_per_strand, cover = (_repeat_per_hair(hair_groups, name) for name in ("hairs_per_strand", "cover"))
     strand_absorption = (absorption / hairs_per_strand[:, None]).astype(np.float32)
     return Strands(roots, knots, radius, strand_absorption, cover.astype(np.float32))
 
 
-def _concatenate_roots(parts: Iterable[Roots]) -> Roots:
-    quads, positions = zip(*parts, strict=True)
+def _concatenate_roots(root_groups: Iterable[Roots]) -> Roots:
+    quads, positions = zip(*root_groups, strict=True)
     return Roots(np.concatenate(quads), np.concatenate(positions))
 
 
-def _repeat_per_hair(groups: list[HairGroup], field_name: str) -> Doubles:
-    """Return the values of a scalar field of `HairGroup`, such as "cover", repeated for each hair, (n,)."""
-    return np.concatenate([np.full(len(group.radius), getattr(group, field_name)) for group in groups])
+def _repeat_per_hair(hair_groups: list[HairGroup], field_name: str) -> Doubles:
+    """Return the value (n,) of a scalar field of `HairGroup`, such as "cover", for each hair of groups."""
+    return np.concatenate([np.full(len(group.radius), getattr(group, field_name)) for group in hair_groups])
 
 
-def _fine_hair_absorption(groups: list[HairGroup], look: HairLook) -> Doubles:
+def _fine_hair_absorption(hair_groups: list[HairGroup], hair_look: HairLook) -> Doubles:
     """Return absorption coefficients (n, 3) of brow and lash hairs, some of them white at random [1/mm]."""
-    rng, pigment_factor = np.random.default_rng((look.seed, 2)), _repeat_per_hair(groups, "pigment_factor")
+    rng, pigment_factor = (
+        np.random.default_rng((hair_look.seed, 2)),
+        _repeat_per_hair(hair_groups, "pigment_factor"),
+    )
     n = len(pigment_factor)
-    amount = pigment_factor * rng.lognormal(0.0, 0.15, n) * (rng.random(n) >= look.grey)
-    return absorption_per_mm(amount * look.eumelanin, amount * look.pheomelanin)
+    amount = pigment_factor * rng.lognormal(0.0, 0.15, n) * (rng.random(n) >= hair_look.grey)
+    return absorption_per_mm(amount * hair_look.eumelanin, amount * hair_look.pheomelanin)

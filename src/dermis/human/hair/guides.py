@@ -23,7 +23,7 @@ _MIN_HEIGHT_MM = 0.5  # least height of guides above the skin, away from their r
 _LAYER_LENGTH_MM = 35.0  # length along which hair rises to the outermost layer
 _WHORL_MM = np.array([9.0, 86.0, -131.0])
 _SKULL_CENTRE_MM = np.array([0.0, 12.0, -66.0])
-_ROUND_RADII_MM = np.array([75.0, 96.0, 92.0])  # semi-axes of the skull
+_ROUND_CUT_RADII_MM = np.array([75.0, 96.0, 92.0])  # semi-axes of the skull
 # Elliptic cylinder around the face that combed hair avoids: centre (z), semi-axes along x and z, and the
 # heights between which it begins [mm].
 _FACE_CENTRE_Z, _FACE_RADII_MM, _FACE_TOP_MM = -60.0, (74.0, 118.0), (78.0, 40.0)
@@ -61,12 +61,12 @@ class Growth(NamedTuple):
 
 
 def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
-    """Return a smooth Hermite transition of x from 0 at `low` to 1 at `high`; `low` may exceed `high`."""
+    """Return a smooth transition of x from 0 at `low` to 1 at `high`; `low` may exceed `high`."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
-def unit(vectors: Doubles) -> Doubles:
+def unit_vectors(vectors: Doubles) -> Doubles:
     """Return vectors (n, 3) scaled to length 1; a vector of length 0 stays 0."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9))
 
@@ -128,7 +128,7 @@ def _uncombed_directions(points: Doubles, style: Style) -> Doubles:
 
 
 def _rope_directions(points: Doubles, style: Style) -> Doubles:
-    """Return the directions (n, 3) of hair in twisted ropes, which fall to all sides of the head."""
+    """Return the directions (n, 3) of hair in twists or braids, which hang down on all sides of the head."""
     away = points - np.array([0.0, 100.0, -70.0])
     return np.asarray(away * [1.0, 0.6, 0.9])
 
@@ -165,16 +165,16 @@ COMBS: dict[str, Callable[[Doubles, Style], Doubles]] = {
 
 
 @cache
-def body_surface(root_finder: RootFinder, ears: bool = True) -> SkinSurface:
+def body_surface(root_finder: RootFinder, has_ears: bool = True) -> SkinSurface:
     """Return the skin of the mean person: head, neck and shoulders.
 
     root_finder : root finder of the mean person
-    ears : whether the skin has ears; if False, a smooth surface replaces them
+    has_ears : whether the skin has ears; if False, a smooth surface replaces them
     """
-    mesh = root_finder.mean_mesh
+    mesh = root_finder.once_subdivided_mesh
     skin = np.unique(mesh.triangles[mesh.material == 0])
     points, normals = mesh.positions[skin].astype(np.float64), mesh.normals[skin].astype(np.float64)
-    if ears:
+    if has_ears:
         return SkinSurface(points, normals)
     y, z = np.abs(points[:, 1:] - _EAR_CENTRE_MM[1:]).T
     ear = (np.abs(points[:, 0]) > _EAR_BEGIN_X) & (y < 36.0) & (z < 28.0)
@@ -185,7 +185,7 @@ def body_surface(root_finder: RootFinder, ears: bool = True) -> SkinSurface:
     filled[:, 0] = _quadratic_terms(filled) @ fit
     dy, dz = filled[:, 1:].T - _EAR_CENTRE_MM[1:, None]
     slopes = fit[1] + 2 * fit[3] * dy + fit[5] * dz, fit[2] + 2 * fit[4] * dz + fit[5] * dy
-    facing = unit(np.stack([np.ones(len(filled)), -slopes[0], -slopes[1]], axis=1))
+    facing = unit_vectors(np.stack([np.ones(len(filled)), -slopes[0], -slopes[1]], axis=1))
     sides = [1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]
     return SkinSurface(
         np.concatenate([points[~ear], *(filled * side for side in sides)]),
@@ -194,7 +194,7 @@ def body_surface(root_finder: RootFinder, ears: bool = True) -> SkinSurface:
 
 
 def _quadratic_terms(points: Doubles) -> Doubles:
-    """Return the terms (n, 6) of a quadratic function of y and z around the middle of the ear."""
+    """Return the monomials (n, 6) up to degree 2 in y and z, measured from the middle of the ear."""
     y, z = points[:, 1:].T - _EAR_CENTRE_MM[1:, None]
     return np.stack([np.ones(len(y)), y, z, y * y, z * z, y * z], axis=1)
 
@@ -205,137 +205,143 @@ def ear_weight(points: Doubles) -> Doubles:
     return np.asarray(np.exp(-(away[:, 1:] ** 2).sum(axis=1)))
 
 
-def grow_guides(root_finder: RootFinder, points: Doubles, style: Style) -> tuple[Doubles, Doubles, Doubles]:
+def grow_guides(root_finder: RootFinder, roots_mm: Doubles, style: Style) -> tuple[Doubles, Doubles, Doubles]:
     """Return the knots (g, k, 3) of guides [mm], with skin normals (g, k, 3) and heights (g, k) [mm].
 
     The normals are those of the skin below the knots, and the heights are measured from this skin.
 
-    points : (g, 3) roots on the skin of the mean person [mm]
+    roots_mm : (g, 3) roots on the skin of the mean person [mm]
     """
-    surface = body_surface(root_finder, ears=style.comb not in _COMBS_OVER_EARS)
-    _, normal = surface.project(points)
-    state = Growth(points, normal, points, _root_directions(points, normal, style), normal,
-                   np.zeros(len(points)), np.zeros(len(points)), np.full(len(points), np.inf))  # fmt: skip
-    knots = [(points, normal, state.height_mm)]
+    surface = body_surface(root_finder, has_ears=style.comb not in _COMBS_OVER_EARS)
+    count, (_, normal) = len(roots_mm), surface.project(roots_mm)
+    state = Growth(roots_mm, normal, roots_mm, _root_directions(roots_mm, normal, style), normal,
+                   np.zeros(count), np.zeros(count), np.full(count, np.inf))  # fmt: skip
+    knots = [(roots_mm, normal, state.height_mm)]
     segment = style.max_length_mm / (GUIDE_KNOTS - 1)
     substeps = max(1, int(np.ceil(segment / _MAX_STEP_MM)))
     for _ in range(GUIDE_KNOTS - 1):
         for _ in range(substeps):
-            state = _advance(surface, state, segment / substeps, style)
+            state = _grow_one_step(surface, state, segment / substeps, style)
         knots.append((state.position_mm, state.skin_normal, state.height_mm))
     positions, normals, heights = (np.stack(part, axis=1) for part in zip(*knots, strict=True))
     return positions, normals, heights
 
 
 def _root_directions(points: Doubles, normals: Doubles, style: Style) -> Doubles:
-    combed = unit(tangent_component(COMBS[style.comb](points, style), normals))
+    combed = unit_vectors(tangent_component(COMBS[style.comb](points, style), normals))
     if style.comb == "up":
-        return unit(normals + style.tilt * combed)
+        return unit_vectors(normals + style.tilt * combed)
     lift = style.lift * (smoothstep(10.0, 70.0, points[:, 1]) if style.comb == "fall" else 1.0)
-    return unit(np.reshape(lift, (-1, 1)) * normals + combed)
+    return unit_vectors(np.reshape(lift, (-1, 1)) * normals + combed)
 
 
-def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> Growth:
+def _grow_one_step(surface: SkinSurface, growth: Growth, step_mm: float, style: Style) -> Growth:
     """Return the state of guides after one step of growth.
 
-    step : length of the step [mm]
+    step_mm : length of the step [mm]
     """
-    direction, length, tied = _steer(state, style), state.length_mm + step, state.tied_mm
+    direction, length, tied = _next_directions(growth, style), growth.length_mm + step_mm, growth.tied_mm
     if style.comb == "gather":
         near = (
-            np.linalg.norm(state.position_mm - style.tie_mm - _tie_offsets(state, style), axis=1)
+            np.linalg.norm(growth.position_mm - style.tie_mm - _tie_offsets(growth, style), axis=1)
             < _TIE_REACH_MM
         )
         tied = np.where(near & ~np.isfinite(tied), length, tied)
-    moved = state.position_mm + step * direction
+    moved = growth.position_mm + step_mm * direction
     base, normal = surface.project(moved)
     height = ((moved - base) * normal).sum(axis=1)
     height_of_ears = _EAR_HEIGHT_MM * ear_weight(base) if style.comb in _COMBS_OVER_EARS else 0.0
     layer = style.volume_mm * (1.0 - np.exp(-length / _LAYER_LENGTH_MM)) * np.minimum(length / 20.0, 1.0)
     least = np.minimum(length / 6.0, 1.0) * (_MIN_HEIGHT_MM + layer + height_of_ears)
-    pushed = np.clip(least - height, 0.0, 0.8 * step)[:, None]
+    pushed = np.clip(least - height, 0.0, 0.8 * step_mm)[:, None]
     moved += pushed * normal
     if style.comb == "fall":
-        loose = fringe_weight(state.root_mm, style)[:, None] < 0.5
+        loose = fringe_weight(growth.root_mm, style)[:, None] < 0.5
         moved = np.where(loose, _move_off_face(moved), moved)
     if style.coil_mm:
         wound = np.clip((length - tied) / 25.0, 0.0, 1.0)[:, None]
-        moved += wound * (_bun_points(state, length, style) - moved)
+        moved += wound * (_bun_points(growth, length, style) - moved)
     # hair that is held out slides along the obstacle: it loses its inward motion, but gains no outward motion
     inward = np.minimum((direction * normal).sum(axis=1, keepdims=True), 0.0)
     direction = np.where(
-        (pushed > 0) & ~np.isfinite(tied)[:, None], unit(direction - inward * normal), direction
+        (pushed > 0) & ~np.isfinite(tied)[:, None], unit_vectors(direction - inward * normal), direction
     )
     base, normal = surface.project(moved)
     height = ((moved - base) * normal).sum(axis=1)
-    return state._replace(position_mm=moved, direction=direction, skin_normal=normal, height_mm=height,
+    return growth._replace(position_mm=moved, direction=direction, skin_normal=normal, height_mm=height,
                           length_mm=length, tied_mm=tied)  # fmt: skip
 
 
-def _steer(state: Growth, style: Style) -> Doubles:
+def _next_directions(growth: Growth, style: Style) -> Doubles:
     """Return the unit directions (g, 3) in which guides grow in the next step."""
-    free = np.minimum(state.length_mm / 60.0, 1.0)[:, None] + 0.15
+    free = np.minimum(growth.length_mm / 60.0, 1.0)[:, None] + 0.15
     pull = 4.0 * style.gravity * free * np.array([0.0, -1.0, 0.0])
     if style.comb in ("gather", "rows", "back"):
-        combed = unit(tangent_component(COMBS[style.comb](state.position_mm, style), state.skin_normal))
-        close = np.exp(-np.maximum(state.height_mm - style.volume_mm, 0.0) / 8.0)[:, None]
+        combed = unit_vectors(
+            tangent_component(COMBS[style.comb](growth.position_mm, style), growth.skin_normal)
+        )
+        close = np.exp(-np.maximum(growth.height_mm - style.volume_mm, 0.0) / 8.0)[:, None]
         if style.comb == "gather":
-            to_tie = np.array(style.tie_mm) + _tie_offsets(state, style) - state.position_mm
+            to_tie = np.array(style.tie_mm) + _tie_offsets(growth, style) - growth.position_mm
             distance = np.linalg.norm(to_tie, axis=1, keepdims=True)
-            combed = unit(np.where(distance < 35.0, to_tie, combed))
-            tail = _tail_directions(state, style, pull)
-            return np.where(np.isfinite(state.tied_mm)[:, None], tail, unit(0.5 * state.direction + combed))
-        return unit(0.6 * state.direction + 0.8 * close * combed + 0.3 * (1.0 - close) * pull)
-    return unit(style.stiffness * state.direction + (1.0 - style.stiffness) * pull)
+            combed = unit_vectors(np.where(distance < 35.0, to_tie, combed))
+            tail = _tail_directions(growth, style, pull)
+            return np.where(
+                np.isfinite(growth.tied_mm)[:, None], tail, unit_vectors(0.5 * growth.direction + combed)
+            )
+        return unit_vectors(0.6 * growth.direction + 0.8 * close * combed + 0.3 * (1.0 - close) * pull)
+    return unit_vectors(style.stiffness * growth.direction + (1.0 - style.stiffness) * pull)
 
 
-def _tie_offsets(state: Growth, style: Style) -> Doubles:
+def _tie_offsets(growth: Growth, style: Style) -> Doubles:
     """Return where guides pass through the hair tie of a ponytail or bun, relative to its middle (g, 3) [mm].
 
     A guide passes through the side of the tie that is nearest to the root of the guide.
     """
-    outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
+    outward = unit_vectors(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
     away = tangent_component(
-        state.root_mm - np.array(style.tie_mm), np.broadcast_to(outward, state.root_mm.shape)
+        growth.root_mm - np.array(style.tie_mm), np.broadcast_to(outward, growth.root_mm.shape)
     )
     reach = np.linalg.norm(away, axis=1, keepdims=True)
-    return np.asarray(_TIE_RADIUS_MM * np.minimum(reach / 60.0, 1.0) * unit(away))
+    return np.asarray(_TIE_RADIUS_MM * np.minimum(reach / 60.0, 1.0) * unit_vectors(away))
 
 
-def _tail_directions(state: Growth, style: Style, pull: Doubles) -> Doubles:
+def _tail_directions(growth: Growth, style: Style, gravity_pull: Doubles) -> Doubles:
     """Return the directions (g, 3) of hair beyond the hair tie: outwards, then down and slightly apart.
 
-    pull : (g, 3) pull of gravity, as vectors
+    gravity_pull : (g, 3) pull of gravity, as vectors
     """
-    outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)[None]
-    since = np.maximum(state.length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, 0.0), 0.0)[
+    outward = unit_vectors(np.array(style.tie_mm) - _SKULL_CENTRE_MM)[None]
+    since = np.maximum(growth.length_mm - np.where(np.isfinite(growth.tied_mm), growth.tied_mm, 0.0), 0.0)[
         :, None
     ]
-    apart = _tie_offsets(state, style) / _TIE_RADIUS_MM
+    apart = _tie_offsets(growth, style) / _TIE_RADIUS_MM
     spread = 0.12 * np.exp(-since / 60.0) - 0.03 * smoothstep(150.0, 400.0, since)
-    return unit(0.85 * state.direction + 0.15 * pull + 0.3 * np.exp(-since / 25.0) * outward + spread * apart)
+    return unit_vectors(
+        0.85 * growth.direction + 0.15 * gravity_pull + 0.3 * np.exp(-since / 25.0) * outward + spread * apart
+    )
 
 
-def _length_beyond_tie(state: Growth, length: Doubles) -> Doubles:
+def _length_beyond_tie(growth: Growth, length_mm: Doubles) -> Doubles:
     """Return the length (g,) of each guide beyond the hair tie [mm]; 0 before the guide reaches the tie.
 
-    length : (g,) lengths from the roots [mm]
+    length_mm : (g,) lengths from the roots [mm]
     """
-    return np.maximum(length - np.where(np.isfinite(state.tied_mm), state.tied_mm, length), 0.0)
+    return np.maximum(length_mm - np.where(np.isfinite(growth.tied_mm), growth.tied_mm, length_mm), 0.0)
 
 
-def _bun_points(state: Growth, length: Doubles, style: Style) -> Doubles:
+def _bun_points(growth: Growth, length_mm: Doubles, style: Style) -> Doubles:
     """Return points (g, 3) on guides that are wound into a bun beyond the hair tie [mm].
 
-    length : (g,) lengths from the roots to the points [mm]
+    length_mm : (g,) lengths from the roots to the points [mm]
     """
-    outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
-    side = unit(np.cross(outward, [0.0, 1.0, 0.0]))
+    outward = unit_vectors(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
+    side = unit_vectors(np.cross(outward, [0.0, 1.0, 0.0]))
     up = np.cross(side, outward)
-    offset = _tie_offsets(state, style)
+    offset = _tie_offsets(growth, style)
     turn = np.arctan2(offset @ up, offset @ side)
     rank = np.linalg.norm(offset, axis=1) / _TIE_RADIUS_MM
-    since = _length_beyond_tie(state, length)
+    since = _length_beyond_tie(growth, length_mm)
     radius = style.coil_mm * (0.7 + 0.3 * rank)
     tilt = 1.9 - 1.5 * smoothstep(0.0, 260.0, since) + 0.25 * np.sin(3.0 * turn)
     turn = turn + since / (0.8 * radius)
@@ -367,7 +373,7 @@ def cut_fractions(knots: Doubles, style: Style) -> Doubles:
         fringe = fringe_weight(root, style) > 0.5
         cut = np.where(fringe, _first_crossing_fractions(knots, np.full(len(knots), style.fringe_y_mm)), cut)
     if style.round:
-        radius = np.linalg.norm((knots - _SKULL_CENTRE_MM) / _ROUND_RADII_MM, axis=2)
+        radius = np.linalg.norm((knots - _SKULL_CENTRE_MM) / _ROUND_CUT_RADII_MM, axis=2)
         limit = 1.0 + style.round * style.max_length_mm / 90.0
         outside = radius > limit
         first = np.where(outside.any(axis=1), outside.argmax(axis=1), GUIDE_KNOTS - 1)
@@ -392,15 +398,15 @@ def _first_crossing_fractions(knots: Doubles, height_mm: Doubles) -> Doubles:
 
 
 def bind_guides(
-    control_mesh: Mesh, points_mm: Doubles, knots: Doubles, heights: Doubles, cut: Doubles
+    control_mesh: Mesh, points_mm: Doubles, knots: Doubles, heights_mm: Doubles, cut_fraction: Doubles
 ) -> Guides:
     """Return guides that move with the skin: each knot follows the quads nearest to it.
 
     control_mesh : control mesh of the mean person
     points_mm : (p, 3) positions of the control points on the subdivided mean person [mm]
     knots : (g, k, 3) knots from `grow_guides` [mm]
-    heights : (g, k) heights of the knots above the skin, from `grow_guides` [mm]
-    cut : (g,) fractions from `cut_fractions`
+    heights_mm : (g, k) heights of the knots above the skin, from `grow_guides` [mm]
+    cut_fraction : (g,) fractions from `cut_fractions`
     """
     from scipy.spatial import cKDTree
 
@@ -416,8 +422,8 @@ def bind_guides(
         corners[near].astype(np.int32),
         local.astype(np.float32),
         weight.astype(np.float32),
-        np.concatenate([knots, heights[..., None]], axis=2).astype(np.float32),
-        cut.astype(np.float32),
+        np.concatenate([knots, heights_mm[..., None]], axis=2).astype(np.float32),
+        cut_fraction.astype(np.float32),
     )
 
 
@@ -429,7 +435,7 @@ def quad_frames(corners_mm: Doubles) -> tuple[Doubles, Doubles]:
     corners_mm : (q, 4, 3) corners of the quads [mm]
     """
     a, b, c, d = corners_mm.swapaxes(0, 1)
-    along = unit((b - a) + (c - d))
+    along = unit_vectors((b - a) + (c - d))
     normal = np.cross(c - a, d - b)
-    normal = unit(normal - (normal * along).sum(axis=1, keepdims=True) * along)
+    normal = unit_vectors(normal - (normal * along).sum(axis=1, keepdims=True) * along)
     return corners_mm.mean(axis=1), np.stack([along, np.cross(normal, along), normal], axis=1)

@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.root_finder import RootFinder
-from dermis.human.hair.strand_roots import BEARD_STRANDS_PER_CM2, STRANDS_PER_CM2, style_tables
+from dermis.human.hair.strand_roots import BEARD_STRANDS_PER_CM2, STRANDS_PER_CM2, style_strands
 from dermis.human.hair.styles import BEARD, Style, styles
 from dermis.human.skin.face import hairline_heights
 from dermis.mesh.groom import Groom
 from dermis.specular.hair import absorption_per_mm
 
-MAX_PER_CM2 = 200.0
+MAX_HAIRS_PER_CM2 = 200.0
 """Density of the densest hair of the head [1/cm2]."""
-BEARD_PER_CM2 = 60.0
+BEARD_HAIRS_PER_CM2 = 60.0
 """Density of beards [1/cm2]."""
 _HAIR_RADIUS_MM, _BEARD_RADIUS_MM = 0.034, 0.048
 _MIN_EUMELANIN = 0.07  # white hair is not quite white
@@ -35,7 +35,7 @@ _FLOAT_FIELDS = (
     "rope_mm", "braid", "curl_mm", "pitch_mm", "incoherence", "frizz_mm", "flyaways", "radius_mm", "cover",
     "grey", "hairs_per_strand",
 )  # fmt: skip
-PART_DTYPE = np.dtype(
+HAIR_PARAMETERS_DTYPE = np.dtype(
     [
         *((name, "f4") for name in _FLOAT_FIELDS),
         ("dark", "f4", 3),
@@ -48,45 +48,52 @@ PART_DTYPE = np.dtype(
 
 
 def make_groom(
-    look: HairLook, recession: float, root_finder: RootFinder, levels: int, hair_fraction: float = 1.0
+    hair_look: HairLook,
+    recession: float,
+    root_finder: RootFinder,
+    subdivision_levels: int,
+    hair_fraction: float = 1.0,
 ) -> Groom | None:
     """Return the scalp hair and beard of a person; None for a bald person without a beard.
 
     recession : recession of the hairline, 0 to 1, see `SkinLook`
     root_finder : root finder of the mean person
-    levels : subdivision levels of the person's mesh
+    subdivision_levels : subdivision levels of the person's mesh
     hair_fraction : fraction of the strands to grow; the strands are widened by the inverse of this fraction,
         so that coverage stays the same
     """
-    scalp, bearded = styles().get(look.style), look.beard_mm > 0.0
-    if look.density == 0.0:
+    scalp, bearded = styles().get(hair_look.style), hair_look.beard_mm > 0.0
+    if hair_look.density == 0.0:
         scalp = None
     if scalp is None and not bearded:
         return None
-    tables = style_tables(scalp, bearded, root_finder, levels)
-    parts = [_scalp_parameters(scalp, look, recession)] if scalp else []
-    parts += [_beard_parameters(look)] if bearded else []
-    parameters, strands = np.array(parts, PART_DTYPE), round(hair_fraction * len(tables.roots))
+    tables = style_strands(scalp, bearded, root_finder, subdivision_levels)
+    parts = [_scalp_parameters(scalp, hair_look, recession)] if scalp else []
+    parts += [_beard_parameters(hair_look)] if bearded else []
+    parameters, strands = np.array(parts, HAIR_PARAMETERS_DTYPE), round(hair_fraction * len(tables.roots))
     heights, knots = hairline_heights(max(recession, scalp.crown if scalp else 0.0)), _knot_count(parameters)
     return Groom(tables.guides, tables.roots, parameters, strands, knots, heights, tables.centre_mm)
 
 
-def _scalp_parameters(style: Style, look: HairLook, recession: float) -> tuple[object, ...]:
-    length, fade = min(look.length_mm, style.max_length_mm), look.fade if style.fade else 0.0
-    densities = STRANDS_PER_CM2, MAX_PER_CM2, look.density
-    return _part_parameters(
-        style, look, length, densities, _HAIR_RADIUS_MM, fade, max(recession, style.crown), 1.0
+def _scalp_parameters(style: Style, hair_look: HairLook, recession: float) -> tuple[object, ...]:
+    length, fade = min(hair_look.length_mm, style.max_length_mm), hair_look.fade if style.fade else 0.0
+    densities = STRANDS_PER_CM2, MAX_HAIRS_PER_CM2, hair_look.density
+    return _parameter_row(
+        style, hair_look, length, densities, _HAIR_RADIUS_MM, fade, max(recession, style.crown), 1.0
     )
 
 
-def _beard_parameters(look: HairLook) -> tuple[object, ...]:
-    length, densities = min(look.beard_mm, BEARD.max_length_mm), (BEARD_STRANDS_PER_CM2, BEARD_PER_CM2, 1.0)
-    return _part_parameters(BEARD, look, length, densities, _BEARD_RADIUS_MM)
+def _beard_parameters(hair_look: HairLook) -> tuple[object, ...]:
+    length, densities = (
+        min(hair_look.beard_mm, BEARD.max_length_mm),
+        (BEARD_STRANDS_PER_CM2, BEARD_HAIRS_PER_CM2, 1.0),
+    )
+    return _parameter_row(BEARD, hair_look, length, densities, _BEARD_RADIUS_MM)
 
 
-def _part_parameters(
+def _parameter_row(
     style: Style,
-    look: HairLook,
+    hair_look: HairLook,
     length_mm: float,
     densities: tuple[float, float, float],
     hair_radius_mm: float,
@@ -94,7 +101,7 @@ def _part_parameters(
     thinning: float = 0.0,
     hairline_effect: float = 0.0,
 ) -> tuple[object, ...]:
-    """Return the parameters of scalp hair or of a beard as a row of `PART_DTYPE`.
+    """Return the parameters of scalp hair or of a beard as a row of `HAIR_PARAMETERS_DTYPE`.
 
     densities : number of strand roots per area [1/cm2], number of real hairs per area [1/cm2], and fraction
         of the roots from which a strand grows
@@ -102,7 +109,7 @@ def _part_parameters(
     strands_per_cm2, hairs_per_cm2, density = densities
     hairs_per_strand = hairs_per_cm2 / strands_per_cm2
     curl_mm, pitch_mm, incoherence, frizz_mm = (
-        float(np.interp(look.curl, _CURL_NODES, column))
+        float(np.interp(hair_look.curl, _CURL_NODES, column))
         for column in (_CURL_RADIUS_MM, _CURL_PITCH_MM, _CURL_INCOHERENCE, _FRIZZ_MM)
     )
     rope = style.rope_mm > 0.0
@@ -127,20 +134,20 @@ def _part_parameters(
         "flyaways": 0.3 * _FLYAWAY_FRACTION if rope else _FLYAWAY_FRACTION,
         "radius_mm": radius,
         "cover": min(cover, 4.0),
-        "grey": look.grey,
+        "grey": hair_look.grey,
         "hairs_per_strand": hairs_per_strand,
-        "dark": tuple(absorption_per_mm(look.eumelanin, look.pheomelanin)),
-        "seed": look.seed % _SEED_COUNT,
+        "dark": tuple(absorption_per_mm(hair_look.eumelanin, hair_look.pheomelanin)),
+        "seed": hair_look.seed % _SEED_COUNT,
         "white": tuple(absorption_per_mm(_MIN_EUMELANIN, 0.0)),
         "pad": 0.0,
     }
-    return tuple(values[name] for name in PART_DTYPE.names or ())
+    return tuple(values[name] for name in HAIR_PARAMETERS_DTYPE.names or ())
 
 
 def _knot_count(parameters: NDArray[np.void]) -> int:
     """Return a number of knots per strand that resolves the longest and most tightly curled strands.
 
-    parameters : (p,) rows of `PART_DTYPE`, for scalp hair and beard
+    parameters : (p,) rows of `HAIR_PARAMETERS_DTYPE`, for scalp hair and beard
     """
     lengths, pitches, curls, ropes = (
         parameters[name] for name in ("length_mm", "pitch_mm", "curl_mm", "rope_mm")

@@ -57,52 +57,56 @@ LOWER_LASHES = LashRow(
 )
 
 
-def sample_positions(row: LashRow, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
-    """Return random root positions of lashes along the edge of the lid, and from the edge into the skin.
+def sample_positions(lash_row: LashRow, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
+    """Return random root positions of lashes on a lid, as two arrays (n,) of coordinates from 0 to 1.
 
-    Both arrays (n,) are coordinates for `RootFinder.lid_edge_roots`, 0 to 1.
+    The coordinates are `edge_position` and `edge_distance` of `RootFinder.lid_edge_roots`.
     """
-    u = (np.arange(row.hairs) + rng.uniform(-0.3, 1.3, row.hairs)) / row.hairs
-    across = 0.04 + 0.12 * rng.integers(0, 3, row.hairs)
-    return row.start + (row.end - row.start) * np.clip(u, 0, 1), np.asarray(across, np.float64)
+    u = (np.arange(lash_row.hairs) + rng.uniform(-0.3, 1.3, lash_row.hairs)) / lash_row.hairs
+    across = 0.04 + 0.12 * rng.integers(0, 3, lash_row.hairs)
+    return lash_row.start + (lash_row.end - lash_row.start) * np.clip(u, 0, 1), np.asarray(across, np.float64)
 
 
-def sample_shapes(row: LashRow, u: Doubles, rng: np.random.Generator, first_clump: int) -> Doubles:
+def sample_shapes(
+    lash_row: LashRow, edge_position: Doubles, rng: np.random.Generator, first_clump: int
+) -> Doubles:
     """Return random shape parameters (7, n) of lashes.
 
     The seven rows are: the splay [-], the elevation of the first segment [rad], the elevation of the last
     segment [rad], the length [mm], the radius at the root [mm], the index of the clump to which the lash
     sticks, and the attraction of the tip to this clump, 0 to 1.
 
-    u : (n,) positions along the edge of the lid, from `sample_positions`
+    edge_position : (n,) positions along the edge of the lid, from `sample_positions`
     first_clump : index of the first clump of this row
     """
-    n, fraction = len(u), (u - row.start) / (row.end - row.start)
-    splay = np.interp(fraction, [0, 1], row.splay) + rng.normal(0, 0.1, n)
-    first = row.rise[0] + rng.normal(0, 0.12, n)
-    last = row.rise[1] + rng.normal(0, 0.18, n)
-    length = np.interp(fraction, _LENGTH_POSITIONS, row.length) * rng.uniform(0.7, 1.08, n)
+    n, fraction = len(edge_position), (edge_position - lash_row.start) / (lash_row.end - lash_row.start)
+    splay = np.interp(fraction, [0, 1], lash_row.splay) + rng.normal(0, 0.1, n)
+    first = lash_row.rise[0] + rng.normal(0, 0.12, n)
+    last = lash_row.rise[1] + rng.normal(0, 0.18, n)
+    length = np.interp(fraction, _LENGTH_POSITIONS, lash_row.length) * rng.uniform(0.7, 1.08, n)
     clump = np.empty(n)  # neighbours that stick together
-    clump[np.argsort(u)] = first_clump + np.cumsum(rng.random(n) < 0.4)
+    clump[np.argsort(edge_position)] = first_clump + np.cumsum(rng.random(n) < 0.4)
     pull = rng.uniform(0.2, 0.7, n)
-    radius = row.radius * rng.uniform(0.8, 1.15, n)
+    radius = lash_row.radius * rng.uniform(0.8, 1.15, n)
     return np.stack([splay, first, last, length, radius, clump, pull])
 
 
-def grow_lashes(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> tuple[Doubles, Doubles]:
+def grow_lashes(
+    root_mm: Doubles, eye_mm: Doubles, side_sign: Doubles, shape_parameters: Doubles
+) -> tuple[Doubles, Doubles]:
     """Return the knots (n, k, 3) and radii (n, k) of lashes [mm].
 
     root_mm : (n, 3) roots on the lids [mm]
     eye_mm : (n, 3) centre of the eye to which each lash belongs [mm]
-    side : (n,) 1 for lashes of the left eye, -1 for lashes of the right eye
-    shape : (7, n) shape parameters from `sample_shapes`; the lashes of a clump must be on the same lid
+    side_sign : (n,) 1 for lashes of the left eye, -1 for lashes of the right eye
+    shape_parameters : (7, n) result of `sample_shapes`; the lashes of a clump must be on the same lid
     """
-    splay, first, last, length, radius, clump, pull = shape
+    splay, first, last, length, radius, clump, pull = shape_parameters
     ahead = root_mm - eye_mm
     ahead = ahead * [0.55, 0.0, 1.0]  # lashes fan out less than the normals of the eye
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     up = np.array([0.0, 1.0, 0.0])
-    out = np.cross(up, ahead) * side[:, None]
+    out = np.cross(up, ahead) * side_sign[:, None]
     t = np.linspace(0.0, 1.0, KNOTS_PER_HAIR)
     angle = first + (last - first) * ((t[1:] - 0.5 / (KNOTS_PER_HAIR - 1)) ** 0.8)[:, None]
     directions = np.cos(angle)[..., None] * ahead + np.sin(angle)[..., None] * up
@@ -114,14 +118,16 @@ def grow_lashes(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles
     return clumped, radius[:, None] * np.maximum(1.0 - t, 0.0) ** 0.55 * np.minimum(1.0, 0.8 + t)
 
 
-def _clump_tips(knots: Doubles, clump: NDArray[np.int64], strength: Doubles, t: Doubles) -> Doubles:
+def _clump_tips(
+    knots: Doubles, clump: NDArray[np.int64], attraction: Doubles, knot_position: Doubles
+) -> Doubles:
     """Return knots (n, k, 3) of lashes whose tips are pulled towards the mean tip of their clump.
 
     clump : (n,) index of the clump of each lash
-    strength : (n,) attraction of each lash to its clump, 0 to 1
-    t : (k,) position of the knots along the lash, from 0 at the root to 1 at the tip
+    attraction : (n,) attraction of each lash to its clump, 0 to 1
+    knot_position : (k,) position of the knots along the lash, from 0 at the root to 1 at the tip
     """
     count = np.maximum(np.bincount(clump), 1)
     mean = np.stack([np.bincount(clump, knots[:, -1, c]) / count for c in range(3)], axis=-1)
-    pull = (mean[clump] - knots[:, -1]) * strength[:, None]
-    return np.asarray(knots + (t**1.6)[None, :, None] * pull[:, None])
+    pull = (mean[clump] - knots[:, -1]) * attraction[:, None]
+    return np.asarray(knots + (knot_position**1.6)[None, :, None] * pull[:, None])

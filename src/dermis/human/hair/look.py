@@ -24,7 +24,10 @@ FIELD_RANGES = {
 # Artist's values.
 _TYPICAL_CURL = {"african": 0.95, "asian": 0.0, "caucasian": 0.2}
 _MIN_TIGHT_CURL = 0.6  # curl above which hair is worn in the styles of tightly coiled hair
-_BALD_CHANCES = {False: 0.01, True: 0.1}  # of women and of men; those of the styles are in styles.toml
+_BALD_CHANCE_BY_IS_MAN = {
+    False: 0.01,
+    True: 0.1,
+}  # of women and of men; those of the styles are in styles.toml
 _BALD_STYLE = Style("up", max_length_mm=500.0, length_mm=6.0)
 _MAX_BEARD_MM = 14.0
 _DARK_EUMELANIN = 3.0  # eumelanin above which shaved hair has full visibility
@@ -114,7 +117,7 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
     eumelanin, pheomelanin : pigment concentrations of the hair, see `HairLook`
     """
     old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
-    curl, woman = demographics.weighted_mean(_TYPICAL_CURL), demographics.sex < 0.5
+    curl, woman = demographics.shape_weighted_mean(_TYPICAL_CURL), demographics.sex < 0.5
     loose, tight = ("shoulder-length", "afro") if woman else ("short", "cropped")
     return HairLook(
         style=tight if curl > _MIN_TIGHT_CURL else loose,
@@ -130,8 +133,7 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
 def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: HairLook) -> HairLook:
     """Return a random hair look around the typical hair look of a person.
 
-    The probabilities of the styles are artist's values from styles.toml. Only men have beards. The order of
-    random draws does not depend on the person.
+    The probabilities of the styles are chosen, not measured; they are in styles.toml. Only men have beards.
     """
     n, style_chance, beard_chance = rng.normal(size=4), rng.random(), rng.random()
     man = demographics.sex > 0.5
@@ -152,16 +154,18 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
     )
 
 
-def _pick_style(chance: float, is_man: bool, is_tightly_coiled: bool) -> str:
-    """Return the hair style that a uniformly distributed number selects by the probabilities of the styles.
+def _pick_style(uniform_sample: float, is_man: bool, is_tightly_coiled: bool) -> str:
+    """Return the name of a random hair style, with the probabilities in styles.toml.
 
-    chance : uniformly distributed number, 0 to 1
+    uniform_sample : uniformly distributed random number, 0 to 1, which selects the style
     is_man : whether the person is a man
     is_tightly_coiled : whether the hair is tightly coiled
     """
     worn = {name: one for name, one in styles().items() if (one.tight if is_tightly_coiled else one.loose)}
-    chances = np.array([_BALD_CHANCES[is_man], *(one.men if is_man else one.women for one in worn.values())])
-    index = int(np.searchsorted(np.cumsum(chances) / chances.sum(), chance, side="right"))
+    chances = np.array(
+        [_BALD_CHANCE_BY_IS_MAN[is_man], *(one.men if is_man else one.women for one in worn.values())]
+    )
+    index = int(np.searchsorted(np.cumsum(chances) / chances.sum(), uniform_sample, side="right"))
     return ("none", *worn)[min(index, len(worn))]
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles
 from dermis.human.hair import lashes
-from dermis.human.hair.brows import grid_points
+from dermis.human.hair.brows import brow_grid_points
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, quad_corners
 from dermis.mesh.subdivide import subdivide
@@ -20,7 +20,7 @@ Index = NDArray[np.int64]
 SIDE_SIGNS = 1.0, -1.0
 """Sign of x on the left and on the right side."""
 _QUAD_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # corners in quad coordinates
-_MIN_WEIGHT = -1e-9  # smallest barycentric weight of points that count as inside a triangle
+_MIN_BARYCENTRIC_WEIGHT = -1e-9  # smallest barycentric weight of points that count as inside a triangle
 _GRID_CELL_MM = 2.0  # cells of the grid of triangle lists
 _GRID_LOW, _GRID_HIGH = (
     np.array([-70.0, -20.0]),
@@ -30,7 +30,7 @@ _HALF_QUAD_CORNERS = np.array([[0, 1, 2], [2, 3, 0]])  # corners of the two tria
 
 
 class _FrontTriangles(NamedTuple):
-    """Front-facing triangles with a grid in the front plane that accelerates point queries.
+    """Front-facing triangles around the brows, with an xy grid that speeds up the search for a triangle.
 
     triangle_lists : (columns, rows, m) indices of the triangles that overlap each grid cell, padded with -1
     quad, half : (t,) index of the quad of each triangle, and 0 or 1 for the first or second half of the quad
@@ -48,8 +48,8 @@ class _LidEdge(NamedTuple):
 
     lengths_mm : (m,) arc length from the first point to each point [mm]
     quad : (m - 1,) index of the adjacent quad of each segment
-    frame : (m - 1, 4, 2) corners of this quad in its bilinear coordinates, 0 or 1: first the start and end of
-        the segment, then the corners opposite to start and end
+    frame : (m - 1, 4, 2) bilinear coordinates, 0 or 1, of the four corners of this quad: the start of the
+        segment, its end, and the corners opposite to its start and to its end
     """
 
     lengths_mm: Doubles
@@ -58,7 +58,7 @@ class _LidEdge(NamedTuple):
 
 
 class RootFinder:
-    """Finder of hair roots on a quad mesh, from a position in the front plane or along the edge of a lid.
+    """Search for hair roots on a quad mesh, by x and y seen from the front or by a position on a lid's edge.
 
     mesh : control mesh
     points_mm : (p, 3) positions of the control points [mm]
@@ -72,13 +72,13 @@ class RootFinder:
         self._lid_edges: dict[tuple[tuple[int, ...], float], _LidEdge] = {}
 
     def front_roots(self, x: Doubles, y: Doubles) -> tuple[Roots, NDArray[np.bool_]]:
-        """Return the roots at n positions in the front plane, and a mask (n,) of the valid roots.
+        """Return the roots at n positions seen from the front, and a mask (n,) of the valid roots.
 
-        Each root is on the foremost triangle at its position. A root is invalid where there is no triangle.
+        Each root is on the foremost triangle at its x and y. A root is invalid where there is no triangle.
 
-        x, y : (n,) coordinates in the front plane [mm]
+        x, y : (n,) coordinates of the roots [mm]
         """
-        front = self._front
+        front = self._front_triangles
         cell = np.floor((np.column_stack([x, y]) - _GRID_LOW) / _GRID_CELL_MM).astype(np.int64)
         last_cell = np.array(front.triangle_lists.shape[:2]) - 1
         triangles = front.triangle_lists[tuple(np.clip(cell, 0, last_cell).T)]
@@ -90,7 +90,9 @@ class RootFinder:
         v = ((px - ax) * (cy - ay) - (cx - ax) * (py - ay)) / det
         w = ((bx - ax) * (py - ay) - (px - ax) * (by - ay)) / det
         u = 1 - v - w
-        inside = np.flatnonzero((u >= _MIN_WEIGHT) & (v >= _MIN_WEIGHT) & (w >= _MIN_WEIGHT))
+        inside = np.flatnonzero(
+            (u >= _MIN_BARYCENTRIC_WEIGHT) & (v >= _MIN_BARYCENTRIC_WEIGHT) & (w >= _MIN_BARYCENTRIC_WEIGHT)
+        )
         z = (az + v * (bz - az) + w * (cz - az))[inside]
         front_index = np.full(len(x), -1)
         order = inside[np.argsort(z)]
@@ -107,41 +109,50 @@ class RootFinder:
         return Roots(quad.astype(np.int32), np.clip(position, 0.0, 1.0).astype(np.float32)), hit
 
     @cached_property
-    def mean_mesh(self) -> Mesh:
-        """Return the control mesh after one level of subdivision; its first points are the control points."""
+    def once_subdivided_mesh(self) -> Mesh:
+        """Return the mesh of the mean person after one level of subdivision.
+
+        Its first points correspond to the control points.
+        """
         return subdivide(self.mesh, 1)[0]
 
     @cached_property
     def brow_grid_roots(self) -> Roots:
-        """Return roots at the nodes of `grid_points`, first of the left and then of the right brow."""
-        x, y = grid_points()
+        """Return roots at the nodes of `brow_grid_points` (left brow), then at the mirrored nodes (right)."""
+        x, y = brow_grid_points()
         return self.front_roots(
             np.concatenate([side * x for side in SIDE_SIGNS]), np.tile(y, len(SIDE_SIGNS))
         )[0]
 
-    def lid_edge_roots(self, lid: lashes.LashRow, side: float, u: Doubles, across: Doubles) -> Roots:
+    def lid_edge_roots(
+        self, lash_row: lashes.LashRow, side_sign: float, edge_position: Doubles, edge_distance: Doubles
+    ) -> Roots:
         """Return lash roots near the edge of a lid, on the quads that adjoin the edge on the outside.
 
-        lid : row of lashes on the lid
-        side : 1 for the left eye, -1 for the right eye
-        u : (n,) positions along the edge, as fractions of its arc length
-        across : (n,) distances from the edge: 0 on the edge, 1 on the opposite side of the adjacent quad
+        lash_row : row of lashes on the lid
+        side_sign : 1 for the left eye, -1 for the right eye
+        edge_position : (n,) positions along the edge, as fractions of its arc length
+        edge_distance : (n,) distances from the edge: 0 on the edge, 1 on the opposite side of the quad
         """
-        key = lid.edge_points, side
+        key = lash_row.edge_points, side_sign
         if key not in self._lid_edges:
-            self._lid_edges[key] = self._lid_edge(np.array(lid.edge_points), side)
+            self._lid_edges[key] = self._lid_edge(np.array(lash_row.edge_points), side_sign)
         lengths_mm, quad, frame = self._lid_edges[key]
-        segment = np.clip(np.searchsorted(lengths_mm, u * lengths_mm[-1], "right") - 1, 0, len(quad) - 1)
-        t = (u * lengths_mm[-1] - lengths_mm[segment]) / (lengths_mm[segment + 1] - lengths_mm[segment])
+        segment = np.clip(
+            np.searchsorted(lengths_mm, edge_position * lengths_mm[-1], "right") - 1, 0, len(quad) - 1
+        )
+        t = (edge_position * lengths_mm[-1] - lengths_mm[segment]) / (
+            lengths_mm[segment + 1] - lengths_mm[segment]
+        )
         frame = frame[segment]
         low = (1 - t)[:, None] * frame[:, 0] + t[:, None] * frame[:, 1]
         high = (1 - t)[:, None] * frame[:, 2] + t[:, None] * frame[:, 3]
-        position = (1 - across)[:, None] * low + across[:, None] * high
+        position = (1 - edge_distance)[:, None] * low + edge_distance[:, None] * high
         return Roots(quad[segment].astype(np.int32), position.astype(np.float32))
 
-    def _lid_edge(self, edge_points: Index, side: float) -> _LidEdge:
-        points, around, eye = self.points_mm, self._quad_points, self._eyes_mm[0 if side > 0 else 1]
-        edge_points = edge_points if side > 0 else _mirrored_points(points, edge_points)
+    def _lid_edge(self, edge_points: Index, side_sign: float) -> _LidEdge:
+        points, around, eye = self.points_mm, self._quad_points, self._eyes_mm[0 if side_sign > 0 else 1]
+        edge_points = edge_points if side_sign > 0 else _mirrored_points(points, edge_points)
         distances = np.linalg.norm(points[around].mean(axis=1) - eye, axis=1)
         segments_mm = np.linalg.norm(np.diff(points[edge_points], axis=0), axis=1)
         lengths_mm = np.concatenate([[0], np.cumsum(segments_mm)])
@@ -162,7 +173,7 @@ class RootFinder:
         return quad_corners(self.mesh, np.arange(len(self.mesh.quads)))
 
     @cached_property
-    def _front(self) -> _FrontTriangles:
+    def _front_triangles(self) -> _FrontTriangles:
         quad = np.repeat(np.arange(len(self.mesh.quads)), 2)
         half = np.tile([0, 1], len(self.mesh.quads))
         corner = self.points_mm[np.take_along_axis(self._quad_points[quad], _HALF_QUAD_CORNERS[half], axis=1)]
@@ -191,15 +202,15 @@ def _bounding_box(corner: Doubles) -> tuple[Doubles, Doubles]:
     return corner[..., :2].min(axis=1), corner[..., :2].max(axis=1)
 
 
-def _mirrored_points(points_mm: Doubles, index: Index) -> Index:
+def _mirrored_points(points_mm: Doubles, point_index: Index) -> Index:
     """Return for points of a symmetric head the indices of their mirror images in x.
 
     points_mm : (p, 3) all points of the head [mm]
-    index : indices of the points to mirror
+    point_index : indices of the points to mirror
     """
     from scipy.spatial import cKDTree
 
-    return np.asarray(cKDTree(points_mm).query(points_mm[index] * [-1, 1, 1])[1], np.int64)
+    return np.asarray(cKDTree(points_mm).query(points_mm[point_index] * [-1, 1, 1])[1], np.int64)
 
 
 def eye_centres(mesh: Mesh) -> Doubles:

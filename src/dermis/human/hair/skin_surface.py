@@ -13,7 +13,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, refine_roots, root_frames
 
-_NEIGHBOURS = 6  # vertices whose tangent planes are averaged
+_NEIGHBOUR_COUNT = 6  # vertices whose tangent planes are averaged
 
 
 class SkinSurface:
@@ -29,7 +29,7 @@ class SkinSurface:
 
     def project(self, points_mm: Doubles) -> tuple[Doubles, Doubles]:
         """Project points (n, 3) onto the skin along its normals; return projections [mm] and unit normals."""
-        distance, near = self._tree.query(points_mm, k=_NEIGHBOURS)
+        distance, near = self._tree.query(points_mm, k=_NEIGHBOUR_COUNT)
         weights = 1.0 / (distance**2 + 0.05)
         weights /= weights.sum(axis=1, keepdims=True)
         plane = np.einsum("nk,nkc->nc", weights, self._planes.take(near, axis=0))
@@ -62,7 +62,7 @@ class RootFrames:
 
     @cached_property
     def frame_vectors(self) -> Floats:
-        """Return the frame axes as an array (axis, xyz, n), root index last for vectorised operations."""
+        """Return the coordinate frames as an array (3, 3, n): axis, component of the axis, root."""
         return np.ascontiguousarray(self.frame.transpose(1, 2, 0), np.float32)
 
 
@@ -87,7 +87,7 @@ class GrowthSurface:
         return self._columns.T
 
     def root_frames(self, roots: Roots) -> RootFrames:
-        """Convert roots on control quads to roots on the subdivided mesh, with positions and frames."""
+        """Convert roots on quads of the control mesh to roots on the subdivided mesh, with frames."""
         finer = refine_roots(self.control_mesh, roots, self._levels)
         return RootFrames(finer, *root_frames(self._mesh, finer, self.points_mm))
 
@@ -100,7 +100,7 @@ class HairGroup(NamedTuple):
     radius : (n, k) radii of the hairs at the knots [mm]
     pigment_factor : pigment concentrations relative to those of the person's look [-]
     hairs_per_strand : number of real hairs that each strand represents
-    cover : area of skin that the hairs cover around their roots, per area of skin, see `Strands` [-]
+    cover : projected area of the hairs around their roots, per area of skin, see `Strands` [-]
     """
 
     roots: Roots

@@ -40,7 +40,7 @@ _GUIDE_FIELDS = "corner", "local_mm", "weight", "rest_mm", "cut"
 _ROOT_FIELDS = "quad", "position", "guide", "guide_weight", "clump", "place", "along_mm"
 
 
-class StyleTables(NamedTuple):
+class StyleStrands(NamedTuple):
     """Guides and roots of scalp hair and beard, shared by all people with the same styles.
 
     guides : guide curves of scalp hair and beard
@@ -54,15 +54,15 @@ class StyleTables(NamedTuple):
 
 
 @lru_cache(_MAX_CACHED_STYLES)
-def style_tables(
-    scalp_style: Style | None, has_beard: bool, root_finder: RootFinder, levels: int
-) -> StyleTables:
+def style_strands(
+    scalp_style: Style | None, has_beard: bool, root_finder: RootFinder, subdivision_levels: int
+) -> StyleStrands:
     """Return the guides and the roots of a hair style and a beard.
 
     scalp_style : style of the hair of the head; None for a bald head
     has_beard : whether to include the beard
     root_finder : root finder of the mean person
-    levels : subdivision levels of the mesh on whose quads the roots lie
+    subdivision_levels : subdivision levels of the mesh on whose quads the roots lie
     """
     worn = [*([scalp_style] if scalp_style else []), *([BEARD] if has_beard else [])]
     parts = [_cached_style_arrays(style, root_finder) for style in worn]
@@ -78,15 +78,15 @@ def style_tables(
     columns["part"] = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
     quad, position, *rest = (columns[name].take(order, axis=0) for name in (*_ROOT_FIELDS, "part"))
     some = slice(None, _CENTRE_ROOT_COUNT)
-    corners_mm = root_finder.mean_mesh.points_mm[quad_corners(root_finder.mesh, quad[some])]
+    corners_mm = root_finder.once_subdivided_mesh.points_mm[quad_corners(root_finder.mesh, quad[some])]
     centre_mm = np.einsum("nk,nkc->nc", quad_weights(position[some]), corners_mm).mean(axis=0)
-    roots = refine_roots(root_finder.mesh, Roots(quad, position), levels)
-    return StyleTables(guides, StrandRoots(roots, *rest), centre_mm)
+    roots = refine_roots(root_finder.mesh, Roots(quad, position), subdivision_levels)
+    return StyleStrands(guides, StrandRoots(roots, *rest), centre_mm)
 
 
 @lru_cache(_MAX_CACHED_STYLES)
 def _cached_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
-    names, points_mm = [*_GUIDE_FIELDS, *_ROOT_FIELDS], root_finder.mean_mesh.points_mm
+    names, points_mm = [*_GUIDE_FIELDS, *_ROOT_FIELDS], root_finder.once_subdivided_mesh.points_mm
     parameters = f"groom {_CACHE_VERSION} {style}"
     return cached_arrays(points_mm, parameters, names, lambda: _build_style_arrays(style, root_finder))
 
@@ -101,7 +101,7 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
     corners = quad_corners(mesh, roots.quad)
     points, guide = np.unique(corners, return_inverse=True)
     guide = guide.reshape(corners.shape)
-    points_mm = root_finder.mean_mesh.points_mm
+    points_mm = root_finder.once_subdivided_mesh.points_mm
     knots, _, heights = grow_guides(root_finder, points_mm[points], style)
     weight = quad_weights(roots.position)
     root_mm = np.einsum("nk,nkc->nc", weight, points_mm[corners])
@@ -110,10 +110,10 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
         one_sided = weight * same
         total = one_sided.sum(axis=1, keepdims=True)
         weight = np.where(total > 1e-3, one_sided / np.maximum(total, 1e-9), weight)
-    weight = _agreeing_weights(weight, guide, knots)
-    place = _root_places(weight, average_points()[corners])
+    weight = _near_guide_weights(weight, guide, knots)
+    place = _root_locations(weight, average_points()[corners])
     guides = bind_guides(mesh, points_mm, knots, heights, cut_fractions(knots, style))
-    clump = _clump_middles(
+    clump = _clump_centre_strands(
         root_mm, np.einsum("nk,nkc->nc", weight, knots[guide, GUIDE_KNOTS // 2]), style, rng
     )
     columns = roots.quad, roots.position, guide, weight, clump, place, -root_mm[clump, 2]
@@ -125,29 +125,29 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
     return found | {name: getattr(guides, name) for name in _GUIDE_FIELDS}
 
 
-def _agreeing_weights(weight: Doubles, guide: NDArray[np.int64], knots: Doubles) -> Doubles:
-    """Reduce the weights of guides that are far from a strand's main guide; return the weights (n, 4).
+def _near_guide_weights(guide_weight: Doubles, guide: NDArray[np.int64], knots: Doubles) -> Doubles:
+    """Return weights (n, 4) in which guides far from a strand's main guide count less.
 
-    The main guide of a strand is the guide with the largest weight. Without this, a strand between guides on
-    opposite sides of the head would pass through the head.
+    The main guide of a strand is the guide with the largest weight. The reduction keeps a strand between
+    guides on opposite sides of the head from passing through the head.
 
-    weight, guide : (n, 4) original weights of the guides, and their indices
+    guide_weight, guide : (n, 4) original weights of the guides, and their indices
     knots : (g, k, 3) knots of all guides [mm]
     """
-    main = np.take_along_axis(guide, weight.argmax(axis=1)[:, None], axis=1)
+    main = np.take_along_axis(guide, guide_weight.argmax(axis=1)[:, None], axis=1)
     some = knots[:, :: GUIDE_KNOTS // 8]
     apart = np.linalg.norm(some[guide] - some[main], axis=-1).max(axis=2)
-    agreeing = weight * smoothstep(_GUIDE_SEPARATION_MM[1], _GUIDE_SEPARATION_MM[0], apart)
+    agreeing = guide_weight * smoothstep(_GUIDE_SEPARATION_MM[1], _GUIDE_SEPARATION_MM[0], apart)
     return np.asarray(agreeing / agreeing.sum(axis=1, keepdims=True))
 
 
-def _root_places(weight: Doubles, corners: Doubles) -> Doubles:
-    """Return the place of each root on the head, (n, 4), as defined by `StrandRoots.place`.
+def _root_locations(corner_weight: Doubles, corner_points: Doubles) -> Doubles:
+    """Return `StrandRoots.place` (n, 4): the angle, height, thinning and nape-to-top position of each root.
 
-    weight : (n, 4) weights of the corners of the quad on which each strand is rooted
-    corners : (n, 4, 4) rows of `average_points` at these corners
+    corner_weight : (n, 4) weights of the corners of the quad on which each strand is rooted
+    corner_points : (n, 4, 4) rows of `average_points` at these corners
     """
-    points = np.einsum("nk,nkc->nc", weight, corners)
+    points = np.einsum("nk,nkc->nc", corner_weight, corner_points)
     angle = density.hairline_angle(points)
     height = points[:, 1] + density.hairline_waves(points)
     thinning = -recession_effect("hair", 1.0, points)
@@ -155,16 +155,17 @@ def _root_places(weight: Doubles, corners: Doubles) -> Doubles:
     return np.stack([angle, height, np.clip(thinning, 0.0, 1.0), top], axis=1)
 
 
-def _clump_middles(
-    root_mm: Doubles, half_mm: Doubles, style: Style, rng: np.random.Generator
+def _clump_centre_strands(
+    root_mm: Doubles, half_length_mm: Doubles, style: Style, rng: np.random.Generator
 ) -> NDArray[np.int64]:
-    """Return for each strand the index (n,) of the strand in the middle of its clump.
+    """Return for each strand the index (n,) of the strand at the centre of its clump.
 
-    In cornrows, this is the strand nearest to the point beside it on the centreline of the row. In other
-    styles, some random strands are chosen as middles, and each strand joins the clump of the nearest one.
+    In cornrows, the centre is the strand nearest to the strand's root after this root was moved sideways onto
+    the centreline of its row. In other styles, random strands are centres, and each strand joins the clump of
+    the nearest centre.
 
     root_mm : (n, 3) roots on the mean person [mm]
-    half_mm : (n, 3) points of the strands at half the length of their guides [mm]
+    half_length_mm : (n, 3) points of the strands at half the length of their guides [mm]
     """
     from scipy.spatial import cKDTree
 
@@ -177,5 +178,7 @@ def _clump_middles(
         return np.asarray(found, np.int64)
     count = max(1, round(len(root_mm) / (STRANDS_PER_CM2 * (style.clump_mm / 10.0) ** 2)))
     middles = rng.permutation(len(root_mm))[:count]
-    near = np.column_stack([root_mm, 0.5 * half_mm])  # hairs that part from each other are not in one clump
+    near = np.column_stack(
+        [root_mm, 0.5 * half_length_mm]
+    )  # hairs that part from each other are not in one clump
     return np.asarray(middles[cKDTree(near[middles]).query(near)[1]], np.int64)

@@ -15,7 +15,7 @@ from dermis.base.arrays import Floats
 from dermis.human.hair import brows
 from dermis.human.hair.density import height_above_hairline
 from dermis.human.labels.classes import class_number
-from dermis.human.regions.average import AVERAGE_HUMAN, average_head, is_human, part_quads
+from dermis.human.regions.average import AVERAGE_HUMAN, average_head, is_human, quads_of_parts
 from dermis.human.regions.labels import known_landmarks, warp_to_average
 from dermis.human.regions.region_table import neck_distance_mm, nose_distance_mm, torso_distance_mm
 from dermis.human.skin.surface import BORDER_FIELDS, average_surface, lid_rings
@@ -26,7 +26,7 @@ from dermis.mesh.strands import quad_corners
 
 Doubles = NDArray[np.float64]
 
-HUMAN_FIELDS = (
+HUMAN_FIELD_CLASSES = (
     "right_ear",
     "left_ear",
     "mouth_interior",
@@ -48,14 +48,14 @@ _MIN_BROW_Z_MM = -30.0  # minimum z of brows
 _HAIRLINE_MARGIN_MM = -8.0  # height relative to the hairline below which hair belongs to the beard
 _DENSE_SUBDIVISION_LEVELS = 2
 SIDE_NAMES = "right", "left"
-_PART_CLASSES = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "torso"}
+_CLASS_OF_MATERIAL = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "torso"}
 _MAX_CACHED_TOPOLOGIES = 3
 _LABEL_CACHE_LOCK = Lock()
 
 
 @cache
 def label_fields() -> Doubles:
-    """Return signed distances (k, p) of control points to the borders of the classes in `HUMAN_FIELDS` [mm].
+    """Return signed distances (k, p) of control points to the borders of `HUMAN_FIELD_CLASSES` [mm].
 
     Distances are positive inside a class.
     """
@@ -76,19 +76,19 @@ def label_fields() -> Doubles:
     for name, values in (("ear", _ear_field()), ("eye", -lids), ("brow", _brow_field(points))):
         fields[f"left_{name}"] = np.where(left, values, _FIELD_OUTSIDE_CLASS_MM)
         fields[f"right_{name}"] = np.where(left, _FIELD_OUTSIDE_CLASS_MM, values)
-    return np.stack([fields[name] for name in HUMAN_FIELDS])
+    return np.stack([fields[name] for name in HUMAN_FIELD_CLASSES])
 
 
-def dense_fields() -> tuple[Doubles, Doubles]:
+def dense_label_fields() -> tuple[Doubles, Doubles]:
     """Return points (n, 3) on the average human's outer skin, and their label fields (k, n) [mm].
 
-    The fields are the signed distances of `label_fields`, interpolated on a subdivided mesh.
+    The fields are the signed distances of `label_fields` at the points of a subdivided mesh.
     """
     head = AVERAGE_HUMAN.head(subdivide=_DENSE_SUBDIVISION_LEVELS)
     assert head.control.stencils is not None
     skin = np.unique(head.mesh.point[head.mesh.triangles[head.mesh.material == 0]])
     fields = head.control.stencils.points(label_fields().T.copy())[skin].T
-    outer = fields[HUMAN_FIELDS.index("mouth_interior")] < 0
+    outer = fields[HUMAN_FIELD_CLASSES.index("mouth_interior")] < 0
     return head.mesh.points_mm[skin][outer], fields[:, outer]
 
 
@@ -135,7 +135,7 @@ def _ear_field() -> Doubles:
     mesh = average_head().mesh
     around = quad_corners(mesh, np.arange(len(mesh.quads)))
     within = np.zeros(len(around))
-    within[part_quads()["ears"]] = 1.0
+    within[quads_of_parts()["ears"]] = 1.0
     count = len(average_head().positions_mm)
     quad_values = within, np.ones(len(around))
     ears, quads = (np.bincount(around.ravel(), np.repeat(values, 4), count) for values in quad_values)
@@ -145,7 +145,7 @@ def _ear_field() -> Doubles:
 def _brow_field(points: Doubles) -> Doubles:
     """Return the signed distance (p,) of points (p, 3) to the brow outlines, positive inside [mm].
 
-    It is measured in the front plane, as the smallest of the signed distances to four edges of the brow.
+    It is the smallest of the signed distances to the four edges of the brow, measured in x and y only.
     """
     x, y = np.abs(points[:, 0]), points[:, 1]
     low, high = (brows.brow_outline(side) for side in (-1.0, 1.0))
@@ -175,18 +175,18 @@ class MeshLabels(NamedTuple):
 def mesh_labels(head: Head) -> MeshLabels:
     """Return the label classes of a head; for parametric humans the result is cached by mesh topology."""
     if not is_human(head):
-        return _build_labels(head)
+        return _build_mesh_labels(head)
     digest = hashlib.blake2b(head.mesh.triangles.tobytes(), digest_size=16).digest()
     key = digest + bytes([head.strands is not None])
     with _LABEL_CACHE_LOCK:
         if key not in _LABEL_CACHE:
             while len(_LABEL_CACHE) >= _MAX_CACHED_TOPOLOGIES:
                 _LABEL_CACHE.pop(next(iter(_LABEL_CACHE)))
-            _LABEL_CACHE[key] = _build_labels(head)
+            _LABEL_CACHE[key] = _build_mesh_labels(head)
         return _LABEL_CACHE[key]
 
 
-def _build_labels(head: Head) -> MeshLabels:
+def _build_mesh_labels(head: Head) -> MeshLabels:
     material_classes = np.array([class_number(_material_class(one)) for one in head.mesh.materials], np.uint8)
     for material, side in zip(
         () if head.eyes is None else head.eyes.material, reversed(SIDE_NAMES), strict=False
@@ -202,21 +202,21 @@ def _build_labels(head: Head) -> MeshLabels:
 
 def _material_class(material: Material) -> str:
     """Return the name of the label class of a material; eyeballs are labelled separately."""
-    known = _PART_CLASSES.get(material.part or material.name)
+    known = _CLASS_OF_MATERIAL.get(material.part or material.name)
     return known or ("skin" if material.kind == "skin" else "other")
 
 
 def _iris_fields(head: Head) -> dict[str, Doubles]:
-    """Return for each iris class the signed distances (p,) of the head's points to the border of the iris.
+    """Return the signed distances (p,) of the head's points to the border of each iris [mm].
 
-    Distances are positive inside the iris, in mm of an eye of average size. Points outside the eyeball get a
-    large negative value.
+    The keys are the label classes of the two irises. Distances are positive inside the iris, and scaled as if
+    the eye had average size. Points outside the eyeball get -1.
     """
     if head.eyes is None:
         return {}
     mesh, points = head.mesh, head.mesh.points_mm
     fields = {}
-    frames = head.eyes.frames(head.control, head.control.rest)
+    frames = head.eyes.eye_matrices(head.control, head.control.rest)
     for frame, material, side in zip(frames, head.eyes.material, reversed(SIDE_NAMES), strict=False):
         eyeball_points = np.unique(mesh.point[mesh.triangles[mesh.material == material]])
         local = points[eyeball_points] @ frame[:3, :3].T + frame[:3, 3]
@@ -229,16 +229,17 @@ def _iris_fields(head: Head) -> dict[str, Doubles]:
 
 
 def _skin_fields(head: Head) -> dict[str, Doubles]:
-    """Return for each class of skin parts the signed distances (p,) of the head's points to its border [mm].
+    """Return the signed distances (p,) of the head's points to the borders of parts of the skin [mm].
 
-    Points that are not on the skin get a large negative value.
+    The keys are the label classes of these parts, such as lips, brows and ears. Points that are not on the
+    skin get -1.
     """
     mesh = head.mesh
     count = int(mesh.point.max()) + 1
     if is_human(head):
         stencils = head.control.stencils
         refined: Callable[[Doubles], Doubles] = stencils.points if stencils else lambda values: values
-        fields = dict(zip(HUMAN_FIELDS, refined(label_fields().T.copy()).T, strict=True))
+        fields = dict(zip(HUMAN_FIELD_CLASSES, refined(label_fields().T.copy()).T, strict=True))
     elif (landmarks := known_landmarks(head)) is not None:
         fields = _warped_fields(head, landmarks)
     else:
@@ -260,6 +261,6 @@ def _warped_fields(head: Head, landmarks: Mapping[str, tuple[float, float, float
     from scipy.spatial import cKDTree
 
     points = head.mesh.points_mm
-    average, values = dense_fields()
+    average, values = dense_label_fields()
     _, near = cKDTree(average).query(warp_to_average(head, landmarks, points))
-    return {name: values[k][near] for k, name in enumerate(HUMAN_FIELDS) if not name.endswith("_eye")}
+    return {name: values[k][near] for k, name in enumerate(HUMAN_FIELD_CLASSES) if not name.endswith("_eye")}

@@ -20,7 +20,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
 _MAX_LANDMARKS = 10_000
-_EXPECTED_CONTENT = "landmarks in CSV: rows of name,vertex"
+_EXPECTED_TABLE_FORMAT = "landmarks in CSV: rows of name,vertex"
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +42,8 @@ class LandmarkPoints:
 def landmark_points(head: Head, set_or_table: str) -> LandmarkPoints:
     """Return the landmarks of a head, from a published set or from a table of vertices.
 
-    set_or_table : one of `LANDMARK_SETS`, or a CSV file with columns name,vertex, where vertex is an index
-        into `Head.positions_mm`
+    set_or_table : one of `LANDMARK_SETS`, or a CSV file with the columns name and vertex; a vertex is an
+        index into `Head.positions_mm`
 
     Raises DermisError for a published set if the head is not a parametric human, and for tables that cannot
     be read.
@@ -74,8 +74,8 @@ def read_landmark_table(table_path: str) -> list[tuple[str, int]]:
 
     Raises DermisError for tables that cannot be read.
     """
-    text = read_text(check_landmarks(table_path), _EXPECTED_CONTENT)
-    with parsing(table_path, _EXPECTED_CONTENT, KeyError, TypeError, csv.Error):
+    text = read_text(check_landmarks(table_path), _EXPECTED_TABLE_FORMAT)
+    with parsing(table_path, _EXPECTED_TABLE_FORMAT, KeyError, TypeError, csv.Error):
         found = [(str(row["name"]), int(row["vertex"])) for row in parse_rows(text)]
     if not 0 < len(found) <= _MAX_LANDMARKS:
         refuse(table_path, f"1 to {_MAX_LANDMARKS} landmarks", f"got {len(found)}", "Correct the table")

@@ -94,25 +94,25 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE_NAM
 
 
 def _region_map(
-    atlas: Atlas, points: NDArray[np.float64], region_values: NDArray[np.float64], own_map: Floats | None
+    atlas: Atlas, points: NDArray[np.float64], region_values: NDArray[np.float64], existing_map: Floats | None
 ) -> Floats:
-    """Return a map (h, w) of a regional quantity, multiplied by the fine detail of an existing map.
+    """Return a map (h, w) of roughness or specular strength, with the fine detail of an existing map.
 
     points : (n, 3) positions of the covered texels of the atlas [mm]
-    region_values : (n,) quantity at these texels, smoothed across region borders
-    own_map : (h, w) existing map of the quantity, or None
+    region_values : (n,) roughness or specular strength at these texels, smoothed across region borders
+    existing_map : (h, w) existing map of the same quantity, or None
     """
-    if own_map is None:
+    if existing_map is None:
         return _texel_image(atlas, region_values)
     y, x = np.nonzero(atlas.coverage)
-    height, width = own_map.shape
-    values = own_map[y * height // MIN_MAP_SIDE, x * width // MIN_MAP_SIDE].astype(np.float64)
+    height, width = existing_map.shape
+    values = existing_map[y * height // MIN_MAP_SIDE, x * width // MIN_MAP_SIDE].astype(np.float64)
     local_mean = gaussian_mean(points, values[:, None], _DETAIL_BLUR_MM)[:, 0]
     local_mean = np.maximum(local_mean, _MIN_RELATIVE_LOCAL_MEAN * values.mean())
     local_mean = np.maximum(local_mean, np.finfo(np.float32).eps)
     shape = max(height, MIN_MAP_SIDE), max(width, MIN_MAP_SIDE)
     detail = np.minimum(
-        _resize_map(own_map, shape) / _resize_map(_texel_image(atlas, local_mean), shape),
+        _resize_map(existing_map, shape) / _resize_map(_texel_image(atlas, local_mean), shape),
         _MAX_RELATIVE_DETAIL,
     )
     return np.asarray(detail * _resize_map(_texel_image(atlas, region_values), shape))
@@ -128,20 +128,22 @@ def _texel_image(atlas: Atlas, texel_values: NDArray[np.float64]) -> Floats:
     return np.asarray(image[y, x])
 
 
-def _resize_map(picture: Floats, map_shape: tuple[int, int]) -> Floats:
+def _resize_map(region_map: Floats, map_shape: tuple[int, int]) -> Floats:
     from scipy.ndimage import zoom
 
-    if picture.shape == map_shape:
-        return picture
-    factors = map_shape[0] / picture.shape[0], map_shape[1] / picture.shape[1]
-    return np.asarray(zoom(picture, factors, order=1, mode="nearest", grid_mode=True), np.float32)
+    if region_map.shape == map_shape:
+        return region_map
+    factors = map_shape[0] / region_map.shape[0], map_shape[1] / region_map.shape[1]
+    return np.asarray(zoom(region_map, factors, order=1, mode="nearest", grid_mode=True), np.float32)
 
 
 def gaussian_mean(points: Doubles, point_values: Doubles, sigma_mm: float) -> Doubles:
-    """Blur values on a surface with a Gaussian in 3D, which ignores seams of the uv layout; return (n, c).
+    """Return values (n, c) at points of a surface, blurred with a Gaussian in 3D.
 
-    points : (n, 3) positions of the samples [mm]
-    point_values : (n, c) values of the samples
+    Distances in space are used, so that seams of the uv layout have no effect.
+
+    points : (n, 3) positions of the points [mm]
+    point_values : (n, c) values at the points
     sigma_mm : standard deviation of the Gaussian [mm]
     """
     from scipy.ndimage import gaussian_filter, map_coordinates
@@ -176,12 +178,14 @@ def with_default_regions(head: Head) -> Head:
     missing = ["roughness"] if head.maps.specular is not None else ["roughness", "specular"]
     sources: list[Array] = [head.mesh.positions, head.mesh.uv, head.mesh.triangles, table.values]
 
-    def make() -> Arrays:
+    def make_region_maps() -> Arrays:
         maps = with_regions(replace(head, maps=Maps()), table)[0].maps
         return {name: np.asarray(getattr(maps, name), np.float32) for name in missing}
 
     try:
-        arrays = cached_arrays(sources, f"regions {_CACHE_VERSION} {MIN_MAP_SIDE} {head.name}", missing, make)
+        arrays = cached_arrays(
+            sources, f"regions {_CACHE_VERSION} {MIN_MAP_SIDE} {head.name}", missing, make_region_maps
+        )
     except DermisError:  # a different head with the name of a known one
         return head
     changed: dict[str, Any] = dict(arrays)

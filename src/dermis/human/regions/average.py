@@ -52,7 +52,7 @@ def average_skin() -> DenseSkin:
     head = _bare_head(_DENSE_SUBDIVISION_LEVELS)
     mesh = head.mesh
     quad_index = control_quads(head, np.arange(len(mesh.triangles)))
-    is_outer = (mesh.material == 0) & ~np.isin(quad_index, part_quads()["mouth"])
+    is_outer = (mesh.material == 0) & ~np.isin(quad_index, quads_of_parts()["mouth"])
     centroids = mesh.positions[mesh.triangles[is_outer]].astype(np.float64).mean(axis=1)
     return DenseSkin(quad_index[is_outer], cKDTree(centroids))
 
@@ -120,7 +120,7 @@ def classify_surface(points: Doubles, quad_index: NDArray[np.int64]) -> NDArray[
     points : (n, 3) positions [mm]
     quad_index : (n,) index of the nearest control quad
     """
-    parts, mesh = part_quads(), average_head().mesh
+    parts, mesh = quads_of_parts(), average_head().mesh
     mouth_materials = [k for k, one in enumerate(mesh.materials) if one.name in _MOUTH_MATERIALS]
     mouth = np.isin(mesh.material[2 * quad_index], mouth_materials)
     lips = np.isin(quad_index, np.concatenate([parts["lips"], parts["mouth"]])) | mouth
@@ -128,7 +128,7 @@ def classify_surface(points: Doubles, quad_index: NDArray[np.int64]) -> NDArray[
 
 
 @cache
-def part_quads() -> Mapping[str, NDArray[np.int64]]:
+def quads_of_parts() -> Mapping[str, NDArray[np.int64]]:
     """Return a dictionary from part (lips, ears, inside of the mouth) to the indices of its control quads."""
     runs_by_part: dict[str, list[NDArray[np.int64]]] = {}
     for row in read_rows(__package__, "parts"):

@@ -50,7 +50,7 @@ _NECK_NOTCH_YZ_MM = -195.0, -42.0  # notch between the collar bones, at the base
 DEFAULT_TABLE_NAME = "default"
 """Name of the package's table, which has artist's values."""
 REGION_VALUE_LIMITS = {"m": (0.05, 1.0), "rho_s": (0.0, 1.0)}
-_FILE_KEYS = ("landmarks", "labels")
+_KEYS_WITH_FILE_NAMES = ("landmarks", "labels")
 
 
 def nose_distance_mm(points: Doubles) -> Doubles:
@@ -65,9 +65,10 @@ def nose_distance_mm(points: Doubles) -> Doubles:
 
 
 def neck_distance_mm(points: Doubles) -> Doubles:
-    """Return the vertical distances (n,) of points from the line between jaw and skull [mm].
+    """Return the vertical distances (n,) of points from the border between head and neck [mm].
 
-    The distance is positive below the line, on the neck, and negative above the line, on the head.
+    Seen from the side, the border rises from the jaw to the back of the skull. The distance is positive below
+    the border, on the neck, and negative on the head.
 
     points : (n, 3) positions on the average human [mm]
     """
@@ -113,7 +114,7 @@ def classify_regions(points: Doubles, on_lips: Mask, on_ears: Mask) -> NDArray[n
 
 
 def _brow_mask(x: Doubles, y: Doubles) -> Mask:
-    """Return a mask (n,) of points inside the brows, from their coordinates in the front plane [mm]."""
+    """Return a mask (n,) of points inside the brows, from their x and y on the average person [mm]."""
     middle = 20.5 - ((x - 33) / 10) ** 2 * 1.2
     inside = np.abs(y - middle) < 5.5 - 0.06 * np.maximum(x - 20, 0)
     return np.asarray(inside & (x > 9) & (x < 55))
@@ -146,7 +147,9 @@ def load_region_table(name_or_path: str | Path) -> RegionTable:
 
 def _build_table(region_entries: dict[str, Any], path: Path) -> RegionTable:
     files = {
-        key: _file_path(path, key, region_entries.pop(key)) for key in _FILE_KEYS if key in region_entries
+        key: _file_path(path, key, region_entries.pop(key))
+        for key in _KEYS_WITH_FILE_NAMES
+        if key in region_entries
     }
     if set(region_entries) != set(REGIONS):
         wrong = sorted(set(region_entries) - set(REGIONS)) or sorted(set(REGIONS) - set(region_entries))

@@ -1,4 +1,4 @@
-"""Tables of skin colours as functions of melanin and blood, cached for each set of other pigments."""
+"""Cached tables of skin colours as functions of melanin and blood."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _COLOUR_TABLE_LOCK = Lock()  # two threads may request the same table
 
 
 def skin_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
-    """Return the table of skin colours as a function of melanin and blood fraction; tables are cached."""
+    """Return a table of skin colours over melanin and blood, for fixed values of the other parameters."""
     with _COLOUR_TABLE_LOCK:
         return _cached_colour_table(eumelanin, oxygen, epidermis_mm)
 

@@ -29,11 +29,11 @@ MOVEMENTS = (
 """Facial movements: first those that deepen folds, see folds.csv, then those that move blood."""
 FOLD_MOVEMENT_COUNT = MOVEMENTS.index("flush")
 """Number of movements that deepen folds."""
-_TABLE_AMOUNTS = (
+_AMOUNTS_IN_CSV = (
     "blood", "melanin", "strength", "roughness", "pores", "furrows",
     "sun", "level", "around", "hair", "beard", "veins", "flush",
 )  # fmt: skip
-ZONE_AMOUNTS = (*_TABLE_AMOUNTS, "oxygen", "_unused", "_unused_too")
+ZONE_AMOUNTS = (*_AMOUNTS_IN_CSV, "oxygen", "_unused", "_unused_too")
 """Quantities that zones change, see zones.csv; their number is a multiple of four."""
 _REFERENCE_SITE = "cheek"
 HAIRLINE_STEP_DEGREES = 2
@@ -66,35 +66,37 @@ def _movement_matrix(target_names: tuple[str, ...]) -> Floats:
 
 
 @lru_cache(maxsize=_MAX_CACHED_TABLES)
-def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> Floats:
+def zone_table(recession: float = 0.0, site_differences: SiteDifferences | None = None) -> Floats:
     """Return the Gaussian zones of the face as rows (k, 24) for the paint shader.
 
     The columns are the centre (3) [mm], a zero, the inverse radii (3) [1/mm], a zero, and the sixteen
     `ZONE_AMOUNTS`.
 
     recession : recession of the hair, 0 to 1, see `SkinLook`; it thins the hair at the crown
-    sites : differences in pigments between sites of the face and the cheek; None for no differences
+    site_differences : differences in pigments between sites of the face and the cheek; None for none
     """
     rows = read_rows(__package__, "zones")
     for row in rows:
         if row["zone"] == _CROWN_ZONE:
             row["hair"] = str(recession * float(row["hair"]))
-    columns = "x y z", "rx ry rz", " ".join(_TABLE_AMOUNTS)
+    columns = "x y z", "rx ry rz", " ".join(_AMOUNTS_IN_CSV)
     centres, radii, amounts = (float_columns(rows, names) for names in columns)
-    amounts = np.hstack([amounts, np.zeros((len(rows), len(ZONE_AMOUNTS) - len(_TABLE_AMOUNTS)))])
-    if sites is not None:
+    amounts = np.hstack([amounts, np.zeros((len(rows), len(ZONE_AMOUNTS) - len(_AMOUNTS_IN_CSV)))])
+    if site_differences is not None:
         pigment_columns = [ZONE_AMOUNTS.index(name) for name in ("melanin", "blood", "oxygen")]
-        amounts[:, pigment_columns] += _site_amounts() @ np.vstack([np.zeros(3), sites.array()])
+        amounts[:, pigment_columns] += _zone_amounts_of_sites() @ np.vstack(
+            [np.zeros(3), site_differences.as_array()]
+        )
     zero = np.zeros((len(rows), 1))
     return np.hstack([centres, zero, 1.0 / radii, zero, amounts]).astype(np.float32)
 
 
 @cache
-def _site_amounts() -> NDArray[np.float64]:
-    """Return the amounts (k, 7) that k overlapping zones need for a change of pigment at only one site.
+def _zone_amounts_of_sites() -> NDArray[np.float64]:
+    """Return amounts (k, 7) of k overlapping zones that change a pigment at only one site of the face.
 
-    Each column is for one of seven sites: first the cheek, then `FACE_SITES`. With its amounts, the sum of
-    all zones is 1 at this site and 0 at the other six.
+    Each column is for one of seven sites: first the cheek, then `FACE_SITES`. If the zones have the amounts
+    in a column, their sum is 1 at this site and 0 at the other six.
     """
     zones, names = read_rows(__package__, "zones"), (_REFERENCE_SITE, *FACE_SITES)
     places = {row["site"]: row for row in read_rows(__package__, "sites")}
@@ -155,11 +157,8 @@ def fold_curves() -> Folds:
 
 
 @cache
-def table_sizes() -> dict[str, int]:
-    """Return the number of zones, folds, fold knots and hairline samples, for use as shader constants.
-
-    The sizes are found without computing splines, because that would import SciPy, which is slow.
-    """
+def paint_table_sizes() -> dict[str, int]:
+    """Return the number of zones, folds, fold knots and hairline samples, for use as shader constants."""
     lengths = Counter(row["fold"] for row in read_rows(__package__, "folds")).values()
     knots = sum(map(_spline_sample_count, lengths))
     return {

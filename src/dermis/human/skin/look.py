@@ -147,12 +147,12 @@ class Demographics(NamedTuple):
     skin_groups: Mapping[str, float]
     ita: float | None = None
 
-    def weighted_mean(self, value_of_ancestry: dict[str, float]) -> float:
-        """Return the mean of one value per ancestry, weighted by the ancestry fractions of the shape."""
+    def shape_weighted_mean(self, value_of_ancestry: dict[str, float]) -> float:
+        """Return the mean of one value per ancestry, weighted by the fractions that determine the shape."""
         return _weighted_mean((self.african, self.asian, self.caucasian), value_of_ancestry)
 
-    def pigmented_mean(self, value_of_ancestry: dict[str, float]) -> float:
-        """Return the mean of one value per ancestry, weighted by the ancestry fractions of the skin."""
+    def skin_weighted_mean(self, value_of_ancestry: dict[str, float]) -> float:
+        """Return the mean of one value per ancestry, weighted by the fractions that determine the skin."""
         return _weighted_mean(pigment_ancestry(self.skin_groups), value_of_ancestry)
 
 
@@ -166,34 +166,38 @@ def typical_skin(demographics: Demographics) -> SkinLook:
 
     Source: [Lu2025] for the pigments.
     """
-    return _typical_look(demographics, *typical_pigments(*_pigment_arguments(demographics)))
+    return _typical_skin_look(demographics, *typical_pigments(*_typical_pigment_arguments(demographics)))
 
 
-def _typical_look(demographics: Demographics, pigments: MeasuredPigments, sites: SiteDifferences) -> SkinLook:
+def _typical_skin_look(
+    demographics: Demographics, pigments: MeasuredPigments, site_differences: SiteDifferences
+) -> SkinLook:
     """Return the typical look of a person with measured pigments."""
     old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
     spot_progress = max(demographics.age - _AGE_SPOTS_FROM_YEARS, 0.0) / (OLD_AGE - _AGE_SPOTS_FROM_YEARS)
     return SkinLook(
         **pigments._asdict(),
-        freckles=demographics.pigmented_mean(_TYPICAL_FRECKLES),
+        freckles=demographics.skin_weighted_mean(_TYPICAL_FRECKLES),
         moles=0.3,
         spots=0.7 * spot_progress * (0.4 + 0.6 * pigment_ancestry(demographics.skin_groups)[2]),
         veins=0.2 + 0.5 * old,
         beard=0.45 * max(2.0 * demographics.sex - 1.0, 0.0),
         oil=0.45 - 0.25 * old,
         age=0.04 + (_MAX_AGE_FOLDS - 0.04) * old**1.5,
-        sites=sites,
+        sites=site_differences,
     )
 
 
-def _pigment_arguments(demographics: Demographics) -> tuple[Mapping[str, float], float, float, float | None]:
+def _typical_pigment_arguments(
+    demographics: Demographics,
+) -> tuple[Mapping[str, float], float, float, float | None]:
     return demographics.skin_groups, demographics.sex, demographics.age, demographics.ita
 
 
 def typical_eyes(demographics: Demographics) -> EyeLook:
     """Return the typical eye look: brown irises, lighter for a larger fraction of European ancestry."""
     redness = 0.15 + 0.2 * (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
-    return EyeLook(eumelanin=demographics.pigmented_mean(_TYPICAL_IRIS_EUMELANIN), redness=redness)
+    return EyeLook(eumelanin=demographics.skin_weighted_mean(_TYPICAL_IRIS_EUMELANIN), redness=redness)
 
 
 def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook:
@@ -210,12 +214,10 @@ def sample_skin(
 ) -> SkinLook:
     """Return a random skin look of a person; pigments and site differences are distributed as measured.
 
-    The order of random draws does not depend on the person.
-
     Source: [Lu2025] for the pigments.
     """
-    pigments, sites = sample_pigments(pigment_rng, *_pigment_arguments(demographics))
-    typical = _typical_look(demographics, pigments, sites)
+    pigments, sites = sample_pigments(pigment_rng, *_typical_pigment_arguments(demographics))
+    typical = _typical_skin_look(demographics, pigments, sites)
     n = rng.normal(size=8)
     freckled = float(rng.beta(0.4, 3.0)) * (1.0 - min(typical.melanin / 0.1, 1.0))
     seed = int(rng.integers(2**31))

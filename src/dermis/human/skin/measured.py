@@ -68,8 +68,8 @@ _ITA_HALF_WIDTH_DEGREES = 1.0
 _MAX_NORMAL_SCORE = 2.9  # largest absolute normal score of an ITA
 # Numbers of melanin fractions, of bisections between two of them, and of changes of the other pigments:
 _MELANIN_NODE_COUNT, _BISECTION_COUNT, _MAX_ITA_STEPS = 257, 40, 15
-Weights = Mapping[str, float]
-"""Weights of groups, with a sum of 1."""
+GroupWeights = Mapping[str, float]
+"""Weights of groups of people, with a sum of 1."""
 
 
 class MeasuredPigments(NamedTuple):
@@ -94,7 +94,7 @@ class SiteDifferences:
     Parameters
     ----------
     cheekbone, forehead, chin, nose_tip, ear_lobe, neck : tuple of float
-        Three differences, site minus cheek: melanin [doublings], blood [doublings], oxygen saturation [-].
+        Three differences, site minus cheek, of log2 of melanin, log2 of blood, and oxygen saturation [-].
 
     Examples
     --------
@@ -124,7 +124,7 @@ class SiteDifferences:
             )
             object.__setattr__(self, one.name, checked)
 
-    def array(self) -> Doubles:
+    def as_array(self) -> Doubles:
         """Return the differences as an array (6, 3) in the order of `FACE_SITES`."""
         return np.array([getattr(self, name) for name in FACE_SITES], np.float64)
 
@@ -132,13 +132,11 @@ class SiteDifferences:
 class _Group(NamedTuple):
     """Distribution of the pigments in one group of people.
 
-    The four variables are those of `MeasuredTable`.
-
-    quantiles : (4, k) quantiles of the four variables
-    ita : (k,) quantiles of the ITA [degrees]
-    correlation : (5, 5) correlation of the normal scores of the four variables and of the ITA
-    sites : (12, 3) differences between each site and the cheek: melanin [doublings], blood [doublings] and
-        oxygen [-]
+    quantiles : (4, k) quantiles of the four variables of the cheek that `MeasuredTable` lists
+    ita : (k,) quantiles of the individual typology angle (ITA) [degrees]
+    correlation : (5, 5) correlation of the normal scores of these four variables and of the ITA
+    sites : (12, 3) differences between each site and the cheek in log2 of melanin, log2 of blood, and oxygen
+        [-]
     """
 
     quantiles: Doubles
@@ -157,10 +155,10 @@ class MeasuredTable(NamedTuple):
     groups : mapping from group name to distribution
     sex, age : (4,) changes of the variables from female to male, and from young to old
     mean_age_term : mean of `age_term` over the ages that `Human.drawn` samples
-    site_slope : (12, 2) change of each site's difference in melanin per doubling of the cheek's melanin, and
-        the same for blood [-]
-    site_spread : (12, 2) standard deviations of the differences in melanin and in blood between people
-        [doublings]
+    site_slope : (12, 2) change of each site's difference in log2 of melanin per change of the cheek's log2 of
+        melanin, and the same for blood [-]
+    site_spread : (12, 2) standard deviations between people of each site's differences in log2 of melanin and
+        in log2 of blood [-]
     """
 
     probabilities: Doubles
@@ -171,53 +169,54 @@ class MeasuredTable(NamedTuple):
     site_slope: Doubles
     site_spread: Doubles
 
-    def group_mean(self, field_name: str, weights: Weights) -> Doubles:
+    def group_mean(self, field_name: str, weight_of_group: GroupWeights) -> Doubles:
         """Return a field of `_Group`, averaged over a mixture of groups.
 
         field_name : name of the field
-        weights : weight of each group in the mixture
+        weight_of_group : weight of each group in the mixture
         """
         parts = [
-            weight * np.asarray(getattr(self.groups[one], field_name)) for one, weight in weights.items()
+            weight * np.asarray(getattr(self.groups[one], field_name))
+            for one, weight in weight_of_group.items()
         ]
         return np.asarray(np.sum(parts, axis=0))
 
     def cheek_variables(
-        self, weights: Weights, sex: ArrayLike, age: ArrayLike, normal_scores: Doubles
+        self, weight_of_group: GroupWeights, sex: ArrayLike, age: ArrayLike, normal_scores: Doubles
     ) -> Doubles:
-        """Return the four variables (n, 4) of n people from a mixture of groups.
+        """Return the variables (n, 4) that describe the cheeks of n people, in the order of `MeasuredTable`.
 
-        weights : weight of each group in the mixture
+        weight_of_group : weight of each group in the mixture
         sex, age : (n,) sex and age of each person, or one number for all
         normal_scores : (n, 4) standard normal scores of the variables of each person, correlated as measured
         """
         from scipy.special import ndtri
 
-        nodes, quantiles = ndtri(self.probabilities), self.group_mean("quantiles", weights)
+        nodes, quantiles = ndtri(self.probabilities), self.group_mean("quantiles", weight_of_group)
         values = np.column_stack([np.interp(normal_scores[:, k], nodes, quantiles[k]) for k in range(4)])
         sexes, terms = np.asarray(sex, np.float64) - 0.5, age_term(age) - self.mean_age_term
         return np.asarray(values + sexes[..., None] * self.sex + terms[..., None] * self.age)
 
     def site_differences(
-        self, weights: Weights, cheek_variables: Doubles, normal_samples: Doubles
+        self, weight_of_group: GroupWeights, cheek_variables: Doubles, normal_samples: Doubles
     ) -> Doubles:
         """Return the differences (n, 12, 3) between all sites and the cheek.
 
-        The differences are in melanin [doublings], blood [doublings] and oxygen [-].
+        The differences are in log2 of melanin, log2 of blood, and oxygen [-].
 
-        weights : weight of each group in the mixture
-        cheek_variables : (n, 4) variables of the cheek
+        weight_of_group : weight of each group in the mixture
+        cheek_variables : (n, 4) result of the method `cheek_variables`
         normal_samples : (n, 12, 2) independent samples of the standard normal distribution, zeros for typical
             people
         """
-        middle = self.group_mean("quantiles", weights)[:2, len(self.probabilities) // 2]
+        middle = self.group_mean("quantiles", weight_of_group)[:2, len(self.probabilities) // 2]
         deviation = np.clip(
             cheek_variables[:, None, :2] - middle,
             -_MAX_CHEEK_DEVIATION_DOUBLINGS,
             _MAX_CHEEK_DEVIATION_DOUBLINGS,
         )
         found = np.broadcast_to(
-            self.group_mean("sites", weights), (len(cheek_variables), len(SITES), 3)
+            self.group_mean("sites", weight_of_group), (len(cheek_variables), len(SITES), 3)
         ).copy()
         found[:, :, :2] += self.site_slope * deviation + self.site_spread * normal_samples
         return found
@@ -225,22 +224,25 @@ class MeasuredTable(NamedTuple):
 
 @cache
 def measured_table() -> MeasuredTable:
-    """Return the package's table of measured people."""
+    """Return the distributions of the pigments of measured people, read from the package's file."""
     text = resources.files("dermis.human").joinpath("data", "measured.json").read_text("utf-8")
-    return parse_table(json.loads(text))
+    return parse_measured_table(json.loads(text))
 
 
-def parse_table(document: Mapping[str, Any]) -> MeasuredTable:
-    """Return the table of measured people from its JSON object."""
+def parse_measured_table(json_object: Mapping[str, Any]) -> MeasuredTable:
+    """Return the distributions of the pigments of measured people from a JSON object.
+
+    json_object : content of measured.json
+    """
     groups = {
         name: _Group(*(np.array(one[field], np.float64) for field in _Group._fields))
-        for name, one in document["groups"].items()
+        for name, one in json_object["groups"].items()
     }
     arrays = {
-        name: np.array(document[name], np.float64)
+        name: np.array(json_object[name], np.float64)
         for name in ("probabilities", "sex", "age", "site_slope", "site_spread")
     }
-    return MeasuredTable(groups=groups, mean_age_term=float(document["mean_age_term"]), **arrays)
+    return MeasuredTable(groups=groups, mean_age_term=float(json_object["mean_age_term"]), **arrays)
 
 
 def age_term(age: ArrayLike) -> Doubles:
@@ -273,17 +275,19 @@ def _split_union_weight(union_name: str, weight: float) -> dict[str, float]:
     return {one: weight / len(members) for one in members}
 
 
-def pigment_ancestry(weights: Weights) -> tuple[float, float, float]:
+def pigment_ancestry(weight_of_group: GroupWeights) -> tuple[float, float, float]:
     """Return the African, Asian and European fractions that determine pigments of hair and eyes."""
-    african = weights.get("african", 0.0)
-    european = sum(weight * _EUROPEAN_FRACTION_OF_GROUP.get(name, 0.0) for name, weight in weights.items())
+    african = weight_of_group.get("african", 0.0)
+    european = sum(
+        weight * _EUROPEAN_FRACTION_OF_GROUP.get(name, 0.0) for name, weight in weight_of_group.items()
+    )
     return african, 1.0 - african - european, european
 
 
 def group_probabilities(ita: float) -> dict[str, float]:
     """Return a dictionary from group to the probability that a person with an ITA belongs to the group.
 
-    All groups are taken as equally common.
+    The groups are assumed to be equally common.
 
     ita : individual typology angle [degrees]
     """
@@ -299,31 +303,29 @@ def group_probabilities(ita: float) -> dict[str, float]:
 
 
 def typical_pigments(
-    weights: Weights, sex: float, age: float, ita: float | None = None
+    weight_of_group: GroupWeights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
     """Return the median pigments and site differences for a sex, an age and, optionally, an ITA.
 
-    weights : weight of each measured group
+    weight_of_group : weight of each measured group
     """
-    return _pigments_and_sites(weights, sex, age, ita, np.zeros(4), None)
+    return _pigments_and_sites(weight_of_group, sex, age, ita, np.zeros(4), None)
 
 
 def sample_pigments(
-    rng: np.random.Generator, weights: Weights, sex: float, age: float, ita: float | None = None
+    rng: np.random.Generator, weight_of_group: GroupWeights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
     """Return random pigments and site differences of a person; pigments are correlated as measured.
 
-    The number of random draws does not depend on the arguments.
-
-    weights : weight of each measured group
+    weight_of_group : weight of each measured group
     """
     return _pigments_and_sites(
-        weights, sex, age, ita, rng.standard_normal(4), rng.standard_normal((len(SITES), 2))
+        weight_of_group, sex, age, ita, rng.standard_normal(4), rng.standard_normal((len(SITES), 2))
     )
 
 
 def _pigments_and_sites(
-    weights: Weights,
+    weight_of_group: GroupWeights,
     sex: float,
     age: float,
     ita: float | None,
@@ -336,13 +338,13 @@ def _pigments_and_sites(
     site_normal_samples : (12, 2) independent samples of the same distribution; None for a typical person
     """
     table = measured_table()
-    correlation = table.group_mean("correlation", weights)
+    correlation = table.group_mean("correlation", weight_of_group)
     covariance, mean = correlation[:4, :4], np.zeros(4)
     if ita is not None:
         slope = correlation[:4, 4]
-        mean, covariance = slope * _ita_score(ita, weights), covariance - np.outer(slope, slope)
+        mean, covariance = slope * _ita_score(ita, weight_of_group), covariance - np.outer(slope, slope)
     scores = mean + symmetric_square_root(covariance) @ normal_samples
-    variables = table.cheek_variables(weights, sex, age, scores[None])
+    variables = table.cheek_variables(weight_of_group, sex, age, scores[None])
     pigments = _clipped_pigments(variables[0])
     if ita is not None:
         pigments = with_ita(pigments, ita)
@@ -351,8 +353,12 @@ def _pigments_and_sites(
     samples_or_zeros = (
         np.zeros((1, len(SITES), 2)) if site_normal_samples is None else site_normal_samples[None]
     )
-    middle = variables if not typical or ita is not None else np.tile(_median_variables(weights), (1, 1))
-    sites = table.site_differences(weights, middle, samples_or_zeros)[0]
+    middle = (
+        variables
+        if not typical or ita is not None
+        else np.tile(_median_cheek_variables(weight_of_group), (1, 1))
+    )
+    sites = table.site_differences(weight_of_group, middle, samples_or_zeros)[0]
     oxygen = variables[0, 2] + sites[:, 2]  # may exceed 1, where skin is redder than the model allows
     sites[:, 2] = np.clip(oxygen, 0.0, 1.0) - pigments.oxygen
     names = [name.replace(" ", "_") for name in SITES]
@@ -360,9 +366,9 @@ def _pigments_and_sites(
     return pigments, SiteDifferences(**rows)
 
 
-def _median_variables(weights: Weights) -> Doubles:
+def _median_cheek_variables(weight_of_group: GroupWeights) -> Doubles:
     table = measured_table()
-    return table.group_mean("quantiles", weights)[:, len(table.probabilities) // 2]
+    return table.group_mean("quantiles", weight_of_group)[:, len(table.probabilities) // 2]
 
 
 def _clipped_pigments(pigment_values: Doubles) -> MeasuredPigments:
@@ -408,9 +414,9 @@ def with_ita(
     return pigments._replace(melanin=float(np.exp(0.5 * (low + high))))
 
 
-def _ita_score(ita: float, weights: Weights) -> float:
+def _ita_score(ita: float, weight_of_group: GroupWeights) -> float:
     """Return the standard normal score of an ITA in a mixture of groups, limited to the range -2.9 to 2.9."""
-    quantiles = measured_table().group_mean("ita", weights)
+    quantiles = measured_table().group_mean("ita", weight_of_group)
     return float(np.clip(_ita_scores(np.array([ita]), quantiles)[0], -_MAX_NORMAL_SCORE, _MAX_NORMAL_SCORE))
 
 
@@ -453,7 +459,9 @@ class MeasuredCell(NamedTuple):
 
 @cache
 def measured_cells() -> tuple[MeasuredCell, ...]:
-    """Return the medians of measured skin for each group and site, in total and for each sex and age group.
+    """Return the medians of measured skin for each group of people and each site.
+
+    There is one entry for all people of a group, and one for each sex and age group.
 
     Source: [Lu2025].
     """

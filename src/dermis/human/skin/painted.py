@@ -1,4 +1,4 @@
-"""Skin maps that the device paints from a skin look, and mean colours of face and lips."""
+"""Skin maps that the GPU paints from a skin look, and mean colours of face and lips."""
 
 from __future__ import annotations
 
@@ -26,29 +26,31 @@ def mean_colour(look: SkinLook) -> NDArray[np.float64]:
     return np.asarray(table.lookup(np.array([look.melanin]), np.array([look.blood]))[0])
 
 
-def oxygen_range(look: SkinLook) -> tuple[float, float]:
+def oxygen_range(skin_look: SkinLook) -> tuple[float, float]:
     """Return the lowest and the highest oxygen saturation of the skin of a head [-]."""
-    differences = look.sites.array()[:, 2]
+    differences = skin_look.sites.as_array()[:, 2]
     low, high = (
-        look.oxygen + float(one) for one in (min(differences.min(), 0.0), max(differences.max(), 0.0))
+        skin_look.oxygen + float(one) for one in (min(differences.min(), 0.0), max(differences.max(), 0.0))
     )
     low = min(max(low, 0.0), 1.0 - _MIN_OXYGEN_RANGE)
     return low, max(min(high, 1.0), low + _MIN_OXYGEN_RANGE)
 
 
-def painted_colour_tables(look: SkinLook) -> NDArray[np.float32]:
+def painted_colour_tables(skin_look: SkinLook) -> NDArray[np.float32]:
     """Return three colour tables (3, n, n, 3), indexed by pigment fractions as in `ColourTable`.
 
     The first two tables are for skin at the two ends of `oxygen_range`, the third table is for lips.
     """
-    lips = look.oxygen, LIP_THICKNESS_RATIO * look.epidermis_mm
-    kinds = *((oxygen, look.epidermis_mm) for oxygen in oxygen_range(look)), lips
-    return np.stack([skin_colour_table(look.eumelanin, *kind).colours for kind in kinds]).astype(np.float32)
+    lips = skin_look.oxygen, LIP_THICKNESS_RATIO * skin_look.epidermis_mm
+    kinds = *((oxygen, skin_look.epidermis_mm) for oxygen in oxygen_range(skin_look)), lips
+    return np.stack([skin_colour_table(skin_look.eumelanin, *kind).colours for kind in kinds]).astype(
+        np.float32
+    )
 
 
 @dataclass(frozen=True, repr=False)
 class PaintedMaps(Maps):
-    """Skin maps that the device paints from a skin look; a map that is not None replaces the painted map.
+    """Skin maps that the GPU paints from a skin look; a map that is not None replaces the painted map.
 
     look : pigments and texture of the skin
     """

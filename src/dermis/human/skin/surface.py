@@ -21,8 +21,8 @@ BORDER_FIELDS = ("lips", "mouth", "lids")
 """Signed distances to borders [mm]: of the lips, positive inside; of the mouth, negative inside; of the
 eyelids, negative on the side of the eye."""
 _STORED_UNIT_MM = 0.01
-_LID_DISTANCES_MM = -2.0, -0.6  # lid distances of the wall and edge columns of lid_rings.csv
-_CREST_LIMITS_MM = 0.15, 0.8  # limits of the lid distance in the crest column
+_WALL_AND_EDGE_LID_DISTANCES_MM = -2.0, -0.6  # lid distances of the wall and edge columns of lid_rings.csv
+_CREST_LID_DISTANCE_LIMITS_MM = 0.15, 0.8  # limits of the lid distance in the crest column
 
 
 @cache
@@ -33,8 +33,8 @@ def average_surface() -> tuple[Floats, Floats]:
     """
     points_mm, fields = _load_array("places"), _load_array("fields")
     rings = lid_rings()
-    fields[rings[..., :2], 2] = _LID_DISTANCES_MM
-    fields[rings[..., 2], 2] = fields[rings[..., 2], 2].clip(*_CREST_LIMITS_MM)
+    fields[rings[..., :2], 2] = _WALL_AND_EDGE_LID_DISTANCES_MM
+    fields[rings[..., 2], 2] = fields[rings[..., 2], 2].clip(*_CREST_LID_DISTANCE_LIMITS_MM)
     return points_mm, fields
 
 
@@ -75,7 +75,7 @@ class PaintedSurface:
     triangles: NDArray[np.uint32]
 
     @property
-    def count(self) -> int:
+    def triangle_count(self) -> int:
         """Return the number of triangles to draw."""
         return len(self.triangles)
 

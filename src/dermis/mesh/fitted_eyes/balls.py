@@ -11,7 +11,7 @@ from dermis.base.arrays import Doubles, Index
 from dermis.mesh.geometry import label_components, triangle_areas
 from dermis.mesh.mesh import Mesh
 
-RADIUS_RANGE_MM = 8.0, 20.0
+EYEBALL_RADIUS_RANGE_MM = 8.0, 20.0
 """Range of the radius of an eyeball, which is 12 mm in reality but varies between artists [mm]."""
 MAX_SPHERE_DEVIATION = 0.06
 """Largest deviation of most of an eyeball from a sphere, as a fraction of its radius."""
@@ -55,9 +55,9 @@ class _EyePiece:
         return float(self.area.sum() / (4 * np.pi * self.sphere.radius**2))
 
     @property
-    def fault(self) -> str:
-        """Return why this component is not an eyeball, such as "is a ball of ..."; empty for an eyeball."""
-        (low, high), (_, radius, deviation) = RADIUS_RANGE_MM, self.sphere
+    def rejection_reason(self) -> str:
+        """Return the reason why this component is not an eyeball; an empty string if it is one."""
+        (low, high), (_, radius, deviation) = EYEBALL_RADIUS_RANGE_MM, self.sphere
         if len(self.points) < _MIN_EYEBALL_POINTS:
             return f"has only {len(self.points)} points"
         if deviation > MAX_SPHERE_DEVIATION:
@@ -73,8 +73,8 @@ class _EyePiece:
 def find_eyeballs(mesh: Mesh) -> tuple[tuple[DetectedEyeball, DetectedEyeball] | None, str]:
     """Find the left and the right eyeball of a mesh.
 
-    Returns both eyeballs and an empty text, or None and the reason why there are not two. The reason is empty
-    if the file declares no eyes.
+    Returns both eyeballs and an empty string, or None and the reason why two eyeballs were not found. The
+    reason is an empty string if the file declares no eyes.
     """
     eye_triangles = np.flatnonzero(np.array([material.eye for material in mesh.materials])[mesh.material])
     if not len(eye_triangles):
@@ -83,14 +83,17 @@ def find_eyeballs(mesh: Mesh) -> tuple[tuple[DetectedEyeball, DetectedEyeball] |
     chosen: list[_EyePiece] = []
     for piece in pieces:
         nested = any(_distance_in_radii(piece.sphere.centre, one) < 1.0 for one in chosen)
-        if not piece.fault and not nested:
+        if not piece.rejection_reason and not nested:
             chosen.append(piece)
     if len(chosen) == 2:
         left, right = sorted(chosen, key=lambda piece: -float(piece.sphere.centre[0]))
         return _add_gaze(mesh, left, right, pieces), ""
     names = ", ".join(sorted({repr(one.name) for one in mesh.materials if one.eye}))
     count = f"{len(chosen)} ball{'s' * (len(chosen) > 1)} instead of two"
-    return None, f"eyes: {names} stay plain: {count if chosen else f'the largest piece {pieces[0].fault}'}"
+    return (
+        None,
+        f"eyes: {names} stay plain: {count if chosen else f'the largest piece {pieces[0].rejection_reason}'}",
+    )
 
 
 def _eye_pieces(mesh: Mesh, eye_triangles: Index) -> list[_EyePiece]:
@@ -119,22 +122,26 @@ def _distance_in_radii(points: Doubles, eye_piece: _EyePiece) -> Doubles:
 
 
 def _add_gaze(
-    mesh: Mesh, left: _EyePiece, right: _EyePiece, pieces: list[_EyePiece]
+    mesh: Mesh, left_sclera: _EyePiece, right_sclera: _EyePiece, eye_pieces: list[_EyePiece]
 ) -> tuple[DetectedEyeball, DetectedEyeball]:
     """Return the left and the right eyeball, with their gaze and the points of cornea and iris.
 
-    left, right : connected components that are the left and the right sclera
-    pieces : all connected components of the eyes; components inside a sclera belong to the same eyeball
+    left_sclera, right_sclera : connected components that are the left and the right sclera
+    eye_pieces : all connected components of the eyes; components inside a sclera belong to the same eyeball
     """
     positions = mesh.points_mm
-    centre = (left.sphere.centre + right.sphere.centre) / 2
-    ahead = np.cross(left.sphere.centre - right.sphere.centre, (0.0, 1.0, 0.0))
+    centre = (left_sclera.sphere.centre + right_sclera.sphere.centre) / 2
+    ahead = np.cross(left_sclera.sphere.centre - right_sclera.sphere.centre, (0.0, 1.0, 0.0))
     ahead /= np.linalg.norm(ahead)
     balls = []
-    for ball in (left, right):
-        farthest = [0.0 if p is ball else _distance_in_radii(positions[p.points], ball).max() for p in pieces]
+    for ball in (left_sclera, right_sclera):
+        farthest = [
+            0.0 if p is ball else _distance_in_radii(positions[p.points], ball).max() for p in eye_pieces
+        ]
         parts = [
-            piece for piece, radii in zip(pieces, farthest, strict=True) if radii < _MAX_PART_DISTANCE_RADII
+            piece
+            for piece, radii in zip(eye_pieces, farthest, strict=True)
+            if radii < _MAX_PART_DISTANCE_RADII
         ]
         points, area = (np.concatenate([getattr(p, name) for p in parts]) for name in ("points", "area"))
         axis = corneal_axis(positions[points], area, ball.sphere, ahead)
@@ -146,8 +153,10 @@ def _add_gaze(
 class Sphere(NamedTuple):
     """Sphere fitted to points.
 
-    centre, radius : (3,) centre and radius of the sphere [mm]
-    deviation : distance from the sphere within which 85 % of the surface lies, divided by the radius [-]
+    centre : (3,) centre [mm]
+    radius : radius [mm]
+    deviation : distance from the sphere within which 85 % of the fitted surface lies, divided by the radius
+        of the sphere [-]
     """
 
     centre: Doubles

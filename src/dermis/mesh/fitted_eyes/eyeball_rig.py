@@ -40,11 +40,11 @@ def with_eyeballs(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> Rig:
     first = len(rig.positions_mm) + np.cumsum([0, *(len(one.points) for one in eyeballs)])
     rotations, targets, followers = list(rig.bone_rotations), rig.targets, list(rig.rigid_followers)
     for eyeball, bone, begin in zip(eyeballs, bones, first, strict=False):
-        origin = np.array(skeleton.origin_mm[bone])
-        own, shifts = _rigid_targets(rig, eyeball, skeleton.names[bone], origin)
+        origin = np.array(skeleton.joint_positions_mm[bone])
+        own, shifts = _rigid_target_motions(rig, eyeball, skeleton.names[bone], origin)
         rotations += own
         points = begin + np.arange(len(eyeball.points))
-        targets = _with_shifts(targets, shifts, points)
+        targets = _with_target_shifts(targets, shifts, points)
         followers.append(RigidFollowers(eyeball.replaced_points.astype(np.int32), points.astype(np.int32)))
     positions = np.concatenate([rig.positions_mm, *(one.points for one in eyeballs)]).astype(np.float32)
     return replace(
@@ -62,17 +62,17 @@ def _with_eye_bones(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> tuple[Skelet
 
     An eyeball gets a new bone if its bone in the file also moves other points.
     """
-    skeleton = rig.skeleton or _single_bone(len(rig.positions_mm))
+    skeleton = rig.skeleton or _single_bone_skeleton(len(rig.positions_mm))
     bones = _eye_bones(skeleton, eyeballs)
     for k, eyeball in enumerate(eyeballs):
         if bones[k] < 0:
-            parent = int(np.argmax(_follower_counts(skeleton, eyeball)))
+            parent = int(np.argmax(_skin_weight_sums(skeleton, eyeball)))
             name = next(
                 name
                 for name in (_EYE_BONE_NAMES[k], f"fitted {_EYE_BONE_NAMES[k]}")
                 if name not in skeleton.names
             )
-            skeleton, bones[k] = _with_bone(skeleton, name, parent, eyeball.centre), len(skeleton.names)
+            skeleton, bones[k] = _with_added_bone(skeleton, name, parent, eyeball.centre), len(skeleton.names)
     for eyeball, bone in zip(eyeballs, bones, strict=True):
         count = len(eyeball.points)
         weight = np.tile(np.eye(1, BONES_PER_POINT, dtype=np.float32), (count, 1))
@@ -86,7 +86,7 @@ def _with_eye_bones(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> tuple[Skelet
     return skeleton, bones
 
 
-def _single_bone(point_count: int) -> Skeleton:
+def _single_bone_skeleton(point_count: int) -> Skeleton:
     """Return a skeleton with a single bone, which all points follow.
 
     point_count : number of points
@@ -105,20 +105,20 @@ def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[FittedEyeball]) -> list[in
     count, bones = len(skeleton.names), list[int]()
     total = np.bincount(skeleton.bone.ravel(), skeleton.weight.ravel(), minlength=count)
     for eyeball in eyeballs:
-        own = _follower_counts(skeleton, eyeball)
+        own = _skin_weight_sums(skeleton, eyeball)
         bone = int(np.argmax(own))
         others = total[bone] - own[bone]
         bones.append(bone if others <= _MAX_OTHER_FOLLOWER_FRACTION * own[bone] else -1)
     return bones
 
 
-def _follower_counts(skeleton: Skeleton, eyeball: FittedEyeball) -> Doubles:
+def _skin_weight_sums(skeleton: Skeleton, eyeball: FittedEyeball) -> Doubles:
     """Return for each bone the sum (b,) of its skin weights over the points of the file's eyeball."""
     bone, weight = skeleton.bone[eyeball.replaced_points], skeleton.weight[eyeball.replaced_points]
     return np.bincount(bone.ravel(), weight.ravel(), len(skeleton.names)).astype(np.float64)
 
 
-def _with_bone(skeleton: Skeleton, bone_name: str, parent_bone: int, origin_mm: Doubles) -> Skeleton:
+def _with_added_bone(skeleton: Skeleton, bone_name: str, parent_bone: int, origin_mm: Doubles) -> Skeleton:
     """Return a skeleton with an additional bone, which no points follow yet.
 
     parent_bone : index of the parent of the new bone
@@ -136,7 +136,7 @@ def _with_bone(skeleton: Skeleton, bone_name: str, parent_bone: int, origin_mm: 
     )
 
 
-def _rigid_targets(
+def _rigid_target_motions(
     rig: Rig, eyeball: FittedEyeball, bone_name: str, origin_mm: Doubles
 ) -> tuple[list[BoneRotation], dict[int, Doubles]]:
     """Return the rotation and translation that best fit how each morph target moves the file's eyeball.
@@ -148,7 +148,9 @@ def _rigid_targets(
     origin_mm : (3,) position of the bone's joint [mm]
     """
     rest = rig.positions_mm[eyeball.replaced_points].astype(np.float64)
-    deltas = rig.targets.dense(eyeball.replaced_points, len(rig.positions_mm)).astype(np.float64)
+    deltas = rig.targets.dense_displacements(eyeball.replaced_points, len(rig.positions_mm)).astype(
+        np.float64
+    )
     rotations, shifts = list[BoneRotation](), dict[int, Doubles]()
     for index, delta in enumerate(deltas):
         if np.abs(delta).max(initial=0.0) < _MIN_SHIFT_MM:
@@ -166,7 +168,7 @@ def _rigid_targets(
     return rotations, shifts
 
 
-def _with_shifts(
+def _with_target_shifts(
     targets: MorphTargets, shift_of_target: dict[int, Doubles], eyeball_points: Index
 ) -> MorphTargets:
     """Return morph targets that also translate the points of a fitted eyeball.
@@ -178,8 +180,8 @@ def _with_shifts(
         return targets
     point, delta, count = list[Ints](), list[Floats](), [0]
     for index in range(len(targets.names)):
-        indices = [targets.point[targets.rows(index)]]
-        deltas = [targets.delta_mm[targets.rows(index)]]
+        indices = [targets.point[targets.displacement_rows(index)]]
+        deltas = [targets.delta_mm[targets.displacement_rows(index)]]
         if index in shift_of_target:
             indices.append(eyeball_points.astype(np.int32))
             deltas.append(np.tile(shift_of_target[index].astype(np.float32), (len(eyeball_points), 1)))

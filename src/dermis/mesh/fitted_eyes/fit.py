@@ -38,10 +38,10 @@ _INWARD_GAZE_ANGLE_RADIANS = np.radians(2.5)
 class _EyeShape(NamedTuple):
     """Shape of a fitted eye.
 
-    The size of cornea and iris hardly differs between adults: a ball larger than an adult's keeps a cornea of
-    adult size, and an eye smaller than an adult's is scaled as a whole.
+    Cornea and iris have nearly the same size in all adults. A ball larger than an adult's therefore keeps a
+    cornea of adult size. In an eye smaller than an adult's, ball and cornea are scaled by the same factor.
 
-    axis : (3,) unit vector from the centre to the cornea
+    axis : (3,) unit vector from the centre of the ball to the cornea
     radius_mm, centre_offset_mm : radius and offset of the ball before scaling, see `Eyes` [mm]
     scale : size of the eye relative to an adult's, at most 1 [-]
     """
@@ -53,7 +53,7 @@ class _EyeShape(NamedTuple):
 
 
 @logged_step("fitting the eyes")
-def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | None = None) -> Head:
+def with_fitted_eyes(head: Head, coarse_mesh: Mesh | None = None, eye_look: EyeLook | None = None) -> Head:
     """Return a head whose two eyeballs from a file are replaced by standard eyeballs with a cornea.
 
     The fitted eyeballs have the radius and position of the file's eyeballs, and follow the same bones and
@@ -61,11 +61,12 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
     have no corneas, through the opening of the lids. If the file does not have two eyeballs, the head is
     returned unchanged, with the reason in its `note`.
 
-    coarse : for a subdivided head, its mesh before subdivision, in which the lids still touch the eyeballs
-    look : appearance of the eyes
+    coarse_mesh : mesh of a subdivided head before subdivision, in which the lids still touch the eyeballs;
+        None if the head is not subdivided
+    eye_look : appearance of the eyes
     """
     mesh, control = head.mesh, head.control
-    balls, reason = find_eyeballs(coarse or mesh)
+    balls, reason = find_eyeballs(coarse_mesh or mesh)
     if balls is None:
         return replace(head, note=reason)
     ball_triangles = _ball_triangles(mesh, control.stencils, balls)
@@ -87,12 +88,12 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
     material = np.arange(-2, 0, dtype=np.int32) + len(new_mesh.materials)
     radii, offsets = np.array([(shape.radius_mm, shape.centre_offset_mm) for shape in shapes]).T
     gaze = np.stack([eye_axes(shape.axis) @ ball.gaze for ball, shape in pairs])
-    eyes = Eyes(apex, back, side, material, look or EyeLook(), radii, offsets, gaze)
+    eyes = Eyes(apex, back, side, material, eye_look or EyeLook(), radii, offsets, gaze)
     return replace(head, mesh=new_mesh, rig=rig, eyes=eyes)
 
 
 def _ball_triangles(
-    mesh: Mesh, stencils: Stencils | None, balls: tuple[DetectedEyeball, DetectedEyeball]
+    mesh: Mesh, stencils: Stencils | None, detected_eyeballs: tuple[DetectedEyeball, DetectedEyeball]
 ) -> tuple[Index, Index]:
     """Return the indices of the triangles of each eyeball.
 
@@ -101,25 +102,27 @@ def _ball_triangles(
     first = mesh.point[mesh.triangles[:, 0]]
     if stencils is not None:
         first = stencils.point[stencils.first[first]]
-    left, right = (np.flatnonzero(np.isin(first, ball.points)) for ball in balls)
+    left, right = (np.flatnonzero(np.isin(first, ball.points)) for ball in detected_eyeballs)
     return left, right
 
 
-def _eye_shapes(corners_mm: Doubles, balls: tuple[DetectedEyeball, DetectedEyeball]) -> list[_EyeShape]:
+def _eye_shapes(
+    corners_mm: Doubles, detected_eyeballs: tuple[DetectedEyeball, DetectedEyeball]
+) -> list[_EyeShape]:
     """Return the shapes of both eyes.
 
     If an eyeball of the file has no cornea, its axis points through the opening of the lids.
 
     corners_mm : (f, 3, 3) corners of all triangles that are not eyeballs
     """
-    lids = [lids_in_front(corners_mm, ball.sphere, ball.gaze) for ball in balls]
+    lids = [lids_in_front(corners_mm, ball.sphere, ball.gaze) for ball in detected_eyeballs]
     (left, a), (right, b) = (one.opening_angles for one in lids)
     outwards, up = (left - right) / 2 - _INWARD_GAZE_ANGLE_RADIANS * (left != right), (a + b) / 2
     shapes = []
-    for ball, lid, side in zip(balls, lids, (1.0, -1.0), strict=True):
+    for ball, lid, side in zip(detected_eyeballs, lids, (1.0, -1.0), strict=True):
         scale, sunk, axis = min(1.0, ball.sphere.radius / SCLERA_MM), 0.0, ball.gaze
         if not ball.cornea:
-            axis = lid.direction(side * outwards, up)
+            axis = lid.turned_direction(side * outwards, up)
             sunk = lid.cornea_recess_mm(axis, scale) / scale
         radius = ball.sphere.radius / scale
         offset = limbus_plane_mm(SCLERA_MM) - limbus_plane_mm(radius) + sunk
@@ -129,10 +132,10 @@ def _eye_shapes(corners_mm: Doubles, balls: tuple[DetectedEyeball, DetectedEyeba
 
 def _eyeball_points(ball: Sphere, eye_shape: _EyeShape) -> Doubles:
     """Return the points (n, 3) of a fitted eyeball in head space [mm]."""
-    return np.asarray(ball.centre + eye_shape.scale * _shape_points(eye_shape) @ eye_axes(eye_shape.axis))
+    return np.asarray(ball.centre + eye_shape.scale * _unscaled_points(eye_shape) @ eye_axes(eye_shape.axis))
 
 
-def _shape_points(eye_shape: _EyeShape) -> Doubles:
+def _unscaled_points(eye_shape: _EyeShape) -> Doubles:
     """Return the points (n, 3) of an eyeball before scaling, about its centre and with axis +Z [mm]."""
     points, _ = build_eyeball(_QUADS_PER_CUBE_EDGE)
     x, y, z = (points / np.linalg.norm(points, axis=1, keepdims=True)).T
@@ -161,21 +164,23 @@ def _extend_stencils(stencils: Stencils, first_point: int, point_count: int) -> 
     )
 
 
-def _replace_eyeballs(mesh: Mesh, balls: tuple[Index, Index], positions: list[Doubles], quads: Index) -> Mesh:
+def _replace_eyeballs(
+    mesh: Mesh, ball_triangles: tuple[Index, Index], eyeball_points: list[Doubles], eyeball_quads: Index
+) -> Mesh:
     """Return a mesh with fitted eyeballs in place of the file's eyeballs; other points keep their indices.
 
-    balls : indices of the triangles of each eyeball of the file
-    positions : (n, 3) points of each fitted eyeball [mm]
-    quads : (q, 4) quads of a fitted eyeball
+    ball_triangles : indices of the triangles of each eyeball of the file
+    eyeball_points : (n, 3) points of each fitted eyeball [mm]
+    eyeball_quads : (q, 4) quads of a fitted eyeball
     """
     remains = np.ones(len(mesh.triangles), bool)
-    remains[np.concatenate(balls)] = False
+    remains[np.concatenate(ball_triangles)] = False
     vertex, triangles = np.unique(mesh.triangles[remains], return_inverse=True)
     used, material = np.unique(mesh.material[remains], return_inverse=True)
-    old_materials = [mesh.materials[mesh.material[ball[0]]] for ball in balls]
+    old_materials = [mesh.materials[mesh.material[ball[0]]] for ball in ball_triangles]
     pairs = zip(_EYE_MATERIAL_NAMES, old_materials, strict=True)
     new_materials = tuple(Material(name, "opaque", old.colour, eye=True) for name, old in pairs)
-    new = _eyeball_meshes(positions, quads, new_materials)
+    new = _eyeball_meshes(eyeball_points, eyeball_quads, new_materials)
     new_index = np.full(len(mesh.triangles), -1)
     new_index[remains] = np.arange(np.count_nonzero(remains))
     old_quads = new_index[mesh.quads][(new_index[mesh.quads] >= 0).all(axis=1)]
@@ -192,17 +197,19 @@ def _replace_eyeballs(mesh: Mesh, balls: tuple[Index, Index], positions: list[Do
     )
 
 
-def _eyeball_meshes(positions: list[Doubles], quads: Index, materials: tuple[Material, ...]) -> Mesh:
+def _eyeball_meshes(
+    eyeball_points: list[Doubles], eyeball_quads: Index, materials: tuple[Material, ...]
+) -> Mesh:
     """Return one mesh of both fitted eyeballs, each with its own material.
 
-    positions : (n, 3) points of each eyeball [mm]
-    quads : (q, 4) quads of an eyeball
+    eyeball_points : (n, 3) points of each eyeball [mm]
+    eyeball_quads : (q, 4) quads of an eyeball
     """
-    count, faces = len(positions[0]), len(quads)
+    count, faces = len(eyeball_points[0]), len(eyeball_quads)
     return build_mesh(
-        np.concatenate(positions),
+        np.concatenate(eyeball_points),
         np.tile(eyeball.eyeball_uv(_QUADS_PER_CUBE_EDGE), (2, 1)),
-        split_quads(np.concatenate([quads, count + quads])),
+        split_quads(np.concatenate([eyeball_quads, count + eyeball_quads])),
         np.repeat([0, 1], 2 * faces),
         materials,
         point=np.arange(2 * count),

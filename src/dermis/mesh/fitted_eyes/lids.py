@@ -43,18 +43,21 @@ class Lids:
         return np.stack([x.ravel(), y.ravel()], axis=1)
 
     @cached_property
-    def ball_front(self) -> Doubles:
-        """Return how far in front of its centre the ball is hit by each ray, (n,) [mm]; 0 for a miss."""
+    def ball_depths_mm(self) -> Doubles:
+        """Return the depth (n,) at which each ray hits the ball [mm]; 0 for a ray that misses it.
+
+        Depth is measured from the ball's centre forwards, in the direction in which the eye looks.
+        """
         return np.asarray(np.sqrt(np.maximum(self.ball.radius**2 - (self.ray_positions**2).sum(axis=1), 0.0)))
 
     @cached_property
-    def obstacle_front(self) -> Doubles:
-        """Return how far in front of the ball's centre each ray first meets lids or other skin, (n,) [mm].
+    def obstacle_depths_mm(self) -> Doubles:
+        """Return the depth (n,) at which each ray first hits the lids or other skin [mm].
 
-        The distance is -inf for rays that meet no skin.
+        Depth is measured as in `ball_depths_mm`, and is -inf for a ray that hits no skin.
         """
         corners = self.corners[self.corners[:, :, 2].max(axis=1) > 0]
-        triangle, ray = self._candidate_pairs(corners)
+        triangle, ray = self._candidate_hits(corners)
         a, b, c = np.moveaxis(corners[triangle], 1, 0)
         b, c, p = b - a, c - a, self.ray_positions[ray] - a[:, :2]
         area = cross_2d(b, c)
@@ -66,7 +69,7 @@ class Lids:
         np.maximum.at(front, ray[inside], depth[inside])
         return front
 
-    def _candidate_pairs(self, corners: Doubles) -> tuple[Index, Index]:
+    def _candidate_hits(self, corners: Doubles) -> tuple[Index, Index]:
         """Return pairs of triangles and rays as two arrays of indices.
 
         In each pair, the ray passes through the bounding box of the triangle.
@@ -92,7 +95,7 @@ class Lids:
         for axis, other, shift in ((0, 1, 0.0), (1, 0, _IRIS_RISE_FRACTION)):
             column = np.abs(self.ray_positions[:, other]) < _IRIS_HALF_WIDTH_RADII * self.ball.radius
             position = self.ray_positions[column, axis]
-            is_open = (self.obstacle_front < self.ball_front)[column]
+            is_open = (self.obstacle_depths_mm < self.ball_depths_mm)[column]
             ends = np.sign(position) * (np.abs(position) > 0.99 * position.max())
             if (
                 not is_open.any()
@@ -111,7 +114,7 @@ class Lids:
             )
         return angles[0], angles[1]
 
-    def direction(self, angle_across: float, angle_up: float) -> Doubles:
+    def turned_direction(self, angle_across: float, angle_up: float) -> Doubles:
         """Return the unit vector (3,) in head space that is turned sideways and upwards from straight ahead.
 
         angle_across, angle_up : angles by which the vector is turned sideways and upwards [rad]
@@ -135,8 +138,10 @@ class Lids:
         )
         distance2 = ((self.ray_positions - centre * local[:2]) ** 2).sum(axis=1)
         cornea = centre * local[2] + np.sqrt(np.maximum(radius**2 - distance2, 0.0))
-        covered = (distance2 < radius**2) & (np.minimum(self.obstacle_front, cornea) > self.ball_front)
-        protrusion = float((cornea - self.obstacle_front)[covered].max(initial=0.0))
+        covered = (distance2 < radius**2) & (
+            np.minimum(self.obstacle_depths_mm, cornea) > self.ball_depths_mm
+        )
+        protrusion = float((cornea - self.obstacle_depths_mm)[covered].max(initial=0.0))
         deepest = max(centre + radius - self.ball.radius - _MIN_BULGE_MM, 0.0)
         return float(np.clip(protrusion - _MAX_PROTRUSION_MM, 0.0, deepest))
 

@@ -9,15 +9,15 @@ from dermis.optics.diffusion.boundary import internal_moment
 from dermis.optics.media import Floats, Layer
 
 
-def source_depths(layer: Layer, A: float) -> tuple[Floats, Floats]:
+def source_depths(layer: Layer, mismatch: float) -> tuple[Floats, Floats]:
     """Return the depth (c,) of the real source, and the height (c,) of its image above the surface [mm].
 
-    A : boundary mismatch [-]
+    mismatch : boundary mismatch [-]
 
     Source: [Jensen2001] section 2.3.
     """
     z_r = layer.mean_free_path_mm
-    return z_r, z_r + 4.0 * A * layer.D
+    return z_r, z_r + 4.0 * mismatch * layer.D
 
 
 def point_source_flux(radius_mm: ArrayLike, depth_mm: Floats, sigma_tr: Floats) -> Floats:
@@ -34,34 +34,34 @@ def point_source_flux(radius_mm: ArrayLike, depth_mm: Floats, sigma_tr: Floats) 
     return np.asarray(depth_mm * (1.0 + sigma_tr * rho) * attenuation / (4.0 * np.pi * rho**3))
 
 
-def reflectance(radius_mm: ArrayLike, layer: Layer, A: float) -> Floats:
+def reflectance(radius_mm: ArrayLike, layer: Layer, mismatch: float) -> Floats:
     """Return the diffusion profile R(r), (n, c), of the standard dipole per power that enters [1/mm2].
 
     radius_mm : (n,) distances r from the beam [mm]
-    A : boundary mismatch [-]
+    mismatch : boundary mismatch [-]
 
     Source: [JensenBuhler2002] eq. 5.
     """
-    z_r, z_v = source_depths(layer, A)
+    z_r, z_v = source_depths(layer, mismatch)
     fluxes = point_source_flux(radius_mm, z_r, layer.sigma_tr) + point_source_flux(
         radius_mm, z_v, layer.sigma_tr
     )
     return np.asarray(layer.alpha_prime * fluxes)
 
 
-def reflectance_hankel(frequency: ArrayLike, layer: Layer, A: float) -> Floats:
+def reflectance_hankel(frequency: ArrayLike, layer: Layer, mismatch: float) -> Floats:
     """Return the Hankel transform (n, c) of the dipole's R(r) at frequencies s [1/mm].
 
     The transform is the integral of 2 pi r R(r) J0(s r) over r, with the Bessel function J0.
     """
-    z_r, z_v = source_depths(layer, A)
+    z_r, z_v = source_depths(layer, mismatch)
     q = np.sqrt(layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)
     return np.asarray(0.5 * layer.alpha_prime * (np.exp(-z_r * q) + np.exp(-z_v * q)))
 
 
-def total_reflectance(layer: Layer, A: float) -> Floats:
+def total_reflectance(layer: Layer, mismatch: float) -> Floats:
     """Return the total reflectance (c,) of the dipole model per power that enters [-]."""
-    return np.asarray(reflectance_hankel(0.0, layer, A))
+    return np.asarray(reflectance_hankel(0.0, layer, mismatch))
 
 
 def better_dipole_reflectance(

@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike
 
 from dermis.optics.media import Floats, Layer, Medium
 
-Source = Literal["beam", "point"]
+SourceKind = Literal["beam", "point"]
 _NEAR_ZERO_FREQUENCY = np.array([1e-8])  # so low that a Hankel transform equals the total reflectance [1/mm]
 
 
 class _Sublayer(NamedTuple):
-    """Layer, or the part of a layer above or below the point source."""
+    """Layer, or one of the two parts into which a layer is divided."""
 
     layer: Layer
     thickness_mm: float | Floats
@@ -29,7 +29,7 @@ class _Sublayer(NamedTuple):
     point: Floats  # power of the point source on its lower face
 
 
-class _Face(NamedTuple):
+class _BoundaryCondition(NamedTuple):
     """Boundary condition D phi' = W - Z phi for the fluence phi at a face; Z and W depend on lower layers."""
 
     Z: Floats
@@ -64,41 +64,48 @@ class _DownwardTransfer(NamedTuple):
 
 
 def solve_layers(
-    frequency: ArrayLike, medium: Medium, A: float, source_kind: Source = "beam"
+    frequency: ArrayLike, medium: Medium, mismatch: float, source_kind: SourceKind = "beam"
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms (n, c) of R(r) and of T(r) of a layered medium [-].
 
     R(r) and T(r) are the profiles at the upper and the lower face, per power that enters.
 
     frequency : (n,) frequencies s > 0 [1/mm]
-    A : boundary mismatch with air; internal interfaces are index-matched [-]
+    mismatch : boundary mismatch with air; internal interfaces are index-matched [-]
     source_kind : "beam" if light first scatters along the beam, in which case R(r) diverges logarithmically
-        at r = 0; "point" if all light first scatters one mean free path deep, in which case R(r) is finite
+        at r = 0; "point" if all light first scatters at a depth of one mean free path, in which case R(r) is
+        finite
 
     Source: [Haskell1994] for the boundary, [Kienle1998] for layers, [Farrell1992] for the beam.
     """
-    return _solve_sublayers(frequency, _sublayers(medium, source_kind), medium.channels, A)
+    return _solve_sublayers(frequency, _sublayers(medium, source_kind), medium.channels, mismatch)
 
 
-def solve_reflectance(frequency: ArrayLike, medium: Medium, A: float, source_kind: Source = "beam") -> Floats:
+def solve_reflectance(
+    frequency: ArrayLike, medium: Medium, mismatch: float, source_kind: SourceKind = "beam"
+) -> Floats:
     """Return the Hankel transform (n, c) of R(r) of a layered medium [-].
 
     R(r) is per power that enters. This function is faster than `solve_layers`, which also computes T(r).
 
     frequency : (n,) frequencies s > 0 [1/mm]
-    A : boundary mismatch with air [-]
+    mismatch : boundary mismatch with air [-]
     source_kind : "beam" or "point", the place where light first scatters, see `solve_layers`
     """
-    return _solve_upwards(frequency, _sublayers(medium, source_kind), medium.channels, A)[0] / (2.0 * A)
+    return _solve_upwards(frequency, _sublayers(medium, source_kind), medium.channels, mismatch)[0] / (
+        2.0 * mismatch
+    )
 
 
-def solve_two_layers(upper_layer: Layer, thickness_mm: ArrayLike, lower_layer: Layer, A: float) -> Floats:
+def solve_two_layers(
+    upper_layer: Layer, thickness_mm: ArrayLike, lower_layer: Layer, mismatch: float
+) -> Floats:
     """Return the total reflectance (n, c) of n skins with two layers, per power that enters [-].
 
     upper_layer : upper layers, with coefficients (n, c), or (c,) if they are the same for all skins
     thickness_mm : (n, 1) thicknesses of the upper layers, or one number [mm]
     lower_layer : semi-infinite lower layers, with coefficients (n, c) or (c,)
-    A : boundary mismatch with air [-]
+    mismatch : boundary mismatch with air [-]
     """
     d = np.asarray(thickness_mm, dtype=np.float64)
     ones = np.ones(np.shape(upper_layer.sigma_a)[-1])
@@ -107,79 +114,83 @@ def solve_two_layers(upper_layer: Layer, thickness_mm: ArrayLike, lower_layer: L
         _Sublayer(upper_layer, d, ones, 0.0 * ones),
         _Sublayer(lower_layer, np.inf, beam, 0.0 * ones),
     ]
-    return _solve_upwards(_NEAR_ZERO_FREQUENCY, sublayers, len(ones), A)[0] / (2.0 * A)
+    return _solve_upwards(_NEAR_ZERO_FREQUENCY, sublayers, len(ones), mismatch)[0] / (2.0 * mismatch)
 
 
-def solve_thicknesses(
-    frequency: ArrayLike, layer: Layer, thickness_mm: Floats, A: float
+def solve_homogeneous_slabs(
+    frequency: ArrayLike, layer: Layer, thickness_mm: Floats, mismatch: float
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms (n, m, c) of R(r) and of T(r) of n slabs of one material [-].
 
     frequency : (m,) frequencies s > 0 [1/mm]
     layer : absorption and scattering of the slabs; its field `thickness_mm` is ignored
     thickness_mm : (n,) thicknesses of the slabs [mm]
-    A : boundary mismatch with air [-]
+    mismatch : boundary mismatch with air [-]
     """
     ones = np.ones(len(layer.sigma_a))
     sublayer = _Sublayer(layer, thickness_mm[:, None, None], ones, np.zeros_like(ones))
-    return _solve_sublayers(frequency, [sublayer], len(ones), A)
+    return _solve_sublayers(frequency, [sublayer], len(ones), mismatch)
 
 
 def _solve_sublayers(
-    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, A: float
+    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, mismatch: float
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms of R(r) and T(r) of a stack of sublayers, topmost first [-]."""
-    fluence, transfers = _solve_upwards(frequency, sublayers, channel_count, A)
-    R = fluence / (2.0 * A)
+    fluence, transfers = _solve_upwards(frequency, sublayers, channel_count, mismatch)
+    R = fluence / (2.0 * mismatch)
     for transfer in transfers:
         fluence = transfer.lower_fluence(fluence)
-    return R, fluence / (2.0 * A)
+    return R, fluence / (2.0 * mismatch)
 
 
 def _solve_upwards(
-    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, A: float
+    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, mismatch: float
 ) -> tuple[Floats, list[_DownwardTransfer]]:
     """Return the fluence at the surface, and the transfer through each sublayer, topmost sublayer first."""
     s = np.asarray(frequency, dtype=np.float64)[..., None]
     zero = np.zeros((*s.shape[:-1], channel_count))
-    face, transfers = _Face(zero + 1.0 / (2.0 * A), zero), list[_DownwardTransfer]()
+    face, transfers = _BoundaryCondition(zero + 1.0 / (2.0 * mismatch), zero), list[_DownwardTransfer]()
     for sublayer in reversed(sublayers):
         face, transfer = _propagate_up(s, sublayer, face)
         transfers.insert(0, transfer)
-    return np.asarray(2.0 * A * face.W / (1.0 + 2.0 * A * face.Z)), transfers
+    return np.asarray(2.0 * mismatch * face.W / (1.0 + 2.0 * mismatch * face.Z)), transfers
 
 
-def _propagate_up(s: Floats, sublayer: _Sublayer, lower_face: _Face) -> tuple[_Face, _DownwardTransfer]:
+def _propagate_up(
+    frequency: Floats, sublayer: _Sublayer, lower_condition: _BoundaryCondition
+) -> tuple[_BoundaryCondition, _DownwardTransfer]:
     """Propagate the boundary condition from the lower face of a sublayer to its upper face.
 
-    s : frequencies [1/mm]
-    lower_face : boundary condition at the lower face
+    frequency : frequencies [1/mm]
+    lower_condition : boundary condition at the lower face
 
     Returns the boundary condition at the upper face, and the coefficients that transfer the fluence from the
     upper to the lower face.
     """
     layer, d = sublayer.layer, sublayer.thickness_mm
     D, sigma_t = layer.D, layer.sigma_t_prime
-    q = np.sqrt(layer.sigma_tr**2 + s**2)
+    q = np.sqrt(layer.sigma_tr**2 + frequency**2)
     source = layer.sigma_s_prime * sublayer.beam / D
     slope = source / (sigma_t + q)  # slope of the particular solution that is 0 at the upper face
     if np.all(np.isinf(d)):
-        return _Face(D * q, D * slope), _DownwardTransfer()
+        return _BoundaryCondition(D * q, D * slope), _DownwardTransfer()
     E = np.exp(-q * d)
     gap = np.abs(sigma_t - q)
     near = np.where(gap * d < 1e-8, d, -np.expm1(-gap * d) / np.where(gap > 0.0, gap, 1.0))
     lower = source * np.exp(-np.minimum(q, sigma_t) * d) * near / (sigma_t + q)
     lower_slope = slope * E - sigma_t * lower
-    rho = (D * q - lower_face.Z) / (D * q + lower_face.Z)
-    W = lower_face.W + sublayer.point  # the flux jumps at a source on the face
-    beta = (W - lower_face.Z * lower - D * lower_slope) / (D * q + lower_face.Z)
+    rho = (D * q - lower_condition.Z) / (D * q + lower_condition.Z)
+    W = lower_condition.W + sublayer.point  # the flux jumps at a source on the face
+    beta = (W - lower_condition.Z * lower - D * lower_slope) / (D * q + lower_condition.Z)
     common = 1.0 / (1.0 + E**2 * rho)
-    face = _Face(D * q * (1.0 - E**2 * rho) * common, 2.0 * D * q * beta * E * common + D * slope)
+    face = _BoundaryCondition(
+        D * q * (1.0 - E**2 * rho) * common, 2.0 * D * q * beta * E * common + D * slope
+    )
     # phi at the lower face is a E + b + P, with a = (phi0 - beta E) common and b = a E rho + beta.
     return face, _DownwardTransfer(E, rho, common, beta, lower)
 
 
-def _sublayers(medium: Medium, source_kind: Source) -> list[_Sublayer]:
+def _sublayers(medium: Medium, source_kind: SourceKind) -> list[_Sublayer]:
     return list(_beam_sublayers(medium) if source_kind == "beam" else _point_sublayers(medium))
 
 

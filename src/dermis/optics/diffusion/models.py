@@ -39,7 +39,7 @@ MODEL_SOURCES: dict[DiffusionModel, tuple[str, ...]] = {
     "layered-point": ("Kienle1998", "Haskell1994"),
 }
 _MIN_ACCURATE_DIPOLE_ALBEDO = 0.9  # reduced albedo below which the error of the dipole exceeds 10 %
-_REPORTED_NEGATIVE_LIGHT_RATIO = (
+_MIN_REPORTED_NEGATIVE_LIGHT_RATIO = (
     0.005  # ratio of negative light to total reflectance above which a warning is given
 )
 
@@ -54,7 +54,7 @@ def diffusion_profile(
 
     medium : stack of layers
     model : "dipole" and "better-dipole" require one half-space; the other models accept any stack
-    clamp : depth of the multipole's source in thin layers, "none" or "layer", see `Slab`
+    clamp : whether the multipole's source is kept inside thin layers ("layer") or not ("none"), see `Slab`
     rgb_weights : (3, c) weights that convert wavelengths to linear Rec. 709; the result then has three
         channels and is per incident power. By default, the result has the medium's channels and is per power
         that enters
@@ -75,7 +75,7 @@ def diffusion_profile(
         edges_mm=edges,
         ring_energy=ring_energy,
         incident=rgb_weights is not None,
-        warnings=(*_medium_warnings(medium, model, clamp), *_result_warnings(total, ring_energy)),
+        warnings=(*_medium_warnings(medium, model, clamp), *_profile_warnings(total, ring_energy)),
         sources=(*medium.sources, *MODEL_SOURCES[model]),
     )
 
@@ -122,7 +122,7 @@ def hankel_transform(medium: Medium, model: DiffusionModel, clamp: Clamp, freque
     """Return the Hankel transform (n, c) of a model's R(r) at n frequencies above 0 [1/mm]."""
     if model in ("layered", "layered-point"):
         A = boundary_mismatch(medium.eta, "exact")
-        source: layered_diffusion.Source = "beam" if model == "layered" else "point"
+        source: layered_diffusion.SourceKind = "beam" if model == "layered" else "point"
         return layered_diffusion.solve_reflectance(frequency, medium, A, source)
     return multipole.stack_response(frequency, medium, boundary_mismatch(medium.eta), clamp).R_above
 
@@ -174,14 +174,14 @@ def _first_event_albedo(medium: Medium) -> Floats:
     return scattered / depth
 
 
-def _result_warnings(total_reflectance: Floats, ring_energy: Floats) -> Sequence[str]:
-    """Return warnings about negative reflectances, and about rings that do not sum to the total."""
+def _profile_warnings(total_reflectance: Floats, ring_energy: Floats) -> Sequence[str]:
+    """Return warnings about negative reflectances, and about ring energies that do not sum to the total."""
     warnings = missing_light_warnings(total_reflectance, ring_energy)
     if (total_reflectance < 0.0).any():
         warnings.append(f"a total reflectance is negative: {np.round(total_reflectance, 4).tolist()}")
     size = np.maximum(np.abs(total_reflectance), SMALLEST_FLOAT)
     negative = float((-np.minimum(ring_energy, 0.0).sum(axis=0) / size).max())
-    if negative > _REPORTED_NEGATIVE_LIGHT_RATIO:
+    if negative > _MIN_REPORTED_NEGATIVE_LIGHT_RATIO:
         warnings.append(
             f"R(r) is negative at some radii, {negative:.1%} of a channel's total: layers too thin for the "
             "model, or colours outside Rec. 709. No sum of Gaussians fits it there"
@@ -278,7 +278,7 @@ def measured_model_error(model_name: str, tissue_name: str = "") -> ModelError |
 
 
 def error_against_photons(model_profile: RadialProfile, photon_profile: RadialProfile) -> ModelError:
-    """Return the error of a profile's ring energies relative to photon counts of the same tissue."""
+    """Return the error of a model's ring energies, relative to a Monte Carlo profile of the same tissue."""
     squares = ((model_profile.ring_energy - photon_profile.ring_energy) ** 2).sum(axis=0)
     error = np.sqrt(squares / (photon_profile.ring_energy**2).sum(axis=0))
     return ModelError(error, error, (model_profile.name,))

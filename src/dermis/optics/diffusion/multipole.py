@@ -21,8 +21,8 @@ class Slab:
 
     layer : absorption, scattering and thickness; the thickness may be infinite
     A_top, A_bottom : boundary mismatch of the upper and the lower face; 1 at index-matched faces [-]
-    clamp : "none" for a source one mean free path deep as published, which may be below the slab; "layer" for
-        a source at this depth, but not below the slab
+    clamp : "none" for a source at a depth of one mean free path, as published, even if this is below the
+        slab; "layer" for a source at this depth, but at most at the lower face
 
     Source: [DonnerJensen2005] section 3.1; boundaries after [Contini1997].
     """
@@ -33,20 +33,20 @@ class Slab:
     clamp: Clamp = "layer"
 
     @property
-    def source_mm(self) -> Floats:
+    def source_depth_mm(self) -> Floats:
         """Return the depth (c,) of the real point source below the upper face [mm]."""
         l, d = self.layer.mean_free_path_mm, self.layer.thickness_mm
         return np.minimum(l, d) if self.clamp == "layer" else l
 
     @property
-    def z_b(self) -> tuple[Floats, Floats]:
+    def extrapolation_distances_mm(self) -> tuple[Floats, Floats]:
         """Return the distances (c,) above and below the slab where the extrapolated fluence is 0 [mm]."""
         return 2.0 * self.A_top * self.layer.D, 2.0 * self.A_bottom * self.layer.D
 
     @property
-    def period_mm(self) -> Floats:
+    def image_period_mm(self) -> Floats:
         """Return the depth interval (c,) after which the mirror images repeat [mm]."""
-        return np.asarray(2.0 * (self.layer.thickness_mm + sum(self.z_b)))
+        return np.asarray(2.0 * (self.layer.thickness_mm + sum(self.extrapolation_distances_mm)))
 
     def upside_down(self) -> Slab:
         """Return the slab upside down, to solve for light that enters from below."""
@@ -57,13 +57,13 @@ def reflectance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
     """Return the Hankel transform (n, c) of R(r) of a slab at frequencies [1/mm], in closed form."""
     if np.isinf(slab.layer.thickness_mm):
         return dipole.reflectance_hankel(frequency, slab.layer, slab.A_top)
-    l, top = slab.source_mm, slab.z_b[0]
+    l, top = slab.source_depth_mm, slab.extrapolation_distances_mm[0]
     return _image_sum(frequency, slab, l, -l - 2.0 * top)
 
 
 def transmittance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
     """Return the Hankel transform (n, c) of T(r) of a slab at frequencies [1/mm], in closed form."""
-    l, top, d = slab.source_mm, slab.z_b[0], slab.layer.thickness_mm
+    l, top, d = slab.source_depth_mm, slab.extrapolation_distances_mm[0], slab.layer.thickness_mm
     if np.isinf(d):
         return np.zeros((*np.shape(frequency), len(l)))
     return _image_sum(frequency, slab, d - l, d + l + 2.0 * top)
@@ -79,7 +79,7 @@ def reflectance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Fl
     """
     if np.isinf(slab.layer.thickness_mm):
         return dipole.reflectance(radius_mm, slab.layer, slab.A_top)
-    l, top = slab.source_mm, slab.z_b[0]
+    l, top = slab.source_depth_mm, slab.extrapolation_distances_mm[0]
     return _image_series(radius_mm, slab, lambda shift: (l + shift, shift - l - 2.0 * top), tolerance)
 
 
@@ -94,7 +94,7 @@ def transmittance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> 
 
     Source: [DonnerJensen2005] eq. 7, 8.
     """
-    l, top, d = slab.source_mm, slab.z_b[0], slab.layer.thickness_mm
+    l, top, d = slab.source_depth_mm, slab.extrapolation_distances_mm[0], slab.layer.thickness_mm
     if np.isinf(d):
         return np.zeros((*np.shape(radius_mm), len(l)))
     return _image_series(radius_mm, slab, lambda shift: (d - l - shift, d + l + 2.0 * top - shift), tolerance)
@@ -111,10 +111,10 @@ def _image_sum(frequency: ArrayLike, slab: Slab, real_source: Floats, image_sour
     real_source, image_source : (c,) signed distances z from the face to one real source and to one image [mm]
     """
     q = np.sqrt(slab.layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)
-    P = slab.period_mm
+    P = slab.image_period_mm
 
-    def periodic_source_sum(z: Floats) -> Floats:
-        z0 = np.mod(z, P)  # the series is odd and periodic: the sum of two geometric series
+    def periodic_source_sum(source_distance: Floats) -> Floats:
+        z0 = np.mod(source_distance, P)  # the series is odd and periodic: the sum of two geometric series
         return np.asarray((np.exp(-z0 * q) - np.exp(-(P - z0) * q)) / -np.expm1(-P * q))
 
     return np.asarray(
@@ -125,9 +125,9 @@ def _image_sum(frequency: ArrayLike, slab: Slab, real_source: Floats, image_sour
 def _image_series(
     radius_mm: ArrayLike, slab: Slab, source_pair: Callable[[Floats], tuple[Floats, Floats]], tolerance: float
 ) -> Floats:
-    result = np.zeros((*np.shape(radius_mm), len(slab.source_mm)))
+    result = np.zeros((*np.shape(radius_mm), len(slab.source_depth_mm)))
     for i in range(-(n := image_pairs_needed(slab, tolerance)), n + 1):
-        real, image = source_pair(i * slab.period_mm)
+        real, image = source_pair(i * slab.image_period_mm)
         result += dipole.point_source_flux(radius_mm, real, slab.layer.sigma_tr)
         result -= dipole.point_source_flux(radius_mm, image, slab.layer.sigma_tr)
     return np.asarray(slab.layer.alpha_prime * result)
@@ -139,7 +139,7 @@ def image_pairs_needed(slab: Slab, tolerance: float, max_pairs: int = 2000) -> i
     tolerance : upper bound of the light from all omitted pairs, per power that enters [-]
     max_pairs : largest result; it is returned if the slab does not absorb, where no bound can be computed
     """
-    decay = float((slab.period_mm * slab.layer.sigma_tr).min())
+    decay = float((slab.image_period_mm * slab.layer.sigma_tr).min())
     if decay <= 0.0:
         return max_pairs
     log_ratio = np.log(4.0 / (tolerance * -np.expm1(-decay)))
@@ -159,38 +159,42 @@ class StackResponse:
     R_below: Floats
     T_up: Floats
 
-    def placed_over(self, lower: StackResponse) -> StackResponse:
+    def placed_over(self, lower_stack: StackResponse) -> StackResponse:
         """Return the combined response of this stack on top of another stack.
 
         Source: [DonnerJensen2005] section 3.3, after Kubelka's addition of layers.
         """
-        between = 1.0 / (1.0 - self.R_below * lower.R_above)
+        between = 1.0 / (1.0 - self.R_below * lower_stack.R_above)
         return StackResponse(
-            self.R_above + self.T_down * lower.R_above * between * self.T_up,
-            self.T_down * between * lower.T_down,
-            lower.R_below + lower.T_up * self.R_below * between * lower.T_down,
-            lower.T_up * between * self.T_up,
+            self.R_above + self.T_down * lower_stack.R_above * between * self.T_up,
+            self.T_down * between * lower_stack.T_down,
+            lower_stack.R_below + lower_stack.T_up * self.R_below * between * lower_stack.T_down,
+            lower_stack.T_up * between * self.T_up,
         )
 
 
-def stack_response(frequency: ArrayLike, medium: Medium, A: float, clamp: Clamp = "layer") -> StackResponse:
+def stack_response(
+    frequency: ArrayLike, medium: Medium, mismatch: float, clamp: Clamp = "layer"
+) -> StackResponse:
     """Return the response of the stack of all layers of a medium, at frequencies s [1/mm].
 
-    A : boundary mismatch with air, above and below; internal interfaces are index-matched [-]
-    clamp : depth of the source in thin layers, "none" or "layer", see `Slab`
+    mismatch : boundary mismatch with air, above and below; internal interfaces are index-matched [-]
+    clamp : whether sources are kept inside thin layers ("layer") or not ("none"), see `Slab`
     """
-    slabs = layer_slabs(medium, A, clamp)
+    slabs = layer_slabs(medium, mismatch, clamp)
     stack = _single_slab_response(frequency, slabs[-1])
     for slab in reversed(slabs[:-1]):
         stack = _single_slab_response(frequency, slab).placed_over(stack)
     return stack
 
 
-def layer_slabs(medium: Medium, A: float, clamp: Clamp = "layer") -> list[Slab]:
-    """Return one slab per layer of a medium, with the boundary mismatch A at the faces that touch air."""
+def layer_slabs(medium: Medium, mismatch: float, clamp: Clamp = "layer") -> list[Slab]:
+    """Return one slab per layer of a medium; only the faces that touch air have a given boundary mismatch."""
     last = len(medium.layers) - 1
     layers = enumerate(medium.layers)
-    return [Slab(layer, A if i == 0 else 1.0, A if i == last else 1.0, clamp) for i, layer in layers]
+    return [
+        Slab(layer, mismatch if i == 0 else 1.0, mismatch if i == last else 1.0, clamp) for i, layer in layers
+    ]
 
 
 def _single_slab_response(frequency: ArrayLike, slab: Slab) -> StackResponse:

@@ -50,11 +50,11 @@ class BurleyProfile:
         s = self.shape
         return np.asarray(self.albedo * s / 4.0 * (1.0 / np.hypot(s, k) + 1.0 / np.hypot(s / 3.0, k)))
 
-    def radius_at_fraction(self, fraction: float) -> Floats:
+    def radius_at_fraction(self, light_fraction: float) -> Floats:
         """Return the radius (c,) within which a given fraction of the emerging light leaves [mm]."""
         # With t = exp(-s r / 3), the fraction outside r is (t^3 + 3 t) / 4; a hyperbolic sine solves this
         # cubic.
-        t = 2.0 * np.sinh(np.arcsinh(2.0 * (1.0 - fraction)) / 3.0)
+        t = 2.0 * np.sinh(np.arcsinh(2.0 * (1.0 - light_fraction)) / 3.0)
         return np.asarray(-3.0 * np.log(t) / self.shape)
 
 
@@ -95,7 +95,7 @@ class BurleyFit:
 
 
 def fit_burley(target: RingTarget) -> BurleyFit:
-    """Fit Burley's profile to ring energies with the smallest error, without changing any channel's total."""
+    """Fit Burley's profile to ring energies, without changing the total reflectance of any channel."""
     shape = np.array([_fit_shape(target.channel(i)) for i in range(len(target.total))])
     profile = BurleyProfile(target.total, shape)
     return BurleyFit(
@@ -142,7 +142,7 @@ def unity_parameters(profile: BurleyProfile) -> UnityParameters:
     According to Unity's source code (DiffusionProfileSettings.cs), the shape s of Burley's profile is
     1 / (colour times multiplier), where the multiplier is in millimetres at scale 1.
     """
-    _check_rgb(profile)
+    _check_three_channels(profile)
     distance = 1.0 / profile.shape
     return UnityParameters(
         scattering_colour=tuple((distance / distance.max()).tolist()),
@@ -177,7 +177,7 @@ def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
     life-size at scale 1. Both facts are from public copies of its source code (SubsurfaceProfile.cpp,
     BurleyNormalizedSSS.cpp).
     """
-    _check_rgb(profile)
+    _check_three_channels(profile)
     mean_free_path = 0.1 * UNREAL_SHAPE_RATIO * shape_factor(profile.albedo) / profile.shape
     distance = max(float(mean_free_path.max()), _UNREAL_MIN_DISTANCE_CM)
     return UnrealParameters(
@@ -187,7 +187,7 @@ def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
     )
 
 
-def _check_rgb(profile: BurleyProfile) -> None:
+def _check_three_channels(profile: BurleyProfile) -> None:
     if profile.shape.shape != (3,):
         actual = f"got {profile.shape.size} channels"
         refuse("engine parameters", "red, green and blue", actual, "Fit three channels")

@@ -149,10 +149,10 @@ def _log_variance_bounds(target: FitTarget) -> tuple[float, float]:
 
 
 def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
-    """Return the least-squares equations of a target, plus one: the weights sum to the total reflectance.
+    """Return the least-squares equations of a target, with an equation for the total reflectance added.
 
-    The results are the design function and the right-hand sides. The added equation has so large a weight
-    that it holds almost exactly.
+    The results are the design function and the right-hand sides. The added equation demands that the weights
+    sum to the total reflectance. It has so large a weight that it holds almost exactly.
     """
     width = target.mean_radius_at([0.5]) ** 2 / 2.0
     stiffness = _ENERGY_EQUATION_WEIGHT * float(np.linalg.norm(target.design_and_derivatives(width)[0]))
@@ -182,16 +182,16 @@ def _variances_of_fit(
     return similar_fit.variance_mm2[used] if used.sum() == gaussian_count else None
 
 
-def _combine_fits(fits: list[tuple[Floats, Floats]], profile_name: str) -> GaussianSum:
+def _combine_fits(channel_fits: list[tuple[Floats, Floats]], profile_name: str) -> GaussianSum:
     """Combine fits of separate channels into one sum of Gaussians, in which equal variances occur once.
 
-    fits : variances (k,) and weights (k, c) of each fit
+    channel_fits : variances (k,) and weights (k, c) of each fit
     """
-    variance, index = np.unique(np.concatenate([v for v, _ in fits]), return_inverse=True)
-    channels = sum(w.shape[1] for _, w in fits)
+    variance, index = np.unique(np.concatenate([v for v, _ in channel_fits]), return_inverse=True)
+    channels = sum(w.shape[1] for _, w in channel_fits)
     weight = np.zeros((len(variance), channels))
     row = channel = 0
-    for v, w in fits:
+    for v, w in channel_fits:
         rows = index[row : row + len(v)]
         np.add.at(weight[:, channel : channel + w.shape[1]], rows, w)
         row, channel = row + len(v), channel + w.shape[1]
@@ -199,9 +199,9 @@ def _combine_fits(fits: list[tuple[Floats, Floats]], profile_name: str) -> Gauss
 
 
 def single_gaussian(profile: GaussianSum) -> GaussianSum:
-    """Fit one Gaussian to a profile by least squares over the plane, without changing any channel's total.
+    """Fit one Gaussian to a profile by least squares over the plane; keep the total reflectance.
 
-    The result reproduces early skin shading, which blurred light maps once [Borshukov2003; Green2004].
+    Early skin shading blurred light maps by a single Gaussian [Borshukov2003; Green2004].
     """
     from scipy.optimize import minimize_scalar
 
@@ -230,13 +230,15 @@ def shared_gaussians(
     first = profiles[0].variance_mm2
     if all(np.array_equal(first, one.variance_mm2) for one in profiles):
         return tuple(profiles)
-    fitted = _fit_shared(tuple(map(_hashable_sum, profiles)), gaussian_count)
+    fitted = _fit_shared_variances(tuple(map(_hashable_sum, profiles)), gaussian_count)
     pairs = zip(fitted, profiles, strict=True)
     return tuple(replace(fit, from_photons=profile.from_photons) for fit, profile in pairs)
 
 
 @lru_cache(_MAX_CACHED_FITS)
-def _fit_shared(hashable_sums: tuple[_HashableSum, ...], gaussian_count: int) -> tuple[GaussianSum, ...]:
+def _fit_shared_variances(
+    hashable_sums: tuple[_HashableSum, ...], gaussian_count: int
+) -> tuple[GaussianSum, ...]:
     profiles = [
         GaussianSum(name, np.frombuffer(variance), np.frombuffer(weight).reshape(-1, channels))
         for name, variance, weight, channels in hashable_sums

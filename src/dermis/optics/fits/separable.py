@@ -26,7 +26,7 @@ class SeparableKernel:
     """Kernel A a(x) a(y), where a(x) is a sum of w exp(-x^2 / 2v) / sqrt(2 pi v); not radially symmetric.
 
     albedo : (c,) total reflectance A [-]
-    variance_mm2 : (k, c) variances v, increasing with k [mm2]
+    variance_mm2 : (k, c) variances v of the k Gaussians, in increasing order [mm2]
     weight : (k, c) weights w, which sum to 1 in each channel [-]
 
     Source: [Jimenez2015].
@@ -60,7 +60,7 @@ class SeparableKernel:
 class SeparableFit:
     """Separable kernel with its errors relative to a diffusion profile.
 
-    kernel : fitted or evaluated kernel
+    kernel : the separable kernel
     error : (c,) relative root-mean-square error of the light through sectors of rings [-]
     energy_error : (c,) relative error of the total reflectance [-]
     """
@@ -88,11 +88,11 @@ def evaluate_kernel(kernel: SeparableKernel, target: RingTarget) -> SeparableFit
 
 
 def fit_separable(target: RingTarget) -> SeparableFit:
-    """Fit a separable kernel of two Gaussians to ring energies, without changing any channel's total.
+    """Fit a separable kernel of two Gaussians to ring energies, without changing the total reflectance.
 
     Source: [Jimenez2015], the artist-friendly model.
     """
-    parameters = np.stack([_fit_channel(target.channel(i)) for i in range(len(target.total))], axis=1)
+    parameters = np.stack([_fit_channel_kernel(target.channel(i)) for i in range(len(target.total))], axis=1)
     fraction, log_variance = parameters[0], parameters[1:]
     order = np.argsort(log_variance, axis=0)
     weight = np.take_along_axis(np.stack([fraction, 1.0 - fraction]), order, axis=0)
@@ -100,7 +100,7 @@ def fit_separable(target: RingTarget) -> SeparableFit:
     return evaluate_kernel(SeparableKernel(target.total, variance, weight), target)
 
 
-def _fit_channel(target: RingTarget) -> Floats:
+def _fit_channel_kernel(target: RingTarget) -> Floats:
     """Fit one channel; return (3,): weight of the first Gaussian, and logarithms of both variances."""
     from scipy.optimize import least_squares
 
@@ -131,14 +131,14 @@ def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Flo
     """
     cells = np.zeros((len(edges_mm) - 1, SECTORS_PER_QUADRANT))
     for i in range(len(variance)):
-        cells += weight[i] ** 2 * _elliptic_sectors(edges_mm, variance[i], variance[i])
+        cells += weight[i] ** 2 * _elliptic_sector_fractions(edges_mm, variance[i], variance[i])
         for j in range(i):
-            crossed = _elliptic_sectors(edges_mm, variance[i], variance[j])
+            crossed = _elliptic_sector_fractions(edges_mm, variance[i], variance[j])
             cells += weight[i] * weight[j] * (crossed + crossed[:, ::-1])
     return cells
 
 
-def _elliptic_sectors(edges_mm: Floats, variance_x_mm2: float, variance_y_mm2: float) -> Floats:
+def _elliptic_sector_fractions(edges_mm: Floats, variance_x_mm2: float, variance_y_mm2: float) -> Floats:
     """Return the fraction (n, SECTORS_PER_QUADRANT) of an elliptic Gaussian in each ring and sector [-].
 
     edges_mm : (n + 1,) radii of the ring edges [mm]

@@ -67,13 +67,13 @@ class PointTarget:
         residual = self.design_and_derivatives(variance_mm2)[0] @ weight - self.samples
         return np.asarray(np.sqrt((residual**2).sum(axis=0) / (self.samples**2).sum(axis=0)))
 
-    def mean_radius_at(self, fractions: Sequence[float]) -> Floats:
+    def mean_radius_at(self, light_fractions: Sequence[float]) -> Floats:
         """Return the radii within which given fractions of the light emerge, on average over channels [mm].
 
-        fractions : increasing fractions of the light, 0 to 1 [-]
+        light_fractions : increasing fractions of the light, 0 to 1 [-]
         """
         radial_density = self._sqrt_quadrature_weights[:, None] ** 2 * np.abs(self.reflectance)
-        return _radii_at_fractions(fractions, self.radius_mm, radial_density)
+        return _radii_at_fractions(light_fractions, self.radius_mm, radial_density)
 
     def channel(self, channel_index: int) -> PointTarget:
         """Return the target with only one of its channels, to fit this channel separately."""
@@ -124,12 +124,12 @@ class RingTarget:
         """Return the relative error (c,) of a sum of Gaussians, as defined by `ring_error` [-]."""
         return ring_error(self, self.design_and_derivatives(variance_mm2)[0] @ weight)
 
-    def mean_radius_at(self, fractions: Sequence[float]) -> Floats:
+    def mean_radius_at(self, light_fractions: Sequence[float]) -> Floats:
         """Return the radii within which given fractions of the light emerge, on average over channels [mm].
 
-        fractions : increasing fractions of the light, 0 to 1 [-]
+        light_fractions : increasing fractions of the light, 0 to 1 [-]
         """
-        return _radii_at_fractions(fractions, self.edges_mm[1:], np.abs(self.energy))
+        return _radii_at_fractions(light_fractions, self.edges_mm[1:], np.abs(self.energy))
 
     def channel(self, channel_index: int) -> RingTarget:
         """Return the target with only one of its channels, to fit this channel separately."""

@@ -40,7 +40,7 @@ class WeightedFit(NamedTuple):
 
 
 def minimise(
-    design: DesignFunction,
+    design_function: DesignFunction,
     samples: Floats,
     log_variance: Floats,
     log_variance_bounds: tuple[float, float],
@@ -48,19 +48,21 @@ def minimise(
 ) -> WeightedFit:
     """Return the fit at a local minimum of the squared residuals, found by descent from given variances.
 
-    design : function from k variances to the samples (n, k) of unit Gaussians, and to the derivatives (n, k)
-        of these samples with respect to the logarithms of the variances
+    design_function : function from k variances to the samples (n, k) of unit Gaussians, and to the
+        derivatives (n, k) of these samples with respect to the logarithms of the variances
     samples : (n, c) data to fit
     log_variance : (k,) logarithms of the variances from which the descent starts
     log_variance_bounds : smallest and largest logarithm of a variance
     cost_tolerance : relative decrease of the cost below which the descent stops
     """
-    fit = _optimal_weights(design, samples, log_variance)
+    fit = _optimal_weights(design_function, samples, log_variance)
     damping, previous = 1e-2, None
     for _ in range(_MAX_STEP_COUNT):
         step = _marquardt_step(fit, damping)
         update = step if previous is None else _anderson_step(fit.log_variance, step, *previous)
-        trial = _optimal_weights(design, samples, np.clip(fit.log_variance + update, *log_variance_bounds))
+        trial = _optimal_weights(
+            design_function, samples, np.clip(fit.log_variance + update, *log_variance_bounds)
+        )
         if trial.cost < fit.cost:
             converged = fit.cost - trial.cost < cost_tolerance * fit.cost
             previous = fit.log_variance, step
@@ -76,10 +78,10 @@ def minimise(
     return fit
 
 
-def _marquardt_step(fit: WeightedFit, damping: float) -> Floats:
-    scale = fit.curvature.diagonal()
-    damped = fit.curvature + np.diag(damping * (scale + 1e-12 * scale.max()))
-    step = -np.linalg.lstsq(damped, fit.gradient, rcond=None)[0]
+def _marquardt_step(weighted_fit: WeightedFit, damping: float) -> Floats:
+    scale = weighted_fit.curvature.diagonal()
+    damped = weighted_fit.curvature + np.diag(damping * (scale + 1e-12 * scale.max()))
+    step = -np.linalg.lstsq(damped, weighted_fit.gradient, rcond=None)[0]
     return np.asarray(np.clip(step, -_MAX_LOG_VARIANCE_STEP, _MAX_LOG_VARIANCE_STEP))
 
 
@@ -98,9 +100,9 @@ def _anderson_step(
     return np.asarray(np.clip(extrapolated, -_MAX_LOG_VARIANCE_STEP, _MAX_LOG_VARIANCE_STEP))
 
 
-def _optimal_weights(design: DesignFunction, samples: Floats, log_variance: Floats) -> WeightedFit:
+def _optimal_weights(design_function: DesignFunction, samples: Floats, log_variance: Floats) -> WeightedFit:
     """Return the fit for given variances, with optimal non-negative weights, cost and derivatives."""
-    columns, slopes = design(np.exp(log_variance))
+    columns, slopes = design_function(np.exp(log_variance))
     k = len(log_variance)
     size = np.linalg.norm(columns, axis=0)
     # One QR factorisation reduces the problem of all channels to the space of these few columns.
@@ -108,7 +110,9 @@ def _optimal_weights(design: DesignFunction, samples: Floats, log_variance: Floa
     weight = np.zeros((k, samples.shape[1]))
     cost, gradient, curvature = 0.0, np.zeros(k), np.zeros((k, k))
     for i, sample in enumerate(reduced.T[2 * k :]):
-        weight[:, i], residual, jacobian = _solve_channel(reduced[:, :k], reduced[:, k : 2 * k], sample)
+        weight[:, i], residual, jacobian = _solve_channel_weights(
+            reduced[:, :k], reduced[:, k : 2 * k], sample
+        )
         cost += float(residual @ residual)
         gradient += jacobian.T @ residual
         curvature += jacobian.T @ jacobian
@@ -126,7 +130,7 @@ def qr_factor(matrix: Floats) -> Floats:
     return factors[0] if len(factors) == 1 else np.asarray(np.linalg.qr(np.vstack(factors), mode="r"))
 
 
-def _solve_channel(columns: Floats, slopes: Floats, sample: Floats) -> tuple[Floats, Floats, Floats]:
+def _solve_channel_weights(columns: Floats, slopes: Floats, sample: Floats) -> tuple[Floats, Floats, Floats]:
     from scipy.optimize import nnls
 
     weight: Floats = nnls(columns, sample)[0]

@@ -1,1 +1,1 @@
-"""Skin made of pigments: spectra of melanin and blood, and layered media that contain these pigments."""
+"""Skin defined by its pigments: spectra of melanin and blood, and layered media that contain both."""

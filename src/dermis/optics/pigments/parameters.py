@@ -1,4 +1,4 @@
-"""Parameters of skins made of pigments: the default skin, and the skins of the presets.
+"""Parameters of skins that are defined by their pigments: the default skin, and the skins of the presets.
 
 All defaults of `SkinParameters` are here. NumPy is not imported, so that help texts appear quickly.
 """

@@ -1,4 +1,4 @@
-"""Distribution of pigments in people's skin: a mixture of normal distributions for all people together."""
+"""Distribution of pigments in people's skin, as a mixture of normal distributions."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from dermis.optics.pigments.spectra import (
     ScatteringLaw,
     baseline_absorption,
     blood_absorption,
-    donner_jensen_2006,
+    donner_jensen_scattering,
     melanosome_absorption,
     visible_wavelengths,
 )
@@ -38,9 +38,9 @@ def spectral_medium(
     structure: Structure,
     parameters: SkinParameters,
     wavelength_nm: Floats = WAVELENGTHS_NM,
-    scattering: ScatteringLaw = donner_jensen_2006,
+    scattering: ScatteringLaw = donner_jensen_scattering,
 ) -> Medium:
-    """Return the medium of a skin made of pigments, with one channel for each wavelength.
+    """Return the medium of a skin with given pigments, with one channel for each wavelength.
 
     structure : "dj2006" is an epidermis on a semi-infinite dermis; "donner2008" has blood in both epidermis
         and dermis, and a thin melanin sheet between them; "biospec" has a stratum corneum, an epidermis and
@@ -96,7 +96,7 @@ def _build_donner2008(
 def _build_biospec(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
 ) -> tuple[Layer, ...]:
-    """Return four skin layers after [KrishnaswamyBaranoski2004], with constants from an author's code."""
+    """Return four skin layers after [KrishnaswamyBaranoski2004], with constants from code by one author."""
     reticular = replace(parameters, blood=_RETICULAR_BLOOD_RATIO * parameters.blood)
     return (
         Layer(
@@ -157,7 +157,7 @@ def dj2006_layers(parameters: SkinParameters, pigment_fractions: Floats) -> tupl
     pigment_fractions : (n,) fractions, used both as melanin fractions of the epidermis and as blood fractions
         of the dermis [-]
     """
-    column, scattering = pigment_fractions[:, None], donner_jensen_2006(WAVELENGTHS_NM)
+    column, scattering = pigment_fractions[:, None], donner_jensen_scattering(WAVELENGTHS_NM)
     epidermal = _epidermal_absorption(parameters, column, WAVELENGTHS_NM)
     dermal = _dermal_absorption(parameters, column, WAVELENGTHS_NM)
     ratios = 1.0, DERMIS_SCATTERING_RATIO

@@ -83,7 +83,7 @@ def _weighted_colour_matching() -> Floats:
 
 
 def _primaries_xyz() -> Floats:
-    """Return a matrix (3, 3) with the XYZ colours of the Rec. 709 primaries as columns, at luminance 1."""
+    """Return a matrix (3, 3) with the XYZ colours of the Rec. 709 primaries as columns, each with Y = 1."""
     x, y = _PRIMARIES_XY.T
     return np.array([x / y, np.ones(3), (1.0 - x - y) / y])
 
@@ -170,7 +170,7 @@ def water_absorption(wavelength_nm: ArrayLike) -> Floats:
     return np.asarray(4.0 * np.pi * k * _NM_PER_MM / visible_wavelengths(wavelength_nm))
 
 
-def donner_jensen_2006(wavelength_nm: ArrayLike) -> Floats:
+def donner_jensen_scattering(wavelength_nm: ArrayLike) -> Floats:
     """Return the reduced scattering coefficient of the epidermis after [DonnerJensen2006] [1/mm].
 
     The unit could not be checked against the paper. It is taken to be 1/mm, because half of this coefficient,
@@ -182,7 +182,7 @@ def donner_jensen_2006(wavelength_nm: ArrayLike) -> Floats:
     return np.asarray(14.74 * wavelength**-0.22 + 2.2e11 * wavelength**-4.0)
 
 
-def jacques_1998(wavelength_nm: ArrayLike) -> Floats:
+def jacques_scattering(wavelength_nm: ArrayLike) -> Floats:
     """Return the reduced scattering coefficient of skin after [Jacques1998] [1/mm].
 
     The law is the sum of Mie scattering by large fibres and Rayleigh scattering by small fibres. It is the

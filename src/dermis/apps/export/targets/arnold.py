@@ -32,16 +32,16 @@ class Arnold(JsonTarget):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the mean free paths of the homogeneous medium whose profile is closest to the reference."""
+        """Return parameters for the homogeneous medium whose profile is closest to the reference profile."""
         colour = subject.clipped_albedo(_MIN_ALBEDO)
         return _material_parameters(colour, fit_homogeneous_medium(subject.curve, colour, "walk").mfp_mm)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return Burley widths as the radius, where Arnold expects mean free paths."""
+        """Return parameters with Burley widths as subsurface_radius, instead of mean free paths."""
         return _material_parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile of a random walk whose single-scattering albedo is derived from the colour."""
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+        """Return the profile of a random walk whose albedo is derived from subsurface_color."""
         path = (
             _MM_PER_CM
             * np.array(get_numbers(parameters, _RADIUS_NAME))
@@ -52,11 +52,11 @@ class Arnold(JsonTarget):
         return curve.with_energy(curve.energy / subject.clipped_albedo(_MIN_ALBEDO) * subject.curve.energy)
 
 
-def _material_parameters(colour: Floats, mean_free_path_mm: Floats) -> Parameters:
+def _material_parameters(base_colour: Floats, mean_free_path_mm: Floats) -> Parameters:
     return (
         Parameter("subsurface", 1.0, "-", "all diffuse light is scattered below the surface"),
         Parameter("subsurface_type", "randomwalk", "-", "not diffusion, whose profile differs"),
-        Parameter(_COLOUR_NAME, flat_tuple(colour), "-", "diffuse reflectance"),
+        Parameter(_COLOUR_NAME, flat_tuple(base_colour), "-", "diffuse reflectance"),
         Parameter(_RADIUS_NAME, flat_tuple(mean_free_path_mm / _MM_PER_CM), "cm", "mean free path"),
         Parameter(_SCALE_NAME, 1.0, "-", "scene units per cm: 0.01 for a scene in metres"),
         Parameter("subsurface_anisotropy", 0.0, "-", "isotropic scattering"),

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.fitting import gaussian_curve
+from dermis.apps.export.fitting import cumulative_gaussian_profile
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, get_value, replace_values, write_files
 from dermis.base.errors import refuse
@@ -112,20 +112,20 @@ class MapFolder(Target):
         """Return the parameters for an ordinary light map, without diffusion."""
         return replace_values(self.parameters(subject, version), {_SCATTERING_PARAMETER_NAME: False})
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the profile of the renderer's sum of Gaussians or, without diffusion, a step at radius 0."""
         energy = subject.curve.energy
         if not get_value(parameters, _SCATTERING_PARAMETER_NAME) or subject.scene is None:
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), energy)
         profile = SkinProfiles().profile(subject.scene.skin)
-        return gaussian_curve(profile.variance_mm2, profile.weight, energy)
+        return cumulative_gaussian_profile(profile.variance_mm2, profile.weight, energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Bake all maps of the scene and write them into the output folder."""
         if subject.scene is None:
             actual = f"got the skin {subject.name}"
             refuse("maps", "a head", actual, "Name a head, and the skin with --profile")
-        scene, side = subject.scene, check_side(self.side)
+        scene, side = subject.scene, check_map_side(self.side)
         settings = Settings(atlas=min(max(side, MAP_SIDES[0]), _MAX_DIFFUSION_ATLAS_SIDE))
         baked = bake_maps(Renderer(self.adapter), scene, settings, side)
         return write_files(output, map_files(baked, scene, self._normal_y))
@@ -139,21 +139,23 @@ def encode_map_exr(map_name: str, texels: Floats) -> bytes:
     """Return a map as OpenEXR, with channels R, G, B for colours and vectors, and Y for scalars."""
     names = "Y" if texels.ndim == 2 else "RGB"
     channels = [texels] if texels.ndim == 2 else list(np.moveaxis(texels, -1, 0))
-    return encode_exr_parts({map_name: dict(zip(names, channels, strict=True))}, run_length=True)
+    return encode_exr_parts({map_name: dict(zip(names, channels, strict=True))}, use_run_length_encoding=True)
 
 
-def quantise_map(texels: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], RangeEntries]:
-    """Return the integer levels of a map for PNG, and the JSON entries that say how to decode the levels."""
-    if encoding == "colour":
+def quantise_map(
+    texels: Floats, png_encoding: PngEncoding
+) -> tuple[NDArray[np.uint8 | np.uint16], RangeEntries]:
+    """Return a map quantised to integers for PNG, and JSON entries that say how to decode the integers."""
+    if png_encoding == "colour":
         return encode_srgb8(np.clip(texels, 0.0, 1.0)), {"png": "sRGB"}
-    if encoding == "light":
+    if png_encoding == "light":
         white = float(np.percentile(texels, _WHITE_PERCENTILE)) or 1.0
         return encode_srgb8(np.clip(texels / white, 0.0, 1.0)), {"png": "sRGB", "white": white}
-    if encoding == "normal":
+    if png_encoding == "normal":
         return _to_uint16(0.5 * texels + 0.5), {"png": "value = 2 level / 65535 - 1"}
-    if encoding == "root":
+    if png_encoding == "root":
         return _to_uint16(np.sqrt(texels)), {"png": "value = (level / 65535)^2"}
-    if encoding == "fraction":
+    if png_encoding == "fraction":
         return _to_uint16(texels), {"png": "value = level / 65535"}
     low, high = float(texels.min()), float(texels.max())
     span = high - low or 1.0
@@ -161,7 +163,7 @@ def quantise_map(texels: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint
     return _to_uint16((texels - low) / span), {"png": formula, "black": low, "white": low + span}
 
 
-def orient_green(normals: Floats, normal_y: NormalY) -> Floats:
+def orient_normal_map(normals: Floats, normal_y: NormalY) -> Floats:
     """Return normals whose y, the green channel, points towards row 0 of the map or away from row 0.
 
     normal_y : "up" if y is to point towards row 0, as in OpenGL; "down" if away from row 0, as in DirectX
@@ -175,7 +177,7 @@ def _to_uint16(fraction: Floats) -> NDArray[np.uint16]:
     return np.rint(np.clip(fraction, 0.0, 1.0) * _MAX_PNG_LEVEL).astype(np.uint16)
 
 
-def check_side(map_side: object) -> int:
+def check_map_side(map_side: object) -> int:
     """Return the requested side of the maps [texel] after checking that the side is supported.
 
     Raises DermisError for a side that is not one of `MAP_SIDES`.
@@ -193,7 +195,7 @@ def check_side(map_side: object) -> int:
 
 
 def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) -> BakedMaps:
-    """Return the skin's maps: material, baked light of the scene, and heights if the head has a height map.
+    """Return the maps of the skin: its material, the irradiance in the scene, and the heights, if any.
 
     map_side : side of the maps [texel]
     """
@@ -205,21 +207,26 @@ def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, map_side: in
     if height is None:
         baked.absent["height"] = "the head has no height map"
     else:
-        baked.maps["height"] = resample(height, map_side)
+        baked.maps["height"] = resample_map(height, map_side)
     return baked
 
 
-def map_files(baked: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterator[tuple[str, bytes]]:
+def map_files(baked_maps: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each file: OpenEXR and PNG of each map, then the JSON that describes them."""
     described: dict[str, RangeEntries] = {}
     for name, info in MAP_INFOS.items():
-        if name not in baked.maps:
+        if name not in baked_maps.maps:
             continue
-        values = orient_green(baked.maps[name], normal_y) if name == "normal" else baked.maps[name]
+        values = (
+            orient_normal_map(baked_maps.maps[name], normal_y) if name == "normal" else baked_maps.maps[name]
+        )
         _LOGGER.info("writing %s", name)
         yield f"{name}.exr", encode_map_exr(name, values)
-        inside = values[baked.covered]
-        bounds = {"least": _to_lists(inside.min(axis=0)), "largest": _to_lists(inside.max(axis=0))}
+        inside = values[baked_maps.covered]
+        bounds = {
+            "least": _round_to_lists(inside.min(axis=0)),
+            "largest": _round_to_lists(inside.max(axis=0)),
+        }
         described[name] = {"unit": info.unit, "meaning": info.description, "exr": "linear", **bounds}
         if info.png_encoding != "none":
             picture, scale = quantise_map(values, info.png_encoding)
@@ -227,12 +234,12 @@ def map_files(baked: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterator[tup
             described[name] |= scale
     yield (
         "maps.json",
-        (json.dumps(_maps_description(baked, scene, normal_y, described), indent=1) + "\n").encode(),
+        (json.dumps(_maps_description(baked_maps, scene, normal_y, described), indent=1) + "\n").encode(),
     )
 
 
 def _maps_description(
-    baked: BakedMaps, scene: Scene, normal_y: NormalY, map_entries: dict[str, RangeEntries]
+    baked_maps: BakedMaps, scene: Scene, normal_y: NormalY, map_entries: dict[str, RangeEntries]
 ) -> dict[str, object]:
     """Return the description of all maps for maps.json: layout, lights, units and ranges.
 
@@ -241,9 +248,9 @@ def _maps_description(
     return {
         "format": "dermis maps 1",
         "made_by": f"dermis {version()}",
-        "size": len(baked.covered),
+        "size": len(baked_maps.covered),
         "layout": "uv of the head, sampled at texel centres; row 0 is the top, v = 1 if v points upwards",
-        "covered": float(baked.covered.mean()),
+        "covered": float(baked_maps.covered.mean()),
         "beyond_the_skin": "the nearest texel of the skin, so that filters never read black",
         "normal_green": "up (OpenGL)" if normal_y == "up" else "down (DirectX)",
         "relief": "normal and height contain the same relief: use one of them",
@@ -253,11 +260,11 @@ def _maps_description(
         "environment": scene.environment and scene.environment.model_dump(mode="json"),
         "profile": scene.skin.profile,
         "maps": map_entries,
-        "absent": baked.absent,
+        "absent": baked_maps.absent,
     }
 
 
-def resample(texels: Floats, new_side: int) -> Floats:
+def resample_map(texels: Floats, new_side: int) -> Floats:
     """Return a map (h, w) resampled to a square map.
 
     The map is halved by averaging while both sides are even and at least twice the new side, and then
@@ -280,7 +287,7 @@ def resample(texels: Floats, new_side: int) -> Floats:
     return np.ascontiguousarray(texels, np.float32)
 
 
-def _to_lists(numbers: Floats) -> float | list[float]:
+def _round_to_lists(numbers: Floats) -> float | list[float]:
     rounded: float | list[float] = np.round(np.asarray(numbers, np.float64), 6).tolist()
     return rounded
 

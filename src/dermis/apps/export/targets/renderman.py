@@ -1,8 +1,8 @@
 """Export to RenderMan: parameters of PxrSurface, based on published documentation and not tested.
 
-The diffuse mean free path is subsurfaceDmfp times subsurfaceDmfpColor times unitLength, in mm. The
-Burley profile for a diffuse mean free path dmfp has the width d = dmfp / s(A), where A is the albedo and s is
-Burley's factor for diffuse mean free paths.
+The diffuse mean free path is subsurfaceDmfp times subsurfaceDmfpColor times unitLength, in mm. The width d of
+the Burley profile is the diffuse mean free path divided by s(A). Here A is the albedo, and s is Burley's
+factor for diffuse mean free paths.
 
 Source: [ChristensenBurley2015].
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.apps.export.fitting import burley_curve, fit_burley_width
+from dermis.apps.export.fitting import cumulative_burley_profile, fit_burley_width
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import JsonTarget, Parameter, Parameters, flat_tuple, get_numbers
 from dermis.optics.cumulative_profile import CumulativeProfile
@@ -40,16 +40,18 @@ class RenderMan(JsonTarget):
         return _material_parameters(albedo, fit_burley_width(subject.curve) * shape_factor_diffuse(albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the widths d of the closest Burley profiles in place of diffuse mean free paths."""
+        """Return parameters with the widths d of the closest Burley profiles as diffuse mean free paths."""
         return _material_parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative Burley profile whose width follows from the diffuse mean free paths."""
         path, path_colour, unit, colour = (
             np.array(get_numbers(parameters, name))
             for name in (_DMFP_NAME, _DMFP_COLOUR_NAME, _UNIT_LENGTH_NAME, _COLOUR_NAME)
         )
-        return burley_curve(path * path_colour * unit / shape_factor_diffuse(colour), subject.curve.energy)
+        return cumulative_burley_profile(
+            path * path_colour * unit / shape_factor_diffuse(colour), subject.curve.energy
+        )
 
 
 def _material_parameters(albedo: Floats, diffuse_mean_free_path_mm: Floats) -> Parameters:

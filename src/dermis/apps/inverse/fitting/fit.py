@@ -70,7 +70,7 @@ def candidate_suns(camera_direction: Floats) -> Floats:
 
 
 def neighbouring_suns(sun_directions: Floats) -> Floats:
-    """Return candidates (n, 3) for a finer search: the given directions and two rings around each of them.
+    """Return candidate suns (n, 3) for a finer search: each given sun and two rings of suns around it.
 
     sun_directions : (k, 3) unit vectors towards suns
     """
@@ -89,24 +89,24 @@ class InitialGuess:
     specular strengths only scale these radiances, so each trial solves small normal equations without
     rendering.
 
-    frames : renderer of the face
-    point : pigments and candidate suns for which the frames are rendered
+    face_renderer : renderer of the face
+    fit_point : pigments and candidate suns for which the frames are rendered
     photo_radiance : (p, 3) radiance of the photograph's pixels in the mask
     pixel_weight : (p, 3) inverse standard deviations of these pixels
     """
 
     def __init__(
-        self, frames: FaceRenderer, point: FitPoint, photo_radiance: Floats, pixel_weight: Floats
+        self, face_renderer: FaceRenderer, fit_point: FitPoint, photo_radiance: Floats, pixel_weight: Floats
     ) -> None:
-        self.point = point
-        diffuse, specular = frames.diffuse_and_specular_radiance(point)
+        self.point = fit_point
+        diffuse, specular = face_renderer.diffuse_and_specular_radiance(fit_point)
         weighted = np.concatenate([diffuse, specular]) * pixel_weight
         weighted_target = photo_radiance * pixel_weight
         self._grams = np.einsum("apc,bpc->cab", weighted, weighted, optimize=True)
         self._rights = np.einsum("apc,pc->ca", weighted, weighted_target)
         self._total = float((weighted_target**2).sum())
         self._lights = len(diffuse)
-        pigments = frames.scene.skin.pigments
+        pigments = face_renderer.scene.skin.pigments
         assert pigments is not None
         fixed = pigments.overrides()
         self._table = skin_colour_table(fixed["eumelanin"], fixed["oxygen"], fixed["epidermis_mm"])
@@ -123,17 +123,17 @@ class InitialGuess:
             suns = self._select_suns(log_skin, sun_count)
         return replace(self.point, logs=log_skin, suns=self.point.suns[suns])
 
-    def melanin_ranges(self, best: FitPoint) -> list[Floats]:
+    def melanin_ranges(self, best_point: FitPoint) -> list[Floats]:
         """Return a range of melanin fractions around each local minimum of the residual, lowest first.
 
         There can be several minima, such as dark skin in strong light and pale skin in weak light. Minima
         with a residual much larger than the smallest residual are left out. A single minimum gets the whole
         grid as its range.
 
-        best : result of `best_point`
+        best_point : result of `best_point`
         """
-        suns = [int(np.argmax(self.point.suns @ one)) for one in best.suns]
-        _, residuals = self._try_skins(best.logs, suns, _MELANIN_GRID)
+        suns = [int(np.argmax(self.point.suns @ one)) for one in best_point.suns]
+        _, residuals = self._try_skins(best_point.logs, suns, _MELANIN_GRID)
         profile = residuals.reshape(len(_MELANIN_GRID), -1).min(axis=1)
         padded = np.concatenate([[np.inf], profile, [np.inf]])
         is_minimum = (profile <= padded[:-2]) & (profile <= padded[2:])
@@ -153,7 +153,7 @@ class InitialGuess:
 
         The skins are the nodes of a grid of melanin, blood and specular strength.
 
-        log_skin : (4,) logarithms of the skin unknowns, of which only the roughness is used
+        log_skin : (4,) logarithms of the skin parameters (see `FitPoint`); only the roughness is used
         sun_indices : indices of the candidate suns
         """
         grid = product(np.log(melanin_grid), np.log(_BLOOD_GRID), np.log(_SPECULAR_STRENGTH_GRID))
@@ -163,7 +163,7 @@ class InitialGuess:
     def _select_suns(self, log_skin: Floats, sun_count: int) -> list[int]:
         """Return the indices of `sun_count` suns, chosen greedily: each lowers the residual the most.
 
-        log_skin : (4,) logarithms of the skin unknowns
+        log_skin : (4,) logarithms of the skin parameters, see `FitPoint`
         """
         selected: list[int] = []
         for _ in range(sun_count):
@@ -172,12 +172,12 @@ class InitialGuess:
         return selected
 
     def _squared_residual(self, log_skin: Floats, sun_indices: list[int]) -> float:
-        """Return the squared residual for a skin and a set of suns, with the best light strengths.
+        """Return the squared residual for a skin and a set of suns, minimised over the light strengths.
 
         The rendered diffuse radiance is scaled to the colour of the skin, and the rendered specular radiance
         to its specular strength.
 
-        log_skin : (4,) logarithms of the skin unknowns
+        log_skin : (4,) logarithms of the skin parameters, see `FitPoint`
         sun_indices : indices of the candidate suns
         """
         lights = np.array([*range(AMBIENT_LOBE_COUNT), *(AMBIENT_LOBE_COUNT + k for k in sun_indices)])
@@ -215,8 +215,8 @@ def fit(
 ) -> FitResult:
     """Fit light and skin to a photograph of a head of known shape.
 
-    All lights have the same colour. The exposure is given, because a photograph cannot tell the exposure from
-    the strength of the light.
+    All lights have the same colour. The exposure is not estimated, because a photograph does not distinguish
+    between a longer exposure and stronger light.
 
     Parameters
     ----------
@@ -288,13 +288,13 @@ def fit(
         frames = FaceRenderer(Renderer(adapter, cache_size=2), subject.scene, settings, Path(folder))
         candidate = _find_skin(frames, small)
         problem = FitProblem(frames, small.linear[frames.mask] / scale, noise, white == "specular", robust)
-        starts = _initial_points(problem, candidate, suns)
+        starts = _start_points(problem, candidate, suns)
         found = [solve_fit(problem, start, progress) for start in starts]
         state, derivatives = min(found, key=lambda one: block_residual(problem, one[0]))
         scene = frames.lit_scene(state.point, state.strengths)
         picture = frames.render_picture(scene) * scale * light_tint(state.point)
     relative_residual = np.abs(state.residual) / np.maximum(problem.target, 1e-6)
-    note_residual(photo if isinstance(photo, str | Path) else "photo", block_residual(problem, state))
+    warn_of_poor_fit(photo if isinstance(photo, str | Path) else "photo", block_residual(problem, state))
     return FitResult(
         subject,
         state.point,
@@ -302,7 +302,7 @@ def fit(
         white_point * light_tint(state.point),
         exposure,
         photograph.size,
-        fit_uncertainty(problem, state, derivatives, _assumed_sd(subject, state.point)),
+        fit_uncertainty(problem, state, derivatives, _sd_from_assumed_parameters(subject, state.point)),
         small.linear,
         picture,
         frames.mask,
@@ -312,7 +312,7 @@ def fit(
     )
 
 
-def _assumed_sd(subject: FitSubject, point: FitPoint) -> dict[str, float]:
+def _sd_from_assumed_parameters(subject: FitSubject, best_point: FitPoint) -> dict[str, float]:
     """Return a dictionary from pigment name to the standard deviation due to assumed skin parameters.
 
     The standard deviations are those of the pigments' logarithms.
@@ -321,47 +321,47 @@ def _assumed_sd(subject: FitSubject, point: FitPoint) -> dict[str, float]:
     assert pigments is not None
     fixed = {name: getattr(pigments, name) for name in ("eumelanin", *FIXED_PARAMETERS)}
     skin = replace(DEFAULT_SKIN, **fixed)
-    values = point.values()
+    values = best_point.values()
     return unknown_skin_sd(values["melanin"], values["blood"], skin, subject.known)
 
 
-def note_residual(photo_source: object, residual: float) -> None:
+def warn_of_poor_fit(photo_source: object, median_residual: float) -> None:
     """Notify the user if a fit is so poor that the picture probably does not show the given head.
 
     photo_source : name of the photograph, for the notification
-    residual : median relative residual over blocks of the picture [-]
+    median_residual : median relative residual over blocks of the picture [-]
     """
-    if residual > _MAX_BLOCK_RESIDUAL:
+    if median_residual > _MAX_BLOCK_RESIDUAL:
         notify(
-            f"{photo_source}: the fit differs from it by {100 * residual:.0f} % (median of blocks); "
+            f"{photo_source}: the fit differs from it by {100 * median_residual:.0f} % (median of blocks); "
             "1 % is usual, up to 10 % for the shape of another person. It probably does not show the head in "
             "this place, "
             "and the results mean nothing: check the camera and that it is upright, or use landmarks"
         )
 
 
-def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
+def _find_skin(face_renderer: FaceRenderer, photo: Photograph) -> FitPoint:
     """Set the renderer's mask to the pixels of lit skin; return the point where the coarse search starts.
 
-    This point has the median skin of the priors, and all candidate suns.
+    This point has the median skin parameters of the prior, and all candidate suns.
     """
-    camera = frames.scene.camera
+    camera = face_renderer.scene.camera
     view_direction = np.subtract(camera.position, camera.target)
     candidate = prior_point(candidate_suns(view_direction / np.linalg.norm(view_direction)))
-    frames.find_mask(candidate, photo.unclipped)
-    frames.mask &= photo.linear.max(axis=2) > 0.0
-    if frames.mask.sum() < _MIN_SKIN_PIXELS:
-        actual = f"only {int(frames.mask.sum())} of its pixels are neither clipped nor black"
+    face_renderer.find_mask(candidate, photo.unclipped)
+    face_renderer.mask &= photo.linear.max(axis=2) > 0.0
+    if face_renderer.mask.sum() < _MIN_SKIN_PIXELS:
+        actual = f"only {int(face_renderer.mask.sum())} of its pixels are neither clipped nor black"
         refuse(
             "photo", "skin at the head's position", actual, "Check camera and exposure, or take a larger side"
         )
     return candidate
 
 
-def _initial_points(problem: FitProblem, candidate: FitPoint, sun_count: int) -> list[FitPoint]:
+def _start_points(problem: FitProblem, candidate_point: FitPoint, sun_count: int) -> list[FitPoint]:
     """Return the points where fits start: minima of a coarse search, refined by a search near their suns."""
     frames, target, weight = problem.frames, problem.target, problem.initial_weights()
-    coarse = InitialGuess(frames, candidate, target, weight)
+    coarse = InitialGuess(frames, candidate_point, target, weight)
     best = coarse.best_point(sun_count)
     starts = []
     for melanin in coarse.melanin_ranges(best):
@@ -374,7 +374,7 @@ def _initial_points(problem: FitProblem, candidate: FitPoint, sun_count: int) ->
 
 
 def _checked_white(white_point: WhitePoint) -> Floats:
-    """Return the light's colour (3,) as the user gives it, scaled to green 1; (1, 1, 1) for "specular".
+    """Return the light's colour (3,) that the user gives, scaled to green 1; for "specular", (1, 1, 1).
 
     Raises DermisError for any other value.
     """

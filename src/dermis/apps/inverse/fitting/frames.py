@@ -46,65 +46,65 @@ class FaceRenderer:
     mask: Mask = field(init=False)
     frame_count: int = 0
 
-    def find_mask(self, point: FitPoint, unclipped_pixels: Floats) -> None:
+    def find_mask(self, fit_point: FitPoint, unclipped_pixels: Floats) -> None:
         """Set the mask (h, w) to the pixels of skin that are neither clipped nor seen at grazing angles.
 
-        point : unknowns of the fit, of which the skin is used
+        fit_point : unknowns of the fit, of which only the skin parameters are used
         unclipped_pixels : (h, w) fraction of each pixel of the photograph in which no channel is clipped
         """
-        scene = with_skin(self._with_lights(()), point)
+        scene = with_skin(self._scene_with_lights(()), fit_point)
         scene = replace(scene, lights=sun_lights(np.array([[0.0, 0.0, 1.0]]), [1.0], np.ones(3)))
-        rendered = self._draw(scene, "mask", ("label", "normal_camera", "alpha"))
+        rendered = self._draw_frame(scene, "mask", ("label", "normal_camera", "alpha"))
         label, alpha = rendered.output("label"), rendered.output("alpha")
         view_cosine = np.abs(rendered.output("normal_camera")[..., 2])
         skin = np.isin(label, _SKIN_LABELS) & (alpha > _FULL_COVERAGE) & (view_cosine > _MIN_VIEW_COSINE)
         self.mask = _erode(skin) & (unclipped_pixels > _FULL_COVERAGE)
 
-    def single_light_radiance(self, point: FitPoint) -> Floats:
+    def single_light_radiance(self, fit_point: FitPoint) -> Floats:
         """Render the face under each light alone; return the radiance (9 + k, p, 3) of the p masked pixels.
 
         The first nine lights are ambient lobes of radiance 1; the other k lights are suns of irradiance 1.
         """
         return np.stack(
-            [self._masked_radiance(scene, view) for scene, view in self._single_light_scenes(point)]
+            [self._masked_radiance(scene, view) for scene, view in self._single_light_scenes(fit_point)]
         )
 
-    def diffuse_and_specular_radiance(self, point: FitPoint) -> tuple[Floats, Floats]:
+    def diffuse_and_specular_radiance(self, fit_point: FitPoint) -> tuple[Floats, Floats]:
         """Return the diffuse radiance (9 + k, p, 3) and the specular radiance under each light alone."""
         scenes = []
-        for scene, view in self._single_light_scenes(point):
-            rendered = self._draw(scene, view, ("diffuse", "specular"))
+        for scene, view in self._single_light_scenes(fit_point):
+            rendered = self._draw_frame(scene, view, ("diffuse", "specular"))
             scenes.append([rendered.output(name)[self.mask] for name in ("diffuse", "specular")])
         both = np.asarray(scenes, np.float64)
         return both[:, 0], both[:, 1]
 
-    def combined_radiance(self, point: FitPoint, light_strengths: Floats, frame_name: str) -> Floats:
+    def combined_radiance(self, fit_point: FitPoint, light_strengths: Floats, frame_name: str) -> Floats:
         """Render the face under all lights together; return the radiance (p, 3) of the masked pixels.
 
         light_strengths : (9 + k,) strengths of ambient lobes and suns
         frame_name : file name of the ambient light's panorama, without suffix
         """
-        return self._masked_radiance(self.lit_scene(point, light_strengths, frame_name), "together")
+        return self._masked_radiance(self.lit_scene(fit_point, light_strengths, frame_name), "together")
 
-    def lit_scene(self, point: FitPoint, light_strengths: Floats, panorama_name: str = "light") -> Scene:
-        """Return the scene with the skin of `point` and all lights; write the panorama of its ambient light.
+    def lit_scene(self, fit_point: FitPoint, light_strengths: Floats, panorama_name: str = "light") -> Scene:
+        """Return the scene with the fitted skin and all lights; write the panorama of its ambient light.
 
         light_strengths : (9 + k,) strengths of ambient lobes and suns
         panorama_name : file name of the panorama in `folder`, without suffix
         """
-        suns = sun_lights(point.suns, light_strengths[AMBIENT_LOBE_COUNT:], np.ones(3))
+        suns = sun_lights(fit_point.suns, light_strengths[AMBIENT_LOBE_COUNT:], np.ones(3))
         radiance = ambient_panorama(light_strengths[:AMBIENT_LOBE_COUNT])
         lights = [one for one in suns if max(one.irradiance) > 0.0]
         ambient = self._panorama_environment(panorama_name, radiance) if radiance.max() > 0.0 else None
-        return with_skin(replace(self._with_lights(lights), environment=ambient), point)
+        return with_skin(replace(self._scene_with_lights(lights), environment=ambient), fit_point)
 
     def render_picture(self, scene: Scene) -> Floats:
         """Render a scene; return the linear radiance of all pixels (h, w, 3)."""
-        return np.asarray(self._draw(scene, "together").linear(), np.float64)
+        return np.asarray(self._draw_frame(scene, "together").linear(), np.float64)
 
-    def _single_light_scenes(self, point: FitPoint) -> list[tuple[Scene, str]]:
+    def _single_light_scenes(self, fit_point: FitPoint) -> list[tuple[Scene, str]]:
         """Return for each light a scene with this light alone, and the name for caching the scene's frame."""
-        base = with_skin(self._with_lights(()), point)
+        base = with_skin(self._scene_with_lights(()), fit_point)
         scenes = []
         for k in range(AMBIENT_LOBE_COUNT):
             path = self.folder / f"lobe_{k}.exr"
@@ -113,7 +113,7 @@ class FaceRenderer:
                 path.stem, ambient_panorama(np.eye(AMBIENT_LOBE_COUNT)[k])
             )
             scenes.append((replace(base, environment=ambient), f"lobe {k}"))
-        for k, sun in enumerate(sun_lights(point.suns, np.ones(len(point.suns)), np.ones(3))):
+        for k, sun in enumerate(sun_lights(fit_point.suns, np.ones(len(fit_point.suns)), np.ones(3))):
             scenes.append((replace(base, lights=(sun,)), f"sun {k}"))
         return scenes
 
@@ -123,13 +123,13 @@ class FaceRenderer:
             file.write_bytes(encode_exr(np.repeat(radiance[..., None], 3, axis=2).astype(np.float32)))
         return Environment(name=str(path))
 
-    def _with_lights(self, lights: Sequence[object]) -> Scene:
+    def _scene_with_lights(self, lights: Sequence[object]) -> Scene:
         return replace(self.scene, lights=tuple(lights), environment=None)  # type: ignore[arg-type]
 
     def _masked_radiance(self, scene: Scene, view_name: str) -> Floats:
-        return np.asarray(self._draw(scene, view_name).linear()[self.mask], np.float64)
+        return np.asarray(self._draw_frame(scene, view_name).linear()[self.mask], np.float64)
 
-    def _draw(self, scene: Scene, view_name: str, outputs: tuple[str, ...] = ()) -> RenderedFrame:
+    def _draw_frame(self, scene: Scene, view_name: str, outputs: tuple[str, ...] = ()) -> RenderedFrame:
         self.frame_count += 1
         return self.renderer.draw(scene, self.settings, timed=False, view=view_name, outputs=outputs)
 

@@ -68,7 +68,7 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
     space = SRGB
     if isinstance(source, str | Path | EmbeddedPicture):
         name = source
-        image, space = read_colours(source, upright=True)
+        image, space = read_colours(source, apply_exif_orientation=True)
     else:
         image = np.asarray(source)
     if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or min(image.shape[:2]) < _MIN_PHOTO_SIDE:
@@ -87,7 +87,7 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
         colours = repair_radiance(name, np.asarray(colours, np.float32))
     else:
         usable &= colours.max(axis=2) < _CLIPPED_LEVEL_FRACTION * full
-    return Photograph(space.linear(colours).astype(np.float64), usable.astype(np.float64))
+    return Photograph(space.to_linear(colours).astype(np.float64), usable.astype(np.float64))
 
 
 def _area_average(picture: Floats, new_size: tuple[int, int]) -> Floats:
@@ -114,7 +114,7 @@ class FitSubject:
     """Head in a photograph, with its camera, as a scene without light.
 
     scene : head, camera, pose and surface
-    person : parametric person with painted skin; None for other heads
+    person : parametric person whose skin maps are painted from pigments; None for other heads
     table : table [head] of the scene file in which the result is saved; empty if the head has neither a name
         nor a file, and the result therefore cannot be saved
     known : names of the pigments that the scene states; the values of all other pigments are assumed
@@ -141,16 +141,16 @@ def fit_subject(head_or_scene: object, camera: object = None) -> FitSubject:
     else:
         scene = head_or_scene if isinstance(head_or_scene, Scene) else Scene(as_head(head_or_scene))
     if camera is not None:
-        scene = replace(scene, camera=_as_camera(camera, scene.head))  # type: ignore[arg-type]
-    person = head_or_scene if isinstance(head_or_scene, Human) else _painted_person(scene.head)
+        scene = replace(scene, camera=_resolve_camera(camera, scene.head))  # type: ignore[arg-type]
+    person = head_or_scene if isinstance(head_or_scene, Human) else _person_of_head(scene.head)
     name = scene.head.name
     if not table and (person is not None or not is_person_name(name)):
         table = {"name": str(Path(name).resolve()) if Path(name).is_file() else name}
     known = () if scene.skin.pigments is None else tuple(scene.skin.pigments.overrides())
-    return FitSubject(_without_light(scene), person, table, known)
+    return FitSubject(_scene_without_lights(scene), person, table, known)
 
 
-def _as_camera(camera_source: object, head: Head) -> Camera | Callable[[Head], Camera]:
+def _resolve_camera(camera_source: object, head: Head) -> Camera | Callable[[Head], Camera]:
     if isinstance(camera_source, str | os.PathLike):
         return load_camera(str(camera_source), head)
     if not (isinstance(camera_source, Camera) or callable(camera_source)):
@@ -159,8 +159,8 @@ def _as_camera(camera_source: object, head: Head) -> Camera | Callable[[Head], C
     return camera_source
 
 
-def _painted_person(head: Head) -> Human | None:
-    """Return the person whose shape and painted skin a head has, or None if there is no such person."""
+def _person_of_head(head: Head) -> Human | None:
+    """Return the parametric person from which a head and its skin maps were made, or None for other heads."""
     maps = head.maps
     if not isinstance(maps, PaintedMaps) or maps.colour is not None or not is_person_name(head.name):
         return None
@@ -170,11 +170,11 @@ def _painted_person(head: Head) -> Human | None:
     return person if same else None
 
 
-def _without_light(scene: Scene) -> Scene:
-    """Return the scene without light, with the pigments that a fit keeps fixed.
+def _scene_without_lights(scene: Scene) -> Scene:
+    """Return the scene without lights, with values for the pigments that a fit keeps fixed.
 
-    Each of these pigments has the value that the scene states. If the scene states none, it has the value of
-    the painted person, or else a default.
+    The value of each of these pigments is the value that the scene states. If the scene states none, it is
+    the value from which the head's maps were painted, or else a default.
     """
     fixed_pigments = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
     if isinstance(scene.head.maps, PaintedMaps):

@@ -122,25 +122,30 @@ def _identify_landmarks(path: str | Path, file_landmarks: _FileLandmarks) -> tup
     return set_name, [known[int(name) - start] for name in names]
 
 
-def _identify_five_landmarks(pixels: Floats) -> tuple[str, Sequence[int]]:
+def _identify_five_landmarks(landmark_pixels: Floats) -> tuple[str, Sequence[int]]:
     """Return the landmark set that five points belong to, and the number of each point in this set.
 
     If the first four points lie on a line, they are the corners of the eyes, as in the files of dlib.
     Otherwise, they are eyes, nose and mouth, as face detectors write them. Files with left and right in
     reverse order are recognised.
     """
-    spread = np.linalg.svd(pixels[:4] - pixels[:4].mean(axis=0), compute_uv=False)
+    spread = np.linalg.svd(landmark_pixels[:4] - landmark_pixels[:4].mean(axis=0), compute_uv=False)
     is_dlib = bool(spread[1] < _MAX_EYE_LINE_DEVIATION * spread[0])
-    right, down = pixels[0] - pixels[2] if is_dlib else pixels[1] - pixels[0], pixels[4] - pixels[0]
+    right, down = (
+        landmark_pixels[0] - landmark_pixels[2] if is_dlib else landmark_pixels[1] - landmark_pixels[0],
+        landmark_pixels[4] - landmark_pixels[0],
+    )
     is_mirrored = bool(right[0] * down[1] < right[1] * down[0])
     name, numbers = _DLIB_FIVE_LANDMARKS if is_dlib else _DETECTOR_FIVE_LANDMARKS
     order = ((2, 3, 0, 1, 4) if is_dlib else (1, 0, 2, 4, 3)) if is_mirrored else range(5)
     return name, [numbers[k] for k in order]
 
 
-def _landmarks_from_pts(path: str | Path, lines: Sequence[str]) -> _FileLandmarks:
-    headers = {match[1].lower(): match[2] for line in lines if (match := _PTS_HEADER_LINE.fullmatch(line))}
-    rows = [line.split() for line in lines if not _PTS_HEADER_LINE.fullmatch(line) and line not in "{}"]
+def _landmarks_from_pts(path: str | Path, text_lines: Sequence[str]) -> _FileLandmarks:
+    headers = {
+        match[1].lower(): match[2] for line in text_lines if (match := _PTS_HEADER_LINE.fullmatch(line))
+    }
+    rows = [line.split() for line in text_lines if not _PTS_HEADER_LINE.fullmatch(line) and line not in "{}"]
     count = headers.get("n_points", str(len(rows)))
     if int(count) != len(rows):
         refuse(path, f"{count} points as it states", f"got {len(rows)}", "Correct the file")
@@ -148,16 +153,20 @@ def _landmarks_from_pts(path: str | Path, lines: Sequence[str]) -> _FileLandmark
     return _FileLandmarks(pixels - 1.0)
 
 
-def _landmarks_from_table(path: str | Path, lines: list[str], photo_size: tuple[int, int]) -> _FileLandmarks:
+def _landmarks_from_table(
+    path: str | Path, text_lines: list[str], photo_size: tuple[int, int]
+) -> _FileLandmarks:
     """Return the landmarks of a table, which may have a header.
 
     The columns are separated by commas, semicolons, tabs or spaces.
     """
-    if not lines:
+    if not text_lines:
         refuse(path, _EXPECTED_FILE_FORMATS, "it is empty", "Find the landmarks again")
-    has_separator = re.search("[,;\t]", lines[0]) is not None
+    has_separator = re.search("[,;\t]", text_lines[0]) is not None
     cells = (
-        csv.reader(lines, delimiter=column_separator(lines[0])) if has_separator else map(str.split, lines)
+        csv.reader(text_lines, delimiter=column_separator(text_lines[0]))
+        if has_separator
+        else map(str.split, text_lines)
     )
     rows = [[cell.strip() for cell in row] for row in cells]
     if not any(map(_is_number, rows[0][1:])):
@@ -165,7 +174,7 @@ def _landmarks_from_table(path: str | Path, lines: list[str], photo_size: tuple[
     if len(rows) == 1:  # all coordinates in one line
         rows = [rows[0][k : k + 2] for k in range(0, len(rows[0]), 2)]
     first = [row[0] for row in rows]
-    has_names = len(rows[0]) > 2 and (not all(map(_is_number, first)) or _are_consecutive(first))
+    has_names = len(rows[0]) > 2 and (not all(map(_is_number, first)) or _are_consecutive_numbers(first))
     start = 1 if has_names else 0
     if len(rows[0]) > start + 2:
         notify(f"{path}: of its {len(rows[0])} columns those from {start + 3} on are not used")
@@ -207,9 +216,9 @@ def _is_number(cell: str) -> bool:
         return False
 
 
-def _are_consecutive(cells: Sequence[str]) -> bool:
+def _are_consecutive_numbers(text_cells: Sequence[str]) -> bool:
     """Return whether the cells are 0, 1, 2 and so on, or 1, 2, 3 and so on."""
-    return any(list(cells) == [str(k + start) for k in range(len(cells))] for start in (0, 1))
+    return any(list(text_cells) == [str(k + start) for k in range(len(text_cells))] for start in (0, 1))
 
 
 def _parse_number(cell: str) -> float:

@@ -66,10 +66,10 @@ def ambient_panorama(lobe_strengths: Floats) -> Floats:
     return np.maximum(lobe_radiance(lobe_directions(), texels) @ lobe_strengths, 0.0)
 
 
-_REGULARISATION = 1e-9
+_GRAM_REGULARISATION = 1e-9
 
 
-def solve_strengths(A: Floats, b: Floats) -> Floats:
+def solve_light_strengths(A: Floats, b: Floats) -> Floats:
     """Return the light strengths x (9 + k,) that minimise |A x - b|, without negative light in any direction.
 
     The first nine strengths belong to the ambient lobes, and the other k to suns.
@@ -81,20 +81,20 @@ def solve_strengths(A: Floats, b: Floats) -> Floats:
 
 
 def solve_normal_equations(gram: Floats, right_side: Floats) -> Floats:
-    """Return the light strengths (9 + k,) of `solve_strengths` from its normal equations.
+    """Return the result (9 + k,) of `solve_light_strengths`, computed from the normal equations of A and b.
 
     gram : (9 + k, 9 + k) product A' A
     right_side : (9 + k,) product A' b
     """
     from scipy.optimize import nnls
 
-    R = np.linalg.cholesky(gram + _REGULARISATION * np.trace(gram) * np.eye(len(gram)))
-    mixing = mixing_matrix(len(gram) - AMBIENT_LOBE_COUNT)
+    R = np.linalg.cholesky(gram + _GRAM_REGULARISATION * np.trace(gram) * np.eye(len(gram)))
+    mixing = lobe_mixing_matrix(len(gram) - AMBIENT_LOBE_COUNT)
     solution = nnls(R.T @ mixing, np.linalg.solve(R, right_side))[0]
     return np.asarray(mixing @ solution)
 
 
-def mixing_matrix(sun_count: int) -> Floats:
+def lobe_mixing_matrix(sun_count: int) -> Floats:
     """Return the matrix (9 + k, n + k) from strengths of the n lobes of `lobe_mixtures` to light strengths.
 
     Light strengths are those of the 9 ambient lobes, followed by those of k suns, which the matrix does not
@@ -114,7 +114,7 @@ def squared_residual(
 ) -> float:
     """Return the squared residual |A x - b|^2 of light strengths x, computed from the normal equations.
 
-    gram, right_side, target_square_sum : A' A, A' b and b' b for the A and b of `solve_strengths`
+    gram, right_side, target_square_sum : A' A, A' b and b' b for the A and b of `solve_light_strengths`
     light_strengths : (9 + k,) strengths x
     """
     return float(

@@ -34,18 +34,20 @@ _PORTRAIT_DISTANCE_MM = 1100.0
 _PORTRAIT_HEIGHT_MM = 300.0
 
 
-def align_to_landmarks(subject: FitSubject, landmarks: str | Path, photo_size: tuple[int, int]) -> FitSubject:
+def align_to_landmarks(
+    subject: FitSubject, landmark_file: str | Path, photo_size: tuple[int, int]
+) -> FitSubject:
     """Fit the camera to landmarks in a photograph, and for a `Human` also the shape; return the new subject.
 
     For a `Human`, ancestry, sex, age, weight, muscle and details of the face are unknowns, with priors
     centred on the given person. Other heads keep their shape; the positions of their landmarks must be known.
 
-    landmarks : file with landmarks in the photograph
+    landmark_file : file with landmarks in the photograph
     photo_size : width and height of the photograph [pixel]
 
     Raises DermisError when the file or the head has no landmarks.
     """
-    name, pixels_by_name = read_landmarks(landmarks, photo_size)
+    name, pixels_by_name = read_landmarks(landmark_file, photo_size)
     person, head = subject.person, subject.scene.head
     model = _LandmarkModel.for_head(person, head, name, pixels_by_name)
     pixels = np.array([pixels_by_name[one] for one in model.names])
@@ -158,56 +160,60 @@ def _landmark_derivative(
 
 
 def _prior_log_focal(photo_size: tuple[int, int]) -> float:
-    """Return the mean of the prior: the logarithm of the focal length of a usual portrait, in pixels.
+    """Return the logarithm of a usual portrait's focal length in pixels, which is the mean of the prior.
 
     photo_size : width and height of the photograph [pixel]
     """
     return float(np.log(photo_size[1] * _PORTRAIT_DISTANCE_MM / _PORTRAIT_HEIGHT_MM))
 
 
-def _macro_prior_sd(parameter: str) -> float:
-    return _MACRO_PARAMETER_SD * (OLD_AGE - YOUNG_AGE if parameter == "age" else 1.0)
+def _macro_prior_sd(parameter_name: str) -> float:
+    return _MACRO_PARAMETER_SD * (OLD_AGE - YOUNG_AGE if parameter_name == "age" else 1.0)
 
 
-def _macro_limits(parameter: str) -> tuple[float, float]:
+def _macro_limits(parameter_name: str) -> tuple[float, float]:
     return {"age": (YOUNG_AGE, OLD_AGE), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0)}.get(
-        parameter, (0.01, 1.0)
+        parameter_name, (0.01, 1.0)
     )
 
 
 def _landmark_positions(
-    landmark_points: LandmarkPoints, indices: NDArray[np.int64], positions: Floats
+    landmark_points: LandmarkPoints, landmark_indices: NDArray[np.int64], positions: Floats
 ) -> Floats:
     return np.asarray(
-        np.einsum("nk,nkc->nc", landmark_points.weight[indices], positions[landmark_points.point[indices]])
+        np.einsum(
+            "nk,nkc->nc",
+            landmark_points.weight[landmark_indices],
+            positions[landmark_points.point[landmark_indices]],
+        )
     )
 
 
 def _fit_camera_and_identity(
-    model: _LandmarkModel, pixels: Floats, photo_size: tuple[int, int], start: Floats
+    model: _LandmarkModel, landmark_pixels: Floats, photo_size: tuple[int, int], start_unknowns: Floats
 ) -> Floats:
     """Fit camera and identity to landmarks; return the unknowns (7 + u,).
 
     They are a rotation vector (3), a translation (3) [mm], the logarithm of the focal length in pixels, and
     the u unknowns of the identity.
 
-    pixels : (n, 2) landmarks in the photograph
+    landmark_pixels : (n, 2) landmarks in the photograph
     photo_size : width and height of the photograph [pixel]
-    start : (7 + u,) unknowns to start from, in the order of the result
+    start_unknowns : (7 + u,) unknowns to start from, in the order of the result
     """
     from scipy.optimize import least_squares
 
     prior_median = _prior_log_focal(photo_size)
 
-    def residuals(x: Floats) -> Floats:
-        positions = model.positions + np.einsum("u,unc->nc", x[7:], model.derivatives)
-        error = (_project_landmarks(x, positions, photo_size) - pixels) / (
+    def residuals(unknowns: Floats) -> Floats:
+        positions = model.positions + np.einsum("u,unc->nc", unknowns[7:], model.derivatives)
+        error = (_project_landmarks(unknowns, positions, photo_size) - landmark_pixels) / (
             _LANDMARK_SD_FRACTION * photo_size[1]
         )
-        return np.concatenate([error.ravel(), [(x[6] - prior_median) / _LOG_FOCAL_SD], x[7:]])
+        return np.concatenate([error.ravel(), [(unknowns[6] - prior_median) / _LOG_FOCAL_SD], unknowns[7:]])
 
     scale = np.concatenate([np.full(3, 0.1), (10.0, 10.0, 100.0), [0.1], np.ones(model.unknown_count)])
-    return np.asarray(least_squares(residuals, start, x_scale=scale, loss="soft_l1").x, np.float64)
+    return np.asarray(least_squares(residuals, start_unknowns, x_scale=scale, loss="soft_l1").x, np.float64)
 
 
 def _project_landmarks(camera_unknowns: Floats, positions: Floats, photo_size: tuple[int, int]) -> Floats:

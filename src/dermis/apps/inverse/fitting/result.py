@@ -108,14 +108,14 @@ class FitResult:
             "not_determined": list(uncertainty.undetermined),
             "not_told_apart": [{"pair": [a, b], "correlation": c} for a, b, c in uncertainty.correlated],
             "singular_values": list(uncertainty.singular_values),
-            "priors": self._priors(),
+            "priors": self._prior_descriptions(),
             "residual": self.residual,
             "pixels": int(self.mask.sum()),
             "frames": self.frames,
             "seconds": round(self.seconds, 2),
         }
 
-    def _priors(self) -> list[str]:
+    def _prior_descriptions(self) -> list[str]:
         """Return sentences that describe the priors of the unknowns and the fixed parameters."""
         skin = self.subject.scene.skin.pigments
         assert skin is not None

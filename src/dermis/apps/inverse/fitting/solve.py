@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.frames import FaceRenderer
-from dermis.apps.inverse.fitting.light_basis import AMBIENT_LOBE_COUNT, solve_strengths
+from dermis.apps.inverse.fitting.light_basis import AMBIENT_LOBE_COUNT, solve_light_strengths
 from dermis.apps.inverse.fitting.unknowns import (
     SKIN_UNKNOWNS,
     SUN_PRIOR_SD,
@@ -28,7 +28,7 @@ _NOISE_FLOOR_FRACTION = 0.03
 photograph's median; it limits the weight of dark pixels [-]."""
 ROBUST_LIMIT = 3.0
 """Number of standard deviations above which the weight of a residual decreases [Huber1964]."""
-NO_ASSUMED_SD: Mapping[str, float] = MappingProxyType({})
+NO_ADDITIONAL_SD: Mapping[str, float] = MappingProxyType({})
 _MAD_TO_SD = 1.4826
 _MAX_ITERATIONS = 8
 _STEP_TOLERANCE = 0.01
@@ -63,7 +63,8 @@ class FitProblem:
     """Photograph to fit, with its noise, and the renderer of the face.
 
     frames : renderer of the face
-    target : (p, 3) values of the photograph's masked pixels, divided by exposure and given light colour
+    target : (p, 3) values of the photograph's masked pixels, divided by the exposure and by the light colour
+        that the user gives
     noise : relative standard deviation of a pixel [-]
     free_white : whether the colour of the light is an unknown
     robust : number of standard deviations beyond which residuals have less weight
@@ -85,10 +86,10 @@ class FitProblem:
         """Return the inverse standard deviations (p, 3) of pixels from their brightness in the photograph."""
         return self.pixel_weights(self.target.mean(axis=1, keepdims=True) * np.ones(3))
 
-    def render_state(self, point: FitPoint, pixel_weight: Floats) -> FitState:
-        """Render the face for the unknowns of `point`; return the state with the best light strengths."""
+    def render_state(self, fit_point: FitPoint, pixel_weight: Floats) -> FitState:
+        """Render the face for the unknowns of `fit_point`; return the state with the best light strengths."""
         return self._best_light_state(
-            point, self.frames.single_light_radiance(point) * light_tint(point), pixel_weight
+            fit_point, self.frames.single_light_radiance(fit_point) * light_tint(fit_point), pixel_weight
         )
 
     def reweighted_state(self, fit_state: FitState) -> FitState:
@@ -99,13 +100,13 @@ class FitProblem:
         weights *= np.sqrt(limit / np.maximum(scaled, limit))
         return self._best_light_state(fit_state.point, fit_state.basis, weights)
 
-    def _best_light_state(self, point: FitPoint, basis: Floats, pixel_weight: Floats) -> FitState:
+    def _best_light_state(self, fit_point: FitPoint, basis: Floats, pixel_weight: Floats) -> FitState:
         A = (basis * pixel_weight).reshape(len(basis), -1).T
-        x = solve_strengths(A, (self.target * pixel_weight).ravel())
+        x = solve_light_strengths(A, (self.target * pixel_weight).ravel())
         residual = self.target - np.einsum("a,apc->pc", x, basis)
-        prior = (self.prior_offsets(point) / self.prior_sd(2 * len(point.suns))) ** 2
+        prior = (self.prior_offsets(fit_point) / self.prior_sd(2 * len(fit_point.suns))) ** 2
         cost = float(((residual * pixel_weight) ** 2).sum()) + float(prior.sum())
-        return FitState(point, x, basis, residual, pixel_weight, cost)
+        return FitState(fit_point, x, basis, residual, pixel_weight, cost)
 
     def derivatives(self, fit_state: FitState, frame_name: str) -> Floats:
         """Return the derivatives (p, 3, u) of the radiance with respect to the u unknowns.
@@ -145,19 +146,19 @@ class FitProblem:
             [one.prior_sd for one in SKIN_UNKNOWNS] + [SUN_PRIOR_SD] * sun_angle_count + [white] * 2
         )
 
-    def prior_offsets(self, point: FitPoint) -> Floats:
+    def prior_offsets(self, fit_point: FitPoint) -> Floats:
         """Return the difference (u,) of each unknown from the mean of its prior, 0 for suns."""
-        skin = point.logs - np.log([one.prior_median for one in SKIN_UNKNOWNS])
-        return np.concatenate([skin, np.zeros(2 * len(point.suns)), point.white])
+        skin = fit_point.logs - np.log([one.prior_median for one in SKIN_UNKNOWNS])
+        return np.concatenate([skin, np.zeros(2 * len(fit_point.suns)), fit_point.white])
 
 
-def light_tint(point: FitPoint) -> Floats:
+def light_tint(fit_point: FitPoint) -> Floats:
     """Return the ratio (3,) of the fitted light colour to the light colour given by the user; green is 1."""
-    return np.array([np.exp(point.white[0]), 1.0, np.exp(point.white[1])])
+    return np.array([np.exp(fit_point.white[0]), 1.0, np.exp(fit_point.white[1])])
 
 
 def solve_fit(
-    problem: FitProblem, start: FitPoint, progress: Callable[[int, int], None] = lambda done, of: None
+    problem: FitProblem, start_point: FitPoint, progress: Callable[[int, int], None] = lambda done, of: None
 ) -> tuple[FitState, Floats]:
     """Minimise the cost from a start point; return the best state and derivatives of the radiance.
 
@@ -167,12 +168,12 @@ def solve_fit(
 
     progress : function called with the number of finished steps and the largest number of steps
     """
-    state = problem.reweighted_state(problem.render_state(start, problem.initial_weights()))
+    state = problem.reweighted_state(problem.render_state(start_point, problem.initial_weights()))
     damping = _INITIAL_DAMPING
     for iteration in range(_MAX_ITERATIONS):
         progress(iteration, _MAX_ITERATIONS)
         derivatives = problem.derivatives(state, f"light_{problem.frames.frame_count}")
-        improved, step, damping = _try_steps(problem, state, derivatives, damping)
+        improved, step, damping = _try_damped_steps(problem, state, derivatives, damping)
         if improved is None:
             return state, derivatives
         gain = 1.0 - improved.cost / state.cost
@@ -182,7 +183,7 @@ def solve_fit(
     return state, derivatives
 
 
-def _try_steps(
+def _try_damped_steps(
     problem: FitProblem, fit_state: FitState, derivatives: Floats, damping: float
 ) -> tuple[FitState | None, Floats, float]:
     """Try steps with increasing damping until one lowers the cost.
@@ -214,16 +215,18 @@ def _normal_equations(problem: FitProblem, fit_state: FitState, derivatives: Flo
     return H, J.T @ r - problem.prior_offsets(fit_state.point) / prior_sd**2
 
 
-def _eliminate_lights(fit_state: FitState, J: Floats) -> tuple[Floats, Floats]:
-    """Return derivatives (3 p, u) orthogonal to changes of light strengths, and weighted residuals (3 p,).
+def _eliminate_lights(fit_state: FitState, weighted_derivatives: Floats) -> tuple[Floats, Floats]:
+    """Return derivatives (3 p, u) with changes of the lights projected out, and weighted residuals (3 p,).
 
-    A sun of strength 0 is left out of the light strengths, because it cannot decrease.
+    A sun of strength 0 keeps this strength, because it cannot decrease further.
 
-    J : (3 p, u) derivatives of the radiance, multiplied by the weights
+    weighted_derivatives : (3 p, u) derivatives of the radiance, multiplied by the weights
     """
     free = [k for k in range(len(fit_state.basis)) if k < AMBIENT_LOBE_COUNT or fit_state.strengths[k] > 0.0]
     Q = np.linalg.qr((fit_state.basis[free] * fit_state.weight).reshape(len(free), -1).T)[0]
-    return J - Q @ (Q.T @ J), (fit_state.residual * fit_state.weight).ravel()
+    return weighted_derivatives - Q @ (Q.T @ weighted_derivatives), (
+        fit_state.residual * fit_state.weight
+    ).ravel()
 
 
 _BLOCKS_PER_SIDE = 16
@@ -240,9 +243,9 @@ _MIN_NOTABLE_CORRELATION = 0.95
 class Uncertainty:
     """Uncertainty of a fit's unknowns.
 
-    sd : dictionary from unknown to standard deviation: of the logarithm for the skin and for the light's
-        colour, of the angle for directions [rad]. It includes errors of the renderer and of assumed skin
-        parameters
+    sd : dictionary from name of an unknown to its standard deviation, which includes errors of the renderer
+        and of assumed skin parameters. Directions have standard deviations of angles [rad]; skin parameters
+        and the light's colour have standard deviations of logarithms
     undetermined : unknowns whose standard deviation exceeds half that of their prior, and unknowns at a limit
     correlated : pairs of unknowns that the photograph cannot separate, with their correlation
     singular_values : singular values of the weighted derivatives, with each unknown in standard deviations of
@@ -260,15 +263,15 @@ def fit_uncertainty(
     problem: FitProblem,
     fit_state: FitState,
     derivatives: Floats,
-    assumed_sd: Mapping[str, float] = NO_ASSUMED_SD,
+    sd_from_assumed_parameters: Mapping[str, float] = NO_ADDITIONAL_SD,
 ) -> Uncertainty:
     """Return the uncertainty of all unknowns.
 
     Residuals are taken as correlated within blocks of pixels, and as independent otherwise [White1980].
 
     derivatives : (p, 3, u) derivatives of the radiance with respect to the unknowns
-    assumed_sd : dictionary from pigment to the standard deviation of its logarithm that is due to assumed
-        parameters of the skin
+    sd_from_assumed_parameters : dictionary from pigment to the standard deviation of its logarithm that is
+        due to assumed parameters of the skin
     """
     sun_angles = 2 * len(fit_state.point.suns)
     suns = [f"sun {k + 1} {axis}" for k in range(sun_angles // 2) for axis in ("across", "along")]
@@ -282,7 +285,7 @@ def fit_uncertainty(
     sums = np.stack([np.bincount(block, column) for column in (J * r[:, None]).T], axis=-1)
     covariance = H @ (sums.T @ sums + np.diag(prior_sd**-2.0)) @ H
     systematic = np.array(
-        [np.hypot(SYSTEMATIC_SD.get(name, 0.0), assumed_sd.get(name, 0.0)) for name in names]
+        [np.hypot(SYSTEMATIC_SD.get(name, 0.0), sd_from_assumed_parameters.get(name, 0.0)) for name in names]
     )
     covariance += np.diag(systematic[:count] ** 2)
     sd = np.sqrt(np.diag(covariance))
@@ -313,8 +316,8 @@ def block_residual(problem: FitProblem, fit_state: FitState) -> float:
     return float(np.median(np.abs(residual[lit]) / target[lit]))
 
 
-def _pixel_blocks(frames: FaceRenderer) -> NDArray[np.int64]:
+def _pixel_blocks(face_renderer: FaceRenderer) -> NDArray[np.int64]:
     """Return for each masked pixel the index (p,) of the block of the picture that contains the pixel."""
-    rows, columns = np.nonzero(frames.mask)
-    side = max(1, max(frames.mask.shape) // _BLOCKS_PER_SIDE)
+    rows, columns = np.nonzero(face_renderer.mask)
+    side = max(1, max(face_renderer.mask.shape) // _BLOCKS_PER_SIDE)
     return np.asarray(rows // side * (_BLOCKS_PER_SIDE * 2) + columns // side, np.int64)

@@ -40,7 +40,7 @@ class SkinUnknown:
 def _measured_unknown(
     pigment_name: str, lower_limit: float, upper_limit: float, log_step: float
 ) -> SkinUnknown:
-    """Return an unknown pigment; its prior is the pigment's distribution in measured people of all groups."""
+    """Return a pigment as an unknown; its prior is its distribution among measured people of all groups."""
     mean, sd = skin_prior().moments(pigment_name)
     return SkinUnknown(pigment_name, float(np.exp(mean)), sd, lower_limit, upper_limit, log_step)
 
@@ -113,20 +113,20 @@ def tangents(directions: Floats) -> Floats:
     return np.stack([first, np.cross(directions, first)], axis=1)
 
 
-def with_skin(scene: Scene, point: FitPoint) -> Scene:
+def with_skin(scene: Scene, fit_point: FitPoint) -> Scene:
     """Return the scene with the skin that the unknowns of a fit describe.
 
-    A person with painted skin is painted with the pigments of `point`. The diffusion profile, which is slow
-    to compute, is that of pigments rounded to a coarse grid. Other heads get the uniform colour of the
-    pigments in place of their colour map, whose pigments are unknown.
+    If the head's maps are painted from pigments, they are painted with the pigments of `fit_point`. Their
+    diffusion profile, which is slow to compute, is that of the nearest pigments of a coarse grid. Other heads
+    get the uniform colour of the pigments in place of their colour map, and the profile of these pigments.
     """
-    numbers = point.values()
+    numbers = fit_point.values()
     skin_values: dict[str, object] = {name: numbers[name] for name in ("roughness", "rho_s")}
     skin_values |= {"oiliness": 0.0, "profile": "spectral"}
     if isinstance(maps := scene.head.maps, PaintedMaps):
         look = replace(maps.look, melanin=numbers["melanin"], blood=numbers["blood"])
         head = replace(scene.head, maps=replace(maps, look=look))
-        melanin, blood = np.exp(_PROFILE_LOG_STEP * np.rint(point.logs[:2] / _PROFILE_LOG_STEP))
+        melanin, blood = np.exp(_PROFILE_LOG_STEP * np.rint(fit_point.logs[:2] / _PROFILE_LOG_STEP))
     else:
         head, melanin, blood = scene.head, numbers["melanin"], numbers["blood"]
         skin_values["albedo"] = "profile"

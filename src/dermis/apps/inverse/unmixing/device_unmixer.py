@@ -30,28 +30,33 @@ from dermis.optics.pigments.parameters import SkinParameters
 Pixels = NDArray[np.float32]
 ProgressCallback = Callable[[int, int], None]
 _SHADER_FOLDER = Path(__file__).parent
-_GUESS_GRID_SIDE = 96  # number of nodes along each side of the grid of initial guesses
+_INITIAL_GUESS_GRID_SIDE = 96  # number of nodes along each side of the grid of initial guesses
 _MAX_STEPS = 8
 _MAX_STRIP_TEXELS = 1 << 22  # texels of a strip, of 16 bytes each in five textures
 _TEXTURE_FORMAT = "rgba32float"
 
 
 class Unmixer:
-    """Inversion of a skin model on the device: from the colour of each texel to its melanin and blood.
+    """Unmixer of pictures on the device: it inverts a skin model to find each texel's melanin and blood.
 
     device : device on which pictures are unmixed
     model : table of skin colours that is inverted
-    noise : relative standard deviation of a channel [-]
+    relative_noise : relative standard deviation of a channel [-]
     """
 
     def __init__(self, device: Device, model: SkinModel, relative_noise: float) -> None:
         self.device, self.model, self.noise = device, model, relative_noise
         self._table = _table_texture(device, model)
         self._outputs: tuple[Texture, Texture] | None = None
-        self._guesses = device.storage_buffer(8 * _GUESS_GRID_SIDE**2, "initial guesses")
+        self._guesses = device.storage_buffer(8 * _INITIAL_GUESS_GRID_SIDE**2, "initial guesses")
         shader = _unmixing_program(device, "unmix_start", model)
         frame = CommandList(device, timed=False)
-        frame.compute("start", shader, self._shader_bindings(shader, 0), (_GUESS_GRID_SIDE, _GUESS_GRID_SIDE))
+        frame.compute(
+            "start",
+            shader,
+            self._shader_bindings(shader, 0),
+            (_INITIAL_GUESS_GRID_SIDE, _INITIAL_GUESS_GRID_SIDE),
+        )
         frame.submit()
 
     def unmix(
@@ -116,7 +121,7 @@ def recolour(
     unmixed_pigments : (h, w, 3) melanin, blood and the third unknown before the change
     residual : (h, w, 3) original colour divided by the model's colour
     pigment_factors : (3,) factors by which melanin, blood and the third unknown are multiplied
-    added_fractions : (3,) constants that are added to melanin, blood and the third unknown after that
+    added_fractions : (3,) constants that are added to these products
     """
     table, shader = _table_texture(device, model), _unmixing_program(device, "recolour", model)
     change = shader.record("Change", factors=pigment_factors, added=added_fractions)
@@ -161,7 +166,7 @@ def _unmixing_program(device: Device, shader_name: str, model: SkinModel) -> Com
         "NODES": nodes,
         "THIRDS": thirds,
         "SHADE": int(model.third == "shade"),
-        "SIDE": _GUESS_GRID_SIDE,
+        "SIDE": _INITIAL_GUESS_GRID_SIDE,
     }
     path = _SHADER_FOLDER / f"{shader_name}.wgsl"
     constants = used_constants(path, (), tuple(numbers.items()))
@@ -224,7 +229,7 @@ def _weighted_blur(
 
 
 def _upsample(block_means: NDArray[np.float64], picture_shape: tuple[int, int]) -> Pixels:
-    """Return a picture of block means interpolated bilinearly to a given height and width."""
+    """Interpolate block means bilinearly; return a picture of the given height and width."""
     from scipy.ndimage import map_coordinates
 
     output = np.empty(picture_shape, np.float32)

@@ -22,12 +22,12 @@ from dermis.optics.profiles import fit_profile, write_profile
 from dermis.optics.tissue import Tissue, load_tissue
 
 Pixels = NDArray[np.float32]
-PROFILE_CORNERS = {"profile": (0, 0), "profile_blood": (0, -1), "profile_dark": (-1, -1)}
+PROFILE_GRID_CORNERS = {"profile": (0, 0), "profile_blood": (0, -1), "profile_dark": (-1, -1)}
 """File name of each profile, with its indices on the grid of melanin and blood: pale skin without blood, pale
 skin with blood, and dark skin with blood."""
 WEIGHT_MAP_NAME = "profile_map"
-_GRID_NODES_PER_AXIS = 4  # number of grid nodes along the logarithms of melanin and of blood
-_GRID_PERCENTILES = 0.5, 99.5  # percentiles of the pigments of the skin texels, which bound the grid
+_PIGMENT_GRID_NODES_PER_AXIS = 4  # number of grid nodes along the logarithms of melanin and of blood
+_PIGMENT_GRID_PERCENTILES = 0.5, 99.5  # percentiles of the pigments of the skin texels, which bound the grid
 # Smallest volume fraction of a grid axis, and smallest ratio of its ends.
 _MIN_VOLUME_FRACTION, _MIN_AXIS_RATIO = 1e-3, 1.02
 _UNIT_SUM_EQUATION_WEIGHT = 1e4  # weight of the equation by which the mixture weights sum to 1
@@ -39,9 +39,9 @@ class ProfileMixture:
 
     profiles : profiles of pale skin without blood, of pale skin with blood, and of dark skin with blood
     weights : (h, w, 2) weights of the second and the third profile; all weights sum to 1 [-]
-    error : (3,) relative root-mean-square error of the mixture over a grid of pigments, by channel; it
-        compares the energies that emerge through rings [-]
-    single_error : (3,) the same error if one profile, from the middle of the grid, is used everywhere [-]
+    error : (3,) relative root-mean-square error of the mixture, by channel. The error compares the energies
+        that emerge through rings, for all skins of a grid of pigments [-]
+    single_error : (3,) the same error if the profile from the middle of the grid is used for all skins [-]
     """
 
     profiles: tuple[GaussianSum, ...]
@@ -54,27 +54,31 @@ class ProfileMixture:
         return {"mixed": self.error.tolist(), "one_profile": self.single_error.tolist()}
 
 
-def profile_mixture(unmixed: UnmixResult) -> ProfileMixture:
+def profile_mixture(unmix_result: UnmixResult) -> ProfileMixture:
     """Return three profiles, and their weights in each texel from the texel's melanin and blood.
 
     Raises DermisError for a picture without skin.
     """
-    skin = unmixed.skin_texels()
+    skin = unmix_result.skin_texels()
     if not skin.any():
         refuse("widths", "a picture of skin", "no texel is like skin", "Give the skin's albedo")
-    axes = [_pigment_axis(one[skin]) for one in (unmixed.melanin, unmixed.blood)]
-    tissues = [_spectral_tissue(unmixed.skin, m, b) for m, b in product(*axes)]
+    axes = [_pigment_axis(one[skin]) for one in (unmix_result.melanin, unmix_result.blood)]
+    tissues = [_spectral_tissue(unmix_result.skin, m, b) for m, b in product(*axes)]
     nodes = np.array([_ring_fractions(one) for one in tissues])
     corners = [
-        (m % _GRID_NODES_PER_AXIS) * _GRID_NODES_PER_AXIS + b % _GRID_NODES_PER_AXIS
-        for m, b in PROFILE_CORNERS.values()
+        (m % _PIGMENT_GRID_NODES_PER_AXIS) * _PIGMENT_GRID_NODES_PER_AXIS + b % _PIGMENT_GRID_NODES_PER_AXIS
+        for m, b in PROFILE_GRID_CORNERS.values()
     ]
     weights = _mixture_weights(nodes, nodes[corners])
-    middle = nodes[(_GRID_NODES_PER_AXIS // 2) * _GRID_NODES_PER_AXIS + _GRID_NODES_PER_AXIS // 2]
+    middle = nodes[
+        (_PIGMENT_GRID_NODES_PER_AXIS // 2) * _PIGMENT_GRID_NODES_PER_AXIS + _PIGMENT_GRID_NODES_PER_AXIS // 2
+    ]
     mixed = np.einsum("nk,krc->nrc", weights, nodes[corners])
-    profiles = [fit_profile(tissues[k], name) for k, name in zip(corners, PROFILE_CORNERS, strict=True)]
-    weight_map = _interpolate_map(
-        weights[:, 1:].reshape(_GRID_NODES_PER_AXIS, _GRID_NODES_PER_AXIS, 2), axes, unmixed
+    profiles = [fit_profile(tissues[k], name) for k, name in zip(corners, PROFILE_GRID_CORNERS, strict=True)]
+    weight_map = _interpolate_weight_map(
+        weights[:, 1:].reshape(_PIGMENT_GRID_NODES_PER_AXIS, _PIGMENT_GRID_NODES_PER_AXIS, 2),
+        axes,
+        unmix_result,
     )
     errors = _rms_error(mixed, nodes), _rms_error(middle[None], nodes)
     return ProfileMixture(shared_gaussians(profiles), weight_map, *errors)
@@ -85,7 +89,7 @@ def save_mixture(folder: Path, mixture: ProfileMixture) -> list[Path]:
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
-    written = [folder / f"{name}.toml" for name in PROFILE_CORNERS]
+    written = [folder / f"{name}.toml" for name in PROFILE_GRID_CORNERS]
     for path, profile in zip(written, mixture.profiles, strict=True):
         write_profile(path, profile, {})
     path = folder / f"{WEIGHT_MAP_NAME}.exr"
@@ -95,8 +99,8 @@ def save_mixture(folder: Path, mixture: ProfileMixture) -> list[Path]:
 
 
 def _pigment_axis(volume_fractions: Pixels) -> Floats:
-    low, high = np.maximum(np.percentile(volume_fractions, _GRID_PERCENTILES), _MIN_VOLUME_FRACTION)
-    return np.geomspace(low, max(high, _MIN_AXIS_RATIO * low), _GRID_NODES_PER_AXIS)
+    low, high = np.maximum(np.percentile(volume_fractions, _PIGMENT_GRID_PERCENTILES), _MIN_VOLUME_FRACTION)
+    return np.geomspace(low, max(high, _MIN_AXIS_RATIO * low), _PIGMENT_GRID_NODES_PER_AXIS)
 
 
 def _spectral_tissue(skin: SkinParameters, melanin: float, blood: float) -> Tissue:
@@ -110,50 +114,57 @@ def _ring_fractions(tissue: Tissue) -> Floats:
     return np.asarray(rings.energy / rings.total)
 
 
-def _mixture_weights(node_fractions: Floats, corner_fractions: Floats) -> Floats:
-    """Return weights (n, k) of k profiles, whose mixtures approximate the profiles of n skins.
+def _mixture_weights(skin_ring_fractions: Floats, profile_ring_fractions: Floats) -> Floats:
+    """Return the weights (n, k) with which mixtures of k profiles approximate the profiles of n skins.
 
-    The weights fit the fractions of light that emerge through rings. The weights of each skin are not
-    negative and sum to 1.
+    The weights are fitted to fractions of the reflectance, see `_ring_fractions`. The weights of each skin
+    are not negative and sum to 1.
 
-    node_fractions : ring fractions of the n skins, which are the nodes of a grid of pigments
-    corner_fractions : ring fractions of the k profiles that are mixed
+    skin_ring_fractions : ring fractions of the n skins, which are the nodes of a grid of pigments
+    profile_ring_fractions : ring fractions of the k profiles that are mixed
     """
     from scipy.optimize import nnls
 
     equations = np.vstack(
         [
-            corner_fractions.reshape(len(corner_fractions), -1).T,
-            np.full((1, len(corner_fractions)), _UNIT_SUM_EQUATION_WEIGHT),
+            profile_ring_fractions.reshape(len(profile_ring_fractions), -1).T,
+            np.full((1, len(profile_ring_fractions)), _UNIT_SUM_EQUATION_WEIGHT),
         ]
     )
     weights = np.array(
-        [nnls(equations, np.append(node.ravel(), _UNIT_SUM_EQUATION_WEIGHT))[0] for node in node_fractions]
+        [
+            nnls(equations, np.append(node.ravel(), _UNIT_SUM_EQUATION_WEIGHT))[0]
+            for node in skin_ring_fractions
+        ]
     )
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
-def _rms_error(mixed_fractions: Floats, node_fractions: Floats) -> Floats:
-    """Return the relative root-mean-square error (3,) of ring fractions over all nodes, by channel."""
-    squares = ((mixed_fractions - node_fractions) ** 2).sum(axis=1) / (node_fractions**2).sum(axis=1)
+def _rms_error(mixed_ring_fractions: Floats, skin_ring_fractions: Floats) -> Floats:
+    """Return the relative root-mean-square error (3,) of the ring fractions of n skins, by channel."""
+    squares = ((mixed_ring_fractions - skin_ring_fractions) ** 2).sum(axis=1) / (skin_ring_fractions**2).sum(
+        axis=1
+    )
     return np.asarray(np.sqrt(squares.mean(axis=0)))
 
 
-def _interpolate_map(node_weights: Floats, pigment_axes: Sequence[Floats], unmixed: UnmixResult) -> Pixels:
+def _interpolate_weight_map(
+    grid_weights: Floats, pigment_axes: Sequence[Floats], unmix_result: UnmixResult
+) -> Pixels:
     """Return mixture weights (h, w, 2) of each texel, interpolated from the nodes of a pigment grid.
 
     The nodes are evenly spaced in the logarithms of melanin and blood.
 
-    node_weights : (m, b, 2) weights of the second and the third profile at the nodes
+    grid_weights : (m, b, 2) weights of the second and the third profile at the nodes
     pigment_axes : melanin fractions (m,) and blood fractions (b,) of the nodes
-    unmixed : melanin and blood of each texel
+    unmix_result : melanin and blood of each texel
     """
     from scipy.interpolate import RegularGridInterpolator
 
     logarithms = [np.log(axis) for axis in pigment_axes]
-    interpolator = RegularGridInterpolator(logarithms, node_weights, bounds_error=False, fill_value=None)
-    result = np.empty((*unmixed.melanin.shape, 2), np.float32)
-    for row, row_values in enumerate(zip(unmixed.melanin, unmixed.blood, strict=True)):
+    interpolator = RegularGridInterpolator(logarithms, grid_weights, bounds_error=False, fill_value=None)
+    result = np.empty((*unmix_result.melanin.shape, 2), np.float32)
+    for row, row_values in enumerate(zip(unmix_result.melanin, unmix_result.blood, strict=True)):
         coordinates = [
             np.log(np.clip(one, a[0], a[-1])) for one, a in zip(row_values, pigment_axes, strict=True)
         ]

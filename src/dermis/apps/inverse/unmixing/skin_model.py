@@ -47,7 +47,7 @@ class SkinModel:
     prior_sd: float
 
     def evaluate(self, unknowns: Floats) -> tuple[Floats, Floats]:
-        """Return the logarithms (t, 3) of colours, and their derivatives (t, 3, 3).
+        """Return the logarithms (t, 3) of the model's colours, and their derivatives (t, 3, 3).
 
         The second axis of the derivatives is the channel, and the third axis is the unknown. The table is
         interpolated linearly.
@@ -56,10 +56,10 @@ class SkinModel:
         """
         third_count, nodes = len(self.log_colours), self.log_colours.shape[1]
         low, high = self.third_range
-        i, u = _node_below(unknowns[:, 0], nodes)
-        j, v = _node_below(unknowns[:, 1], nodes)
+        i, u = _grid_node_below(unknowns[:, 0], nodes)
+        j, v = _grid_node_below(unknowns[:, 1], nodes)
         fraction = (unknowns[:, 2] - low) / (high - low)
-        k, w = _node_below(fraction if third_count > 1 else np.zeros(len(unknowns)), third_count)
+        k, w = _grid_node_below(fraction if third_count > 1 else np.zeros(len(unknowns)), third_count)
         next_k = min(1, third_count - 1)
         corners = [(k + (d & next_k), i + (e >> 1), j + (e & 1)) for d in (0, 1) for e in range(4)]
         c = np.array([self.log_colours[corner] for corner in corners])
@@ -86,8 +86,11 @@ class SkinModel:
         return np.asarray(np.exp(self.evaluate(x)[0]))
 
 
-def _node_below(axis_fraction: Floats, node_count: int) -> tuple[NDArray[np.int64], Floats]:
-    """Return the node below each position in [0, 1], and the fraction of the way from it to the next node."""
+def _grid_node_below(axis_fraction: Floats, node_count: int) -> tuple[NDArray[np.int64], Floats]:
+    """Return the grid node below each position in [0, 1], and the position between this node and the next.
+
+    The second result is 0 at the node below and 1 at the next node.
+    """
     position = np.clip(axis_fraction, 0.0, 1.0) * (node_count - 1)
     node = np.clip(position.astype(np.int64), 0, max(node_count - 2, 0))
     return node, position - node
@@ -98,7 +101,7 @@ def _lerp(node_values: Floats, fraction: Floats) -> Floats:
 
 
 def skin_model(skin: SkinParameters = DEFAULT_SKIN, third_unknown: ThirdUnknown = "none") -> SkinModel:
-    """Return the model of skins with all fractions of melanin and blood, computed by layered diffusion.
+    """Return the skin model for all fractions of melanin and blood, computed by layered diffusion.
 
     skin : parameters that do not vary; its melanin and blood are ignored
     third_unknown : unknown besides melanin and blood; "none" keeps the oxygenation of `skin`
@@ -116,15 +119,15 @@ def skin_model(skin: SkinParameters = DEFAULT_SKIN, third_unknown: ThirdUnknown 
 
 
 @lru_cache(maxsize=8)
-def _cached_skin_model(skin: SkinParameters, third: ThirdUnknown) -> SkinModel:
-    if third == "oxygen":
+def _cached_skin_model(skin: SkinParameters, third_unknown: ThirdUnknown) -> SkinModel:
+    if third_unknown == "oxygen":
         oxygens = np.linspace(0.0, 1.0, _OXYGEN_NODE_COUNT)
         sd = skin_prior().moments("oxygen")[1]
-        return SkinModel(_log_colour_tables(skin, oxygens), third, (0.0, 1.0), skin.oxygen, sd)
+        return SkinModel(_log_colour_tables(skin, oxygens), third_unknown, (0.0, 1.0), skin.oxygen, sd)
     logs = _log_colour_tables(skin, [skin.oxygen])
-    if third == "shade":
-        return SkinModel(logs, third, _LOG_SHADE_RANGE, 0.0, _LOG_SHADE_SD)
-    return SkinModel(logs, third, (-1.0, 1.0), 0.0, _FIXED_UNKNOWN_SD)
+    if third_unknown == "shade":
+        return SkinModel(logs, third_unknown, _LOG_SHADE_RANGE, 0.0, _LOG_SHADE_SD)
+    return SkinModel(logs, third_unknown, (-1.0, 1.0), 0.0, _FIXED_UNKNOWN_SD)
 
 
 def _log_colour_tables(skin: SkinParameters, oxygen_fractions: Floats | list[float]) -> Floats:
@@ -188,11 +191,11 @@ def solve_pigments(
     weights = inverse_variances(colours, relative_noise)
     x = _initial_guess(model, logs) if start is None else start.copy()
     damping = np.full(len(x), 1e-3)
-    cost = _cost(model, x, logs, weights)
+    cost = _fit_cost(model, x, logs, weights)
     for _ in range(MAX_STEPS):
         step = _damped_step(model, x, logs, weights, damping)
         trial = _clip_unknowns(model, x + step)
-        trial_cost = _cost(model, trial, logs, weights)
+        trial_cost = _fit_cost(model, trial, logs, weights)
         better = trial_cost <= cost
         x[better], cost = trial[better], np.minimum(cost, trial_cost)
         damping = np.where(better, 0.2 * damping, 8.0 * damping)
@@ -214,7 +217,7 @@ def _initial_guess(model: SkinModel, log_colours: Floats) -> Floats:
     return np.asarray(x[nearest])
 
 
-def _cost(model: SkinModel, unknowns: Floats, log_colours: Floats, colour_weights: Floats) -> Floats:
+def _fit_cost(model: SkinModel, unknowns: Floats, log_colours: Floats, colour_weights: Floats) -> Floats:
     residual_cost = colour_weights * (log_colours - model.evaluate(unknowns)[0]) ** 2
     blood_cost = ((unknowns[:, 1] - BLOOD_ROOT_MEAN) / BLOOD_ROOT_SD) ** 2
     third_cost = ((unknowns[:, 2] - model.prior_mean) / model.prior_sd) ** 2

@@ -45,7 +45,7 @@ _MAX_REFLECTANCE = 1.5
 class SpectraTable:
     """Reflectance spectra read from a file.
 
-    labels : for each spectrum, a dictionary from heading to cell for the cells that are not reflectances
+    labels : for each spectrum, a dictionary from heading to text, for all cells that are not reflectances
     reflectance : (n, 31) reflectance factors at `WAVELENGTHS_NM`, NaN for spectra with missing values [-]
     """
 
@@ -62,7 +62,7 @@ def read_spectra(path: str | Path) -> SpectraTable:
 
     Raises DermisError when the file is not such a table, or when its wavelengths do not cover this range.
     """
-    rows = _read_cells(path)
+    rows = _read_table_cells(path)
     columns = {k: nm for k, cell in enumerate(rows[0]) if (nm := _parse_wavelength_nm(cell)) is not None}
     if len(columns) < _MIN_BAND_COUNT:
         rows = [list(column) for column in zip(*rows, strict=True)]
@@ -87,7 +87,7 @@ def read_spectra(path: str | Path) -> SpectraTable:
     return SpectraTable([{name: row[k] for k, name in heads.items()} for row in body], spectra)
 
 
-def _read_cells(path: str | Path) -> list[list[str]]:
+def _read_table_cells(path: str | Path) -> list[list[str]]:
     """Return the cells of a table whose rows all have the same length.
 
     Raises DermisError for other files.
@@ -158,10 +158,10 @@ def _check_wavelengths(path: str | Path, wavelengths_nm: Floats) -> None:
 class UnmixedSpectra:
     """Pigments estimated from a table of spectra.
 
-    labels : for each spectrum, a dictionary from heading to cell for the cells that are not reflectances
+    labels : for each spectrum, a dictionary from heading to text, for all cells that are not reflectances
     names : names of the parameters that were estimated
-    fit : parameters of the complete spectra, which have no missing values
-    complete : indices of the complete spectra in the table
+    fit : parameters fitted to the spectra that have no missing values
+    complete : indices of these spectra in the table
     """
 
     labels: list[dict[str, str]]

@@ -118,22 +118,22 @@ class SpectralFit:
 
 
 def skin_model_spectra(skin: SkinParameters = DEFAULT_SKIN) -> SpectralModel:
-    """Return the package's spectral model of skin.
+    """Return the package's spectral model of skin: a function from parameters to reflectance spectra.
 
     skin : parameters that are used where a call of the model omits them
     """
 
     def reflectance(parameter_values: ParameterValues) -> Floats:
-        def parameter(name: str) -> Floats:
-            return np.asarray(parameter_values.get(name, getattr(skin, name)))
+        def parameter_value(parameter_name: str) -> Floats:
+            return np.asarray(parameter_values.get(parameter_name, getattr(skin, parameter_name)))
 
         return skin_reflectance(
-            parameter("melanin"),
-            parameter("blood"),
-            oxygen=parameter("oxygen"),
-            eumelanin_fraction=parameter("eumelanin"),
-            epidermis_mm=parameter("epidermis_mm"),
-            baseline=parameter("baseline"),
+            parameter_value("melanin"),
+            parameter_value("blood"),
+            oxygen=parameter_value("oxygen"),
+            eumelanin_fraction=parameter_value("eumelanin"),
+            epidermis_mm=parameter_value("epidermis_mm"),
+            baseline=parameter_value("baseline"),
             scattering=parameter_values.get("scattering", np.float64(1.0)),
         )
 
@@ -164,20 +164,20 @@ def invert_spectra(
     x = np.stack([np.broadcast_to(column, len(spectra)) for column in columns], axis=-1)
     low, high = (np.array([one.coordinate(getattr(one, end)) for one in unknowns]) for end in ("low", "high"))
 
-    def values_at(point: Floats) -> dict[str, Floats]:
-        return {one.name: one.parameter_values(point[:, i]) for i, one in enumerate(unknowns)}
+    def parameter_values_at(coordinates: Floats) -> dict[str, Floats]:
+        return {one.name: one.parameter_values(coordinates[:, i]) for i, one in enumerate(unknowns)}
 
     weights = rgb_weights()
     target = lab(spectra @ weights.T)
     metric = colour_metric(target)
 
-    def residual(point: Floats) -> Floats:
-        reflectance = model(values_at(point))
+    def residual(coordinates: Floats) -> Floats:
+        reflectance = model(parameter_values_at(coordinates))
         if criterion == "spectrum":
             return np.asarray(reflectance - spectra)
         return np.asarray(np.einsum("nij,nj->ni", metric, lab(reflectance @ weights.T) - target))
 
-    found = values_at(least_squares(residual, x, low, high, max_steps))
+    found = parameter_values_at(least_squares(residual, x, low, high, max_steps))
     return SpectralFit(found, spectra, model(found))
 
 

@@ -30,18 +30,19 @@ def unknown_skin_sd(
 ) -> dict[str, float]:
     """Return the relative standard deviations of melanin and blood that are due to assumed skin parameters.
 
-    Skins are sampled from the prior, and unmixed as if they had the parameters of `skin`. The error of a
-    sample is the logarithm of the ratio of found to true pigment. The result is the root mean square of this
-    error over the samples whose found pigments are near `melanin` and `blood`.
+    Skins are sampled from the prior, and their colours are unmixed as if they had the parameters of `skin`.
+    The error of a sample is the logarithm of the ratio of the estimated to the true fraction of a pigment.
+    The result is the root mean square of this error over the samples with estimates near `melanin` and
+    `blood`.
 
-    melanin, blood : volume fractions that were found in a picture [-]
+    melanin, blood : volume fractions that were estimated from a picture [-]
     skin : parameters that are assumed for unmixing
     known_parameters : those of the `FIXED_PARAMETERS` that are known for the person
     is_oxygen_fitted : whether unmixing also estimates oxygen
     """
     if set(FIXED_PARAMETERS) <= set(known_parameters):
         return {"melanin": 0.0, "blood": 0.0}
-    found, error = _unmixed_sample(skin, tuple(sorted(known_parameters)), is_oxygen_fitted)
+    found, error = _unmix_prior_sample(skin, tuple(sorted(known_parameters)), is_oxygen_fitted)
     target = np.log(np.maximum([melanin, blood], 1e-4))
     distance = ((found - target) ** 2).sum(axis=1)
     # Relative to the nearest sample, so that results outside the prior have weights too.
@@ -51,12 +52,12 @@ def unknown_skin_sd(
 
 
 @lru_cache(maxsize=8)
-def _unmixed_sample(
+def _unmix_prior_sample(
     skin: SkinParameters, known_parameters: tuple[str, ...], is_oxygen_fitted: bool
 ) -> tuple[Floats, Floats]:
-    """Unmix skins sampled from the prior; return found logarithms (n, 2) and their errors (n, 2).
+    """Unmix skins sampled from the prior; return estimates (n, 2) and their errors (n, 2).
 
-    The logarithms are those of the fractions of melanin and blood that unmixing finds.
+    The estimates are logarithms of the fractions of melanin and blood.
     """
     true = skin_prior().sample(_SAMPLE_COUNT)
     values = true | {name: np.full(_SAMPLE_COUNT, getattr(skin, name)) for name in known_parameters}

@@ -33,7 +33,7 @@ DEFAULT_NOISE = 0.01
 MAX_SKIN_DELTA_E = 5.0
 """Largest CIEDE2000 difference from the model's nearest colour at which a texel counts as skin."""
 _REPORTED_DELTA_E_LIMITS = 1.0, 2.0, MAX_SKIN_DELTA_E
-_SUMMARY_SIDE = 512  # largest number of texels along the longer side that the summary reads
+_SUMMARY_SIDE_TEXELS = 512  # largest number of texels along the longer side that the summary reads
 _RELATIVE_NOISE_RANGE = 1e-4, 0.5
 _MAX_BACKGROUND_CHANNEL = 1e-3  # largest channel of texels between the charts of a map
 _MAX_LOG_RESIDUAL = 0.15  # largest logarithm of the residual of a skin texel
@@ -119,8 +119,8 @@ class UnmixResult:
     blood : (h, w) volume fraction of blood in the dermis [-]
     melanin_sd, blood_sd : (h, w) lower bounds of the standard deviations of melanin and blood that are due to
         noise (Cramér-Rao bound) [-]
-    residual : (h, w, 3) colour divided by the model's colour, which shows all that is not skin, such as paint
-        and hair [-]
+    residual : (h, w, 3) colour divided by the model's colour; it differs from 1 where the picture shows
+        something other than skin, such as paint or hair [-]
     third : (h, w) oxygenated fraction of haemoglobin; None if it was not requested [-]
     shading : (h, w) shading by which the colours were divided; None if it was not requested [-]
     skin : parameters of the model's skins other than melanin and blood
@@ -140,7 +140,7 @@ class UnmixResult:
     devices: dict[str, LazyDevice] = field(default_factory=dict)
 
     def maps(self) -> dict[str, Pixels]:
-        """Return a dictionary from file name, without suffix, to map for all maps that were computed."""
+        """Return all maps that were computed, as a dictionary from file name without suffix to map."""
         names = "melanin", "blood", "melanin_sd", "blood_sd", "residual"
         named = {name: getattr(self, name) for name in names}
         optional = {"oxygen": self.third, "shading": self.shading}
@@ -149,11 +149,11 @@ class UnmixResult:
     def summary(self) -> dict[str, Any]:
         """Return medians of the pigments, colour differences, skin tone, and the fraction of skin texels.
 
-        They are computed from about 512 evenly spaced texels along the longer side. Black texels do not count
-        as skin. The entry "sd" is the standard deviation due to noise, and "skin_sd" that due to the values
-        assumed for oxygen and epidermal thickness, which vary among people.
+        They are computed from a grid of texels, with about 512 texels along the longer side. Black texels do
+        not count as skin. The entry "sd" is the standard deviation due to noise, and "skin_sd" that due to
+        the values assumed for oxygen and epidermal thickness, which vary among people.
         """
-        step = max(1, max(self.melanin.shape) // _SUMMARY_SIDE)
+        step = max(1, max(self.melanin.shape) // _SUMMARY_SIDE_TEXELS)
         maps = {name: one[::step, ::step].astype(np.float64) for name, one in self.maps().items()}
         fractions = {name: maps[name].ravel() for name in ("melanin", "blood", "oxygen") if name in maps}
         model_colours = self.model.colours(fractions["melanin"], fractions["blood"], fractions.get("oxygen"))
@@ -165,11 +165,11 @@ class UnmixResult:
             above = {
                 f"above_{limit:g}": float((delta_e > limit).mean()) for limit in _REPORTED_DELTA_E_LIMITS
             }
-            result["delta_e"] = _percentiles(delta_e[skin]) | above
+            result["delta_e"] = _percentile_summary(delta_e[skin]) | above
             result["skin_tone"] = skin_tone(np.median(colours[skin], axis=0)).as_json()
             for name, fraction in fractions.items():
                 sd = {"sd": float(np.median(maps[f"{name}_sd"].ravel()[skin]))} if name != "oxygen" else {}
-                result[name] = _percentiles(fraction[skin]) | sd
+                result[name] = _percentile_summary(fraction[skin]) | sd
             median = {name: result[name]["median"] for name in ("melanin", "blood")}
             found = self.third is not None
             spread = unknown_skin_sd(**median, skin=self.skin, is_oxygen_fitted=found)
@@ -188,15 +188,15 @@ class UnmixResult:
         Raises DermisError when `dermis.gpu.open_device` does.
         """
         lazy_device = self.devices.setdefault(adapter, LazyDevice(adapter))
-        return lazy_device.run(lambda device: self._recoloured(device, change))
+        return lazy_device.run(lambda device: self._recolour_on_device(device, change))
 
-    def _recoloured(self, device: Device, change: PigmentChange) -> Pixels:
-        fixed = self.third is None or change.oxygen is not None
-        target = skin_model(change.applied_to(self.skin), "none") if fixed else self.model
+    def _recolour_on_device(self, device: Device, pigment_change: PigmentChange) -> Pixels:
+        fixed = self.third is None or pigment_change.oxygen is not None
+        target = skin_model(pigment_change.applied_to(self.skin), "none") if fixed else self.model
         prior_mean = np.broadcast_to(np.float32(target.prior_mean), self.melanin.shape)
         third = prior_mean if fixed or self.third is None else self.third
         estimate = np.stack([self.melanin, self.blood, third], axis=-1)
-        factors, added = change.scales_and_offsets(
+        factors, added = pigment_change.scales_and_offsets(
             self._skin_median(self.melanin), self._skin_median(self.blood)
         )
         return recolour(device, target, estimate, self.residual, factors, added)
@@ -212,8 +212,8 @@ class UnmixResult:
         return float(np.median(fraction_map[skin] if skin.any() else fraction_map))
 
 
-def _percentiles(values: Floats) -> dict[str, float]:
-    low, middle, high = np.percentile(values, (5.0, 50.0, 95.0))
+def _percentile_summary(texel_values: Floats) -> dict[str, float]:
+    low, middle, high = np.percentile(texel_values, (5.0, 50.0, 95.0))
     return {"p5": float(low), "median": float(middle), "p95": float(high)}
 
 
@@ -275,7 +275,7 @@ def unmix(
     if third == "shade":
         refuse("third", '"none" or "oxygen"', "got 'shade'", "Set shading=True instead")
     if isinstance(picture, str | Path | EmbeddedPicture):
-        colours = colour_map(picture, upright=True)
+        colours = colour_map(picture, apply_exif_orientation=True)
     else:
         colours = _checked_colours(picture)
 
@@ -308,14 +308,14 @@ UNMIX_SUMMARY_FILE = "unmixed.json"
 def save_maps(
     folder: Path,
     unmix_result: UnmixResult,
-    recoloured: NDArray[np.float32] | None = None,
+    recoloured_picture: NDArray[np.float32] | None = None,
     linear: bool = False,
 ) -> list[Path]:
     """Write all maps as EXR files, the summary, and the recoloured picture; return the paths of all files.
 
     Each file is written atomically.
 
-    recoloured : (h, w, 3) recoloured picture in linear Rec. 709; None to write no such picture
+    recoloured_picture : (h, w, 3) recoloured picture in linear Rec. 709; None to write no such picture
     linear : whether the recoloured picture is written as EXR instead of PNG
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
@@ -326,9 +326,9 @@ def save_maps(
         with atomic_file(path) as file:
             file.write_bytes(encode_exr(values if values.ndim == 3 else values[..., None]))
         written.append(path)
-    if recoloured is not None:
+    if recoloured_picture is not None:
         path = folder / ("recoloured.exr" if linear else "recoloured.png")
-        write_image(path, recoloured)
+        write_image(path, recoloured_picture)
         written.append(path)
     with atomic_file(folder / UNMIX_SUMMARY_FILE) as file:
         file.write_text(json.dumps(unmix_result.summary(), indent=2) + "\n", encoding="utf-8")

@@ -26,15 +26,15 @@ Floats = NDArray[np.float32]
 
 COAT_TRANSMITTANCE = 0.98
 """Fraction of light that the coat transmits, see `coat_bsdf`; the medium compensates for it."""
-COAT_INDEX = SKIN_ETA
+COAT_IOR = SKIN_ETA
 ALBEDO_GRID_SIDE_VOXELS = 96
 """Number of cells along the longest side of the albedo grid."""
 _HALF_SIDE_PER_FRAME_HEIGHT, _MIN_HALF_SIDE_MM = 0.75, 25.0
 """Half the side of the albedo grid, relative to the height that the picture shows, and its lower limit."""
 _COLOURED_DEPTH_MM = 3.0  # depth to which the medium has the colour of the surface
 _SAMPLES_PER_VOXEL = 3.0  # samples per area of one voxel face
-_MAX_COLOUR = 0.97
-_MIN_ABSORPTION_ROOT = 0.02  # smallest tabulated square root of 1 - albedo
+_MAX_SKIN_REFLECTANCE = 0.97
+_MIN_ROOT_ABSORPTION = 0.02  # smallest tabulated square root of 1 - albedo
 _DISTANCE_PHOTON_COUNT, _TABLE_PHOTON_COUNT = 40_000, 40_000
 _HALF_SPACE_TABLE_ALBEDO_COUNT = 48
 _STACK_TABLE_ALBEDO_COUNT = 20
@@ -42,11 +42,11 @@ _STACK_TABLE_ALBEDO_COUNT = 20
 
 
 def uniform_skin(colour: ArrayLike, exit_distance_mm: ArrayLike, eta: float) -> Medium:
-    """Return a homogeneous skin that has a given colour and moves light by a given mean distance.
+    """Return a homogeneous skin with a given colour and mean distance between entry and exit of light.
 
     colour : (3,) reflectance of light at normal incidence [-]
-    exit_distance_mm : (3,) mean distance along the surface between the points where light enters, at normal
-        incidence, and leaves [mm]
+    exit_distance_mm : (3,) mean distance along the surface from the point where light enters, at normal
+        incidence, to the point where it leaves [mm]
     eta : index of refraction, 1 or `SKIN_ETA` [-]
     """
     albedo = _half_space_albedo(colour, eta)
@@ -78,7 +78,7 @@ def pigmented_skin(parameters: SkinParameters, colour: ArrayLike, eta: float) ->
 
 
 def with_deepest_albedo(medium: Medium, albedo: ArrayLike) -> Medium:
-    """Return a medium with a new single-scattering albedo (3,) in its last layer, at the same extinction."""
+    """Return the medium with another single-scattering albedo (3,) of its last layer, at equal extinction."""
     *above, last = medium.layers
     extinction, albedo = last.sigma_t_prime, np.asarray(albedo)
     return replace(
@@ -107,7 +107,7 @@ def deepest_albedo(medium: Medium, colour: ArrayLike) -> Doubles:
         )
         for one in medium.layers
     )
-    roots = np.linspace(1.0, _MIN_ABSORPTION_ROOT, _STACK_TABLE_ALBEDO_COUNT)
+    roots = np.linspace(1.0, _MIN_ROOT_ABSORPTION, _STACK_TABLE_ALBEDO_COUNT)
     found = [
         np.interp(wanted[..., c], _reflectance_table(tuple(one[c] for one in layers), medium.eta), roots)
         for c in range(3)
@@ -124,7 +124,7 @@ def _reflectance_table(layers: tuple[tuple[float, float, float], ...], eta: floa
     above = [ScatteringLayer(a, s, thickness, eta=eta) for a, s, thickness in layers[:-1]]
     extinction = layers[-1][0] + layers[-1][1]
     totals = []
-    for root in np.linspace(1.0, _MIN_ABSORPTION_ROOT, _STACK_TABLE_ALBEDO_COUNT):
+    for root in np.linspace(1.0, _MIN_ROOT_ABSORPTION, _STACK_TABLE_ALBEDO_COUNT):
         last = ScatteringLayer(root**2 * extinction, (1.0 - root**2) * extinction, eta=eta)
         totals.append(trace_slab([*above, last], _TABLE_PHOTON_COUNT).relative_to_entering.total_reflectance)
     return np.maximum.accumulate(totals)
@@ -133,7 +133,7 @@ def _reflectance_table(layers: tuple[tuple[float, float, float], ...], eta: floa
 def _half_space_albedo(colour: ArrayLike, eta: float) -> Doubles:
     """Return single-scattering albedos of half-spaces that have given colours [-]."""
     totals, roots = _half_space_reflectance_table(eta)
-    wanted = np.clip(np.asarray(colour, np.float64), 0.0, _MAX_COLOUR)
+    wanted = np.clip(np.asarray(colour, np.float64), 0.0, _MAX_SKIN_REFLECTANCE)
     return np.asarray(1.0 - np.interp(wanted, totals, roots) ** 2)
 
 
@@ -141,9 +141,9 @@ def _half_space_albedo(colour: ArrayLike, eta: float) -> Doubles:
 def _half_space_reflectance_table(eta: float) -> tuple[Doubles, Doubles]:
     """Return reflectances of half-spaces at normal incidence, and sqrt(1 - single-scattering albedo) of each.
 
-    The reflectances are exact for an index of refraction of 1, and counted by Monte Carlo for `SKIN_ETA`.
+    The reflectances are exact for an index of refraction of 1, and from Monte Carlo for `SKIN_ETA`.
     """
-    roots = np.linspace(1.0, _MIN_ABSORPTION_ROOT, _HALF_SPACE_TABLE_ALBEDO_COUNT)
+    roots = np.linspace(1.0, _MIN_ROOT_ABSORPTION, _HALF_SPACE_TABLE_ALBEDO_COUNT)
     if eta == 1.0:
         return np.array([float(directional_albedo(1.0, float(1.0 - root**2))) for root in roots]), roots
     if eta != SKIN_ETA:
@@ -171,10 +171,10 @@ def _mean_exit_distance(albedo: float, eta: float) -> float:
 def skin_media(mi: Mitsuba, person: Person, camera: Camera, medium: Medium) -> list[MitsubaObject]:
     """Return Mitsuba's media of the layers of a skin, topmost first.
 
-    The deepest layer has a grid of albedos around the camera's target, which give the skin its painted
-    colours.
+    The deepest layer has a grid of albedos around the camera's target. These albedos give the skin the
+    colours of its colour map.
 
-    medium : layers of a skin that has the mean of the painted colours
+    medium : layers of a skin that has the mean colour of the colour map
     """
     *above, last = medium.layers
     low, high = _voxel_box(person, camera)
@@ -210,12 +210,12 @@ def _skin_triangles(person: Person) -> NDArray[np.int32]:
 
 
 def colour_grid(person: Person, low_corner: Doubles, high_corner: Doubles, voxels_per_side: int) -> Doubles:
-    """Return the colour (z, y, x, 3) of each cell of a box, averaged over the nearest points of the skin.
+    """Return the skin's colour (z, y, x, 3) in each voxel of a box: the mean of the nearest skin points.
 
-    Cells more than about 3 mm from the skin have the mean colour.
+    Voxels more than about 3 mm from the skin have the mean colour of all points.
 
     low_corner, high_corner : (3,) corners of the box [mm]
-    voxels_per_side : number of cells along the longest side
+    voxels_per_side : number of voxels along the longest side
     """
     from scipy.ndimage import binary_dilation
     from scipy.spatial import cKDTree
@@ -247,7 +247,7 @@ def _skin_samples(
     The random seed is fixed.
 
     low_corner, high_corner : (3,) corners of the box [mm]
-    cell_mm : size of a cell, which determines the number of samples [mm]
+    cell_mm : side length of a voxel; smaller voxels need more positions [mm]
     """
     mesh, triangles = person.mesh, _skin_triangles(person)
     corners = mesh.positions[triangles].astype(np.float64)

@@ -56,15 +56,15 @@ def path_trace_person(
 ) -> PathTraced:
     """Return the path-traced image of the person in a scene, with the given textures.
 
-    The skin consists of layers below a surface with the two specular lobes of the real-time renderer. Light
-    passes this surface without refraction if the medium has an index of refraction of 1, and is refracted if
-    it has `SKIN_ETA`. A grid of albedos in the deepest layer gives the skin its painted colours. Lights must
-    have a size, because the cornea refracts the light on its way to the iris. The skin settings of the scene
-    are ignored.
+    The skin consists of layers below a surface with the two specular lobes of the real-time renderer. This
+    surface refracts light if the medium has the index of refraction `SKIN_ETA`, and does not if the index is
+    1. A grid of albedos in the deepest layer gives the skin the colours of its colour map. Lights must have a
+    size, because the cornea refracts the light on its way to the iris. The skin settings of the scene are
+    ignored.
 
     textures : textures of skin, eyes and teeth
-    medium : layers of a skin that has the mean of the painted colours, see `uniform_skin` and
-        `pigmented_skin`; None for Lambertian skin with the painted colours
+    medium : layers of a skin that has the mean colour of the colour map, see `uniform_skin` and
+        `pigmented_skin`; None for Lambertian skin with the colours of the colour map
     size : width and height of the image [pixel]
     max_depth : largest number of scattering events plus 1, so 2 for direct light; None for no limit
     samples, variant, use_cache, progress : as in `path_trace`
@@ -78,7 +78,7 @@ def path_trace_person(
     voxels = ALBEDO_GRID_SIDE_VOXELS
     constants = f"{SAMPLES_PER_PASS} {RUSSIAN_ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {voxels} {max_depth}"
     trace_settings = f"{_CACHE_VERSION} {mi.__version__} {variant} {constants} {size}"
-    key = person_key(scene, person, medium, trace_settings) if use_cache else None
+    key = person_cache_key(scene, person, medium, trace_settings) if use_cache else None
     return render_passes(
         mi,
         variant,
@@ -109,7 +109,7 @@ def person_scene(
     else:
         media = skin_media(mi, person, scene.camera, medium)
         shapes, notes = skin_shapes(mi, person, medium, media)
-    shapes |= eye_shapes(mi, person) | _opaque_parts(mi, person)
+    shapes |= eye_shapes(mi, person) | _opaque_shapes(mi, person)
     for number, hairs in enumerate(person.hairs):
         shapes |= hair_shapes(mi, hairs, f"hairs_{number}")
     integrator = {"type": "volpathmis", "rr_depth": RUSSIAN_ROULETTE_DEPTH, "hide_emitters": True}
@@ -118,8 +118,8 @@ def person_scene(
     return mitsuba_scene(mi, scene, integrator, shapes, picture_size), notes
 
 
-def _opaque_parts(mi: Mitsuba, person: Person) -> SceneDict:
-    """Return the Mitsuba shapes of materials other than skin and eyes.
+def _opaque_shapes(mi: Mitsuba, person: Person) -> SceneDict:
+    """Return the Mitsuba shapes of all materials other than skin and eyes.
 
     Teeth and tongue are coated with saliva; all other materials are diffuse.
     """
@@ -158,7 +158,7 @@ def _emissive_head(mi: Mitsuba, person: Person) -> SceneDict:
     return {"head": mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=emitter)}
 
 
-def person_key(scene: Scene, person: Person, medium: Medium | None, trace_settings: str) -> str:
+def person_cache_key(scene: Scene, person: Person, medium: Medium | None, trace_settings: str) -> str:
     """Return a hash of all inputs of a path-traced person, used as the name of the cached passes.
 
     medium : as in `path_trace_person`

@@ -74,7 +74,8 @@ class Person:
 
     eyes : (m, 4, 4) transforms from head space to the space of each eye. There, the eye has the size of an
         average eye [mm], and its axis is z
-    eye_materials : (m,) indices of the eyes' materials; refracting eyeballs replace their triangles
+    eye_materials : (m,) indices of the eyes' materials; refracting eyeballs replace the triangles of these
+        materials
     """
 
     name: str
@@ -121,5 +122,5 @@ def posed_person(scene: Scene, textures: SkinTextures) -> Person:
     )
     centred = np.eye(4)
     centred[:3, 3] = head.centre_mm
-    eyes = head.eyes.frames(rig, motion) @ centred
+    eyes = head.eyes.eye_matrices(rig, motion) @ centred
     return Person(head.name, posed_mesh, eyes, tuple(head.eyes.material.tolist()), hairs, textures)

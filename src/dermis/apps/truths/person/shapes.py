@@ -17,10 +17,10 @@ from dermis.apps.truths.mitsuba_scene import (
     mesh_shape,
 )
 from dermis.apps.truths.mitsuba_solid import ClosedSurface, closed_skin, offset_inwards
-from dermis.apps.truths.person.medium import COAT_INDEX, COAT_TRANSMITTANCE
+from dermis.apps.truths.person.medium import COAT_IOR, COAT_TRANSMITTANCE
 from dermis.apps.truths.person.person import HairFibres, Person, SkinTextures
 from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, SceneDict, mitsuba_rgb
-from dermis.mesh.eyeball import LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_plane_mm, profile_mm
+from dermis.mesh.eyeball import LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_plane_mm, surface_distance_mm
 from dermis.optics.media import Medium
 from dermis.specular.two_lobe import MAX_ROUGHNESS, MIN_ROUGHNESS, NARROW_FACTOR, NARROW_WEIGHT, WIDE_FACTOR
 
@@ -39,9 +39,9 @@ def mitsuba_texture(mi: Mitsuba, texels: NDArray[np.floating]) -> SceneDict:
 def coat_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
     """Return the BSDF of skin with the two specular lobes of the real-time renderer, without refraction.
 
-    Most paths pass the surface undeflected, so that they can connect to point lights. The others meet the
-    lobes, whose reflectance is divided by the fraction of these paths, so the reflection has its full
-    strength. Light from below is weakened by this small fraction only.
+    Most paths pass the surface undeflected, so that they can connect to point lights. A small fraction of the
+    paths meets the lobes instead. The reflectance of the lobes is divided by this fraction, which gives the
+    reflection its full strength. The light that leaves the skin is reduced by the same small fraction.
     """
     mirror_fraction = 1.0 - COAT_TRANSMITTANCE
     coat = {
@@ -53,14 +53,14 @@ def coat_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
 
 
 def _reflection_lobes_bsdf(mi: Mitsuba, textures: SkinTextures, path_fraction: float) -> SceneDict:
-    """Return the BSDF of skin with relief that reflects by the two lobes of `specular.two_lobe`.
+    """Return the BSDF of the skin's surface reflection: its relief with the two lobes of `specular.two_lobe`.
 
     path_fraction : fraction of the paths that meet this BSDF; the reflectance is divided by it [-]
     """
     lobe = {
         "distribution": "beckmann",
         "type": "roughconductor",
-        "eta": COAT_INDEX,
+        "eta": COAT_IOR,
         "k": 0.0,  # with a real index it reflects like a dielectric
         "specular_reflectance": mitsuba_texture(mi, textures.strength / path_fraction),
     }
@@ -80,7 +80,7 @@ def refracting_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject
     transmitted does not depend on the specular strength. Lights must have a size, because paths cannot
     connect to a point light through this boundary.
     """
-    indices = {"int_ior": COAT_INDEX, "ext_ior": 1.0}
+    indices = {"int_ior": COAT_IOR, "ext_ior": 1.0}
     # A blend with a perfectly smooth dielectric would be up to 20 % too bright in Mitsuba 3.9.
     below = {"type": "roughdielectric", "distribution": "beckmann", "alpha": _NEARLY_SMOOTH_ROUGHNESS}
     below |= {"specular_reflectance": 0.0, "specular_transmittance": 1.0 / (1.0 - _REFLECTION_PATH_FRACTION)}
@@ -94,8 +94,8 @@ def refracting_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject
     return mi.load_dict(outside), mi.load_dict({"type": "dielectric"} | indices)
 
 
-def painted_diffuse_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
-    """Return the BSDF of skin with two specular lobes over a Lambertian base of the painted colours."""
+def lambertian_skin_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
+    """Return the BSDF of skin with two specular lobes over a Lambertian base, which has the colour map."""
     fraction = 1.0 - COAT_TRANSMITTANCE
     base = {
         "type": "diffuse",
@@ -106,13 +106,13 @@ def painted_diffuse_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
 
 
 def diffuse_skin_shapes(mi: Mitsuba, person: Person) -> SceneDict:
-    """Return the skin as an open surface with the BSDF `painted_diffuse_bsdf`, without a medium inside."""
+    """Return the skin as an open surface with the BSDF `lambertian_skin_bsdf`, without a medium inside."""
     triangles = person.mesh.triangles[_skin_mask(person)]
     vertices, corners = np.unique(triangles, return_inverse=True)
     positions, normals, uv = (
         values[vertices] for values in (person.mesh.positions, person.mesh.normals, person.mesh.uv)
     )
-    bsdf = painted_diffuse_bsdf(mi, person.textures)
+    bsdf = lambertian_skin_bsdf(mi, person.textures)
     return {"skin": mesh_shape(mi, positions, corners.reshape(-1, 3), normals, uv, bsdf=bsdf)}
 
 
@@ -135,10 +135,10 @@ def skin_shapes(
     lower, _ = offset_inwards(solid, np.zeros(len(gap)), person.name)
     textures, refracts = person.textures, medium.eta != 1.0
     outer, inner = refracting_bsdfs(mi, textures) if refracts else (coat_bsdf(mi, textures), None)
-    shapes = {"skin": _painted_mesh(mi, person, upper, outer, media[0])}
+    shapes = {"skin": _textured_skin_mesh(mi, person, upper, outer, media[0])}
     fans = solid.triangles[int(_skin_mask(person).sum()) :]
     if refracts:
-        shapes["skin_lower"] = _painted_mesh(mi, person, lower, inner, media[0])
+        shapes["skin_lower"] = _textured_skin_mesh(mi, person, lower, inner, media[0])
         if len(fans):
             shapes["openings_lower"] = interface_mesh(mi, replace(lower, triangles=fans), top)
     else:
@@ -154,12 +154,13 @@ def _skin_mask(person: Person) -> NDArray[np.bool_]:
     return np.asarray(np.array([material.kind == "skin" for material in mesh.materials])[mesh.material])
 
 
-def _painted_mesh(
+def _textured_skin_mesh(
     mi: Mitsuba, person: Person, surface: ClosedSurface, bsdf: MitsubaObject, medium: MitsubaObject
 ) -> MitsubaObject:
-    """Return the skin's triangles at the positions of a closed surface, with the head's normals and uv.
+    """Return the skin as a Mitsuba mesh at the positions of a closed surface, with the head's normals and uv.
 
     surface : closed surface of the head, from `closed_skin` and `offset_inwards`
+    bsdf : BSDF of the mesh
     medium : Mitsuba's medium inside the surface
     """
     mesh, triangles = person.mesh, person.mesh.triangles[_skin_mask(person)]
@@ -174,7 +175,7 @@ def _painted_mesh(
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-CORNEA_INDEX = 1.336
+CORNEA_IOR = 1.336
 """Index of refraction of the aqueous humour, used behind the cornea's front surface [-]."""
 TEAR_ROUGHNESS = 0.06
 """Roughness of the tear film over the white of the eye [-]."""
@@ -197,7 +198,7 @@ def eyeball_mesh() -> tuple[Doubles, Index, Doubles, Doubles]:
     azimuth = 2.0 * np.pi * np.arange(_EYEBALL_STEPS_AROUND + 1) / _EYEBALL_STEPS_AROUND
     a, t = (grid.ravel() for grid in np.meshgrid(angle, azimuth, indexing="ij"))
     outwards = np.stack([np.sin(a) * np.cos(t), np.sin(a) * np.sin(t), np.cos(a)], axis=-1)
-    positions = profile_mm(a)[:, None] * outwards
+    positions = surface_distance_mm(a)[:, None] * outwards
     cornea = positions - [0.0, 0.0, cornea_centre_mm()]
     cornea /= np.linalg.norm(cornea, axis=1, keepdims=True)
     clear = cornea_weight(np.hypot(positions[:, 0], positions[:, 1]), positions[:, 2])[:, None]
@@ -208,10 +209,10 @@ def eyeball_mesh() -> tuple[Doubles, Index, Doubles, Doubles]:
 
 
 def _grid_triangles(row_count: int, column_count: int) -> Index:
-    """Return the triangles of a grid of points on a surface of revolution.
+    """Return the triangles between rings of points on a surface of revolution.
 
-    row_count : number of angles from the axis
-    column_count : number of azimuths
+    row_count : number of rings around the axis
+    column_count : number of points in each ring
     """
     first = (np.arange(row_count - 1)[:, None] * column_count + np.arange(column_count - 1)).ravel()
     a, b, c, d = first, first + column_count, first + column_count + 1, first + 1
@@ -232,12 +233,15 @@ def cornea_weight_map() -> Doubles:
     """Return `cornea_weight` as a texture (n, n) over the polar uv of the eyeball."""
     u = (np.arange(_CORNEA_TEXTURE_SIDE) + 0.5) / _CORNEA_TEXTURE_SIDE - 0.5
     angle = np.minimum(np.hypot(*np.meshgrid(u, u)) / EYE_UV_RADIUS, 1.0) * np.pi
-    radius = profile_mm(angle)
+    radius = surface_distance_mm(angle)
     return cornea_weight(radius * np.sin(angle), radius * np.cos(angle))
 
 
 def iris_disc() -> tuple[Doubles, Index, float]:
-    """Return the iris as a disc that nearly touches the eyeball: positions [mm], triangles, radius [mm]."""
+    """Return the iris as a disc: positions [mm], triangles, and its radius [mm].
+
+    Its rim nearly touches the eyeball.
+    """
     radius = float(np.sqrt(SCLERA_MM**2 - iris_plane_mm() ** 2)) - _IRIS_GAP_MM
     azimuth = 2.0 * np.pi * np.arange(_EYEBALL_STEPS_AROUND) / _EYEBALL_STEPS_AROUND
     rim = np.stack(
@@ -257,10 +261,10 @@ def eye_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject, Mitsu
         "type": "roughplastic",
         "distribution": "beckmann",
         "alpha": TEAR_ROUGHNESS,
-        "int_ior": CORNEA_INDEX,
+        "int_ior": CORNEA_IOR,
         "diffuse_reflectance": mitsuba_texture(mi, textures.white),
     }
-    clear = {"type": "dielectric", "int_ior": CORNEA_INDEX, "ext_ior": 1.0}
+    clear = {"type": "dielectric", "int_ior": CORNEA_IOR, "ext_ior": 1.0}
     weight = mitsuba_texture(mi, cornea_weight_map())
     eyeball = {"type": "blendbsdf", "weight": weight, "white": white, "clear": clear}
     iris = {"type": "diffuse", "reflectance": mitsuba_texture(mi, textures.iris)}
@@ -287,7 +291,7 @@ def _transform_points(matrix: Doubles, positions: Doubles) -> Doubles:
     return np.asarray(positions @ matrix[:3, :3].T + matrix[:3, 3])
 
 
-KERATIN_INDEX = 1.55
+KERATIN_IOR = 1.55
 """Index of refraction of keratin [Marschner2003]."""
 CUTICLE_TILT_DEGREES = 2.0
 """Tilt of the cuticle scales."""
@@ -316,7 +320,7 @@ def hair_shapes(mi: Mitsuba, hairs: HairFibres, shape_name: str = "hairs") -> Sc
                 "longitudinal_roughness": LONGITUDINAL_ROUGHNESS,
                 "azimuthal_roughness": AZIMUTHAL_ROUGHNESS,
                 "scale_tilt": CUTICLE_TILT_DEGREES,
-                "int_ior": KERATIN_INDEX,
+                "int_ior": KERATIN_IOR,
             }
             curves = {"type": "bsplinecurve", "filename": str(file), "bsdf": fibre}
             shapes[f"{shape_name}_{k}"] = mi.load_dict(curves)
@@ -349,7 +353,7 @@ def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating])
 
 
 def bspline_control_points(knots: Doubles) -> Doubles:
-    """Return the control points (n, k + 2, c) of uniform cubic B-splines through knots, uncurved at the ends.
+    """Return the control points (n, k + 2, c) of uniform cubic B-splines through knots, straight at the ends.
 
     knots : (n, k, c) points through which the curves pass
     """

@@ -1,4 +1,4 @@
-"""Errors of diffusion by blurs on the atlas: impulse responses, curved surfaces and seams."""
+"""Errors of scattered light computed by blurs on the atlas: impulse responses, curved surfaces, seams."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ Array = NDArray[np.floating]
 Mask = NDArray[np.bool_]
 PointFilter = Callable[[Array], Mask]
 FLAT_PATCH_SIDE = 256  # side of flat patches [texels]
-HUMAN_FILE = "heads/makehuman/head_young_male_light.obj"
+MAKEHUMAN_HEAD_FILE = "heads/makehuman/head_young_male_light.obj"
 SPHERE_RADII_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
 BALL_ATLAS_SIDE, HEAD_ATLAS_SIDE = 320, 1024
 STRIPE_SPACING_MM, STRIPE_WIDTH_MM = 12.0, 6.0  # of stripes of light across seams
@@ -51,19 +51,19 @@ MIN_FACING_COSINE = 0.4  # least cosine between the normal at a seam and the lig
 
 
 def blur(adapter: str = "auto") -> None:
-    """Print tables of the errors of blurs: for points of light, on curved surfaces and across seams.
+    """Print tables of the errors of blurred light: for a single lit texel, on spheres and across seams.
 
-    The tables of curved surfaces and of seams need the folder `tests` of a checkout.
+    The tables of spheres and of seams need the folder `tests` of a checkout.
     """
-    print_tables({name: str(text) for name, text in point_tables(open_device(adapter)).items()})
+    print_tables({name: str(text) for name, text in blur_error_texts(open_device(adapter)).items()})
     print_tables(surface_tables(adapter))
 
 
-def point_tables(device: Device) -> dict[str, object]:
-    """Return table rows and errors of blurred light for docs/templates/accuracy.md, keyed by placeholder."""
+def blur_error_texts(device: Device) -> dict[str, object]:
+    """Return texts on the errors of blurred light for docs/templates/accuracy.md, keyed by placeholder."""
     return {
-        "rows": "\n".join(point_row(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0)),
-        "leaning": "\n".join(sheared_row(device, degrees) for degrees in (90, 80, 60, 45)),
+        "rows": "\n".join(lit_texel_row(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0)),
+        "leaning": "\n".join(sheared_uv_row(device, degrees) for degrees in (90, 80, 60, 45)),
         "constant": f"{constant_light_error(device):.1e}",
         "rounding": half_store_rounding(device),
     }
@@ -72,7 +72,7 @@ def point_tables(device: Device) -> dict[str, object]:
 def blurred_levels(device: Device, mesh: Mesh, irradiance: Array, stretch_mode: str = "full") -> list[Array]:
     """Blur light on the atlas of a mesh; return all pyramid levels (n, n), resampled to full resolution.
 
-    irradiance : (n, n) irradiance
+    irradiance : (n, n) irradiance of the texels of the atlas
     stretch_mode : stretch map that the blur uses: "full", or "axes", which ignores the angle between u and v
     """
     levels, blur = blur_light(
@@ -81,10 +81,12 @@ def blurred_levels(device: Device, mesh: Mesh, irradiance: Array, stretch_mode: 
     return [resampled_level(device, levels, blur, k + 1) for k in range(len(blur.variance_mm2))]
 
 
-def point_row(device: Device, texels_per_mm: float) -> str:
-    """Return a Markdown row with the shape and energy errors of a blurred point of light on a flat patch.
+def lit_texel_row(device: Device, texels_per_mm: float) -> str:
+    """Return a Markdown row with errors in shape and energy after the light of one texel is blurred.
 
-    The reference is the analytic sum of Gaussians.
+    The surface is flat. The reference is the analytic sum of Gaussians.
+
+    texels_per_mm : resolution of the atlas on the surface
     """
     profile = load_profile("gpu-gems-3")
     light = np.zeros((FLAT_PATCH_SIDE, FLAT_PATCH_SIDE), np.float32)
@@ -102,11 +104,11 @@ def point_row(device: Device, texels_per_mm: float) -> str:
     return f"| {texels_per_mm:g} | {100 * shape:.2f} % | {100 * energy:+.4f} % |"
 
 
-def sheared_row(device: Device, shear_degrees: float) -> str:
-    """Return a Markdown row with errors of the shape of a blurred point of light on a sheared uv map.
+def sheared_uv_row(device: Device, shear_degrees: float) -> str:
+    """Return a Markdown row with the widths to which the light of one texel is blurred on a sheared uv map.
 
-    Each of the stretch maps "axes" and "full" has two cells: the ratios of the smaller and of the larger
-    principal width of the blurred point to the exact width.
+    The surface is flat. The widths are divided by the exact width. The cells are the smallest and the largest
+    width with the stretch map "axes", then the same with "full".
 
     shear_degrees : angle between the uv axes on the flat surface [degrees]
     """
@@ -130,7 +132,7 @@ def sheared_row(device: Device, shear_degrees: float) -> str:
 
 
 def constant_light_error(device: Device) -> float:
-    """Return the largest error of blurred constant light on the atlas of a sphere, over all levels [-]."""
+    """Return the largest error after constant light is blurred on the atlas of a sphere [-]."""
     atlas = build_atlas(uv_sphere(100.0), FLAT_PATCH_SIDE)
     levels = blurred_levels(device, uv_sphere(100.0), atlas.coverage.astype(np.float32))
     return max(float(np.abs(level[atlas.coverage] - 1).max()) for level in levels)
@@ -140,16 +142,17 @@ def surface_tables(adapter: str) -> dict[str, str]:
     """Return Markdown rows on curvature and seams for docs/templates/techniques.md, keyed by placeholder."""
     add_tests_to_path()
     renderer = dermis.Renderer(adapter)
-    curved = [harmonic_row(renderer, radius) for radius in SPHERE_RADII_MM]
+    curved = [sphere_blur_row(renderer, radius) for radius in SPHERE_RADII_MM]
     return {"curvature": "\n".join(curved), "seams": "\n".join(seam_rows(renderer))}
 
 
-def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
-    """Return a Markdown row that compares three ways of blurring light on a sphere with the widest Gaussian.
+def sphere_blur_row(renderer: Renderer, radius_mm: float) -> str:
+    """Return a Markdown row that compares three ways to blur light on a sphere.
 
-    The ways are the blur on the atlas, the heat equation on the sphere, and an integral over the sphere as a
-    function of Euclidean distance. The irradiance is proportional to x, so each blur only scales it; the
-    cells are the scale factors.
+    They are the blur on the atlas, the heat equation on the sphere, and an integral over the sphere with
+    weights that depend on Euclidean distance. Each blurs by the widest Gaussian of `BLUR_PROFILE`. The
+    irradiance is proportional to x, so that each blur multiplies it by a constant. The row contains these
+    constants.
     """
     from atlas_reading import shown
     from cut_meshes import cut_sphere
@@ -157,7 +160,7 @@ def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
     mesh = cut_sphere(radius_mm, 20)
     atlas = build_atlas(mesh, BALL_ATLAS_SIDE, "stitched")
     light = np.nan_to_num(shown(atlas, mesh, own=True))[..., :1] / radius_mm
-    remaining = widest_level(renderer, *blur_light(renderer.device, mesh, atlas, light))
+    remaining = widest_gaussian_level(renderer, *blur_light(renderer.device, mesh, atlas, light))
     density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
     area = atlas.lit[..., None] / density
     map_fraction = (area * remaining * light).sum() / (area * light**2).sum()
@@ -170,12 +173,15 @@ def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
 def blur_light(
     device: Device, mesh: Mesh, atlas: Atlas, irradiance: Array, stretch_mode: str = "full"
 ) -> tuple[PyramidLevels, Blur]:
-    """Blur grey light (n, n, 1) on the atlas of a mesh by all Gaussians of `BLUR_PROFILE` but the narrowest.
+    """Blur grey light on the atlas of a mesh, and return the pyramid levels and the parameters of the blur.
 
+    The light is blurred by each Gaussian of `BLUR_PROFILE` except the narrowest.
+
+    irradiance : (n, n, 1) irradiance of the texels of the atlas
     stretch_mode : stretch map that the blur uses: "full", or "axes", which ignores the angle between u and v
     """
     textures, variance = upload_atlas(device, atlas, stretch_mode), BLUR_PROFILE.variance_mm2[1:]
-    max_halvings = len(textures.mips_for("repeated")) - 1
+    max_halvings = len(textures.mips_for_blurs("repeated")) - 1
     halvings = choose_halvings(variance, textures.median_texels_per_mm, max_halvings)
     blur = Blur(variance, BLUR_PROFILE.weight[1:], halvings)
     levels = make_levels(device, len(irradiance), (halvings,), level_format(device))
@@ -198,8 +204,8 @@ def resampled_level(device: Device, levels: PyramidLevels, blur: Blur, level_ind
     return np.asarray(zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True))
 
 
-def widest_level(renderer: Renderer, levels: PyramidLevels, blur: Blur) -> Array:
-    """Return the pyramid level of the widest Gaussian (n, n, 1), at the full resolution of the atlas."""
+def widest_gaussian_level(renderer: Renderer, levels: PyramidLevels, blur: Blur) -> Array:
+    """Return the light (n, n, 1) blurred by the widest Gaussian, at the full resolution of the atlas."""
     return resampled_level(renderer.device, levels, blur, len(blur.halvings) - 1)[..., None]
 
 
@@ -211,46 +217,53 @@ def seam_rows(renderer: Renderer) -> list[str]:
     from cut_meshes import cut_sphere
 
     human = dermis.load_head("human")
-    makehuman = replace(dermis.load_head(data_file(HUMAN_FILE), unit_mm=100, subdivide=0), maps=Maps())
+    makehuman = replace(
+        dermis.load_head(data_file(MAKEHUMAN_HEAD_FILE), unit_mm=100, subdivide=0), maps=Maps()
+    )
     rows = (
-        ("sphere in six charts", Head("sphere", cut_sphere(30.0, 20), Maps()), BALL_ATLAS_SIDE, all_points),
-        ("human, neck and back of the head", human, HEAD_ATLAS_SIDE, visible_points),
-        ("human, eye sockets and inside of the mouth", human, HEAD_ATLAS_SIDE, hidden_points),
-        ("MakeHuman, neck", makehuman, HEAD_ATLAS_SIDE, neck_points),
-        ("MakeHuman, back of the head", makehuman, HEAD_ATLAS_SIDE, back_points),
+        (
+            "sphere in six charts",
+            Head("sphere", cut_sphere(30.0, 20), Maps()),
+            BALL_ATLAS_SIDE,
+            all_points_mask,
+        ),
+        ("human, neck and back of the head", human, HEAD_ATLAS_SIDE, visible_seams_mask),
+        ("human, eye sockets and inside of the mouth", human, HEAD_ATLAS_SIDE, hidden_seams_mask),
+        ("MakeHuman, neck", makehuman, HEAD_ATLAS_SIDE, neck_mask),
+        ("MakeHuman, back of the head", makehuman, HEAD_ATLAS_SIDE, back_of_head_mask),
     )
     return [seam_row(renderer, *row) for row in rows]
 
 
-def all_points(positions: Array) -> Mask:
+def all_points_mask(positions: Array) -> Mask:
     """Return a mask (n,) that selects all positions (n, 3)."""
     return np.ones(len(positions), bool)
 
 
-def neck_points(positions: Array) -> Mask:
+def neck_mask(positions: Array) -> Mask:
     """Return the mask of positions on and below the neck."""
     return np.asarray((positions[:, 1] < -90.0) & (positions[:, 2] < 60.0))
 
 
-def back_points(positions: Array) -> Mask:
+def back_of_head_mask(positions: Array) -> Mask:
     """Return the mask of positions on the back of the head."""
     return np.asarray((positions[:, 1] > -90.0) & (positions[:, 2] < -30.0))
 
 
-def visible_points(positions: Array) -> Mask:
+def visible_seams_mask(positions: Array) -> Mask:
     """Return the mask of positions where seams of the package's human are visible: neck and back."""
-    return np.asarray(neck_points(positions) | back_points(positions))
+    return np.asarray(neck_mask(positions) | back_of_head_mask(positions))
 
 
-def hidden_points(positions: Array) -> Mask:
+def hidden_seams_mask(positions: Array) -> Mask:
     """Return the mask of positions where seams of the package's human are hidden: eye sockets and mouth."""
-    return ~visible_points(positions)
+    return ~visible_seams_mask(positions)
 
 
 def seam_row(
     renderer: Renderer, row_title: str, head: Head, atlas_side: int, point_filter: PointFilter
 ) -> str:
-    """Return a Markdown row with the discontinuity of light across seams, in one cell for each seam method.
+    """Return a Markdown row with the discontinuity of light across seams, with one cell per seam method.
 
     atlas_side : side of the atlas [texel]
     point_filter : function that returns the mask of the seam points to use, given their positions
@@ -258,13 +271,15 @@ def seam_row(
     first, second = seam_side_points(head, point_filter)
     cells = []
     for method in SEAM_METHODS:
-        jumps = seam_jumps(renderer, striped_scene(head), method, atlas_side, first, second)
+        jumps = seam_discontinuities(renderer, striped_scene(head), method, atlas_side, first, second)
         cells.append(f"{100 * jumps.mean():.1f} / {100 * np.percentile(jumps, 95):.1f}")
     return f"| {row_title} | {len(first.triangle)} | {' | '.join(cells)} |"
 
 
 def seam_side_points(head: Head, point_filter: PointFilter) -> tuple[Points, Points]:
-    """Return pairs of points on the two sides of seams, where the surface faces the front or the back.
+    """Return points on one side of the seams of a head, and the opposite points on the other side.
+
+    Points where the surface faces neither the front nor the back of the head are left out.
 
     point_filter : function that returns the mask of the seam points to use, given their positions
     """
@@ -285,7 +300,10 @@ def seam_side_points(head: Head, point_filter: PointFilter) -> tuple[Points, Poi
 
 
 def striped_scene(head: Head) -> Scene:
-    """Return a scene lit from the front and the back by sharp stripes of light and weak uniform light."""
+    """Return a scene with a head lit by sharp stripes of light and by weak uniform light.
+
+    Both come from the front and from the back.
+    """
     x = head.mesh.positions[:, 0] - head.centre_mm[0]
     positions = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), STRIPE_SPACING_MM)
     stripe = partial(StripeLight, up=(0.4, 1, 0), width_mm=STRIPE_WIDTH_MM, shadows=False)
@@ -297,7 +315,7 @@ def striped_scene(head: Head) -> Scene:
     return Scene(replace(head, maps=Maps()), lights=lights, skin=skin)
 
 
-def seam_jumps(
+def seam_discontinuities(
     renderer: Renderer,
     scene: Scene,
     seam_method: str,
@@ -305,11 +323,11 @@ def seam_jumps(
     first_side: Points,
     second_side: Points,
 ) -> Array:
-    """Return the relative differences (n,) of scattered red light between the two sides of seams.
+    """Return the relative differences (n,) between the scattered red light on the two sides of seams.
 
     seam_method : key of `SEAM_METHODS`
     atlas_side : side of the atlas [texel]
-    first_side, second_side : n pairs of points on the two sides of seams
+    first_side, second_side : n points on one side of the seams, and the opposite points
     """
     from atlas_reading import lit_at
 

@@ -32,7 +32,7 @@ HIGHLIGHT_RESULTS, LOOK_RESULTS = RESULTS / "highlights.json", RESULTS / "look.j
 LOOK_PICTURE = DOCS / "images" / "look.webp"
 LOBE_MODELS = ("torrance-sparrow-smith", "kelemen", "two-lobe")
 HIGHLIGHT_VIEWS = ("cheek", "portrait")
-SKIN_ROUGHNESS, HIGHLIGHT_PATHS = 0.3, 64
+SKIN_ROUGHNESS, HIGHLIGHT_PATH_COUNT = 0.3, 64
 KEY_LIGHT = PointLight(position=(-300, 250, 600), irradiance=(3, 3, 3))
 ONE_LOBE = ((1.0, SKIN_ROUGHNESS),)
 TWO_LOBES = (
@@ -45,7 +45,7 @@ GRAIN_BLUR_PX = 6.0  # standard deviation of the blur that removes the grain [pi
 HEAD_NAMES = {"scan": "lee_perry_smith", "human": "human"}
 LOOK_VIEWS = ("portrait", "three-quarter", "cheek", "profile")
 LOOK_COLUMNS = ("deck-2007", "default", "Cycles")
-LOOK_SIDE, SURFACE_PATHS, MAX_MAP_SIDE = 256, 16, 1024
+LOOK_SIDE, SURFACE_PATH_COUNT, MAX_MAP_SIDE = 256, 16, 1024
 
 Picture = NDArray[np.float32]
 
@@ -56,8 +56,8 @@ class HighlightRow(TypedDict):
     view : camera preset
     model : model of surface reflection
     energy : ratio of the reflected light to that of Cycles [-]
-    grain : contrast of fine detail in the picture by dermis [-]
-    grain_of_cycles : contrast of fine detail in the picture by Cycles [-]
+    grain : contrast of fine detail in the picture rendered by dermis [-]
+    grain_of_cycles : contrast of fine detail in the picture rendered by Cycles [-]
     correlation : correlation of the two pictures in bright pixels [-]
     """
 
@@ -81,11 +81,11 @@ def highlights(adapter: str = "auto") -> None:
     require_in_checkout(RESULTS)
     renderer, head = dermis.Renderer(adapter), scan_with_normal_map()
     rows = [row for view in HIGHLIGHT_VIEWS for row in highlight_rows(renderer, head, view)]
-    write_results(HIGHLIGHT_RESULTS, {"paths": HIGHLIGHT_PATHS, "rows": rows})
+    write_results(HIGHLIGHT_RESULTS, {"paths": HIGHLIGHT_PATH_COUNT, "rows": rows})
 
 
 def looks(adapter: str = "auto") -> None:
-    """Render skins by dermis and by Cycles; write benchmarks/results/look.json and docs/images/look.webp."""
+    """Render skin with dermis and Cycles; write benchmarks/results/look.json and docs/images/look.webp."""
     require_in_checkout(LOOK_PICTURE.parent)
     renderer, rows, panels = dermis.Renderer(adapter), list[dict[str, object]](), dict[str, Picture]()
     renders = {head: skin_renders(renderer, head) for head in HEAD_NAMES}
@@ -95,12 +95,12 @@ def looks(adapter: str = "auto") -> None:
             rows.append({"head": head, "view": view, "shares": [one.reflected for one in columns]})
             for column, one in zip(LOOK_COLUMNS, columns, strict=True):
                 panels[f"{head} {view}, {column}: {100 * one.reflected:.1f} %"] = one.picture
-    write_results(LOOK_RESULTS, {"paths": HIGHLIGHT_PATHS, "rows": rows})
+    write_results(LOOK_RESULTS, {"paths": HIGHLIGHT_PATH_COUNT, "rows": rows})
     LOOK_PICTURE.write_bytes(sheet_bytes(panels, 2 * len(LOOK_COLUMNS)))
 
 
-def tables() -> dict[str, object]:
-    """Return Markdown rows of the last measurement for docs/templates/accuracy.md, keyed by placeholder."""
+def cycles_comparison_texts() -> dict[str, object]:
+    """Return texts on the last measurement for docs/templates/accuracy.md, keyed by placeholder."""
     highlight_rows, look_rows = read_results(HIGHLIGHT_RESULTS)["rows"], read_results(LOOK_RESULTS)["rows"]
     cells = (" | ".join(f"{100 * share:.1f} %" for share in row["shares"]) for row in look_rows)
     return {
@@ -109,17 +109,17 @@ def tables() -> dict[str, object]:
             f"| {row['grain_of_cycles']:.2f} | {row['correlation']:.3f} |"
             for row in highlight_rows
         ),
-        "highlight_paths": HIGHLIGHT_PATHS,
+        "highlight_paths": HIGHLIGHT_PATH_COUNT,
         "looks": "\n".join(
             f"| {row['head']} | {row['view']} | {fractions} |"
             for row, fractions in zip(look_rows, cells, strict=True)
         ),
-        "look_paths": HIGHLIGHT_PATHS,
+        "look_paths": HIGHLIGHT_PATH_COUNT,
     }
 
 
 def scan_with_normal_map() -> Head:
-    """Return the scanned head with its relief as a normal map and without other maps."""
+    """Return the scanned head with a normal map made from its height map, and without other maps."""
     head = dermis.load_head("lee_perry_smith", subdivide=1, regions="none")
     assert head.maps.height is not None
     return replace(head, maps=Maps(normal=relief_slopes(head.mesh, head.maps.height)))
@@ -145,19 +145,19 @@ def grain_contrast(picture: Picture, lit_mask: NDArray[np.bool_]) -> float:
 
 
 def traced_highlights(scene: Scene, settings: Settings, lobes: tuple[tuple[float, float], ...]) -> Picture:
-    """Return the highlights (h, w) that Cycles path-traces for a sum of Beckmann lobes.
+    """Return the highlights (h, w) that Cycles renders on a surface that reflects a sum of Beckmann lobes.
 
     lobes : weight and roughness of each lobe
     """
     picture = np.zeros(settings.size[::-1], np.float32)
     for weight, roughness in lobes:
-        (image_pass,) = cycles_passes(scene, BeckmannSurface(roughness), [HIGHLIGHT_PATHS], settings)
+        (image_pass,) = cycles_passes(scene, BeckmannSurface(roughness), [HIGHLIGHT_PATH_COUNT], settings)
         picture += weight * image_pass.image[..., 1]
     return picture
 
 
 def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[HighlightRow]:
-    """Return the comparison of highlights with Cycles for each model of surface reflection.
+    """Return one comparison of highlights with Cycles for each model of surface reflection.
 
     view : camera preset
     """
@@ -185,7 +185,7 @@ def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[Hig
 
 
 def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
-    """Render a scene by dermis, and again with surface reflection alone to find the reflected fraction."""
+    """Render a scene with dermis, and again without scattered light to find the reflected fraction."""
     options = {"size": (LOOK_SIDE, LOOK_SIDE), "atlas": 1024, "strands": False}
     settings = Settings.model_validate(options), Settings.model_validate(options | {"parts": "specular"})
     picture, surface_pass = (renderer.draw(scene, one).linear() for one in settings)
@@ -193,26 +193,28 @@ def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
 
 
 def render_cycles_skin(scene: Scene, skin: PrincipledSkin) -> SkinRender:
-    """Render a scene by Cycles, and again with black skin to find the fraction that the surface reflects."""
+    """Render a scene with Cycles, and again with black skin to find the reflected fraction."""
     settings = Settings(size=(LOOK_SIDE, LOOK_SIDE))
     black = replace(skin, colour=np.zeros_like(skin.colour))
-    (image_pass,) = cycles_passes(scene, skin, [HIGHLIGHT_PATHS], settings)
-    (surface_pass,) = cycles_passes(scene, black, [SURFACE_PATHS], settings)
+    (image_pass,) = cycles_passes(scene, skin, [HIGHLIGHT_PATH_COUNT], settings)
+    (surface_pass,) = cycles_passes(scene, black, [SURFACE_PATH_COUNT], settings)
     return SkinRender(image_pass.image, float(surface_pass.image.sum() / image_pass.image.sum()))
 
 
-def downsample_map(texels: Picture) -> Picture:
+def downsample_map(map_texels: Picture) -> Picture:
     """Return a map averaged over blocks of texels, to at most `MAX_MAP_SIDE` rows.
 
-    texels : (h, w) or (h, w, c) map
+    map_texels : (h, w) or (h, w, c) map
     """
-    step = max(1, len(texels) // MAX_MAP_SIDE)
-    blocks = texels.reshape(len(texels) // step, step, texels.shape[1] // step, step, *texels.shape[2:])
+    step = max(1, len(map_texels) // MAX_MAP_SIDE)
+    blocks = map_texels.reshape(
+        len(map_texels) // step, step, map_texels.shape[1] // step, step, *map_texels.shape[2:]
+    )
     return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
 
 
 def with_normal_map(head: Head) -> Head:
-    """Return the head with its relief converted to a normal map, for Cycles."""
+    """Return the head with its height map converted to a normal map, for Cycles."""
     if head.maps.height is None:
         return head
     relief = relief_slopes(head.mesh, downsample_map(head.maps.height))
@@ -220,10 +222,10 @@ def with_normal_map(head: Head) -> Head:
 
 
 def principled_skin(head: Head) -> PrincipledSkin:
-    """Return a Cycles material that has a head's colours and scatters light as far as the default skin.
+    """Return a Cycles material with the colours of a head and the mean scattering distance of default skin.
 
-    For Burley's profile, the mean distance between entry and exit of light is 2.5 d, where d is the mean free
-    path divided by a factor that depends on the colour.
+    The scattering distance is the distance between the points where light enters and leaves. For Burley's
+    profile its mean is 2.5 d, where d is the mean free path divided by a function of the colour.
     """
     assert head.maps.colour is not None and head.maps.mean_colour is not None
     profile, colour = load_profile(Skin().profile), head.maps.mean_colour
@@ -234,9 +236,9 @@ def principled_skin(head: Head) -> PrincipledSkin:
 
 
 def skin_renders(renderer: dermis.Renderer, head_title: str) -> dict[str, list[SkinRender]]:
-    """Return three renderings of a head for each view, as a dictionary from view to renderings.
+    """Return a dictionary from the name of a view to three renderings of a head.
 
-    The first shows the preset skin "deck-2007", the second the default skin, and the third is by Cycles.
+    The first shows the preset skin "deck-2007", the second the default skin. The third is rendered by Cycles.
 
     head_title : key of `HEAD_NAMES`
     """

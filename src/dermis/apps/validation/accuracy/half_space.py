@@ -1,4 +1,4 @@
-"""Directional reflection of a half-space under a boundary of index 1.4, for docs/techniques.md."""
+"""Reflection of a half-space with index of refraction 1.4, by direction, for docs/techniques.md."""
 
 from __future__ import annotations
 
@@ -34,24 +34,29 @@ _QUADRATURE_NODE_COUNT = 48
 
 
 def half_space(adapter: str = "auto") -> None:
-    """Print the table of reflection by direction; this takes less than a minute."""
+    """Print a table that shows how the reflection of skin depends on the directions of light and view."""
     print_lines(direction_table(load_head("lee_perry_smith", subdivide=0), adapter))
 
 
 def direction_table(head: Head, adapter: str) -> str:
-    """Return a Markdown table of reflection by direction, with errors of Lambertian and half-space skin."""
+    """Return a Markdown table that shows how the reflection of skin depends on direction.
+
+    The table also has the errors of the directional models "lambertian" and "half-space".
+
+    head : head that is rendered in studio light for the last two rows
+    """
     layer = published_media()["skin1"].layers[0]
     albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
     forward = layer.sigma_s_prime / (layer.sigma_a * (1.0 - FORWARD_G) + layer.sigma_s_prime)
-    median, high = _studio_ratios(head, adapter)
+    median, high = _studio_brightness_ratios(head, adapter)
     oblique, errors = "light from 81° over light from above", "relative RMSE over all pairs of directions"
     photons = f"photons of mean cosine {FORWARD_G:g}"
     rows: dict[str, Sequence[float]] = {
-        f"{oblique}, index-matched": [_oblique_ratio(one, 1.0) for one in albedo],
-        f"{oblique}, index {SKIN_IOR:g}": [_oblique_ratio(one, SKIN_IOR) for one in albedo],
-        "the same, photons": [_monte_carlo_ratio(one, 0.0, SKIN_IOR) for one in albedo],
-        f"the same, {photons}": [_monte_carlo_ratio(one, FORWARD_G, SKIN_IOR) for one in forward],
-        f"index-matched, {photons}": [_monte_carlo_ratio(one, FORWARD_G, 1.0) for one in forward],
+        f"{oblique}, index-matched": [_oblique_to_normal_ratio(one, 1.0) for one in albedo],
+        f"{oblique}, index {SKIN_IOR:g}": [_oblique_to_normal_ratio(one, SKIN_IOR) for one in albedo],
+        "the same, photons": [_monte_carlo_oblique_ratio(one, 0.0, SKIN_IOR) for one in albedo],
+        f"the same, {photons}": [_monte_carlo_oblique_ratio(one, FORWARD_G, SKIN_IOR) for one in forward],
+        f"index-matched, {photons}": [_monte_carlo_oblique_ratio(one, FORWARD_G, 1.0) for one in forward],
         f"{errors}, lambertian": [_direction_errors(one)[0] for one in albedo],
         f"{errors}, half-space": [_direction_errors(one)[1] for one in albedo],
         "default skin in the studio over lambertian, median": median,
@@ -63,16 +68,16 @@ def direction_table(head: Head, adapter: str) -> str:
     return "\n".join(lines)
 
 
-def _oblique_ratio(albedo: float, eta: float) -> float:
+def _oblique_to_normal_ratio(albedo: float, eta: float) -> float:
     oblique, above = directional_reflectance([OBLIQUE_COSINE, 1.0], albedo, eta)
     return float(oblique / above)
 
 
 def _direction_errors(albedo: float) -> tuple[float, float]:
-    """Return relative RMS errors of Lambertian and of half-space skin over directions of light and view [-].
+    """Return the relative RMS errors of the directional models "lambertian" and "half-space" [-].
 
-    The reference combines the exact radiance of an index-matched half-space with all internal reflections at
-    the surface.
+    The errors are averaged over the directions of light and view. The reference combines the exact radiance
+    of an index-matched half-space with all internal reflections at the surface.
 
     albedo : single-scattering albedo [-]
     """
@@ -102,8 +107,8 @@ def _direction_errors(albedo: float) -> tuple[float, float]:
     return relative_rmse(lambertian), relative_rmse(half_space)
 
 
-def _monte_carlo_ratio(albedo: float, mean_cosine: float, eta: float) -> float:
-    """Return the ratio of the reflectance at 81 degrees to that at normal incidence, by Monte Carlo [-].
+def _monte_carlo_oblique_ratio(albedo: float, mean_cosine: float, eta: float) -> float:
+    """Return the ratio of reflectance at 81 degrees of incidence to that at 0 degrees, by Monte Carlo [-].
 
     mean_cosine : mean cosine of the scattering angle [-]
     """
@@ -136,27 +141,31 @@ def _reflected_fraction(cosine: float, albedo: float, mean_cosine: float, eta: f
     return reflected / PHOTON_COUNT
 
 
-def _scattered_cosines(downward_cosines: Floats, g: float, rng: np.random.Generator) -> Floats:
+def _scattered_cosines(downward_cosines: Floats, mean_cosine: float, rng: np.random.Generator) -> Floats:
     """Return cosines (n,) of the angles between photon directions and the downward axis, after scattering.
 
     Scattering angles are distributed according to [HenyeyGreenstein1941].
 
     downward_cosines : (n,) cosines before scattering
-    g : mean cosine of the scattering angle [-]
+    mean_cosine : mean cosine of the scattering angle [-]
     """
     uniform = rng.random(len(downward_cosines))
-    if g == 0.0:
+    if mean_cosine == 0.0:
         return 2.0 * uniform - 1.0
-    cosine = (1.0 + g**2 - ((1.0 - g**2) / (1.0 - g + 2.0 * g * uniform)) ** 2) / (2.0 * g)
+    cosine = (
+        1.0
+        + mean_cosine**2
+        - ((1.0 - mean_cosine**2) / (1.0 - mean_cosine + 2.0 * mean_cosine * uniform)) ** 2
+    ) / (2.0 * mean_cosine)
     sines = np.sqrt(np.maximum((1.0 - cosine**2) * (1.0 - downward_cosines**2), 0.0))
     deflected = downward_cosines * cosine + sines * np.cos(2.0 * np.pi * rng.random(len(downward_cosines)))
     return np.asarray(np.clip(deflected, -1.0, 1.0))
 
 
-def _studio_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
-    """Return ratios of the brightness of half-space skin to that of Lambertian skin, in studio light.
+def _studio_brightness_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
+    """Return ratios of the radiance of skin with `direction` "half-space" to that with "lambertian".
 
-    The result is the median and the 99th percentile over the pixels of a picture, by channel.
+    The ratios are the median and the 99th percentile over the pixels of a head in studio light, by channel.
     """
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
 

@@ -1,4 +1,4 @@
-"""Errors of lighting: environments, white furnaces, area lights, ambient occlusion."""
+"""Errors of lighting: environments, area lights, ambient occlusion, energy in white furnace tests."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from dermis.environment.prefilter import (
     LAYER_ROUGHNESSES,
     MAX_LAYER_ROUGHNESS,
     MIN_LAYER_ROUGHNESS,
-    Prefiltered,
+    PrefilteredPanorama,
     prefilter,
 )
 from dermis.frame.features.occlusion.baked import SKY_DIRECTION_COUNT, bake_occlusion
@@ -46,8 +46,8 @@ UP_AXIS = np.array([0.0, 1.0, 0.0])
 
 
 def light(adapter: str = "auto") -> None:
-    """Print the tables of environments, white furnaces, area lights and ambient occlusion."""
-    print_tables(tables(adapter))
+    """Print tables with errors of environments, area lights, ambient occlusion and white furnace tests."""
+    print_tables(light_error_tables(adapter))
 
 
 def sample_panorama(panorama_image: Array, directions: Array) -> Array:
@@ -74,7 +74,9 @@ def normalise(vectors: Array) -> Array:
 
 
 @cache
-def prefiltered_panorama(panorama_name: str, row_count: int = 256) -> tuple[Array, Array, Prefiltered]:
+def prefiltered_panorama(
+    panorama_name: str, row_count: int = 256
+) -> tuple[Array, Array, PrefilteredPanorama]:
     """Return directions (n, 3) and light (n, 3) of a panorama's texels, and the prefiltered panorama.
 
     Light is radiance times solid angle; suns are removed.
@@ -89,7 +91,7 @@ def prefiltered_panorama(panorama_name: str, row_count: int = 256) -> tuple[Arra
 
 
 def irradiance_error(panorama_name: str, normal_count: int = 200) -> float:
-    """Return the largest relative error of the irradiance of a panorama, over random normals.
+    """Return the largest relative error of the irradiance from a prefiltered panorama, over random normals.
 
     normal_count : number of normals
     """
@@ -102,9 +104,9 @@ def irradiance_error(panorama_name: str, normal_count: int = 200) -> float:
 def reflection_error(
     panorama_name: str, roughness_m: float, view_degrees: float, normal_count: int = 320
 ) -> float:
-    """Return the relative RMS error of a panorama's light that a specular lobe reflects, over random normals.
+    """Return the relative RMS error of the radiance that a specular lobe reflects, over random normals.
 
-    Lookups in the prefiltered panorama are compared with a sum over all texels of the panorama.
+    The radiance from lookups in a prefiltered panorama is compared with a sum over the panorama's texels.
 
     roughness_m : roughness of the specular lobe
     view_degrees : angle between view and normal [degrees]
@@ -131,23 +133,23 @@ def reflection_error(
 
 
 def reflected_radiance(
-    directions: Array, light: Array, normal: Array, view: Array, roughness_m: float
+    texel_directions: Array, texel_light: Array, normal: Array, view: Array, roughness_m: float
 ) -> Array:
     """Return the radiance that a specular lobe reflects, as a sum over all texels of a panorama.
 
     Texels where the lobe is below 1e-10 of its peak are skipped.
 
-    directions : (n, 3) directions of the texels
-    light : (n, 3) radiance of the texels, multiplied by their solid angles
+    texel_directions : (n, 3) directions of the texels
+    texel_light : (n, 3) radiance of the texels, multiplied by their solid angles
     normal, view : (3,) unit vectors
     roughness_m : roughness of the lobe
     """
-    n_l, n_v, v_l = directions @ normal, float(normal @ view), directions @ view
+    n_l, n_v, v_l = texel_directions @ normal, float(normal @ view), texel_directions @ view
     n_h = (n_l + n_v) / np.sqrt(np.maximum(2 + 2 * v_l, 1e-12))
     near = np.flatnonzero((n_l > 0) & (n_h > 1 / np.sqrt(1 + (4.8 * roughness_m) ** 2)))
     v_h = np.sqrt(0.5 + 0.5 * v_l[near])
     angles = Cosines(n_l[near], np.full(len(near), n_v), n_h[near], v_h)
-    return np.asarray((kelemen(angles, roughness_m) * n_l[near]) @ light[near])
+    return np.asarray((kelemen(angles, roughness_m) * n_l[near]) @ texel_light[near])
 
 
 def lobe_parameters(cosine: float, roughness_m: float) -> Array:
@@ -163,12 +165,12 @@ def lobe_parameters(cosine: float, roughness_m: float) -> Array:
     return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], rows))
 
 
-def lobe_radiance(layers: Array, directions: Array, roughness_m: float) -> Array:
+def lobe_radiance(prefiltered_layers: Array, directions: Array, roughness_m: float) -> Array:
     """Return the radiance (k, 3) of a prefiltered panorama in the directions of isotropic lobes.
 
     The radiance is interpolated between the two layers whose roughness is nearest to that of the lobes.
 
-    layers : (n, h, w, 3) layers of the prefiltered panorama, in order of roughness
+    prefiltered_layers : (n, h, w, 3) layers of the prefiltered panorama, in order of roughness
     directions : (k, 3) directions of the lobes
     roughness_m : roughness of the lobes
     """
@@ -179,18 +181,19 @@ def lobe_radiance(layers: Array, directions: Array, roughness_m: float) -> Array
     )
     low = int(np.clip(level, 0, len(LAYER_ROUGHNESSES) - 2))
     f = float(np.clip(level - low, 0, 1))
-    below, above = (sample_panorama(layers[1 + k], directions) for k in (low, low + 1))
+    below, above = (sample_panorama(prefiltered_layers[1 + k], directions) for k in (low, low + 1))
     return np.asarray((1 - f) * below + f * above)
 
 
 def furnace_extremes(
     renderer: dermis.Renderer, head: Head, energy_scheme: str, **setting_values: str
 ) -> Array:
-    """Return minimum, mean and maximum ratio of outgoing to incoming radiance on a head in uniform light.
+    """Return minimum, mean and maximum ratio of outgoing to incoming radiance in a white furnace test.
 
-    The colour of the head is white.
+    In this test, a head with a white albedo map is lit by a uniform environment.
 
-    energy_scheme : energy conservation scheme
+    energy_scheme : energy conservation scheme of the skin
+    setting_values : values of further render settings, by name
     """
     white_head = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
     skin = Skin.preset("deck-2007").replace(energy=energy_scheme)
@@ -278,7 +281,7 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
     return float(np.sqrt(np.nanmean((ours - reference) ** 2)))
 
 
-def tables(adapter: str = "auto") -> dict[str, str]:
+def light_error_tables(adapter: str = "auto") -> dict[str, str]:
     """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     renderer = dermis.Renderer(adapter)
     shadows = [(rig, *soft_shadow_error(renderer, rig)) for rig in ("window", "top", "rim")]

@@ -117,14 +117,14 @@ def picture_error(
     rebuilt = rebuilt_head(head, posed_points(head, person_points, target_weights))
     lights, camera = LIGHT_AND_CAMERA[view_name]
     scene = Scene(rebuilt, load_lights(lights), load_camera(camera, rebuilt))
-    posed_head = _with_centre(replace(head), rebuilt)
+    posed_head = _with_centre_of(replace(head), rebuilt)
     pose = Pose(target_weights, positions_mm=person_points)
     posed = renderer.draw(replace(scene, head=posed_head, pose=pose), SETTINGS).linear()
     reference = renderer.draw(scene, SETTINGS).linear()
     return float(np.sqrt(((posed - reference) ** 2).mean() / (reference**2).mean()))
 
 
-def _with_centre(head: Head, shaped_head: Head) -> Head:
+def _with_centre_of(head: Head, shaped_head: Head) -> Head:
     """Change the centre of a head in place to the centre of `shaped_head`, and return the head.
 
     Lights and cameras are relative to the centre.
@@ -134,17 +134,22 @@ def _with_centre(head: Head, shaped_head: Head) -> Head:
     return head
 
 
-def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
+def expression_rows(
+    renderer: Renderer, head: Head, person_points_by_name: Mapping[str, Points]
+) -> Iterator[str]:
     """Yield Markdown rows, one per expression, with the largest picture error over all people.
 
     Heads are seen from the front and from the back.
 
-    persons : dictionary from the name of a person to positions in the rest pose [mm]
+    person_points_by_name : dictionary from the name of a person to positions in the rest pose [mm]
     """
     worst = dict.fromkeys(LIGHT_AND_CAMERA, 0.0)
     for name, weights in EXPRESSIONS.items():
         errors = {
-            view: max(picture_error(renderer, head, person, weights, view) for person in persons.values())
+            view: max(
+                picture_error(renderer, head, person, weights, view)
+                for person in person_points_by_name.values()
+            )
             for view in LIGHT_AND_CAMERA
         }
         worst = {view: max(worst[view], errors[view]) for view in LIGHT_AND_CAMERA}
@@ -153,7 +158,7 @@ def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points
 
 
 def deformation_rows(renderer: Renderer, head: Head) -> Iterator[str]:
-    """Yield Markdown rows, one per deformation, with the strain and the errors of a front and a back view."""
+    """Yield Markdown rows, one per deformation, with its strain and the errors of front and back views."""
     gauge = StrainGauge(head)
     for name, deform in DEFORMATIONS.items():
         points = deform(head.positions_mm)
@@ -162,47 +167,49 @@ def deformation_rows(renderer: Renderer, head: Head) -> Iterator[str]:
 
 
 def _with_thinner_ears(point_positions: Points, thickness_fraction: float) -> Points:
-    """Return the points (p, 3) of the scan with thinner ears: points at the sides are scaled along z.
+    """Return the points (p, 3) of the scanned head with thinner ears, made by scaling the ears along z.
 
-    thickness_fraction : fraction of the thickness that is removed
+    thickness_fraction : fraction of the thickness of the ears that is removed
     """
     ear = np.clip((np.abs(point_positions[:, :1]) - 65.0) / 10.0, 0.0, 1.0)
     return (point_positions * (1.0 - ear * [0.0, 0.0, thickness_fraction])).astype(np.float32)
 
 
-def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
-    """Yield Markdown rows with discontinuities across seams: at rest, in expressions, and for other people.
+def seam_rows(renderer: Renderer, head: Head, person_points_by_name: Mapping[str, Points]) -> Iterator[str]:
+    """Yield Markdown rows with the discontinuity of scattered light across the seams of a head.
 
-    persons : dictionary from the name of a person to positions in the rest pose [mm]
+    The rows are for the rest pose, for expressions, and for the shapes of other people.
+
+    person_points_by_name : dictionary from the name of a person to positions in the rest pose [mm]
     """
     rest_points = head.positions_mm
     yield _seam_row(renderer, "at rest", head, head, None)
     for name in ("open jaw", "smile", "puffed cheeks"):
         shape = rebuilt_head(head, posed_points(head, rest_points, EXPRESSIONS[name]))
         yield _seam_row(renderer, name, head, shape, Pose(EXPRESSIONS[name]))
-    for name, person in persons.items():
+    for name, person in person_points_by_name.items():
         shape = rebuilt_head(head, person)
         yield _seam_row(renderer, f"{name}, by positions", head, shape, Pose(positions_mm=person))
         yield _seam_row(renderer, f"{name}, rebuilt", shape, shape, None)
 
 
 def _seam_row(renderer: Renderer, row_title: str, head: Head, shaped_head: Head, pose: Pose | None) -> str:
-    """Return a Markdown row with the discontinuity of light across the seams of a posed head.
+    """Return a Markdown row with the discontinuity of scattered light across the seams of a posed head.
 
     shaped_head : head loaded in the shape of the pose; used to find the points beside seams
     """
     cells = []
-    for where in (blur.neck_points, blur.back_points):
+    for where in (blur.neck_mask, blur.back_of_head_mask):
         sides = blur.seam_side_points(shaped_head, where)
         scene = replace(blur.striped_scene(head), pose=pose)
-        _with_centre(scene.head, shaped_head)
-        errors = blur.seam_jumps(renderer, scene, "stitch", blur.HEAD_ATLAS_SIDE, *sides)
+        _with_centre_of(scene.head, shaped_head)
+        errors = blur.seam_discontinuities(renderer, scene, "stitch", blur.HEAD_ATLAS_SIDE, *sides)
         cells.append(f"{100 * errors.mean():.1f} / {100 * np.percentile(errors, 95):.1f}")
     return f"| {row_title} | {' | '.join(cells)} |"
 
 
 def occlusion_table(renderer: Renderer, head: Head) -> Iterator[str]:
-    """Yield the Markdown rows on ambient occlusion in several poses."""
+    """Yield Markdown rows with errors of ambient occlusion in several poses."""
     neck = dict.fromkeys(("neck01", "neck02", "neck03", "head"), (0.0, 15.0, 0.0))
     poses = {name: Pose(EXPRESSIONS[name]) for name in ("open jaw", "smile", "blink", "pucker", "surprise")}
     poses["head turned by 60 degrees"] = Pose(bones=neck)
@@ -218,7 +225,7 @@ def occlusion_rows(
 ) -> Iterator[str]:
     """Yield Markdown rows, one per pose, with RMS errors of the visible sky fraction.
 
-    Each error is given over all texels, and over those where the fraction differs from the rest pose.
+    Each cell has the error over all texels, and over those where the pose changes the fraction.
 
     poses_and_shaped_heads : dictionary from the name of a pose to the pose and the head loaded in its shape
     """
@@ -241,10 +248,10 @@ def occlusion_rows(
 
 
 def baked_occlusion(renderer: Renderer, head: Head, shaped_head: Head, *directions_and_side: int) -> Floats:
-    """Return the visible sky fraction (n, n) of a head, baked in an atlas; NaN in texels without a surface.
+    """Return the visible sky fraction of a posed head, baked in an atlas (n, n); NaN outside the charts.
 
-    head : head at rest, whose atlas is used
-    shaped_head : head loaded in the shape of a pose, whose occlusion is computed
+    head : the head in its rest pose; determines the atlas
+    shaped_head : the head loaded in the shape of the pose
     directions_and_side : number of directions, and side of the depth maps [texel]; by default, the values
         that frames use
     """

@@ -1,4 +1,4 @@
-"""Errors of diffusion models against Monte Carlo, and of fits to the profiles of these models."""
+"""Errors of diffusion models against Monte Carlo, and of sums of Gaussians fitted to their profiles."""
 
 from __future__ import annotations
 
@@ -40,18 +40,21 @@ THICKNESSES_MM = (0.5, 1.0, 2.0, 4.0)
 
 
 def optics() -> None:
-    """Print the tables of diffusion models, of fits and of light through thin parts."""
-    print_tables(tables())
+    """Print tables with errors of diffusion models, of fitted profiles and of the transmittance of slabs."""
+    print_tables(optics_error_tables())
 
 
 def tissue_by_name(tissue_name: str) -> Tissue:
-    """Return a tissue by name; homogeneous skin has the index of refraction assumed by [Jensen2001]."""
+    """Return a tissue by name; "skin1" and "skin2" have the index of refraction assumed by [Jensen2001]."""
     tissue = load_tissue(tissue_name)
     return Tissue(published_media()[tissue_name].with_eta(1.3)) if tissue_name.startswith("skin") else tissue
 
 
-def models_table() -> str:
-    """Return Markdown rows with errors of diffusion models, in total energy and in the energies of rings."""
+def diffusion_models_table() -> str:
+    """Return Markdown rows with errors of diffusion models against Monte Carlo, by tissue.
+
+    The errors are those of the total energy, and of the energies in rings around the point of entry.
+    """
     return "\n".join(row for name in COMPARED_TISSUES for row in _model_rows(name, tissue_by_name(name)))
 
 
@@ -79,7 +82,10 @@ def _model_rows(tissue_name: str, tissue: Tissue) -> Iterator[str]:
 
 
 def photon_counts_table() -> str:
-    """Return Markdown rows with errors of tabulated photon counts and of layered diffusion, by medium."""
+    """Return Markdown rows with errors of the diffusion models "counted" and "layered", by medium.
+
+    The model "counted" interpolates in tables made by Monte Carlo.
+    """
     rows = []
     for name in ("skin1", "skin2"):
         for eta in (1.0, SKIN_ETA):
@@ -93,10 +99,10 @@ def photon_counts_table() -> str:
     return "\n".join(rows)
 
 
-def fits_table() -> str:
-    """Return Markdown rows with errors of fitted Gaussians and Burley profiles, by tissue.
+def fitted_profiles_table() -> str:
+    """Return Markdown rows with errors of fitted Gaussians and fitted Burley profiles, by tissue.
 
-    Both are fitted to the energies of a layered-diffusion profile in rings around its centre.
+    They are fitted to the energies of a layered-diffusion profile in rings around its centre.
     """
     rows = []
     for name in COMPARED_TISSUES:
@@ -108,11 +114,10 @@ def fits_table() -> str:
     return "\n".join(rows)
 
 
-def point_fits_table() -> str:
-    """Return Markdown rows with shape and energy errors of six Gaussians fitted to point samples of profiles.
+def gaussian_point_fits_table() -> str:
+    """Return Markdown rows with errors of six Gaussians fitted to the radial values of diffusion profiles.
 
-    The channels share the variances of the Gaussians. Each profile is fitted twice: without a constraint, and
-    with its total energy conserved.
+    Each profile is fitted twice: without a constraint, and with its total energy conserved.
     """
     rows = []
     for name, model, clamp in (
@@ -154,9 +159,9 @@ def transmission_table() -> str:
 
 
 def error_against_published_sum(profile: RadialProfile) -> Floats:
-    """Return the error in shape of a profile against the published Gaussians of GPU Gems 3, by channel.
+    """Return the relative difference (3,) between a profile and that published in GPU Gems 3, by channel.
 
-    In each channel, the profile is scaled to a total energy of 1.
+    The profile is first scaled to a total energy of 1 in each channel.
     """
     r, log_r = profile.radius_mm[:, None], np.log(profile.radius_mm)
     table = load_profile("gpu-gems-3").radiant_exitance(profile.radius_mm)
@@ -164,8 +169,8 @@ def error_against_published_sum(profile: RadialProfile) -> Floats:
     return np.sqrt(squared_error / np.trapezoid((r * table) ** 2, log_r, axis=0))
 
 
-def published_errors() -> str:
-    """Return text with errors of diffusion models of the tissue "dj3", see `error_against_published_sum`."""
+def published_profile_errors_text() -> str:
+    """Return text with `error_against_published_sum` of three diffusion profiles of the tissue "dj3"."""
     variants: tuple[tuple[str, DiffusionModel, Clamp], ...] = (
         ("multipole as printed", "multipole", "none"),
         ("multipole", "multipole", "layer"),
@@ -178,15 +183,15 @@ def published_errors() -> str:
     return ", ".join(cells)
 
 
-def tables() -> dict[str, str]:
+def optics_error_tables() -> dict[str, str]:
     """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     return {
-        "models": models_table(),
+        "models": diffusion_models_table(),
         "counted": photon_counts_table(),
-        "fits": fits_table(),
-        "pointwise": point_fits_table(),
+        "fits": fitted_profiles_table(),
+        "pointwise": gaussian_point_fits_table(),
         "transmission": transmission_table(),
-        "published": published_errors(),
+        "published": published_profile_errors_text(),
         "photons": f"{PHOTON_COUNT:,}",
         "spectral_photons": f"{SPECTRAL_PHOTON_COUNT:,}",
     }

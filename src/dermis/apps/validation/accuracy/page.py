@@ -15,11 +15,11 @@ def page(adapter: str = "auto") -> None:
     fill_page(
         PAGE,
         adapter=f"{device.adapter.name}, {device.adapter.backend}",
-        **blur.point_tables(device),
-        **cycles_comparison.tables(),
-        **specular.tables(),
-        **light.tables(adapter),
-        **optics.tables(),
-        **slabs.tables(adapter),
-        **thin.tables(adapter),
+        **blur.blur_error_texts(device),
+        **cycles_comparison.cycles_comparison_texts(),
+        **specular.specular_error_tables(),
+        **light.light_error_tables(adapter),
+        **optics.optics_error_tables(),
+        **slabs.slab_error_tables(adapter),
+        **thin.thin_body_error_tables(adapter),
     )

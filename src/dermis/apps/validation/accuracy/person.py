@@ -24,7 +24,7 @@ from dermis.apps.gallery.script import encode_webp
 from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse, signed_difference
 from dermis.apps.truths.path_traced import MitsubaVariant, path_trace
 from dermis.apps.validation.comparisons.person import (
-    CAUSES,
+    ERROR_CAUSES,
     TRUTHS,
     Cause,
     PersonComparison,
@@ -60,7 +60,7 @@ from dermis.scene.heads import load_head
 from dermis.scene.settings import Settings
 
 PAGE = DOCS / "path_traced.md"
-PICTURE = DOCS / "images" / "path_traced.webp"
+PICTURE_FILE = DOCS / "images" / "path_traced.webp"
 RESULTS_FILE = RESULTS / "path_traced.json"
 PICTURE_SIDE, PATHS_PER_PIXEL = 160, 48
 SHEET_COLUMNS = 6
@@ -95,7 +95,7 @@ class Measurement:
     person : key of `_PEOPLE`
     view : key of `ALL_VIEWS`
     truth : kind of path-traced reference, one of `comparisons.person.TRUTHS`
-    cause : cause of error that is left out of both pictures, or None
+    cause : cause of error that both renderers leave out, or None
     """
 
     person: PersonName
@@ -115,13 +115,15 @@ def list_measurements() -> list[Measurement]:
     found += [Measurement("human", view, "layered") for view in VIEWS]
     people: tuple[PersonName, ...] = "dark", "old"
     found += [Measurement(one, view, "matched") for one in people for view in _PEOPLE_VIEWS]
-    found += [Measurement("human", view, "matched", cause) for view in _ABLATED_VIEWS for cause in CAUSES]
+    found += [
+        Measurement("human", view, "matched", cause) for view in _ABLATED_VIEWS for cause in ERROR_CAUSES
+    ]
     found += [Measurement("human", view, "refracting") for view in VIEWS]
     return found
 
 
 class ComparisonRunner:
-    """Renderer of people and heads by dermis and by path tracing, with the same options for all comparisons.
+    """Comparisons of people and heads rendered by dermis and by path tracing, all with the same options.
 
     renderer : renderer of the frames
     side : side of the pictures [pixel]
@@ -139,7 +141,10 @@ class ComparisonRunner:
         self._skins: dict[tuple[str, str], SharedSkin] = {}
 
     def measure(self, measurement: Measurement) -> Figures:
-        """Make a comparison and return its figures; pictures that the page shows are kept in the cache."""
+        """Render a person with dermis and by path tracing; return the errors in JSON-compatible form.
+
+        Pictures that docs/path_traced.md shows are kept in the cache.
+        """
         head, textures = self._load_person(measurement.person)
         skin = self._shared_skin(measurement.person, head, measurement.truth)
         subject = PersonSubject(view_scene(head, ALL_VIEWS[measurement.view]), textures)
@@ -171,16 +176,18 @@ class ComparisonRunner:
             self._people[person_name] = head, textures
         return self._people[person_name]
 
-    def _shared_skin(self, person: PersonName, head: Head, truth: TruthName) -> SharedSkin:
-        key = person, truth
+    def _shared_skin(self, person_name: PersonName, head: Head, reference_kind: TruthName) -> SharedSkin:
+        key = person_name, reference_kind
         if key not in self._skins:
-            folder = self.folder / person
+            folder = self.folder / person_name
             folder.mkdir(exist_ok=True)
-            self._skins[key] = shared_skin(self.renderer, head, truth, folder)
+            self._skins[key] = shared_skin(self.renderer, head, reference_kind, folder)
         return self._skins[key]
 
     def measure_head(self, head_name: str, light_name: str, medium: Medium) -> Figures:
-        """Compare renderings of a head without maps or surface reflection; return errors, paths and notes.
+        """Compare renderings of a head without maps or surface reflection, and return the errors.
+
+        The result also has the number of paths per pixel and the notes of the path tracer.
 
         head_name : key of `_HEAD_FILES`
         light_name : key of `scenes.LIGHTS`
@@ -210,7 +217,7 @@ def _load_named_head(head_name: str) -> Head:
 
 
 def comparison_figures(comparison: PersonComparison) -> Figures:
-    """Return errors of a comparison as JSON-compatible figures."""
+    """Return the errors of a comparison, its paths per pixel and its duration in JSON-compatible form."""
     return {
         "error": list(comparison.relrmse),
         "energy": list(comparison.energy),
@@ -311,7 +318,7 @@ def person(
     seconds:
         Time after which no further comparison starts; 0 for no limit [s].
     """
-    require_in_checkout(PICTURE.parent)
+    require_in_checkout(PICTURE_FILE.parent)
     started, renderer = time.perf_counter(), Renderer(adapter)
     chosen: Any = fastest_variant() if variant == "auto" else variant
     device = f"{renderer.device.adapter.name}, {renderer.device.adapter.backend}"
@@ -328,20 +335,22 @@ def person(
             figures[group][key] = measure()
             write_results(RESULTS_FILE, figures, digits=5)
             print_lines(f"{key}: {figures[group][key]['error']} {figures[group][key]['energy']}")
-    PICTURE.write_bytes(picture_sheet(list(ALL_VIEWS)))
+    PICTURE_FILE.write_bytes(picture_sheet(list(ALL_VIEWS)))
     person_page()
 
 
-_Job = tuple[str, str, Callable[[], Figures]]
+_MeasurementJob = tuple[str, str, Callable[[], Figures]]
 
 
-def _measurement_jobs(runner: ComparisonRunner) -> list[_Job]:
-    """Return the group, key and function of each comparison, in the order in which they are run.
+def _measurement_jobs(runner: ComparisonRunner) -> list[_MeasurementJob]:
+    """Return the comparisons in the order in which they are run, each with its group, its key and a function.
 
-    The most important comparisons of people are first, then heads, then other comparisons of people.
+    The group and the key locate its results in the file of results. The function returns these results.
     """
-    people: list[_Job] = [("people", one.key, partial(runner.measure, one)) for one in list_measurements()]
-    heads: list[_Job] = [
+    people: list[_MeasurementJob] = [
+        ("people", one.key, partial(runner.measure, one)) for one in list_measurements()
+    ]
+    heads: list[_MeasurementJob] = [
         (
             "heads",
             f"{name} / {light} / {medium}",
@@ -372,7 +381,7 @@ def person_page() -> None:
     )
 
 
-def with_error(estimate: Sequence[float] | Estimate | None, digits: int = 3) -> str:
+def estimate_text(estimate: Sequence[float] | Estimate | None, digits: int = 3) -> str:
     """Return an estimate with its standard error as text, such as "0.102 ± 0.004"."""
     if estimate is None:
         return NOT_MEASURED
@@ -380,47 +389,51 @@ def with_error(estimate: Sequence[float] | Estimate | None, digits: int = 3) -> 
     return f"{value:.{digits}f} ± {error:.{digits}f}"
 
 
-def _error_cells(figures: Figures | None) -> str:
+def _error_cells(comparison_errors: Figures | None) -> str:
     """Return table cells with the relative RMSE and the energy ratio of a comparison."""
-    return f"{with_error(figures['error'])} | {figures['energy'][0]:.3f}" if figures else f"{NOT_MEASURED} | "
+    return (
+        f"{estimate_text(comparison_errors['error'])} | {comparison_errors['energy'][0]:.3f}"
+        if comparison_errors
+        else f"{NOT_MEASURED} | "
+    )
 
 
-def view_rows(people: Figures) -> str:
+def view_rows(people_figures: Figures) -> str:
     """Return Markdown rows, one per view of the human, with the errors against each path-traced reference."""
     lines = []
     for view, where in ALL_VIEWS.items():
-        rows = {truth: people.get(Measurement("human", view, truth).key) for truth in TRUTHS}
+        rows = {truth: people_figures.get(Measurement("human", view, truth).key) for truth in TRUTHS}
         matched = rows["matched"]
         shipped = matched["default"] if matched else None
-        default = f"{with_error(shipped[:2])} | {shipped[2]:.3f}" if shipped else f"{NOT_MEASURED} | "
+        default = f"{estimate_text(shipped[:2])} | {shipped[2]:.3f}" if shipped else f"{NOT_MEASURED} | "
         cells = " | ".join(_error_cells(rows[truth]) for truth in TRUTHS)
         paths = matched["paths"] if matched else ""
         lines.append(f"| {view} | {where.light} | {paths} | {cells} | {default} |")
     return "\n".join(lines)
 
 
-def people_rows(people: Figures) -> str:
+def people_rows(people_figures: Figures) -> str:
     """Return Markdown rows with the errors of all people except "human"."""
     keys = [(one, view) for one in get_args(PersonName)[1:] for view in _PEOPLE_VIEWS]
-    rows = ((one, view, people.get(Measurement(one, view, "matched").key)) for one, view in keys)
+    rows = ((one, view, people_figures.get(Measurement(one, view, "matched").key)) for one, view in keys)
     return "\n".join(f"| {one} | {view} | {_error_cells(row)} |" for one, view, row in rows)
 
 
-def head_rows(heads: Figures) -> str:
+def head_rows(head_figures: Figures) -> str:
     """Return Markdown rows with the errors of heads without maps, by head and medium."""
     lines = []
     for medium in _HEAD_MEDIA:
         for name in _HEAD_FILES:
             cells = " | ".join(
-                _error_cells(heads.get(f"{name} / {light} / {medium}")) for light in _HEAD_LIGHTS
+                _error_cells(head_figures.get(f"{name} / {light} / {medium}")) for light in _HEAD_LIGHTS
             )
             lines.append(f"| {name} | {medium} | {cells} |")
     return "\n".join(lines)
 
 
-def region_table(people: Figures) -> str:
-    """Return a Markdown table of the frame's light relative to the reference, by region and view."""
-    rows = {view: people.get(Measurement("human", view, "matched").key) for view in ALL_VIEWS}
+def region_table(people_figures: Figures) -> str:
+    """Return a Markdown table with the ratio of light in frames to that in references, by region and view."""
+    rows = {view: people_figures.get(Measurement("human", view, "matched").key) for view in ALL_VIEWS}
     found = {view: row["regions"] for view, row in rows.items() if row}
     names = list(dict.fromkeys(name for regions in found.values() for name in regions))
     lines = [f"| region | {' | '.join(found)} |", "|---" * (len(found) + 1) + "|"]
@@ -430,21 +443,26 @@ def region_table(people: Figures) -> str:
     return "\n".join(lines)
 
 
-def cause_table(people: Figures) -> str:
-    """Return a Markdown table of relative RMSE and energy, with one cause of error left out in each row."""
+def cause_table(people_figures: Figures) -> str:
+    """Return a Markdown table with the relative RMSE and energy ratio when one cause of error is left out.
+
+    Each row is for one cause, and the first for none.
+    """
     lines = [
         f"| left out on both sides | {' | '.join(f'{view} | energy' for view in _ABLATED_VIEWS)} |",
         "|---" * (2 * len(_ABLATED_VIEWS) + 1) + "|",
     ]
-    for cause in (None, *CAUSES):
-        rows = (people.get(Measurement("human", view, "matched", cause).key) for view in _ABLATED_VIEWS)
+    for cause in (None, *ERROR_CAUSES):
+        rows = (
+            people_figures.get(Measurement("human", view, "matched", cause).key) for view in _ABLATED_VIEWS
+        )
         lines.append(f"| {cause or 'nothing'} | {' | '.join(_error_cells(row) for row in rows)} |")
     return "\n".join(lines)
 
 
-def iris_cells(people: Figures) -> dict[str, str]:
+def iris_cells(people_figures: Figures) -> dict[str, str]:
     """Return texts with errors of the iris in the view "eye", keyed by the placeholder that each replaces."""
-    row = people.get(Measurement("human", "eye", "matched").key) or {}
+    row = people_figures.get(Measurement("human", "eye", "matched").key) or {}
     iris = row.get("iris", {})
     names = "right", "down", "brightness", "left_half", "right_half"
-    return {name: with_error(iris.get(name), 2) for name in names}
+    return {name: estimate_text(iris.get(name), 2) for name in names}

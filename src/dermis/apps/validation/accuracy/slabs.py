@@ -1,6 +1,6 @@
-"""Errors of light through slabs by direction of incidence, far from the rim of the slabs.
+"""Errors of the reflectance and transmittance of rendered slabs, by direction of incidence.
 
-The reference is adding and doubling (`optics/slabs.py`), which tests compare with Monte Carlo.
+The reference is adding and doubling, which tests compare with Monte Carlo.
 """
 
 from __future__ import annotations
@@ -39,28 +39,32 @@ SLAB_MEDIA = (("skin1", 1.0), ("skin2", 1.0), ("skin1", 1.4), ("skin2", 1.4))
 
 
 def slabs(adapter: str = "auto") -> None:
-    """Print the tables of light through slabs."""
-    print_tables(tables(adapter))
+    """Print tables with errors of the reflectance and transmittance of rendered slabs."""
+    print_tables(slab_error_tables(adapter))
 
 
-def exact_response(medium: Medium, thickness_mm: float, g: float = 0.0) -> Array:
-    """Return reflectance and transmittance (2, angles, 3) of a slab by adding and doubling.
+def exact_slab_response(medium: Medium, thickness_mm: float, mean_cosine: float = 0.0) -> Array:
+    """Return reflectance and transmittance (2, n, 3) of a slab by adding and doubling, for n angles.
+
+    The angles of incidence are `INCIDENT_DEGREES`.
 
     thickness_mm : thickness of the slab [mm]
-    g : mean cosine of the scattering angle; the medium's scattering coefficient already has the factor 1 - g
+    mean_cosine : mean cosine of the scattering angle [-]; `medium` contains the reduced scattering
     """
     layer, response = medium.layers[0], np.empty((2, len(INCIDENT_DEGREES), 3))
     inner_cosine = refracted_cosine(np.cos(np.radians(INCIDENT_DEGREES)), medium.eta)
     for c in range(3):
         albedo, depth = float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness_mm
-        slab = adding_doubling.solve_slabs(albedo, depth, medium.eta, g=g)
+        slab = adding_doubling.solve_slabs(albedo, depth, medium.eta, g=mean_cosine)
         sides = slab.reflected[0], slab.transmitted[0]
         response[..., c] = [np.interp(inner_cosine, slab.cosine, side) for side in sides]
     return response
 
 
-def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness_mm: float) -> Array:
-    """Return reflectance and transmittance (2, angles, 3) of a slab as rendered by dermis.
+def rendered_slab_response(renderer: dermis.Renderer, skin: Skin, thickness_mm: float) -> Array:
+    """Return reflectance and transmittance (2, n, 3) of a slab rendered by dermis, for n angles of incidence.
+
+    They are measured far from the rim of the slab.
 
     thickness_mm : thickness of the slab [mm]
     """
@@ -91,24 +95,25 @@ def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
     return {name: Skin.model_validate(values | {"direction": name}) for name in ("lambertian", "half-space")}
 
 
-def error_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows with RMS errors of reflectance and transmittance, by slab and skin."""
+def slab_error_rows(renderer: dermis.Renderer) -> str:
+    """Return Markdown rows with errors of rendered slabs, by medium, skin `direction` and thickness."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, eta in SLAB_MEDIA:
             medium = published_media()[name].with_eta(eta)
             for direction, skin in skins_by_direction(medium, folder).items():
                 for thickness in THICKNESSES_MM:
-                    rendered = rendered_response(renderer, skin, thickness)
-                    cells = _error_cells(rendered, exact_response(medium, thickness))
+                    rendered = rendered_slab_response(renderer, skin, thickness)
+                    cells = _error_cells(rendered, exact_slab_response(medium, thickness))
                     rows.append(f"| {name}, index {eta:g} | {direction} | {thickness:g} mm | {cells} |")
     return "\n".join(rows)
 
 
-def forward_error_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows with the errors of half-space skin against forward-scattering slabs.
+def forward_scattering_error_rows(renderer: dermis.Renderer) -> str:
+    """Return Markdown rows with errors of rendered slabs against references with forward scattering.
 
-    Half of the rows ignore forward scattering; the others account for it by the skin's `anisotropy`.
+    The `direction` of the rendered skin is "half-space". Half of the rows ignore forward scattering; the
+    others account for it by the skin's `anisotropy`.
     """
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -118,16 +123,17 @@ def forward_error_rows(renderer: dermis.Renderer) -> str:
             for g in (0.0, FORWARD_G):
                 skin = half_space.model_copy(update={"anisotropy": g})
                 for thickness in THICKNESSES_MM:
-                    rendered = rendered_response(renderer, skin, thickness)
-                    cells = _error_cells(rendered, exact_response(medium, thickness, FORWARD_G))
+                    rendered = rendered_slab_response(renderer, skin, thickness)
+                    cells = _error_cells(rendered, exact_slab_response(medium, thickness, FORWARD_G))
                     rows.append(f"| {name}, index {eta:g} | {g:g} | {thickness:g} mm | {cells} |")
     return "\n".join(rows)
 
 
-def forward_direction_rows() -> str:
-    """Return Markdown rows with RMS errors of radiance below the surface of forward-scattering "skin1".
+def forward_scattering_direction_rows() -> str:
+    """Return Markdown rows with errors of skin with `direction` "half-space", over light and view directions.
 
-    The errors are over all directions of light and view, by index of refraction, in red, green and blue.
+    The medium is "skin1" with forward scattering. A row is for one value of the skin's `anisotropy`. A cell
+    is for one index of refraction and has the errors in red, green and blue.
     """
     rows = []
     for g in (0.0, FORWARD_G):
@@ -139,12 +145,12 @@ def forward_direction_rows() -> str:
     return "\n".join(rows)
 
 
-def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
+def _direction_pairs_error(albedo: float, eta: float, skin_anisotropy: float) -> float:
     a, weights, exact = adding_doubling.half_space_radiance(
         albedo, eta, adding_doubling.DIRECTION_NODES, FORWARD_G
     )
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
-    angular = anisotropic_response(float(directional_reflectance(1.0, albedo, eta)), eta, g)
+    angular = anisotropic_response(float(directional_reflectance(1.0, albedo, eta)), eta, skin_anisotropy)
     table = np.interp(np.sqrt(air), np.linspace(0.0, 1.0, DIRECTION_ROWS), angular.relative_reflectance[:, 0])
     single = 1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta)
     response = table + angular.single_scattering[0] * single
@@ -153,23 +159,26 @@ def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
     return float(np.sqrt((weight * (response - exact) ** 2).sum() / (weight * exact**2).sum()))
 
 
-def _error_cells(response: Array, reference: Array) -> str:
-    """Return two table cells for transmittance, and then two for reflectance.
+def _error_cells(slab_response: Array, reference: Array) -> str:
+    """Return two table cells with errors of transmittance, then two with errors of reflectance.
 
-    The first cell of each pair has the RMS error. The second has the ratio of red light to the reference, for
-    each angle of incidence.
+    The first cell of each pair has the relative RMS error. The second has the ratio of red light to the
+    reference for each angle of incidence.
     """
     flux, cells = np.sqrt(np.cos(np.radians(INCIDENT_DEGREES)))[:, None], []
     for side in (1, 0):
-        ours, exact = response[side], reference[side]
+        ours, exact = slab_response[side], reference[side]
         error = np.linalg.norm(flux * (ours - exact)) / np.linalg.norm(flux * exact)
         red = ours[:, 0] / exact[:, 0]
         cells.append(f"{error:.3f} | {' '.join(f'{one:.2f}' for one in red)}")
     return " | ".join(cells)
 
 
-def forward_rows() -> str:
-    """Return Markdown rows with red light through isotropic and forward-scattering slabs, by Monte Carlo."""
+def forward_scattering_rows() -> str:
+    """Return Markdown rows with transmittance and reflectance of slabs in red light, by Monte Carlo.
+
+    Each row compares isotropic scattering with forward scattering.
+    """
     rows = []
     for eta in (1.0, 1.4):
         layer = published_media()["skin1"].layers[0]
@@ -185,12 +194,12 @@ def forward_rows() -> str:
     return "\n".join(rows)
 
 
-def tables(adapter: str = "auto") -> dict[str, str]:
+def slab_error_tables(adapter: str = "auto") -> dict[str, str]:
     """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     renderer = dermis.Renderer(adapter)
     return {
-        "slab_errors": error_rows(renderer),
-        "slab_forward": forward_rows(),
-        "slab_forward_errors": forward_error_rows(renderer),
-        "forward_directions": forward_direction_rows(),
+        "slab_errors": slab_error_rows(renderer),
+        "slab_forward": forward_scattering_rows(),
+        "slab_forward_errors": forward_scattering_error_rows(renderer),
+        "forward_directions": forward_scattering_direction_rows(),
     }

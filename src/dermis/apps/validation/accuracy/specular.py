@@ -1,4 +1,4 @@
-"""Errors of the albedo tables of surface reflection, and tests of white spheres in uniform light."""
+"""Errors of the albedo tables of surface reflection, and white furnace tests."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ ENERGY_MODELS = {
     "full": ENERGY_SCHEMES["full"],
 }
 ROUGHNESS_AND_STRENGTH = ((0.1, 0.18), (0.3, 0.18), (0.5, 0.18), (0.3, 1.0))
-REFERENCE_NODE_COUNTS = (96, 96)
+REFERENCE_QUADRATURE_NODE_COUNTS = (96, 96)
 
 
 def specular() -> None:
-    """Print the tables of directional albedos and of the white furnace."""
-    print_tables(tables())
+    """Print tables with errors of directional albedos, and with results of white furnace tests."""
+    print_tables(specular_error_tables())
 
 
 def read_albedo(lobe_model: str, cosine: Floats, roughness_m: Floats) -> Floats:
@@ -40,13 +40,16 @@ def read_albedo(lobe_model: str, cosine: Floats, roughness_m: Floats) -> Floats:
 
 
 def albedo_rows() -> str:
-    """Return Markdown rows with errors of each lobe's quadrature and table, and the table's build time."""
+    """Return Markdown rows with errors of each lobe's directional albedo, and the time to tabulate it [ms].
+
+    The errors are those of the quadrature and those of the table that is computed with it.
+    """
     m, c = np.linspace(0.1, 0.5, 17)[:, None], np.linspace(0.05, 1.0, 39)
     rows = []
     for name, model in MODELS.items():
         if name == "kelemen-direct":
             continue
-        dense = directional_albedo(c, m, model.lobe, node_counts=REFERENCE_NODE_COUNTS)
+        dense = directional_albedo(c, m, model.lobe, node_counts=REFERENCE_QUADRATURE_NODE_COUNTS)
         ms = 1e3 * min(timeit.repeat(partial(albedo_table.__wrapped__, name), number=1, repeat=5))
         errors = (directional_albedo(c, m, model.lobe), read_albedo(name, c, m)[..., 0])
         cells = [f"{100 * np.abs(one / dense - 1).max():.1g} %" for one in errors]
@@ -66,9 +69,9 @@ def beckmann_table_error() -> float:
 
 
 def furnace_cell(energy_scheme: EnergyScheme, roughness_m: float, rho_s: float) -> str:
-    """Return a table cell with the minimum, mean and maximum ratio of outgoing to incoming light.
+    """Return a table cell with results of a white furnace test: a white sphere in uniform light.
 
-    The surface is a white sphere in uniform light.
+    They are the minimum, mean and maximum ratio of outgoing to incoming light.
 
     energy_scheme : energy conservation scheme
     roughness_m : roughness of the surface
@@ -82,14 +85,14 @@ def furnace_cell(energy_scheme: EnergyScheme, roughness_m: float, rho_s: float) 
 
 
 def furnace_rows() -> str:
-    """Return the Markdown rows of the white furnace, one for each energy conservation scheme."""
+    """Return Markdown rows with results of white furnace tests, one for each energy conservation scheme."""
     return "\n".join(
         f"| {name} | {' | '.join(furnace_cell(model, m, rho_s) for m, rho_s in ROUGHNESS_AND_STRENGTH)} |"
         for name, model in ENERGY_MODELS.items()
     )
 
 
-def tables() -> dict[str, str]:
+def specular_error_tables() -> dict[str, str]:
     """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     below = (np.arange(4000) + 0.5) / 4000
     kelemen = float((directional_albedo(below, 0.3) * below).sum() / below.sum())

@@ -37,7 +37,7 @@ DIRECTION_HEADER = (
     "|---|---|---|---|---|---|---|---|"
 )
 BALL = Head("ball", uv_sphere(100.0, 512, 256), Maps())
-BALL_SAMPLES = {"front": 64, "back": 64}  # paths per pixel
+BALL_SAMPLES_BY_LIGHT = {"front": 64, "back": 64}  # paths per pixel
 
 
 def techniques(adapter: str = "auto") -> None:
@@ -53,7 +53,7 @@ def techniques(adapter: str = "auto") -> None:
     path_traced: dict[str, dict[str, Comparison]] = {}
     for medium in ("skin1", "skin2"):
         parts[f"traced_{medium}"], comparison = technique_rows(head, "path-traced", medium, adapter)
-        parts[f"floor_{medium}"] = lambertian_limit(head, medium, comparison["front"], adapter)
+        parts[f"floor_{medium}"] = lambertian_limit_text(head, medium, comparison["front"], adapter)
         path_traced[medium] = comparison
     parts["direction"] = direction_rows(head, SAMPLES_BY_LIGHT, SETTINGS, adapter)
     parts["counted"] = profile_model_rows(head, path_traced, adapter)
@@ -61,16 +61,17 @@ def techniques(adapter: str = "auto") -> None:
     parts["integral"], _ = technique_rows(head, "surface-integral", "skin1", adapter, "layered")
     parts["heat"], _ = technique_rows(head, "heat", "skin1", adapter, "layered")
     parts["heat"] += "\n" + fine_atlas_row(head, adapter)
-    parts |= texture_space.tables(head, SETTINGS, adapter) | blur.surface_tables(adapter)
+    parts |= texture_space.texture_space_error_tables(head, SETTINGS, adapter) | blur.surface_tables(adapter)
     fill_page(PAGE, adapter=comparison["front"].adapter, **parts)
 
 
-def _compare(
+def _compare_under_light(
     head: Head, reference_name: str, techniques: Sequence[str], light_name: str, adapter: str, **options: Any
 ) -> Comparison:
-    """Return a comparison whose region and number of samples suit the light, unless `options` sets them.
+    """Return a comparison of techniques with a reference under one light.
 
     reference_name : name of the reference
+    options : further arguments of `compare`; the default region and number of samples depend on the light
     """
     defaults: dict[str, Any] = {"region": default_region(light_name), "samples": SAMPLES_BY_LIGHT[light_name]}
     defaults["settings"] = SETTINGS
@@ -97,7 +98,7 @@ def technique_rows(
     for light in SAMPLES_BY_LIGHT:
         region = "ear" if reference_name == "heat" else default_region(light)
         techniques = ("none", "gpu-gems-3", "texture-space") if reference_name == "heat" else TECHNIQUES.names
-        comparison[light] = _compare(
+        comparison[light] = _compare_under_light(
             head, reference_name, techniques, light, adapter, region=region, medium=medium, model=model
         )
         rows += [technique_row(light, row) for row in comparison[light].rows]
@@ -105,26 +106,28 @@ def technique_rows(
 
 
 def fine_atlas_row(head: Head, adapter: str) -> str:
-    """Return a Markdown row with the errors of texture-space diffusion on an atlas of side 2048.
+    """Return a Markdown row with the errors of texture-space diffusion on an atlas of 2048 by 2048 texels.
 
-    The light is the laser, and the reference is the heat equation on the surface.
+    The head is lit by the laser's stripe. The reference is the heat equation on the surface.
     """
     settings, only = SETTINGS.model_copy(update={"atlas": 2048}), ("texture-space",)
-    comparison = _compare(
+    comparison = _compare_under_light(
         head, "heat", only, "laser", adapter, region="ear", settings=settings, model="layered"
     )
     return technique_row("laser, atlas 2048", comparison.rows[0])
 
 
-def profile_model_rows(head: Head, path_traced: dict[str, dict[str, Comparison]], adapter: str) -> str:
-    """Return Markdown rows of errors against path tracing, by scattering model of the profile.
+def profile_model_rows(
+    head: Head, comparisons_by_medium: dict[str, dict[str, Comparison]], adapter: str
+) -> str:
+    """Return Markdown rows with errors against path tracing, for profiles of two scattering models.
 
-    path_traced : comparisons with Monte Carlo profiles, keyed by medium, then by light
+    comparisons_by_medium : comparisons for profiles of the model "counted", keyed by medium, then by light
     """
     rows, techniques = [], ("texture-space", "screen-space")
     for light in SAMPLES_BY_LIGHT:
-        for medium, by_photons in path_traced.items():
-            layered = _compare(
+        for medium, by_photons in comparisons_by_medium.items():
+            layered = _compare_under_light(
                 head, "path-traced", techniques, light, adapter, medium=medium, model="layered"
             )
             for model, comparison in (("layered", layered), ("counted", by_photons[light])):
@@ -135,19 +138,19 @@ def profile_model_rows(head: Head, path_traced: dict[str, dict[str, Comparison]]
 
 
 def _error_and_energy_cells(comparison: Comparison, comparison_row: ComparisonRow) -> str:
-    """Return table cells with the relative RMSE, and the energy ratio in red, green and blue."""
+    """Return table cells with the relative RMSE and with the energy ratios in red, green and blue."""
     reference = comparison.reference
-    _, energy = errors_by_channel(comparison.images[comparison_row.technique], reference, reference.mask)
+    _, energy = error_cells_by_channel(comparison.images[comparison_row.technique], reference, reference.mask)
     return f"{comparison_row.relrmse:.4f} | {energy}"
 
 
-def lambertian_limit(head: Head, medium: str, path_traced: Comparison, adapter: str) -> str:
-    """Return text with the error and energy of an ideal Lambertian skin under the front light.
+def lambertian_limit_text(head: Head, medium: str, path_traced_comparison: Comparison, adapter: str) -> str:
+    """Return text with the relative RMSE and energy ratio of an ideal Lambertian skin under the front light.
 
-    The ideal skin reflects as much light as a half-space does for the same angle of incidence. No Lambertian
-    skin has a smaller error.
+    The ideal skin reflects as much light as a half-space does for the same angle of incidence. It shows how
+    small the error of Lambertian skin can become.
 
-    path_traced : comparison with path tracing under the front light
+    path_traced_comparison : comparison with path tracing under the front light
     """
     renderer = dermis.Renderer(adapter)
     scene = comparison_scene(head, "front", default_region("front"), "gpu-gems-3")
@@ -173,27 +176,29 @@ def lambertian_limit(head: Head, medium: str, path_traced: Comparison, adapter: 
     irradiance = irradiance_at(renderer, scene, SETTINGS, visible.triangle, visible.barycentric)
     image = np.zeros((*visible.mask.shape, 3))
     image[visible.mask] = irradiance * albedo / np.pi
-    error, energy = errors_by_channel(image, path_traced.reference, path_traced.reference.mask & visible.mask)
+    error, energy = error_cells_by_channel(
+        image, path_traced_comparison.reference, path_traced_comparison.reference.mask & visible.mask
+    )
     return f"relative RMSE {error} and energy {energy} in red, green and blue"
 
 
-def direction_rows(head: Head, lights: dict[str, int], settings: Settings, adapter: str) -> str:
-    """Return Markdown rows that compare Lambertian and half-space skin with path tracing.
+def direction_rows(head: Head, samples_by_light: dict[str, int], settings: Settings, adapter: str) -> str:
+    """Return Markdown rows with errors of skin with `direction` "lambertian" and "half-space".
 
-    The skins are compared on the head under each of `lights`, and on a ball.
+    The reference is path tracing. The rows are for the head under each light, and for a ball.
 
-    lights : dictionary from the name of a light to the number of paths per pixel
+    samples_by_light : dictionary from the name of a light to the number of paths per pixel
     """
     lines = [DIRECTION_HEADER]
-    for light, samples in lights.items():
-        lines += _direction_rows(head, light, default_region(light), samples, settings, adapter)
-    for light, samples in BALL_SAMPLES.items():
+    for light, samples in samples_by_light.items():
+        lines += _direction_rows_under_light(head, light, default_region(light), samples, settings, adapter)
+    for light, samples in BALL_SAMPLES_BY_LIGHT.items():
         small = settings.model_copy(update={"size": (96, 96)})
-        lines += _direction_rows(BALL, light, "ear", samples, small, adapter)
+        lines += _direction_rows_under_light(BALL, light, "ear", samples, small, adapter)
     return "\n".join(lines)
 
 
-def _direction_rows(
+def _direction_rows_under_light(
     head: Head, light_name: str, region: str, samples_per_pixel: int, settings: Settings, adapter: str
 ) -> list[str]:
     prefix = "ball, " if head is BALL else ""
@@ -206,7 +211,7 @@ def _direction_rows(
                 "direction": direction,
                 "samples": samples_per_pixel,
             }
-            comparison = _compare(
+            comparison = _compare_under_light(
                 head,
                 "path-traced",
                 ("texture-space",),
@@ -218,13 +223,13 @@ def _direction_rows(
             )
             _, error, flip, energy, _ = error_cells(comparison.rows[0])
             image, reference = comparison.images["texture-space"], comparison.reference
-            errors, energies = errors_by_channel(image, reference, reference.mask)
+            errors, energies = error_cells_by_channel(image, reference, reference.mask)
             figures = (error, errors, flip, energy, energies)
             lines.append(f"| {prefix}{light_name} | {medium} | {direction} | " + " | ".join(figures) + " |")
     return lines
 
 
-def errors_by_channel(
+def error_cells_by_channel(
     rendered_image: Floats, reference: ReferenceImage, mask: NDArray[np.bool_]
 ) -> list[str]:
     """Return table cells with relative RMSE and energy ratio, each in red, green and blue.

@@ -1,4 +1,4 @@
-"""Sources of the error of texture-space diffusion against the surface integral."""
+"""Causes of the difference between texture-space diffusion and the surface integral."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ LANDMARKS_BY_REGION: dict[str, dict[str, tuple[str, ...]]] = {
 """Landmarks of the regions that are visible under each light; their mean is the centre of the region."""
 
 
-def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
+def texture_space_error_tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
     """Return Markdown rows for docs/templates/techniques.md, keyed by placeholder."""
     rows: dict[str, list[str]] = {"by_atlas": [], "zero_width": [], "places": [], "even": []}
     for light in COMPARED_LIGHTS:
@@ -54,10 +54,10 @@ def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
             integral, uniform = surface_integral(subject, 0), uniform_light_integral(subject)
             normalised = replace(integral, image=integral.image / np.maximum(uniform, MIN_UNIFORM_INTEGRAL))
             rows["by_atlas"] += atlas_rows(subject, integral, normalised, light)
-            rows["zero_width"].append(zero_width_row(subject, light))
+            rows["zero_width"].append(narrow_profile_row(subject, light))
             rows["places"] += region_rows(subject, integral, light) if light in LANDMARKS_BY_REGION else []
             if light == "front":
-                rows["even"].append(mean_and_percentile(uniform[integral.mask]))
+                rows["even"].append(mean_and_percentile_text(uniform[integral.mask]))
     return {name: "\n".join(lines) for name, lines in rows.items()}
 
 
@@ -98,10 +98,11 @@ def atlas_rows(
     return rows
 
 
-def zero_width_row(subject: ComparisonSubject, light_name: str) -> str:
+def narrow_profile_row(subject: ComparisonSubject, light_name: str) -> str:
     """Return a Markdown row with the sampling error of the surface integral.
 
-    The error is the difference between the integral of a very narrow profile and the irradiance.
+    With a very narrow profile, the exact integral equals the irradiance. The row therefore compares the
+    sampled integral with the irradiance.
     """
     narrow_profile = GaussianSum("narrow", np.array([0.05**2]), np.ones((1, 3)))
     reference = surface_integral(replace(subject, profile=narrow_profile), 0)
@@ -111,7 +112,7 @@ def zero_width_row(subject: ComparisonSubject, light_name: str) -> str:
 
 
 def uniform_light_integral(subject: ComparisonSubject) -> Floats:
-    """Return the surface integral (h, w, 3) for an irradiance of 1 everywhere and an albedo of 1."""
+    """Return the surface integral at each pixel (h, w, 3) for an irradiance and an albedo of 1."""
     samples = irradiance_samples(subject)
     uniform_samples = replace(samples, irradiance=np.ones_like(samples.irradiance))
     visible = surface_points(subject.renderer, subject.scene, subject.settings)
@@ -121,19 +122,19 @@ def uniform_light_integral(subject: ComparisonSubject) -> Floats:
     return image
 
 
-def mean_and_percentile(uniform_light: Floats) -> str:
-    """Return the mean and the 95th percentile of each channel as text.
+def mean_and_percentile_text(uniform_integral: Floats) -> str:
+    """Return text with the mean and the 95th percentile of each channel.
 
-    uniform_light : (n, 3) surface integral in uniform light
+    uniform_integral : (n, 3) surface integral in uniform light, at n pixels
     """
-    pairs = zip(uniform_light.mean(axis=0), np.percentile(uniform_light, 95, axis=0), strict=True)
+    pairs = zip(uniform_integral.mean(axis=0), np.percentile(uniform_integral, 95, axis=0), strict=True)
     return ", ".join(f"{mean:.3f} ({high:.3f})" for mean, high in pairs)
 
 
 def region_rows(subject: ComparisonSubject, integral_image: ReferenceImage, light_name: str) -> list[str]:
     """Return Markdown rows with errors of texture-space diffusion, one row per region of the face.
 
-    For comparison, each row also has the error of diffusion on the surface itself, by the heat equation.
+    For comparison, each row also has the error of the heat equation on the surface.
     """
     landmarks = known_landmarks(subject.scene.head)
     assert landmarks is not None

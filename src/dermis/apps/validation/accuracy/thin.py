@@ -1,4 +1,4 @@
-"""Errors of light through thin parts: slabs, wedges and ears."""
+"""Errors of light transmitted through thin bodies: slabs, wedges and ears."""
 
 from __future__ import annotations
 
@@ -28,8 +28,10 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 PointFilter = Callable[[Array, Array], Mask]  # mask of points from their positions and normals
 MATTE_SKIN = Skin(albedo="profile", rho_s=0.0)
-PROFILE = load_profile("gpu-gems-3")
-BLURRED_PROFILE = GaussianSum("blurred levels", PROFILE.variance_mm2[1:], PROFILE.weight[1:])
+GPU_GEMS_3_PROFILE = load_profile("gpu-gems-3")
+BLURRED_PROFILE = GaussianSum(
+    "blurred levels", GPU_GEMS_3_PROFILE.variance_mm2[1:], GPU_GEMS_3_PROFILE.weight[1:]
+)
 THICKNESSES_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0)
 WEDGE_DEGREES = (5.0, 10.0, 20.0, 30.0, 45.0)
 ATLAS_SIDE = 1024
@@ -37,8 +39,8 @@ EAR_DISTANCE_MM = 66.0  # distance from the scan's middle beyond which a point i
 
 
 def thin(adapter: str = "auto") -> None:
-    """Print the tables of light through slabs, wedges and ears."""
-    print_tables(tables(adapter))
+    """Print tables with errors of light transmitted through slabs, wedges and ears."""
+    print_tables(thin_body_error_tables(adapter))
 
 
 def scattered_light(
@@ -49,7 +51,7 @@ def scattered_light(
     atlas_side: int,
     **setting_values: str,
 ) -> tuple[Array, Array, Array]:
-    """Return positions, normals and scattered light (n, 3) of a mesh's texels in parallel light.
+    """Return positions, normals and scattered light (n, 3) of the atlas texels of a mesh in parallel light.
 
     light_direction : (3,) direction of the light, which casts no shadows
     atlas_side : side of the atlas [texel]
@@ -73,12 +75,13 @@ def scattered_light(
 
 
 def integrated_light(mesh: Mesh, light_direction: Array, points: Array, spacing_mm: float) -> Array:
-    """Return the scattered light (n, 3) at points by integrating the profile over the surface.
+    """Return the scattered light (n, 3) at points, by integrating irradiance times profile over the surface.
 
     The profile is a function of Euclidean distance.
 
     light_direction : (3,) direction of the light
-    spacing_mm : largest distance of the irradiance samples [mm]
+    points : (n, 3) positions [mm]
+    spacing_mm : largest distance between neighbouring samples of the irradiance
     """
 
     def irradiance_at(samples: MeshPoints) -> Array:
@@ -92,9 +95,9 @@ def integrated_light(mesh: Mesh, light_direction: Array, points: Array, spacing_
 
 
 def slab_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows with the light through slabs, as rendered and as computed from the profile.
+    """Return Markdown rows with the transmittance of slabs: rendered, and computed from the profile.
 
-    The light is measured far from the rim of the slabs.
+    It is measured far from the rim of the slabs.
     """
     rows = []
     for thickness in THICKNESSES_MM:
@@ -109,9 +112,10 @@ def slab_rows(renderer: dermis.Renderer) -> str:
 
 
 def light_across_air(mesh: Mesh, light_direction: Array, points: Array, normals: Array) -> Array:
-    """Return the red light (n,) that the surface integral carries to each point across air.
+    """Return the red light (n,) that reaches points across air in the surface integral.
 
-    Light crosses air if the straight path between source and point leaves the body.
+    This is an error of the integral. Light crosses air if the straight path from the place where it enters
+    the skin to the point leaves the body.
 
     light_direction : (3,) direction of the light
     points : (n, 3) positions
@@ -153,13 +157,15 @@ def comparison_cells(
     *,
     compares_without_air: bool,
 ) -> str:
-    """Return table cells with the energy ratio and relative RMSE of frames against the surface integral.
+    """Return table cells with the energy ratio and the relative RMSE of rendered light, for two settings.
 
-    The first two cells are of a frame without light through thin parts, the next two of a frame with it.
+    The first two cells are for the setting `transmission` "none", the next two for "thin". The reference is
+    the surface integral.
 
     point_filter : function that returns the mask of the points to compare, given positions and normals
-    spacing_mm : largest distance of the irradiance samples [mm]
-    compares_without_air : whether to add the energy ratio to the integral without `light_across_air`
+    spacing_mm : largest distance between neighbouring samples of the irradiance
+    compares_without_air : whether to add a cell for "thin" with the energy ratio to a reference without
+        `light_across_air`
     """
     cells = []
     for transmission in ("none", "thin"):
@@ -180,10 +186,10 @@ def comparison_cells(
 
 
 def wedge_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows on red light through wedges lit from behind, within 15 mm of their edge."""
+    """Return Markdown rows with errors of red light on the unlit side of wedges, near their edge."""
     rows = []
     for angle in WEDGE_DEGREES:
-        mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells=16)
+        mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells_per_side=16)
 
         def unlit_points(points: Array, normals: Array, half_angle: float = angle / 2) -> Mask:
             facing = normals @ [-np.sin(np.radians(half_angle)), 0.0, np.cos(np.radians(half_angle))] > 0.99
@@ -197,7 +203,10 @@ def wedge_rows(renderer: dermis.Renderer) -> str:
 
 
 def ear_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows on red light through ears, lit from behind and from the front."""
+    """Return Markdown rows with errors of red light on the unlit side of ears.
+
+    The ears are lit from behind or from the front.
+    """
     rows = []
     for name in ("lee_perry_smith", "human"):
         head = dermis.load_head(name, subdivide=0)
@@ -217,7 +226,7 @@ def ear_rows(renderer: dermis.Renderer) -> str:
     return "\n".join(rows)
 
 
-def tables(adapter: str = "auto") -> dict[str, str]:
+def thin_body_error_tables(adapter: str = "auto") -> dict[str, str]:
     """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     renderer = dermis.Renderer(adapter)
     rows = {"thin_slabs": slab_rows, "thin_wedges": wedge_rows, "thin_ears": ear_rows}

@@ -60,8 +60,8 @@ def frame_traffic(device: Device, inputs: FrameInputs, vertex_count: int) -> Fra
 def stage_bytes(traffic: FrameTraffic) -> dict[str, float]:
     """Return the least memory traffic of each stage: inputs read once and results written once [byte].
 
-    Some traffic is not counted: texels without a surface and pixels without the head if a stage does not need
-    them, repeated reads within a stage or a blur, scratch data between passes, tables that fit in caches.
+    Repeated reads, scratch data between passes, and tables that fit in caches are not counted. Neither are
+    texels without a surface and pixels without the head, unless a stage needs them.
     """
     inputs, picture = traffic.inputs, traffic.inputs.resources.post.picture
     pixels, shadow = picture.size[0] * picture.size[1], inputs.resources.shadow_maps.texture
@@ -104,10 +104,10 @@ def _scattering_bytes(traffic: FrameTraffic, shadow_bytes: int) -> dict[str, flo
 
 
 def _blur_surface_bytes(inputs: FrameInputs, texel_count: int) -> float:
-    """Return the memory traffic of blurs besides light: stretch map, reach map and gutters [byte].
+    """Return the memory traffic of blurs, except that of the light itself [byte].
 
-    The reach map says how far the chart extends from each texel. The passes of GPU Gems 3 have neither a
-    reach map nor gutters, but blur the stretch map along with the light.
+    It consists of stretch map, reach map and gutters. The reach map says how far the chart extends from each
+    texel. The passes of GPU Gems 3 have neither a reach map nor gutters, but also blur the stretch map.
 
     texel_count : number of atlas texels that show the surface
     """
@@ -126,11 +126,11 @@ def _blur_surface_bytes(inputs: FrameInputs, texel_count: int) -> float:
 
 
 def _translucency_bytes(translucency: Translucency, levels: PyramidLevels, blur: Blur) -> float:
-    """Return the memory traffic of light that passes through thin parts of the head [byte].
+    """Return the memory traffic of the stage that transmits light through thin parts of the head [byte].
 
-    The light is carried by pairs of texels: sources, where light enters, and receivers, where it leaves. The
-    stage reads the pairs and the light at the sources, and writes the light at the receivers. It also reads
-    the positions and normals of sources if the transmittance depends on the direction of the light.
+    Light enters at source texels and leaves at receiver texels. The stage reads a list of weighted sources
+    for each receiver, and the light at the sources. It writes the light at the receivers. If the
+    transmittance depends on the direction of the light, it also reads positions and normals of the sources.
     """
     pairs, halving = translucency.pairs, blur.halvings[blur.profile_levels[1 + translucency.source_level]]
     receivers, sources = pairs.receivers[1], pairs.sources[1]
@@ -142,13 +142,13 @@ def _translucency_bytes(translucency: Translucency, levels: PyramidLevels, blur:
 
 
 def _map_bytes(inputs: FrameInputs, point_count: int) -> int:
-    """Return the bytes read from the head's maps to shade a number of points, one texel per map and point."""
+    """Return the bytes read from the maps of a head to shade points, at one texel per map and point."""
     textures = [cast(Texture, inputs.bindings[name]) for name in _MAP_BINDINGS]
     return sum(texel_bytes(one) * min(point_count, one.size[0] * one.size[1]) for one in textures)
 
 
 def copy_rate(device: Device) -> float:
-    """Return the memory bandwidth of a pass that copies a texture; reads and writes are counted [byte/s].
+    """Measure the memory bandwidth of copying a texture, counting both reads and writes [byte/s].
 
     Raises DermisError when the device has no timestamps.
     """

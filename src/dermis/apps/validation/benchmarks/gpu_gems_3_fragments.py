@@ -71,7 +71,7 @@ class FragmentPasses(GpuGems3):
         for layout, blur in zip(inputs.layouts, inputs.blurs, strict=True):
             graph.repeat(atlas_passes.draw_stretch, layout.head, layout.atlas)
             surface_texels.draw(graph, layout)
-            self._light(graph, layout, inputs.light_constants, levels.layer(0), blur.scale)
+            self._light_atlas(graph, layout, inputs.light_constants, levels.layer(0), blur.scale)
             self.blur_levels(graph, levels, layout.atlas, blur)
             thin = layout.translucency
             if thin:
@@ -107,25 +107,25 @@ class FragmentPasses(GpuGems3):
         assert isinstance(graph, Graph) and isinstance(shader, RenderProgram)
         graph.fill("diffuse", shader, shader_resources, target_pair)
 
-    def _light(
+    def _light_atlas(
         self,
         graph: Graph,
         layout: LitAtlas,
         constants: Constants,
-        target: TextureOrView,
+        target_texture: TextureOrView,
         radiance_scale: float,
     ) -> None:
         shader = _fragment_program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALF_TEXEL_FORMAT])
         entering = shader.record("Entering", scale=radiance_scale)
         bound = {**layout.bindings, "surfaces": layout.surfaces, "entering": entering}
-        graph.fill("irradiance", shader, bound, [target])
+        graph.fill("irradiance", shader, bound, [target_texture])
 
     def _sum_levels(
         self,
         graph: Graph,
         levels: PyramidLevels,
         blur: Blur,
-        target: Texture,
+        target_texture: Texture,
         transmitted_light: Texture | None,
         lost_light: Texture | None,
     ) -> None:
@@ -142,18 +142,18 @@ class FragmentPasses(GpuGems3):
             else transmitted_light,
             "lost": placeholder_light(graph.device) if lost_light is None else lost_light,
         }
-        graph.fill("combine", shader, bound, [target])
+        graph.fill("combine", shader, bound, [target_texture])
 
 
 def _fragment_program(
-    device: Device, shader_name: str, constants: Constants, targets: list[str]
+    device: Device, shader_name: str, constants: Constants, target_formats: list[str]
 ) -> RenderProgram:
-    def make() -> RenderProgram:
+    def make_program() -> RenderProgram:
         path, folders = _SHADER_FOLDER / shader_name, shader_folders()
         all_constants = program_constants(device, path, folders, constants)
-        return RenderProgram(device, path, folders, all_constants, targets=targets)
+        return RenderProgram(device, path, folders, all_constants, targets=target_formats)
 
-    return cached_program(device, (shader_name, registry_version()), constants, make)
+    return cached_program(device, (shader_name, registry_version()), constants, make_program)
 
 
 FRAGMENT_PASSES = FragmentPasses()

@@ -28,7 +28,7 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     """Return the device time per evaluation of each lobe model with each Fresnel term [ns].
 
     The time is the inverse throughput of the whole device, minus the time of a loop that evaluates no lobe.
-    Keys of the result are pairs of names in MODELS and FRESNEL.
+    A key of the result is a pair: a key of MODELS and a key of FRESNEL.
     """
     on_cpu = device.adapter.kind == "CPU"
     side, lights = (
@@ -58,17 +58,19 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     }
 
 
-def _pass_ms(device: Device, program: ComputeProgram, bindings: JsonObject, side: int) -> float:
+def _pass_ms(
+    device: Device, program: ComputeProgram, bindings: JsonObject, invocations_per_axis: int
+) -> float:
     """Return the time of one compute pass [ms].
 
     The time is measured by timestamps, or by `perf_counter` on devices without timestamps.
 
     bindings : dictionary from the name of a binding to its resource
-    side : number of invocations along each of two axes
+    invocations_per_axis : number of invocations along each of two axes
     """
     frame = CommandList(device)
     started = time.perf_counter()
-    frame.compute("lobe", program, bindings, (side, side))
+    frame.compute("lobe", program, bindings, (invocations_per_axis, invocations_per_axis))
     frame.submit()
     frame.wait()
     wall_ms = 1e3 * (time.perf_counter() - started)

@@ -60,11 +60,11 @@ class BenchmarkRow:
 
     triangles : number of triangles of the head
     frame_ms : elapsed time per frame in a sequence, with several frames in flight
-    gpu_ms : device time of each stage, measured in separate passes, and of the whole frame as "total"; the
-        total is less than the sum on GPUs, where it is measured in frames whose stages share a pass
+    gpu_ms : device time of each stage, and of the whole frame as "total"; stages are timed in separate
+        passes, so that their sum may exceed the total
     floor_ms : lower bound of each stage's time, derived from its memory traffic, and their sum as "total"
     python_ms : host time to prepare, record and submit a frame while the device is idle
-    image_ms : time from the end of a frame until its picture is in NumPy
+    image_ms : time to transfer the picture of a finished frame to a NumPy array
     memory_mb : memory of textures and buffers [MB]
     """
 
@@ -85,34 +85,44 @@ class BenchmarkRow:
 
 
 def measure_case(
-    renderer: Renderer, case: BenchmarkCase, head: Head, folder: Path, bytes_per_s: float, counts: FrameCounts
+    renderer: Renderer,
+    case: BenchmarkCase,
+    head: Head,
+    folder: Path,
+    bytes_per_s: float,
+    frame_counts: FrameCounts,
 ) -> BenchmarkRow:
     """Draw many frames of a case with moving camera and lights, and return the measurements of the case.
 
     On a slow device, fewer frames are drawn.
 
     folder : folder in which the file of the diffusion profile is written
-    bytes_per_s : memory bandwidth of a copy [byte/s]
-    counts : numbers of frames to draw
+    bytes_per_s : memory bandwidth, as measured by `copy_rate` [byte/s]
+    frame_counts : numbers of frames to draw
 
     Raises DermisError if the device cannot draw the frames, for example for lack of memory.
     """
     with converted_gpu_failures(renderer.device), TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES):
-        return _measure_case(renderer, case, head, folder, bytes_per_s, counts)
+        return _measure_case(renderer, case, head, folder, bytes_per_s, frame_counts)
 
 
 def _measure_case(
-    renderer: Renderer, case: BenchmarkCase, head: Head, folder: Path, bytes_per_s: float, counts: FrameCounts
+    renderer: Renderer,
+    case: BenchmarkCase,
+    head: Head,
+    folder: Path,
+    bytes_per_s: float,
+    frame_counts: FrameCounts,
 ) -> BenchmarkRow:
     settings = case_settings(case)
-    first, *other_scenes = case_scenes(case, head, folder, max(counts.sequence, counts.timed, 2))
+    first, *other_scenes = case_scenes(case, head, folder, max(frame_counts.sequence, frame_counts.timed, 2))
     scenes = cycle([*other_scenes, first])
     renderer.draw(first, settings)
-    counts = counts.limited_to(_MAX_CASE_S, sequence_ms(renderer, scenes, 1, settings))
-    sequence_ms(renderer, scenes, counts.warmup, settings)
-    frame_ms = sequence_ms(renderer, scenes, counts.sequence, settings) / counts.sequence
-    gpu_ms = stage_ms(renderer, scenes, settings, counts)
-    python_ms, image_ms = _host_times_ms(renderer, scenes, settings, counts)
+    frame_counts = frame_counts.limited_to(_MAX_CASE_S, sequence_ms(renderer, scenes, 1, settings))
+    sequence_ms(renderer, scenes, frame_counts.warmup, settings)
+    frame_ms = sequence_ms(renderer, scenes, frame_counts.sequence, settings) / frame_counts.sequence
+    gpu_ms = stage_ms(renderer, scenes, settings, frame_counts)
+    python_ms, image_ms = _host_times_ms(renderer, scenes, settings, frame_counts)
     traffic = frame_traffic(renderer.device, renderer.prepare(first, settings), len(head.mesh.positions))
     return BenchmarkRow(
         case,
@@ -134,16 +144,16 @@ def sequence_ms(renderer: Renderer, scenes: Iterator[Scene], frame_count: int, s
     frame_count : number of frames
     """
 
-    def draw() -> None:
+    def draw_sequence() -> None:
         for scene in islice(scenes, frame_count):
             renderer.draw(scene, settings, timed=False)
         renderer.device.wait()
 
-    return _elapsed_ms(draw)
+    return _elapsed_ms(draw_sequence)
 
 
 def stage_ms(
-    renderer: Renderer, scenes: Iterator[Scene], settings: Settings, counts: FrameCounts
+    renderer: Renderer, scenes: Iterator[Scene], settings: Settings, frame_counts: FrameCounts
 ) -> dict[str, float]:
     """Return the median device time of each stage, and of the whole frame as "total" [ms].
 
@@ -152,25 +162,25 @@ def stage_ms(
     software = renderer.device.adapter.kind == "CPU"
     timings: tuple[Timing, ...] = (True,) if software else (True, "whole")
     times: dict[Timing, list[dict[str, float]]] = {timing: [] for timing in timings}
-    for _ in range(counts.timed):
+    for _ in range(frame_counts.timed):
         for timing in timings:
-            sequence_ms(renderer, scenes, counts.between, settings)
+            sequence_ms(renderer, scenes, frame_counts.between, settings)
             times[timing].append(renderer.draw(next(scenes), settings, timed=timing).gpu_ms or {})
     stages = {stage: statistics.median(one[stage] for one in times[True]) for stage in times[True][0]}
     return stages | {"total": statistics.median(one["total"] for one in times[timings[-1]])}
 
 
 def _host_times_ms(
-    renderer: Renderer, scenes: Iterator[Scene], settings: Settings, counts: FrameCounts
+    renderer: Renderer, scenes: Iterator[Scene], settings: Settings, frame_counts: FrameCounts
 ) -> tuple[float, float]:
     """Return median host times: to submit a frame, and to transfer its picture to NumPy [ms]."""
     before, after = [], []
-    for k in range(max(counts.sequence, counts.timed)):
+    for k in range(max(frame_counts.sequence, frame_counts.timed)):
         renderer.device.wait()
         started, scene = time.perf_counter(), next(scenes)
         rendered = renderer.draw(scene, settings, timed=False)
         before.append(1e3 * (time.perf_counter() - started))
-        if k < counts.timed:
+        if k < frame_counts.timed:
             renderer.device.wait()
             after.append(_elapsed_ms(rendered.srgb8))
     return statistics.median(before), statistics.median(after)
@@ -189,7 +199,7 @@ def _floor_ms(
 
     stage_bytes : memory traffic by stage [byte]
     gpu_ms : measured device time by stage
-    bytes_per_s : memory bandwidth of a copy [byte/s]
+    bytes_per_s : memory bandwidth, as measured by `copy_rate` [byte/s]
     """
     floor = {stage: 1e3 * stage_bytes[stage] / bytes_per_s for stage in gpu_ms if stage in stage_bytes}
     return floor | {"total": sum(floor.values())}

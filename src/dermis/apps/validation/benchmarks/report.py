@@ -87,8 +87,8 @@ def row_cells(benchmark_row: BenchmarkRow) -> tuple[str, ...]:
 def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
     """Return a table of the stages of the base frame, with column titles as its first row.
 
-    The columns are the device time, its lower bound, the ratio of the two, and the device times of the frame
-    when it is drawn with the passes of GPU Gems 3.
+    The first columns are the device time, its lower bound, and the ratio of the two. Further columns have the
+    device times of frames drawn with the passes of GPU Gems 3.
     """
     if benchmark.base_row is None:
         return []
@@ -105,8 +105,8 @@ def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
     return table
 
 
-def published_text(benchmark: Benchmark) -> str:
-    """Return a sentence with the time of a frame by the passes of GPU Gems 3, relative to the base frame.
+def gpu_gems_3_text(benchmark: Benchmark) -> str:
+    """Return a sentence that compares frames rendered with the passes of GPU Gems 3 to the base frame.
 
     The text is empty if these passes were not measured.
     """
@@ -130,7 +130,7 @@ def _case_text(case: BenchmarkCase) -> str:
 
 
 def summary_line(benchmark: Benchmark) -> str:
-    """Return the adapter, the head, the date and the library versions in one line."""
+    """Return a line of text that names the adapter, the head, the date and the library versions."""
     versions = ", ".join(f"{name} {number}" for name, number in benchmark.versions.items())
     return (
         f"{benchmark.adapter} ({benchmark.driver}), {benchmark.head}, {benchmark.date}; {versions}; "
@@ -146,7 +146,7 @@ def write_report(path: Path, benchmark: Benchmark) -> None:
     text = Template((resources.files(__package__) / "report.html").read_text(encoding="utf-8"))
     page = text.substitute(
         summary=html.escape(summary_line(benchmark)),
-        published=published_text(benchmark),
+        published=gpu_gems_3_text(benchmark),
         rows=_table_html([COLUMNS, *(row_cells(row) for row in benchmark.rows)]),
         skipped="".join(f"<p>{html.escape(line)}</p>" for line in skipped_lines(benchmark)),
         stages=_table_html(stage_table(benchmark)),
@@ -176,9 +176,9 @@ _SCALING_AXES: dict[str, tuple[str, Callable[[BenchmarkRow], float]]] = {
 }
 
 
-def format_three_digits(value: float) -> str:
+def format_three_digits(number: float) -> str:
     """Return a number as text with three significant digits, without an exponent."""
-    return f"{value:.0f}" if value >= 1000 else f"{value:.3g}"
+    return f"{number:.0f}" if number >= 1000 else f"{number:.3g}"
 
 
 def scaling_plots(benchmark: Benchmark) -> str:
@@ -186,7 +186,9 @@ def scaling_plots(benchmark: Benchmark) -> str:
     axes_names = [name for name in _SCALING_AXES if any(row.case.varies == name for row in benchmark.rows)]
     if not axes_names:
         return ""
-    figure, panels = _figure(width_inches=3.4 * len(axes_names), height_inches=2.9, columns=len(axes_names))
+    figure, panels = _figure(
+        width_inches=3.4 * len(axes_names), height_inches=2.9, column_count=len(axes_names)
+    )
     for axes, name in zip(panels, axes_names, strict=True):
         label, value = _SCALING_AXES[name]
         rows = sorted((row for row in benchmark.rows if row.case.varies in ("", name)), key=value)
@@ -204,7 +206,7 @@ def scaling_plots(benchmark: Benchmark) -> str:
 def stage_bars(benchmark_row: BenchmarkRow) -> str:
     """Return an SVG bar chart of device time and its lower bound by stage."""
     names = [stage for stage in benchmark_row.gpu_ms if stage != "total"]
-    figure, (axes,) = _figure(width_inches=7.0, height_inches=0.34 * len(names) + 0.9, columns=1)
+    figure, (axes,) = _figure(width_inches=7.0, height_inches=0.34 * len(names) + 0.9, column_count=1)
     positions = range(len(names))
     axes.barh(
         positions, [benchmark_row.gpu_ms[name] for name in names], 0.7, color=_TOTAL_COLOUR, label="device"
@@ -223,12 +225,12 @@ def stage_bars(benchmark_row: BenchmarkRow) -> str:
     return _figure_svg(figure)
 
 
-def _figure(width_inches: float, height_inches: float, columns: int) -> tuple[Figure, list[Axes]]:
+def _figure(width_inches: float, height_inches: float, column_count: int) -> tuple[Figure, list[Axes]]:
     figure = import_extra("matplotlib.figure", "plots").Figure(
         figsize=(width_inches, height_inches), layout="constrained"
     )
     figure.patch.set_alpha(0.0)
-    panels = list(figure.subplots(1, columns, squeeze=False)[0])
+    panels = list(figure.subplots(1, column_count, squeeze=False)[0])
     for axes in panels:
         axes.patch.set_alpha(0.0)
         axes.tick_params(colors=_TEXT_COLOUR, labelsize=8, which="both")
@@ -240,11 +242,13 @@ def _figure(width_inches: float, height_inches: float, columns: int) -> tuple[Fi
     return figure, panels
 
 
-def _set_ticks(axis: Axis, positions: list[float] | None) -> None:
+def _set_ticks(axis: Axis, tick_positions: list[float] | None) -> None:
     """Label an axis with plain numbers, at the given positions or at 1, 2 and 5 times powers of ten."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
-    axis.set_major_locator(FixedLocator(positions) if positions else LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_locator(
+        FixedLocator(tick_positions) if tick_positions else LogLocator(subs=(1.0, 2.0, 5.0))
+    )
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda value, _: format_three_digits(value)))
 

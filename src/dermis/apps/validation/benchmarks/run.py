@@ -42,7 +42,7 @@ class SkippedCase:
 class Benchmark:
     """Measurements of all cases on one machine.
 
-    copy_bytes_s : measured memory bandwidth of a copy on the device [byte/s]
+    copy_bytes_s : memory bandwidth of the device, as measured by `copy_rate` [byte/s]
     seconds : duration of the whole benchmark [s]
     rows : measurements of each case
     skipped : cases that could not be measured
@@ -64,14 +64,14 @@ class Benchmark:
         return next((row for row in self.rows if not row.case.varies), None)
 
     def row_with_technique(self, technique: str) -> BenchmarkRow | None:
-        """Return the measurements of the base frame drawn with `technique`; None if the case was skipped."""
+        """Return the measurements of the base frame drawn with a technique; None if they were skipped."""
         rows = (row for row in self.rows if row.case.varies == "technique")
         return next((row for row in rows if row.case.technique == technique), None)
 
     def relative_time(self, technique: str) -> float | None:
-        """Return the device time of the base frame drawn with `technique`, relative to its usual technique.
+        """Return the device time of the base frame drawn with another technique, divided by its usual time.
 
-        Returns None if one of the two was not measured.
+        Returns None if one of the two times was not measured.
         """
         other = self.row_with_technique(technique)
         return other.gpu_ms["total"] / self.base_row.gpu_ms["total"] if other and self.base_row else None
@@ -123,7 +123,7 @@ def _measure_cases(
     """Return the measurements of the cases that could be drawn, and the skipped cases with the reasons.
 
     load_case_head : function that returns the head for a subdivision level
-    bytes_per_s : memory bandwidth of a copy [byte/s]
+    bytes_per_s : memory bandwidth, as measured by `copy_rate` [byte/s]
     """
     counts = CPU_FRAME_COUNTS if renderer.device.adapter.kind == "CPU" else FrameCounts()
     subdivided = lru_cache(1)(lambda levels: load_case_head(subdivide=levels))

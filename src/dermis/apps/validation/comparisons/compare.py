@@ -14,7 +14,7 @@ from dermis.apps.validation.comparisons.references import (
     REFERENCES,
     ComparisonSubject,
     ReferenceImage,
-    check_visible,
+    require_visible_pixels,
 )
 from dermis.apps.validation.comparisons.scenes import LIGHTS, REGIONS, ModelName, medium_scene
 from dermis.base.errors import refuse
@@ -24,7 +24,7 @@ from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
 from dermis.optics.media import published_media
 from dermis.scene.settings import Settings
-from dermis.scene.skin import DirectionName, Skin
+from dermis.scene.skin import DiffuseDirectionName, Skin
 from dermis.scene.sources import scattering_sources
 
 Floats = NDArray[np.float64]
@@ -87,7 +87,7 @@ def compare(
     region: str = "portrait",
     medium: str = "skin1",
     settings: Settings | None = None,
-    direction: DirectionName | None = None,
+    direction: DiffuseDirectionName | None = None,
     model: ModelName | None = None,
     samples: int = 64,
     adapter: str = "auto",
@@ -111,9 +111,9 @@ def compare(
     check_names(against, light, region, medium)
     settings = settings or Settings(size=(256, 256), atlas=1024)
     with comparison_subject(head, light, region, medium, settings, adapter, model) as subject:
-        check_visible(surface_points(subject.renderer, subject.scene, settings).mask)
+        require_visible_pixels(surface_points(subject.renderer, subject.scene, settings).mask)
         reference = REFERENCES[against](subject, samples)
-        check_visible(reference.mask)
+        require_visible_pixels(reference.mask)
         skin = Skin(**(subject.scene.skin.model_dump() | {"direction": direction or reference.direction}))
         compared = replace(subject, scene=replace(subject.scene, skin=skin))
         images, ms = {}, {}
@@ -138,10 +138,10 @@ def comparison_subject(
     adapter: str,
     model: ModelName | None = None,
 ) -> Iterator[ComparisonSubject]:
-    """Yield the subject of a comparison.
+    """Yield the scene of a comparison, with the renderer, settings, profile and medium.
 
-    The diffusion profile is in a temporary file, which is deleted when the context ends. The parameters are
-    described in `compare`.
+    The scene reads the profile from a temporary file, which is deleted when the context ends. The parameters
+    are described in `compare`.
     """
     index_matched = published_media()[medium].with_eta(1.0)
     with medium_scene(head, light, region, index_matched, model) as (scene, profile):
@@ -149,7 +149,7 @@ def comparison_subject(
 
 
 def check_names(reference_name: str, light_name: str, region_name: str, medium_name: str) -> None:
-    """Raise DermisError for unknown names, before any long computation."""
+    """Raise DermisError if any of the names is unknown."""
     choices: dict[str, tuple[str, Collection[str]]] = {
         "against": (reference_name, REFERENCES),
         "light": (light_name, LIGHTS),
@@ -164,7 +164,9 @@ def check_names(reference_name: str, light_name: str, region_name: str, medium_n
 def _render_technique(
     subject: ComparisonSubject, technique: str, reference: ReferenceImage
 ) -> tuple[Floats, float]:
-    """Return the linear radiance rendered by a technique, and the device time of a frame at 4 samples [ms].
+    """Return the linear radiance rendered by a technique, and the device time of a frame [ms].
+
+    The time is measured with 4 samples per pixel.
 
     reference : reference image; the frame leaves out translucency or interreflection if the reference does
     """

@@ -1,4 +1,4 @@
-"""Views of the package's human rendered by dermis and by path tracing, with the errors of dermis."""
+"""Comparisons of people rendered by dermis and by path tracing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dermis.apps.truths.path_traced import MitsubaVariant, PathTraced
 from dermis.apps.truths.person.medium import pigmented_skin, uniform_skin
 from dermis.apps.truths.person.path_traced import path_trace_person
 from dermis.apps.truths.person.person import SkinTextures
-from dermis.apps.validation.comparisons.references import check_visible
+from dermis.apps.validation.comparisons.references import require_visible_pixels
 from dermis.apps.validation.comparisons.scenes import medium_gaussians
 from dermis.frame.renderer import Renderer
 from dermis.human.skin.painted import PaintedMaps, mean_colour
@@ -40,15 +40,15 @@ _DIRECT_LIGHT_DEPTH = 2
 
 @dataclass(frozen=True, eq=False)
 class PersonComparison:
-    """View of a person rendered by dermis and by path tracing, with the errors of dermis.
+    """Pictures of one view of a person by dermis and by path tracing, with the errors of dermis.
 
     name : name of the view
-    ours : (h, w, 3) linear radiance by dermis
-    reference : (h, w, 3) linear radiance by path tracing
-    variance : (h, w, 3) variance of the reference's noise
-    mask : (h, w) pixels that are compared
+    ours : (h, w, 3) linear radiance rendered by dermis
+    reference : (h, w, 3) linear radiance rendered by path tracing
+    variance : (h, w, 3) variance of the noise in `reference`
+    mask : (h, w) mask of the pixels that are compared
     relrmse : relative RMSE within the mask [-]
-    energy : ratio of the total light by dermis to that of the reference, within the mask [-]
+    energy : total light in `ours`, divided by the total light in `reference`, within the mask [-]
     energy_by_channel : `energy` in red, green and blue [-]
     samples : paths per pixel
     seconds : duration of path tracing [s]
@@ -92,48 +92,48 @@ Cause = Literal["pigments", "relief", "reflection", "hair", "scattering", "bounc
 lobe of the skin. "hair": hair, brows and lashes. "scattering": subsurface scattering, so that skin is
 Lambertian. "bounces": all light but direct light on Lambertian skin, so that eyes are black; and hair.
 """
-CAUSES: tuple[Cause, ...] = get_args(Cause)
+ERROR_CAUSES: tuple[Cause, ...] = get_args(Cause)
 
 
 @dataclass(frozen=True, eq=False)
 class SharedSkin:
-    """Skin of both the frame and the path-traced reference, as a medium and as a diffusion profile.
+    """Skin in two equivalent forms: a medium for the path tracer, and a diffusion profile for dermis.
 
     medium : layers of skin, with the mean colour of the person
-    profile : file with the Gaussians that are fitted to photon counts of these layers
+    profile : file with Gaussians fitted to the result of Monte Carlo in these layers
     """
 
     medium: Medium
     profile: Path
 
 
-def shared_skin(renderer: Renderer, head: Head, truth: TruthName, folder: Path) -> SharedSkin:
+def shared_skin(renderer: Renderer, head: Head, reference_kind: TruthName, folder: Path) -> SharedSkin:
     """Return the skin of a person for a kind of path-traced reference, and write its diffusion profile.
 
-    In homogeneous skin, the mean distance between entry and exit of light is that of the default skin.
+    Homogeneous skin has the mean scattering distance of the default skin.
 
-    truth : kind of path-traced reference, one of `TRUTHS`
+    reference_kind : kind of path-traced reference, one of `TRUTHS`
     folder : existing folder in which the file of the profile is written
     """
-    maps, eta = head.maps, SKIN_ETA if truth == "refracting" else 1.0
+    maps, eta = head.maps, SKIN_ETA if reference_kind == "refracting" else 1.0
     assert isinstance(maps, PaintedMaps)
     colour = mean_colour(maps.look)
-    if truth == "layered":
+    if reference_kind == "layered":
         look = maps.look
         parameters = SkinParameters(look.melanin, look.eumelanin, look.blood, look.oxygen, look.epidermis_mm)
         medium = pigmented_skin(parameters, colour, eta)
     else:
         medium = uniform_skin(colour, mean_distance_mm(renderer.skin_profile(Skin())), eta)
-    file = folder / f"{truth}.toml"
+    file = folder / f"{reference_kind}.toml"
     write_profile(file, medium_gaussians(medium, "montecarlo"), {"model": "montecarlo"})
     return SharedSkin(medium, file)
 
 
 @dataclass(frozen=True, eq=False)
 class PersonSubject:
-    """Scene of a person and textures of the skin, from which both dermis and the path tracer render.
+    """Scene of a person, and the textures of the skin for the path tracer.
 
-    cause : cause of error that is left out of both pictures, or None
+    cause : cause of error that both renderers leave out, or None
     """
 
     scene: Scene
@@ -142,7 +142,7 @@ class PersonSubject:
 
 
 def without_cause(subject: PersonSubject, cause: Cause) -> PersonSubject:
-    """Return a subject for which a cause of error is left out of both the frame and the reference."""
+    """Return a subject for which both dermis and the path tracer leave out one cause of error."""
     scene, textures, head = subject.scene, subject.textures, subject.scene.head
     maps, flat = head.maps, np.ones((1, 1), np.float32)
     assert isinstance(maps, PaintedMaps)
@@ -164,12 +164,12 @@ def without_cause(subject: PersonSubject, cause: Cause) -> PersonSubject:
 def render_subject_frame(
     renderer: Renderer, subject: PersonSubject, skin: SharedSkin | None, settings: Settings
 ) -> Floats:
-    """Return the linear radiance (h, w, 3) of a subject's frame.
+    """Render a person with dermis, and return the linear radiance (h, w, 3).
 
-    For skin that does not refract, the radiance is the sum of two frames: light scattered by skin without
-    surface reflection, and surface reflection alone.
+    For skin that does not refract light, two frames are added. One shows the scattered light of skin without
+    surface reflection, the other only surface reflection.
 
-    skin : skin of the path-traced reference; None for the default skin
+    skin : skin of the path-traced reference; None for the skin of the scene
     """
     scene, cause = subject.scene, subject.cause
     if cause in ("scattering", "bounces"):
@@ -211,9 +211,9 @@ def compare_person(
     variant: MitsubaVariant = "scalar_rgb",
     progress: Callable[[int, int], None] | None = None,
 ) -> PersonComparison:
-    """Render a person by dermis and by path tracing with the same model of the skin.
+    """Render a person with dermis and by path tracing, and compare the pictures.
 
-    skin : model of the skin, from `shared_skin`
+    skin : skin that both render, from `shared_skin`
     comparison_name : name of the view
     picture_side : side of the pictures [pixel]
     samples : paths per pixel
@@ -225,7 +225,7 @@ def compare_person(
     settings = Settings(size=(picture_side, picture_side), atlas=atlas, samples=4)
     reference = path_trace_subject(subject, skin, settings.size, samples, use_cache, variant, progress)
     mask = reference.mask > _FULL_COVERAGE
-    check_visible(mask)
+    require_visible_pixels(mask)
     return person_comparison(
         comparison_name, render_subject_frame(renderer, subject, skin, settings), reference, mask
     )
@@ -252,8 +252,9 @@ def path_trace_subject(
     variant: MitsubaVariant = "scalar_rgb",
     progress: Callable[[int, int], None] | None = None,
 ) -> PathTraced:
-    """Path-trace a person with the skin that frames by dermis show too.
+    """Render a person by path tracing.
 
+    skin : skin to render, from `shared_skin`
     picture_size : width and height of the picture [pixel]
     samples : paths per pixel
     variant : variant of Mitsuba, as in `path_trace`
@@ -284,11 +285,11 @@ def path_trace_view(
     *,
     variant: MitsubaVariant = "scalar_rgb",
 ) -> PathTraced:
-    """Path-trace a person with homogeneous skin that has a specular strength of 1 and does not refract.
+    """Path-trace a person with homogeneous skin that has a specular strength of 1 and does not refract light.
 
-    The mean distance between entry and exit of light is that of the diffusion profile of the scene's skin.
+    The mean scattering distance is that of the diffusion profile of the scene's skin.
 
-    textures : maps of the skin as dermis paints them, with the reflectance in uniform light as colour
+    textures : textures that dermis paints for the skin; the colour is the reflectance in uniform light
     picture_size : width and height of the picture [pixel]
     samples : paths per pixel
     variant : variant of Mitsuba, as in `path_trace`
@@ -304,15 +305,18 @@ def path_trace_view(
 
 
 def mean_distance_mm(profile: GaussianSum) -> Floats:
-    """Return the mean distance (3,) between entry and exit of light for a diffusion profile [mm]."""
+    """Return the mean scattering distance (3,) of a diffusion profile [mm].
+
+    This is the mean distance between the points where light enters and leaves the skin.
+    """
     weight, width = profile.weight, np.sqrt(0.5 * np.pi * profile.variance_mm2)
     return np.asarray((weight * width[:, None]).sum(axis=0) / weight.sum(axis=0))
 
 
 def normal_incidence_reflectance(diffuse_reflectance: ArrayLike) -> Floats:
-    """Convert reflectances of half-spaces in uniform light to their reflectances at normal incidence [-].
+    """Convert reflectances in uniform light to reflectances at normal incidence [-].
 
-    The half-spaces are index-matched.
+    Both are of the same index-matched half-spaces.
     """
     albedo = 1.0 - np.linspace(1.0, 0.01, 48) ** 2
     uniform, normal = (
@@ -326,8 +330,8 @@ def person_comparison(
 ) -> PersonComparison:
     """Return the comparison of a frame with a path-traced picture.
 
-    dermis_image : (h, w, 3) linear radiance by dermis
-    mask : (h, w) pixels to compare
+    dermis_image : (h, w, 3) linear radiance rendered by dermis
+    mask : (h, w) mask of the pixels to compare
     """
     image, variance = reference.image.astype(np.float64), reference.variance.astype(np.float64)
     return PersonComparison(
@@ -350,12 +354,12 @@ _MIN_RELATIVE_HIGHLIGHT = 1.6  # least brightness of highlights, relative to the
 
 
 class IrisErrors(NamedTuple):
-    """Errors of an iris as rendered by dermis against the path-traced reference.
+    """Differences between an iris rendered by dermis and the same iris rendered by path tracing.
 
-    right : shift of the reference's pupil relative to the pupil by dermis, positive to the right [pixel]
-    down : shift of the reference's pupil relative to the pupil by dermis, positive downwards [pixel]
-    brightness : ratio of the iris's mean brightness by dermis to its mean brightness in the reference;
-        highlights are left out [-]
+    right : distance by which the path-traced pupil is further to the right [pixel]
+    down : distance by which the path-traced pupil is further down [pixel]
+    brightness : mean brightness of the iris outside highlights, by dermis, divided by that in the path-traced
+        picture [-]
     left_half : `brightness` of the left half of the iris [-]
     right_half : `brightness` of the right half of the iris [-]
     """
@@ -367,28 +371,26 @@ class IrisErrors(NamedTuple):
     right_half: Estimate
 
 
-def iris_errors(comparison: PersonComparison, frame_mm: float) -> IrisErrors:
-    """Return the errors of an iris, in pictures whose centre shows an eye from the front.
+def iris_errors(comparison: PersonComparison, view_height_mm: float) -> IrisErrors:
+    """Return the errors of the iris in a comparison whose pictures show an eye from the front, at the centre.
 
-    frame_mm : height of the visible area [mm]
+    view_height_mm : height of the visible area [mm]
     """
     ours, reference = comparison.ours.mean(axis=2), comparison.reference.mean(axis=2)
     noise = comparison.variance.mean(axis=2)  # an upper bound, since channels may share paths
     side = len(ours)
-    along = (np.arange(side) + 0.5 - 0.5 * side) * frame_mm / side
+    along = (np.arange(side) + 0.5 - 0.5 * side) * view_height_mm / side
     x, y = np.meshgrid(along, along)
     radius = np.hypot(x, y)
     ring = (radius > _IRIS_INNER_RADIUS_MM) & (radius < _IRIS_OUTER_RADIUS_MM)
-    dull = _without_highlights(ours, ring) & _without_highlights(reference, ring)
+    dull = _highlight_free_mask(ours, ring) & _highlight_free_mask(reference, ring)
     right, down = _image_shift(ours, reference, noise, dull & (radius < _PUPIL_RADIUS_MM))
     masks = (ring & dull & half for half in (radius > 0, x < 0, x >= 0))
     return IrisErrors(right, down, *(_brightness_ratio(ours, reference, noise, mask) for mask in masks))
 
 
-def _without_highlights(image: Floats, iris_ring: Mask) -> Mask:
-    """Return the mask (h, w) of pixels outside highlights.
-
-    In a highlight, the blurred image is much brighter than the median of the iris.
+def _highlight_free_mask(image: Floats, iris_ring: Mask) -> Mask:
+    """Return the mask (h, w) of the pixels that are not much brighter than the median of the iris.
 
     iris_ring : (h, w) mask of the iris
     """
@@ -401,9 +403,9 @@ def _without_highlights(image: Floats, iris_ring: Mask) -> Mask:
 def _image_shift(
     dermis_image: Floats, reference: Floats, noise_variance: Floats, region_mask: Mask
 ) -> tuple[Estimate, Estimate]:
-    """Return the shift of the reference relative to the picture by dermis, to the right and down [pixel].
+    """Return the shift of the reference relative to dermis's image, to the right and downwards [pixel].
 
-    Shift and brightness are fitted together by least squares.
+    The shift is fitted by least squares, together with a factor of brightness.
 
     noise_variance : (h, w) variance of the noise of the reference
     region_mask : (h, w) mask of the pixels to compare

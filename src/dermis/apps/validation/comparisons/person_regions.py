@@ -18,7 +18,7 @@ from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-ZONES: dict[str, tuple[str, ...]] = {
+ZONES_BY_REGION: dict[str, tuple[str, ...]] = {
     "forehead": ("forehead", "side of the forehead", "glabella", "temple"),
     "cheek": ("apple of the cheek", "cheek", "cheekbone", "jaw", "beside the mouth"),
     "nose side": ("wing of the nose", "inner cheek", "nasolabial"),
@@ -42,7 +42,10 @@ class Regions:
     masks: dict[str, Mask]
 
     def light_ratios(self, comparison: PersonComparison) -> dict[str, Estimate]:
-        """Return the frame's light divided by the reference's light, for regions with enough pixels [-]."""
+        """Return the light in the frame divided by that in the reference, for each region [-].
+
+        Regions with few pixels are left out.
+        """
         found = {}
         for name, mask in self.masks.items():
             inside = mask & comparison.mask
@@ -54,9 +57,9 @@ class Regions:
 def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regions:
     """Return the regions of the skin that a square picture of a parametric human shows.
 
-    There are regions for parts of the head, such as "nose", and "rim" for skin seen at a grazing angle. The
-    regions "lit side", "terminator" and "shadowed side" contain skin that faces the scene's first light, is
-    grazed by it, or faces away from it. Normals are those of the rest pose.
+    Most regions are parts of the head, such as "nose". The region "rim" is skin seen at a grazing angle. In
+    "lit side", skin faces the first light of the scene; in "shadowed side", it faces away; "terminator" is
+    the skin in between.
 
     picture_side : side of the picture [pixel]
     """
@@ -75,7 +78,7 @@ def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regi
     lips = placed[:, _LIPS_COLUMN] > 0.0
     lids = (placed[:, _LIDS_COLUMN] > _LID_RANGE_MM[0]) & (placed[:, _LIDS_COLUMN] < _LID_RANGE_MM[1])
     zone = _nearest_zone(placed[:, _POSITION_COLUMNS])
-    found = {name: on_skin & (zone == k) & ~lips & ~lids for k, name in enumerate(ZONES)}
+    found = {name: on_skin & (zone == k) & ~lips & ~lids for k, name in enumerate(ZONES_BY_REGION)}
     found |= {"lips": on_skin & lips, "lids": on_skin & lids, "eyes and mouth": ~on_skin}
     centre = np.array(head.centre_mm)
     facing = _cosines_to_normals(normals, np.array(scene.camera.position) + centre - positions)
@@ -90,9 +93,10 @@ def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regi
 
 
 def _nearest_zone(positions_mm: Floats) -> NDArray[np.int64]:
-    """Return the region (n,) of each point, as an index into `ZONES`.
+    """Return the index (n,) of the region in `ZONES_BY_REGION` to which each point belongs.
 
-    The region contains the zone whose centre is nearest to the point, relative to the radii of the zone.
+    A region consists of ellipsoidal zones. A point belongs to the region of the zone whose centre is nearest;
+    distances are divided by the radii of the zone.
 
     positions_mm : (n, 3) points
     """
@@ -100,7 +104,7 @@ def _nearest_zone(positions_mm: Floats) -> NDArray[np.int64]:
     mirrored = np.abs(positions_mm[:, :1])
     points = np.concatenate([mirrored, positions_mm[:, 1:]], axis=1)
     distances = []
-    for names in ZONES.values():
+    for names in ZONES_BY_REGION.values():
         zones = [rows[name] for name in names]
         centres, radii = float_columns(zones, "x y z"), float_columns(zones, "rx ry rz")
         distances.append((((points[:, None] - centres) / radii) ** 2).sum(axis=-1).min(axis=1))
@@ -111,7 +115,7 @@ def _cosines_to_normals(normals: Floats, directions: Floats) -> Floats:
     return np.asarray((normals * directions).sum(axis=1) / np.linalg.norm(directions, axis=1))
 
 
-def _picture_mask(visible: Mask, region_points: Mask) -> Mask:
-    mask = np.zeros(visible.shape, bool)
-    mask[visible] = region_points
+def _picture_mask(visible_pixels: Mask, region_points: Mask) -> Mask:
+    mask = np.zeros(visible_pixels.shape, bool)
+    mask[visible_pixels] = region_points
     return mask

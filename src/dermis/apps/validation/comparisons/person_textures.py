@@ -1,4 +1,4 @@
-"""Maps of a person's skin as dermis paints them, for a path tracer."""
+"""Textures that dermis paints for the skin, eyes and teeth of a person, for a path tracer."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _SETTINGS = Settings(size=(16, 16), atlas=64, samples=1, shadow_size=64)
 
 
 def person_textures(renderer: Renderer, scene: Scene, texture_side: int = 2048) -> SkinTextures:
-    """Return the colours, roughness and relief of a person's skin, as frames show them in the rest pose.
+    """Return the textures of a person in the rest pose: colour, roughness and height of skin, eyes and teeth.
 
     texture_side : side of the skin's maps, a power of two from 256 to 4096 [texel]
 
@@ -63,9 +63,9 @@ def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, texture_si
 
 
 def _detail_heights_mm(pores: Floats, furrows: Floats, log2_mm_per_uv: Floats) -> Floats:
-    """Return the heights (n, n) of pores and furrows that are too fine for the head's maps [mm].
+    """Return the heights (n, n) of fine pores and furrows, which are missing in the head's height map [mm].
 
-    The patterns are tiled as in skin.wgsl.
+    They are two patterns that are tiled as in skin.wgsl.
 
     pores, furrows : (n, n) weights of the two patterns
     log2_mm_per_uv : (n, n) binary logarithm of the length on the surface per unit of uv [mm]
@@ -102,7 +102,7 @@ def _sample_tile(periodic_pattern: Floats, u: Any, v: Any) -> Floats:
 
 
 def _part_texture(renderer: Renderer, scene: Scene, part_index: int, iris_radius_mm: float) -> Floats:
-    """Return the painted texture (n, n, 3) of one part of the eyes or teeth.
+    """Return the painted texture (n, n, 3) of a part of the head, such as the iris or the upper teeth.
 
     part_index : index of the part in person_textures.wgsl
     """

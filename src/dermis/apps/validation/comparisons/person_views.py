@@ -64,7 +64,7 @@ def behind_ear_camera(head: Head) -> Camera:
 
 
 def _eye_position_mm(head: Head) -> tuple[float, float, float]:
-    """Return the front of the left cornea, relative to the head's centre [mm]."""
+    """Return the frontmost point of the left cornea, relative to the head's centre [mm]."""
     if head.eyes is None:
         return head.frontmost(30.0, 0.0)
     x, y, z = head.control.positions_mm[head.eyes.apex[0]] - np.array(head.centre_mm)

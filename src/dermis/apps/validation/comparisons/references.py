@@ -17,7 +17,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Medium
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
-from dermis.scene.skin import DirectionName
+from dermis.scene.skin import DiffuseDirectionName
 
 if TYPE_CHECKING:
     from dermis.apps.truths.irradiance_samples import IrradianceSamples
@@ -31,12 +31,12 @@ _SAMPLE_SPACING_MM, _MIN_SAMPLE_SPACING_MM = 3.0, 0.2
 _HEAT_PATCH_RADIUS_MM = 10.0
 _MIN_VARIANCE_MM2 = 0.25  # for narrower Gaussians the surface is nearly flat
 _FULL_COVERAGE = 0.999  # fraction of a pixel from which it counts as covered
-PIXEL_SAMPLES = 16
+SAMPLES_PER_PIXEL = 16
 
 
 @dataclass(frozen=True)
 class ComparisonSubject:
-    """Scene to compare, with the profile and medium of its skin, and the settings of its image."""
+    """Scene in which techniques are compared, with its renderer, its settings, and the profile and medium."""
 
     renderer: Renderer
     scene: Scene
@@ -55,8 +55,8 @@ class ReferenceImage:
     samples : samples per pixel at which techniques must be rendered for the comparison with this image
     seconds : duration of the computation [s]
     notes : sentences for the report
-    has_translucency : whether the image includes light through thin parts
-    has_interreflection : whether the image includes light from skin to skin through the air
+    has_translucency : whether the image includes light transmitted through ears and other thin parts
+    has_interreflection : whether the image includes light that one part of the head reflects to another
     direction : angular distribution of the light that leaves the skin, as in `Skin`
     """
 
@@ -68,11 +68,11 @@ class ReferenceImage:
     notes: tuple[str, ...] = ()
     has_translucency: bool = True
     has_interreflection: bool = True
-    direction: DirectionName = "lambertian"
+    direction: DiffuseDirectionName = "lambertian"
 
 
 def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Return the reference image obtained by integrating the profile over the surface.
+    """Return the reference image in which irradiance times profile is integrated over the surface.
 
     The profile is a function of Euclidean distance.
 
@@ -88,9 +88,9 @@ def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage
 
 
 def surface_heat(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Return the reference image obtained by diffusing irradiance along the surface by the heat equation.
+    """Return the reference image in which the irradiance diffuses according to the heat equation.
 
-    Only the skin around the camera's target is computed.
+    Light diffuses along the surface. Only the skin around the camera's target is computed.
 
     samples : ignored, because the solution has no noise
     """
@@ -102,17 +102,16 @@ def surface_heat_around(
     subject: ComparisonSubject,
     target_mm: tuple[float, float, float],
     radius_mm: float,
-    light: IrradianceSamples,
+    surface_irradiance: IrradianceSamples,
     min_variance_mm2: float = _MIN_VARIANCE_MM2,
 ) -> ReferenceImage:
-    """Return the reference image obtained by the heat equation on the surface, around a visible point.
+    """Return the reference image in which light diffuses according to the heat equation, in a round patch.
 
-    Each Gaussian of the profile is replaced by diffusion along the surface for a time proportional to its
-    variance.
+    Each Gaussian of the profile becomes diffusion along the surface, for a time proportional to the variance.
 
     target_mm : point relative to the head's centre; the nearest visible point is the centre of the patch [mm]
     radius_mm : radius of the patch in which pixels are compared [mm]
-    light : samples of the irradiance on the whole head, see `irradiance_samples`
+    surface_irradiance : samples of the irradiance on the whole head, see `irradiance_samples`
     min_variance_mm2 : variance below which Gaussians are integrated by Euclidean distance instead [mm2]
     """
     from dermis.apps.truths.surface_diffusion import diffuse_on_surface
@@ -126,13 +125,13 @@ def surface_heat_around(
     target = np.array(target_mm) + subject.scene.head.centre_mm
     centre = points[np.linalg.norm(points - target, axis=1).argmin()]
     patch = mesh_patch(subject.scene.head.mesh, centre, radius_mm, variances[~narrow])
-    irradiance = _irradiance(subject, *patch.vertex_barycentrics())
+    irradiance = _irradiance_at_points(subject, *patch.vertex_barycentrics())
     levels = diffuse_on_surface(patch.positions, patch.triangles, irradiance, variances[~narrow])
     fine, weights = patch.locate(visible.triangle, visible.barycentric)
     inside = (fine >= 0) & patch.contains(points)
     diffused = np.einsum("knc,kc->nc", levels, weight[~narrow])
     exitance = patch.interpolate(diffused, fine[inside], weights[inside])
-    exitance += _integrate_gaussians(points[inside], light, weight[narrow], variances[narrow])
+    exitance += _integrate_gaussians(points[inside], surface_irradiance, weight[narrow], variances[narrow])
     mask = visible.mask.copy()
     mask[visible.mask] = inside
     compared = SurfacePoints(mask, visible.triangle[inside], visible.barycentric[inside])
@@ -145,10 +144,12 @@ def irradiance_samples(subject: ComparisonSubject) -> IrradianceSamples:
     """Return samples of the irradiance on the whole head, as dense as the references need."""
     from dermis.apps.truths.irradiance_samples import MeshPoints, sample_irradiance
 
-    def light(points: MeshPoints) -> Floats:
-        return _irradiance(subject, points.face, points.barycentric)
+    def irradiance_at_points(points: MeshPoints) -> Floats:
+        return _irradiance_at_points(subject, points.face, points.barycentric)
 
-    return sample_irradiance(subject.scene.head.mesh, light, _SAMPLE_SPACING_MM, _MIN_SAMPLE_SPACING_MM)
+    return sample_irradiance(
+        subject.scene.head.mesh, irradiance_at_points, _SAMPLE_SPACING_MM, _MIN_SAMPLE_SPACING_MM
+    )
 
 
 def path_traced_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage:
@@ -181,23 +182,28 @@ REFERENCES: dict[str, Callable[[ComparisonSubject, int], ReferenceImage]] = {
 }
 
 
-def _reference_image(path_traced: PathTraced, *notes: str) -> ReferenceImage:
-    image, variance = path_traced.image.astype(np.float64), path_traced.variance.astype(np.float64)
-    mask, notes = path_traced.mask > _FULL_COVERAGE, (*notes, *path_traced.notes)
-    return ReferenceImage(image, variance, mask, PIXEL_SAMPLES, path_traced.seconds, notes)
+def _reference_image(path_traced_picture: PathTraced, *notes: str) -> ReferenceImage:
+    image, variance = (
+        path_traced_picture.image.astype(np.float64),
+        path_traced_picture.variance.astype(np.float64),
+    )
+    mask, notes = path_traced_picture.mask > _FULL_COVERAGE, (*notes, *path_traced_picture.notes)
+    return ReferenceImage(image, variance, mask, SAMPLES_PER_PIXEL, path_traced_picture.seconds, notes)
 
 
-def _irradiance(subject: ComparisonSubject, triangle: NDArray[np.int64], barycentric: Floats) -> Floats:
+def _irradiance_at_points(
+    subject: ComparisonSubject, triangle: NDArray[np.int64], barycentric: Floats
+) -> Floats:
     return irradiance_at(subject.renderer, subject.scene, subject.settings, triangle, barycentric)
 
 
 def _integrate_gaussians(
-    points: Floats, light: IrradianceSamples, gaussian_weight: Floats, variance_mm2: Floats
+    points: Floats, irradiance: IrradianceSamples, gaussian_weight: Floats, variance_mm2: Floats
 ) -> Floats:
     """Return the radiant exitance (n, 3) at points by integrating Gaussians of the Euclidean distance.
 
     points : (n, 3) positions [mm]
-    light : irradiance on the surface
+    irradiance : irradiance on the surface
     gaussian_weight : (k, 3) weights of the Gaussians
     variance_mm2 : (k,) variances of the Gaussians [mm^2]
     """
@@ -206,29 +212,31 @@ def _integrate_gaussians(
 
     if not len(variance_mm2):
         return np.zeros_like(points)
-    return integrate_exitance(points, light, Profile(gaussian_weight, variance_mm2))
+    return integrate_exitance(points, irradiance, Profile(gaussian_weight, variance_mm2))
 
 
-def hit_positions(subject: ComparisonSubject, visible: SurfacePoints) -> Floats:
+def hit_positions(subject: ComparisonSubject, visible_points: SurfacePoints) -> Floats:
     """Return the positions (n, 3) where rays through pixel centres meet the head [mm].
 
-    visible : triangle and barycentric weights of each position
+    visible_points : triangle and barycentric weights of each position
     """
     mesh = subject.scene.head.mesh
-    corners = mesh.positions[mesh.triangles[visible.triangle]].astype(np.float64)
-    return np.asarray(np.einsum("nk,nkc->nc", visible.barycentric, corners))
+    corners = mesh.positions[mesh.triangles[visible_points.triangle]].astype(np.float64)
+    return np.asarray(np.einsum("nk,nkc->nc", visible_points.barycentric, corners))
 
 
 def _image_of_points(
-    visible: SurfacePoints, exitance: Floats, start_time_s: float, assumption: str
+    visible_points: SurfacePoints, exitance: Floats, start_time_s: float, assumption: str
 ) -> ReferenceImage:
-    image = np.zeros((*visible.mask.shape, 3))
-    image[visible.mask] = exitance / np.pi
+    image = np.zeros((*visible_points.mask.shape, 3))
+    image[visible_points.mask] = exitance / np.pi
     seconds, noise = time.perf_counter() - start_time_s, np.zeros_like(image)
-    return ReferenceImage(image, noise, visible.mask, 1, seconds, (assumption,), has_interreflection=False)
+    return ReferenceImage(
+        image, noise, visible_points.mask, 1, seconds, (assumption,), has_interreflection=False
+    )
 
 
-def check_visible(mask: NDArray[np.bool_]) -> None:
+def require_visible_pixels(mask: NDArray[np.bool_]) -> None:
     """Raise DermisError when no pixel can be compared.
 
     mask : (h, w) pixels that show nothing but the head

@@ -47,20 +47,20 @@ def error_cells(comparison_row: ComparisonRow) -> tuple[str, ...]:
     flip = "-" if comparison_row.flip is None else f"{comparison_row.flip:.3f}"
     return (
         comparison_row.technique,
-        _with_error(comparison_row.relrmse, comparison_row.relrmse_se),
+        _estimate_text(comparison_row.relrmse, comparison_row.relrmse_se),
         flip,
-        _with_error(comparison_row.energy_ratio, comparison_row.energy_ratio_se),
+        _estimate_text(comparison_row.energy_ratio, comparison_row.energy_ratio_se),
         f"{comparison_row.ms:.3g}",
     )
 
 
-def _with_error(estimate: float, standard_error: float) -> str:
+def _estimate_text(estimate: float, standard_error: float) -> str:
     return f"{estimate:.4f}" + (f" ± {standard_error:.4f}" if standard_error > 0 else "")
 
 
-def _errors_table(rows: tuple[ComparisonRow, ...]) -> str:
+def _errors_table(comparison_rows: tuple[ComparisonRow, ...]) -> str:
     head = "".join(f"<th>{name}</th>" for name in _COLUMN_TITLES)
-    body = ["".join(f"<td>{html.escape(cell)}</td>" for cell in error_cells(row)) for row in rows]
+    body = ["".join(f"<td>{html.escape(cell)}</td>" for cell in error_cells(row)) for row in comparison_rows]
     return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in body) + "</table>"
 
 

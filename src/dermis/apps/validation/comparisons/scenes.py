@@ -127,10 +127,10 @@ _PHOTONS_PER_CHANNEL = 2_000_000  # per channel
 def medium_gaussians(medium: Medium, model: ModelName | None = None) -> GaussianSum:
     """Return the sum of six Gaussians that fits a medium's diffusion profile.
 
-    model : scattering model; by default tabulated photon counts if a table covers the medium, else layered
-        diffusion
+    model : scattering model; by default "counted", or "layered" if the tables of "counted" do not contain the
+        medium
 
-    Raises DermisError if photon counts are requested for a medium that no table covers.
+    Raises DermisError if the model is "counted" and its tables do not contain the medium.
     """
     if model == "montecarlo":
         return fit_radial(monte_carlo_profile(medium, photons=_PHOTONS_PER_CHANNEL), medium.name)

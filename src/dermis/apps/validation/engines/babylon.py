@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.fitting import burley_curve, fit_burley_width
+from dermis.apps.export.fitting import cumulative_burley_profile, fit_burley_width
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import load_subject
 from dermis.apps.export.target import get_numbers
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 PAGE_FILE = Path(__file__).with_name("babylon.html")
 RESULTS_FILE = RESULTS / "engines_babylon.json"
-LIBRARY_VARIABLE = "DERMIS_BABYLON"
+LIBRARY_FOLDER_VARIABLE = "DERMIS_BABYLON"
 CANVAS_SIDE, FULLY_LIT_RADIANCE = 640, 0.9
 PIXELS_PER_BURLEY_WIDTH = 14.0  # number of pixels that the largest Burley width covers
 AZIMUTH_COUNT = 5
@@ -40,13 +40,15 @@ def babylon_library() -> Path:
 
     Raises DermisError when DERMIS_BABYLON does not name such a folder.
     """
-    folder = Path(os.environ.get(LIBRARY_VARIABLE, ""))
+    folder = Path(os.environ.get(LIBRARY_FOLDER_VARIABLE, ""))
     if not (folder / "babylonjs" / "babylon.js").is_file():
         actual = (
-            f"{folder} has no babylonjs/babylon.js" if os.environ.get(LIBRARY_VARIABLE) else "it is not set"
+            f"{folder} has no babylonjs/babylon.js"
+            if os.environ.get(LIBRARY_FOLDER_VARIABLE)
+            else "it is not set"
         )
         refuse(
-            LIBRARY_VARIABLE,
+            LIBRARY_FOLDER_VARIABLE,
             "a folder that npm has installed babylonjs into",
             actual,
             "npm install babylonjs",
@@ -55,11 +57,11 @@ def babylon_library() -> Path:
 
 
 @contextmanager
-def babylon_page(library: Path) -> Iterator[Page]:
+def babylon_page(library_folder: Path) -> Iterator[Page]:
     """Open the measurement page with Babylon.js in Chromium for the duration of a context."""
     with chromium_page(CANVAS_SIDE) as page:
         page.goto(PAGE_FILE.as_uri())
-        page.add_script_tag(path=str(library / "babylonjs" / "babylon.js"))
+        page.add_script_tag(path=str(library_folder / "babylonjs" / "babylon.js"))
         yield page
 
 
@@ -110,37 +112,43 @@ def predicted_radiance(
 
 
 def edge_profile(
-    picture: Floats, pixel_mm: float, azimuth: float, x_mm: Floats, half_width_mm: float
+    picture: Floats, pixel_mm: float, azimuth: float, edge_distance_mm: Floats, half_width_mm: float
 ) -> Floats:
     """Return the mean radiance (n, 3) at distances from the edge of the light, in a strip across the edge.
 
     picture : (side, side, 3) radiance
     pixel_mm : size of a pixel [mm]
     azimuth : direction across the edge [rad]
-    x_mm : (n,) evenly spaced distances from the edge, positive on the lit side [mm]
+    edge_distance_mm : (n,) evenly spaced distances from the edge, positive on the lit side [mm]
     half_width_mm : half the width of the strip [mm]
     """
     middle = (np.arange(CANVAS_SIDE) + 0.5 - 0.5 * CANVAS_SIDE) * pixel_mm
     x, y = middle[None, :], middle[:, None]
     across = x * np.cos(azimuth) + y * np.sin(azimuth)
     strip = np.abs(y * np.cos(azimuth) - x * np.sin(azimuth)) < half_width_mm
-    bins = np.round((across[strip] - x_mm[0]) / (x_mm[1] - x_mm[0])).astype(int)
-    inside = (bins >= 0) & (bins < len(x_mm))
-    count = np.bincount(bins[inside], minlength=len(x_mm))
-    sums = [np.bincount(bins[inside], picture[strip][inside, c], len(x_mm)) for c in range(3)]
+    bins = np.round(
+        (across[strip] - edge_distance_mm[0]) / (edge_distance_mm[1] - edge_distance_mm[0])
+    ).astype(int)
+    inside = (bins >= 0) & (bins < len(edge_distance_mm))
+    count = np.bincount(bins[inside], minlength=len(edge_distance_mm))
+    sums = [np.bincount(bins[inside], picture[strip][inside, c], len(edge_distance_mm)) for c in range(3)]
     return np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None]
 
 
-def edge_responses(page: Page, profile_colour: Floats, meters_per_unit: float, d_mm: Floats) -> JsonObject:
-    """Return the measured and predicted edge responses of a diffusion profile, averaged over azimuths.
+def edge_responses(
+    page: Page, profile_colour: Floats, meters_per_unit: float, burley_width_mm: Floats
+) -> JsonObject:
+    """Measure the edge response of a diffusion profile in Babylon.js, and compare it with predictions.
 
-    The result also has the largest errors against the prediction and against exact Burley profiles.
+    An edge response is the radiance of a half-lit plane by distance from the edge of the light. Here it is
+    averaged over directions across the edge. The predictions come from the samples of Babylon.js's shader and
+    from exact Burley profiles.
 
     profile_colour : diffusion profile, which Babylon.js expresses as a colour
     meters_per_unit : setting metersPerUnit of Babylon.js; the unit of the scene is a millimetre
-    d_mm : (3,) widths of the Burley profiles, by channel [mm]
+    burley_width_mm : (3,) widths of the Burley profiles, by channel [mm]
     """
-    widest = float(d_mm.max())
+    widest = float(burley_width_mm.max())
     pixel = widest / PIXELS_PER_BURLEY_WIDTH
     x = np.arange(-84, 85) * pixel  # to 6 d
     profiles = []
@@ -150,13 +158,13 @@ def edge_responses(page: Page, profile_colour: Floats, meters_per_unit: float, d
         profiles.append([edge_profile(one, pixel, azimuth, x, 3.0 * widest) for one in pictures])
     largest = max(float(np.abs(one - other).max()) for one, other in profiles)
     measured, predicted = np.mean(profiles, axis=0)
-    true = burley_curve(d_mm, np.ones(3)).edge_response(x)
-    near = np.abs(x)[:, None] <= 6.0 * d_mm
+    true = cumulative_burley_profile(burley_width_mm, np.ones(3)).edge_response(x)
+    near = np.abs(x)[:, None] <= 6.0 * burley_width_mm
     step = slice(0, None, 7)
     return {
         "colour": np.round(profile_colour, 5).tolist(),
         "metersPerUnit_mm": round(1e3 * meters_per_unit, 5),
-        "expected_d_mm": np.round(d_mm, 5).tolist(),
+        "expected_d_mm": np.round(burley_width_mm, 5).tolist(),
         "fitted_d_mm": fitted_widths(x, measured),
         "x_mm": np.round(x[step], 4).tolist(),
         "edge": np.round(measured[step], 4).tolist(),
@@ -171,20 +179,23 @@ def _max_by_channel(difference: Floats, is_near_edge: NDArray[np.bool_]) -> list
     return [round(float(x), 4) for x in np.abs(difference * is_near_edge).max(axis=0)]
 
 
-def fitted_widths(x_mm: Floats, edge_response: Floats) -> list[float]:
+def fitted_widths(edge_distance_mm: Floats, edge_response: Floats) -> list[float]:
     """Return the width of the Burley profile that fits the measured edge response best, by channel [mm].
 
-    x_mm : (n,) distances from the edge
+    edge_distance_mm : (n,) distances from the edge
     edge_response : (n, 3) measured edge responses
     """
-    widths = np.geomspace(x_mm[-1] / 600.0, x_mm[-1], 241)
-    curves = [burley_curve(np.full(3, d), np.ones(3)).edge_response(x_mm)[:, 0] for d in widths]
+    widths = np.geomspace(edge_distance_mm[-1] / 600.0, edge_distance_mm[-1], 241)
+    curves = [
+        cumulative_burley_profile(np.full(3, d), np.ones(3)).edge_response(edge_distance_mm)[:, 0]
+        for d in widths
+    ]
     error = ((np.stack(curves)[:, :, None] - edge_response) ** 2).sum(axis=1)
     return [round(float(d), 4) for d in widths[error.argmin(axis=0)]]
 
 
 def measure_exported_skin(page: Page, skin_name: str) -> JsonObject:
-    """Return the edge responses of an exported skin, and their errors against the skin's own profile."""
+    """Return results of `edge_responses` for an exported skin, and errors against the skin's own profile."""
     subject, target = load_subject(skin_name), TARGETS["babylon"].with_variant(None)
     rows = target.parameters(subject, target.resolve_version(None))
     colour = np.array(get_numbers(rows, "subSurface.scatteringDiffusionProfile"))

@@ -12,7 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 from PIL import Image
 
-from dermis.apps.export.fitting import curve_error, fit_burley_width
+from dermis.apps.export.fitting import fit_burley_width, profile_error
 from dermis.apps.export.subject import load_subject
 from dermis.apps.export.targets.blender.target import TARGET
 from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
@@ -29,8 +29,8 @@ from dermis.images.colour import encode_srgb
 from dermis.optics.cumulative_profile import CumulativeProfile
 
 RESULTS_FILE = RESULTS / "engines_blender.json"
-PICTURE = DOCS / "images" / "engines_blender.webp"
-SCRIPT = Path(__file__).with_name("blender_script.py")
+PICTURE_FILE = DOCS / "images" / "engines_blender.webp"
+BLENDER_SCRIPT = Path(__file__).with_name("blender_script.py")
 Measurement = Literal["edges", "heads", "picture"]
 COMPARED_SKINS = "skin1", "skin2", "dj3"
 SUBSURFACE_METHODS = "random-walk-skin", "random-walk", "burley"
@@ -45,7 +45,9 @@ SEED_COUNT = 2  # pictures per channel; their difference gives the noise
 HEAD_SIDE, HEAD_SAMPLES, HEAD_SEEDS = 192, 32, 2
 PICTURE_SIDE, PICTURE_SAMPLES = 320, 48
 METHODS_BY_VERSION = {"4.5": ("random-walk-skin",), "5.2": ("random-walk-skin", "random-walk", "burley")}
-PLANE_TASK = BlenderTask("Cycles", "to render a half-lit plane", "See the message of Blender in brackets")
+HALF_LIT_PLANE_TASK = BlenderTask(
+    "Cycles", "to render a half-lit plane", "See the message of Blender in brackets"
+)
 
 
 def blender(python_45: Path, python_52: Path, *parts: Measurement) -> None:
@@ -60,57 +62,65 @@ def blender(python_45: Path, python_52: Path, *parts: Measurement) -> None:
     parts:
         Measurements to make [all]; other measurements keep their last results.
     """
-    pythons = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
+    python_by_version = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
     parts = parts or get_args(Measurement)
     results: JsonObject = read_results(RESULTS_FILE) if RESULTS_FILE.exists() else {}
-    results["columns_in_d"] = column_positions().reshape(EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=1).tolist()
+    results["columns_in_d"] = (
+        column_edge_distances().reshape(EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=1).tolist()
+    )
     if "edges" in parts:
-        results["edges"] = list(measure_edges(pythons))
+        results["edges"] = list(measure_edges(python_by_version))
         write_results(RESULTS_FILE, results)
     if "heads" in parts:
-        results["heads"] = list(measure_heads(pythons))
+        results["heads"] = list(measure_heads(python_by_version))
         write_results(RESULTS_FILE, results)
     if "picture" in parts:
-        write_picture(pythons)
+        write_hair_picture(python_by_version)
 
 
-def measure_edges(pythons: dict[str, Path]) -> Iterator[JsonObject]:
-    """Yield the measured edge response of each skin, by Blender version and subsurface method."""
-    for version, python in pythons.items():
+def measure_edges(python_by_version: dict[str, Path]) -> Iterator[JsonObject]:
+    """Yield results of `measure_edge_response` for each Blender version, subsurface method and skin."""
+    for version, python in python_by_version.items():
         for method in SUBSURFACE_METHODS:
             for name in COMPARED_SKINS:
-                yield measure_edge(python, version, method, name)
+                yield measure_edge_response(python, version, method, name)
                 print_lines(f"{version} {method} {name}")
 
 
-def column_positions() -> Floats:
-    """Return the distance of each pixel column from the edge of the light, in units of the Burley width d."""
+def column_edge_distances() -> Floats:
+    """Return the distances of the pixel columns from the edge of the light, in units of the Burley width."""
     return 12.0 * (np.arange(EDGE_BIN_COUNT * PIXELS_PER_BIN) + 0.5) / (EDGE_BIN_COUNT * PIXELS_PER_BIN) - 6.0
 
 
-def measure_edge(python: Path, version: str, subsurface_method: str, skin_name: str) -> JsonObject:
-    """Return the measured and the predicted edge response of a skin, and their errors.
+def measure_edge_response(
+    python_program: Path, blender_version: str, subsurface_method: str, skin_name: str
+) -> JsonObject:
+    """Return the measured and the predicted edge response of an exported skin, and its errors.
 
-    python : Python program that has Blender's module bpy
+    An edge response is the radiance of a half-lit plane by distance from the edge of the light.
+
+    python_program : Python program that has Blender's module bpy
     skin_name : name of the skin
     """
     subject, target = load_subject(skin_name), TARGET.with_variant(subsurface_method)
-    rows, d = target.parameters(subject, version), fit_burley_width(subject.curve)
-    predicted_curve = target.predicted_curve(rows, subject, version)
-    naive = target.predicted_curve(target.naive_parameters(subject, version), subject, version)
+    rows, d = target.parameters(subject, blender_version), fit_burley_width(subject.curve)
+    predicted_profile = target.predicted_profile(rows, subject, blender_version)
+    naive = target.predicted_profile(
+        target.naive_parameters(subject, blender_version), subject, blender_version
+    )
     samples = SAMPLES_BY_METHOD.get(subsurface_method, DEFAULT_SAMPLES)
     shared = {"size": [EDGE_BIN_COUNT * PIXELS_PER_BIN, PIXEL_ROWS], "samples": samples}
     channels = [(k, c) for k in range(SEED_COUNT) for c in range(3)]
     passes = [{"channel": c, "width_m": 12e-3 * d[c], "seed": k, **shared} for k, c in channels]
     with TemporaryDirectory() as folder_name:
         folder = Path(folder_name)
-        target.write(subject, rows, folder, version)
+        target.write(subject, rows, folder, blender_version)
         (folder / "passes.json").write_text(json.dumps(passes), encoding="utf-8")
-        run_blender(python, SCRIPT, [str(folder)], 3600.0, PLANE_TASK)
+        run_blender(python_program, BLENDER_SCRIPT, [str(folder)], 3600.0, HALF_LIT_PLANE_TASK)
         output = json.loads((folder / "done.json").read_text(encoding="utf-8"))
     columns = np.array([[output["columns"][3 * k + c] for c in range(3)] for k in range(SEED_COUNT)])[..., 0]
     means = columns.reshape(SEED_COUNT, 3, EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=-1)
-    predicted, true = (binned_response(curve, d) for curve in (predicted_curve, subject.curve))
+    predicted, true = (binned_edge_response(curve, d) for curve in (predicted_profile, subject.curve))
     radiance = (means.mean(axis=0) * predicted).sum(axis=1) / (predicted**2).sum(axis=1)
     measured = means.mean(axis=0) / radiance[:, None]
     noise = np.abs(means[0] - means[1]) / (2.0 * radiance[:, None])
@@ -126,28 +136,34 @@ def measure_edge(python: Path, version: str, subsurface_method: str, skin_name: 
         "against_true": np.abs(measured - true).max(axis=1).round(4).tolist(),
         "noise": np.sqrt((noise**2).mean(axis=1)).round(4).tolist(),
         "energy": (np.pi * radiance / subject.curve.energy).round(4).tolist(),
-        "typed_in": curve_error(subject.curve, naive).edge.round(4).tolist(),
-        "predicted_energy": (predicted_curve.energy / subject.curve.energy).round(4).tolist(),
+        "typed_in": profile_error(subject.curve, naive).edge.round(4).tolist(),
+        "predicted_energy": (predicted_profile.energy / subject.curve.energy).round(4).tolist(),
     }
 
 
-def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
-    """Return the edge response (3, n) of a cumulative profile, averaged over the pixels in each bin.
+def binned_edge_response(cumulative_profile: CumulativeProfile, burley_width_mm: Floats) -> Floats:
+    """Return the predicted edge response (3, n) of a profile, averaged over the pixel columns of each bin.
 
-    d_mm : (3,) Burley widths of the channels, which set the width of the bins [mm]
+    cumulative_profile : cumulative form of the profile
+    burley_width_mm : (3,) Burley widths of the channels, to which the width of a bin is proportional [mm]
     """
-    columns = [curve.edge_response(column_positions() * d_mm[c])[:, c] for c in range(3)]
+    columns = [
+        cumulative_profile.edge_response(column_edge_distances() * burley_width_mm[c])[:, c] for c in range(3)
+    ]
     return np.asarray(np.array(columns).reshape(3, EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=-1))
 
 
-def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
-    """Yield differences in outline and colour between pictures of a bald head by Cycles and by dermis."""
+def measure_heads(python_by_version: dict[str, Path]) -> Iterator[JsonObject]:
+    """Yield differences in outline and colour between pictures of a bald head by Cycles and dermis.
+
+    There is one result for each Blender version and subsurface method.
+    """
     subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
     assert subject.scene is not None
     head = replace(subject.scene.head, hair=None, strands=None)
     bald = replace(subject, scene=replace(subject.scene, head=head))
     ours = render_dermis(bald, HEAD_SIDE)
-    for version, python in pythons.items():
+    for version, python in python_by_version.items():
         for method in METHODS_BY_VERSION[version]:
             pictures = render_cycles(bald, method, version, python, HEAD_SIDE, HEAD_SAMPLES, HEAD_SEEDS)
             results = {"version": version, "method": method, "samples": HEAD_SEEDS * HEAD_SAMPLES}
@@ -156,13 +172,13 @@ def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
             yield results
 
 
-def write_picture(pythons: dict[str, Path]) -> None:
-    """Write a picture that shows a head with hair by dermis and by each version of Cycles."""
+def write_hair_picture(python_by_version: dict[str, Path]) -> None:
+    """Write a picture that shows a head with hair, rendered by dermis and by each version of Cycles."""
     subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
     columns = [render_dermis(subject, PICTURE_SIDE)]
-    for version, python in pythons.items():
+    for version, python in python_by_version.items():
         method = METHODS_BY_VERSION[version][0]
         columns += render_cycles(subject, method, version, python, PICTURE_SIDE, PICTURE_SAMPLES, 1)
-    over_grey = [one[..., :3] + 0.4 * (1.0 - one[..., 3:]) for one in columns]
-    levels = encode_srgb(np.clip(np.concatenate(over_grey, axis=1), 0.0, 1.0))
-    Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=88)
+    composite_over_grey = [one[..., :3] + 0.4 * (1.0 - one[..., 3:]) for one in columns]
+    levels = encode_srgb(np.clip(np.concatenate(composite_over_grey, axis=1), 0.0, 1.0))
+    Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE_FILE, quality=88)

@@ -33,7 +33,7 @@ def main(folder: Path) -> None:
     skin.check_version()
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.preferences.addon_enable(module="cycles")
-    material = skin.make_skin()
+    material = skin.make_skin_material()
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Specular IOR Level"].default_value = 0.0  # light below the surface only
     add_rectangle(skin, material, -PLANE_HALF_SIDE_M, PLANE_HALF_SIDE_M, 0.0)
@@ -49,7 +49,7 @@ def main(folder: Path) -> None:
     camera_object.matrix_world = Matrix.Translation((0.0, 0.0, 0.1))
     scene = bpy.context.scene
     scene.camera = camera_object
-    skin.set_render(scene)
+    skin.set_render_settings(scene)
     passes = json.loads((folder / "passes.json").read_text(encoding="utf-8"))
     columns = []
     for k, one in enumerate(passes):
@@ -59,20 +59,22 @@ def main(folder: Path) -> None:
     (folder / "done.json").write_text(json.dumps(report), encoding="utf-8")
 
 
-def isolate_channel(shader: Any, description: dict[str, Any], channel: int) -> None:
-    """Give all channels the colour and radius of one channel, so that all paths help to measure this channel.
+def isolate_channel(shader: Any, subsurface_parameters: dict[str, Any], channel: int) -> None:
+    """Give all three channels the albedo and subsurface radius of one channel.
 
-    description : subsurface parameters of the exported skin, with values for all channels
+    Each path then contributes to the measurement of this channel.
+
+    subsurface_parameters : subsurface parameters of the exported skin, with values for all channels
     """
-    shader.inputs["Base Color"].default_value = (*[description["colour"][channel]] * 3, 1.0)
-    radius = description["inputs"]["Subsurface Radius"][channel]
+    shader.inputs["Base Color"].default_value = (*[subsurface_parameters["colour"][channel]] * 3, 1.0)
+    radius = subsurface_parameters["inputs"]["Subsurface Radius"][channel]
     shader.inputs["Subsurface Radius"].default_value = [radius] * 3
 
 
-def add_rectangle(skin: Any, material: Any, left_m: float, right_m: float, height_m: float) -> Any:
+def add_rectangle(skin_script: Any, material: Any, left_m: float, right_m: float, height_m: float) -> Any:
     """Add a horizontal rectangle between two x coordinates, at a height; return its object.
 
-    skin : exported script, imported as a module
+    skin_script : exported script, imported as a module
     """
     mesh = bpy.data.meshes.new("rectangle")
     corners = [
@@ -83,7 +85,7 @@ def add_rectangle(skin: Any, material: Any, left_m: float, right_m: float, heigh
     ]
     mesh.from_pydata([(x, y, height_m) for x, y in corners], [], [(0, 1, 2, 3)])
     mesh.materials.append(material)
-    return skin.add_object("rectangle", mesh)
+    return skin_script.add_object("rectangle", mesh)
 
 
 def black_material() -> Any:
@@ -97,18 +99,18 @@ def black_material() -> Any:
 
 
 def column_radiance(
-    skin: Any, camera: Any, path: Path, width_m: float, picture_size: Any, **parameters: int
+    skin_script: Any, camera: Any, path: Path, width_m: float, picture_size: Any, **parameters: int
 ) -> Any:
     """Render a picture across the edge of the light, and return the mean radiance of each pixel column.
 
-    skin : exported script, imported as a module
+    skin_script : exported script, imported as a module
     width_m : width of the picture [m]
     """
     camera.ortho_scale = width_m
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = picture_size
     arguments = [word for name, value in parameters.items() for word in (f"--{name}", str(value))]
-    skin.finish(skin.parse_options(["--", "--render", str(path), *arguments]))
+    skin_script.finish(skin_script.parse_options(["--", "--render", str(path), *arguments]))
     picture = bpy.data.images.load(str(path))
     pixels = np.empty(picture_size[0] * picture_size[1] * 4, np.float32)
     picture.pixels.foreach_get(pixels)

@@ -1,4 +1,4 @@
-"""Pictures of one exported head, with the same camera and lights, by dermis, Cycles, Babylon.js and Mitsuba.
+"""Pictures of one exported head, rendered by dermis, Cycles, Babylon.js and Mitsuba with the same lights.
 
 Hair is omitted, because each program draws it differently. Lights are directional, as on the page that is
 exported for Babylon.js.
@@ -23,7 +23,7 @@ from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.truths.metrics import relative_rmse
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
-from dermis.apps.validation.engines.babylon import LIBRARY_VARIABLE, babylon_library
+from dermis.apps.validation.engines.babylon import LIBRARY_FOLDER_VARIABLE, babylon_library
 from dermis.apps.validation.pages import (
     DOCS,
     RESULTS,
@@ -39,7 +39,7 @@ from dermis.images.io import read_image
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.settings import Settings
 
-RESULTS_FILE, PICTURE = RESULTS / "engines_heads.json", DOCS / "images" / "engines_heads.webp"
+RESULTS_FILE, PICTURE_FILE = RESULTS / "engines_heads.json", DOCS / "images" / "engines_heads.webp"
 EXPORTED_MAP_SIDE, HEAD_PICTURE_SIDE = 1024, 256
 CYCLES_SAMPLES, MITSUBA_SAMPLES, SEED_COUNT = 64, 256, 2
 HEAD_LIGHTS = (
@@ -59,7 +59,7 @@ def heads() -> None:
     programs are found by environment variables: DERMIS_BLENDER_PYTHONS names Python programs that have bpy
     4.5 and 5.2, separated by a comma; DERMIS_BABYLON names a folder into which npm installed babylonjs.
     """
-    require_in_checkout(PICTURE.parent)
+    require_in_checkout(PICTURE_FILE.parent)
     subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
     assert subject.head is not None and subject.scene is not None
     hairless = replace(subject.head, hair=None, strands=None)
@@ -73,8 +73,10 @@ def heads() -> None:
         columns.append(pictures.mean(axis=0))
         rows.append(result)
         write_results(RESULTS_FILE, {"heads": rows}, 4)
-    levels = encode_srgb(np.clip(np.concatenate([over_grey(one) for one in columns], axis=1), 0.0, 1.0))
-    Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=90)
+    levels = encode_srgb(
+        np.clip(np.concatenate([composite_over_grey(one) for one in columns], axis=1), 0.0, 1.0)
+    )
+    Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE_FILE, quality=90)
 
 
 def available_renderers(subject: Subject, dermis_picture: Floats) -> dict[str, Callable[[], list[Floats]]]:
@@ -82,7 +84,7 @@ def available_renderers(subject: Subject, dermis_picture: Floats) -> dict[str, C
 
     The functions return linear pictures (h, w, 4), one per random seed.
 
-    dermis_picture : (h, w, 4) picture by dermis; its alpha is used for programs that render none
+    dermis_picture : (h, w, 4) picture rendered by dermis; its alpha is used for programs that render none
     """
     result: dict[str, Callable[[], list[Floats]]] = {}
     named = [one for one in os.environ.get("DERMIS_BLENDER_PYTHONS", "").split(",") if one]
@@ -90,21 +92,21 @@ def available_renderers(subject: Subject, dermis_picture: Floats) -> dict[str, C
         result[f"Cycles {version}"] = lambda version=version, python=python: render_cycles(  # type: ignore[misc]
             subject, "random-walk-skin", version, Path(python), HEAD_PICTURE_SIDE, CYCLES_SAMPLES, SEED_COUNT
         )
-    if os.environ.get(LIBRARY_VARIABLE):
+    if os.environ.get(LIBRARY_FOLDER_VARIABLE):
         library = babylon_library()
         result["Babylon.js 9.28"] = lambda: [render_babylon(subject, library, dermis_picture)] * 2
     result["Mitsuba 3"] = lambda: render_mitsuba(subject, dermis_picture)
     return result
 
 
-def render_babylon(subject: Subject, library: Path, dermis_picture: Floats) -> Floats:
-    """Return the canvas of the exported page in Chromium as linear light (h, w, 4).
+def render_babylon(subject: Subject, library_folder: Path, dermis_picture: Floats) -> Floats:
+    """Return the linear picture (h, w, 4) that Babylon.js renders in the exported page, in Chromium.
 
-    dermis_picture : (h, w, 4) picture by dermis, whose alpha is used
+    dermis_picture : (h, w, 4) picture rendered by dermis; its alpha is used
     """
     with TemporaryDirectory() as folder_name, chromium_page(HEAD_PICTURE_SIDE) as page:
         file = Path(folder_name) / "head.html"
-        export_skin(subject, "babylon", file, library=library)
+        export_skin(subject, "babylon", file, library=library_folder)
         page.goto(file.as_uri())
         page.wait_for_selector("html[data-state]", state="attached", timeout=240_000)
         page.evaluate("document.querySelectorAll('body > :not(canvas)').forEach((one) => one.remove())")
@@ -114,9 +116,9 @@ def render_babylon(subject: Subject, library: Path, dermis_picture: Floats) -> F
 
 
 def render_mitsuba(subject: Subject, dermis_picture: Floats) -> list[Floats]:
-    """Return linear pictures (h, w, 4) of the exported scene by Mitsuba, one per random seed.
+    """Return linear pictures (h, w, 4) of the exported scene rendered by Mitsuba, one per random seed.
 
-    dermis_picture : (h, w, 4) picture by dermis, whose alpha is used
+    dermis_picture : (h, w, 4) picture rendered by dermis; its alpha is used
     """
     mi = load_mitsuba()
     with TemporaryDirectory() as folder_name, mitsuba_variant(mi, "scalar_rgb"):
@@ -132,13 +134,13 @@ def render_mitsuba(subject: Subject, dermis_picture: Floats) -> list[Floats]:
     return [np.dstack([one, dermis_picture[..., 3]]).astype(np.float64) for one in frames]
 
 
-def over_grey(picture: Floats) -> Floats:
+def composite_over_grey(picture: Floats) -> Floats:
     """Return a picture (h, w, 4) composited over a grey background, (h, w, 3)."""
     return np.asarray(picture[..., :3] * (picture[..., 3:] > 0) + 0.05 * (1.0 - picture[..., 3:]))
 
 
 def render_dermis(subject: Subject, picture_side: int) -> Floats:
-    """Return the linear picture (h, w, 4) of the subject by dermis."""
+    """Return the linear picture (h, w, 4) of the subject rendered by dermis."""
     assert subject.scene is not None
     settings = Settings(size=(picture_side, picture_side), atlas=EXPORTED_MAP_SIDE, samples=16)
     return np.asarray(Renderer().draw(subject.scene, settings).linear_rgba(), np.float64)
@@ -147,20 +149,20 @@ def render_dermis(subject: Subject, picture_side: int) -> Floats:
 def render_cycles(
     subject: Subject,
     subsurface_method: str,
-    version: str,
-    python: Path,
+    blender_version: str,
+    python_program: Path,
     picture_side: int,
     samples: int,
     seed_count: int,
 ) -> list[Floats]:
-    """Return linear pictures (h, w, 4) of the exported scene by Cycles, one per random seed.
+    """Return linear pictures (h, w, 4) of the exported scene rendered by Cycles, one per random seed.
 
     subsurface_method : name of a variant of the export target "blender"
-    python : Python program that has Blender's module bpy
+    python_program : Python program that has Blender's module bpy
     """
     with TemporaryDirectory() as folder_name:
         folder = Path(folder_name) / "head"
-        export_skin(subject, "blender", folder, version=version, variant=subsurface_method)
+        export_skin(subject, "blender", folder, version=blender_version, variant=subsurface_method)
         script = folder / "skin.py"
         text = script.read_text(encoding="utf-8")
         script.write_text(
@@ -171,19 +173,19 @@ def render_cycles(
         for seed in range(seed_count):
             picture = folder / f"{seed}.exr"
             options = ["--render", str(picture), "--samples", str(samples), "--seed", str(seed)]
-            command = [str(python), "-I", str(script), "--", *options]
+            command = [str(python_program), "-I", str(script), "--", *options]
             subprocess.run(command, check=True, capture_output=True)
             result.append(read_image(picture).astype(np.float64))
     return result
 
 
-def compare_pictures(dermis_picture: Floats, other_picture: Floats) -> JsonObject:
-    """Compare pictures by another program with that by dermis; return differences in outline and colour.
+def compare_pictures(dermis_picture: Floats, other_pictures: Floats) -> JsonObject:
+    """Return the differences in outline and colour between pictures by dermis and by another program.
 
-    dermis_picture : (h, w, 4) picture by dermis
-    other_picture : (seeds, h, w, 4) pictures of the other program with different random seeds
+    dermis_picture : (h, w, 4) picture rendered by dermis
+    other_pictures : (n, h, w, 4) pictures rendered by the other program with n different random seeds
     """
-    mean, variance = other_picture.mean(axis=0), other_picture.var(axis=0, ddof=1) / len(other_picture)
+    mean, variance = other_pictures.mean(axis=0), other_pictures.var(axis=0, ddof=1) / len(other_pictures)
     a, b = dermis_picture[..., 3] > 0.5, mean[..., 3] > 0.5
     outline_distance = max(distance_transform_edt(~b)[a].max(), distance_transform_edt(~a)[b].max())
     covered = (dermis_picture[..., 3] > 0.999) & (mean[..., 3] > 0.999)

@@ -44,24 +44,29 @@ _BLACK_ALBEDO = 1e-9
 
 
 def half_lit_plane(
-    mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, *, is_black: bool = False
+    mi: Mitsuba,
+    medium: IsotropicMedium,
+    boundary: Boundary,
+    burley_width_mm: float,
+    *,
+    is_black: bool = False,
 ) -> MitsubaObject:
     """Return a scene of the plane z = 0, lit where x > 0, in an orthographic view around the edge.
 
     The camera looks down on a rough surface. If the surface is smooth or absent, the camera is in the medium
     just below the plane; light along the normal crosses such a surface undeflected.
 
-    d_mm : Burley width d of the profile; the view spans 3 d on each side of the edge [mm]
+    burley_width_mm : Burley width d of the profile; the view spans 3 d on each side of the edge [mm]
     is_black : whether the medium absorbs all light, so that only the surface reflects
     """
     transform = mi.ScalarTransform4f
-    size, height = _PLANE_HALF_SIDE_D * d_mm, _LAMP_HEIGHT_D * d_mm
+    size, height = _PLANE_HALF_SIDE_D * burley_width_mm, _LAMP_HEIGHT_D * burley_width_mm
     albedo = (_BLACK_ALBEDO,) * 3 if is_black else medium.albedo
     inside = mi.load_dict(medium_description(IsotropicMedium(medium.sigma_t, albedo)))
     camera_below = boundary != "rough"
     eye = -1e-3 * height if camera_below else 0.5 * height
     lamp_to_world = transform().translate([size, 0.0, height]).rotate([1, 0, 0], 180).scale([size, size, 1.0])
-    scale = [_VIEW_HALF_WIDTH_D * d_mm, _VIEW_HALF_WIDTH_D * d_mm, 1.0]
+    scale = [_VIEW_HALF_WIDTH_D * burley_width_mm, _VIEW_HALF_WIDTH_D * burley_width_mm, 1.0]
     camera_to_world = transform().look_at([0, 0, eye], [0, 0, -1], [0, 1, 0]).scale(scale)
     film = {"type": "hdrfilm", "width": _PIXEL_COUNT, "height": 1, "pixel_format": "rgb"}
     sensor = {
@@ -86,22 +91,22 @@ def half_lit_plane(
     )
 
 
-def measured_edge(
-    mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, samples: int
+def measured_edge_response(
+    mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, burley_width_mm: float, samples: int
 ) -> tuple[Floats, Floats, float]:
     """Measure the light scattered across the edge of a half-lit plane in Mitsuba.
 
     Returns the edge response (n,) averaged over each pixel, its standard errors (n,), and the radiance in the
     lit area far from the edge.
 
-    d_mm : Burley width of the profile [mm]
+    burley_width_mm : Burley width of the profile [mm]
     samples : paths per pixel
     """
-    plane = half_lit_plane(mi, medium, boundary, d_mm)
+    plane = half_lit_plane(mi, medium, boundary, burley_width_mm)
     passes = [mi.render(plane, spp=samples // _PASS_COUNT, seed=k) for k in range(_PASS_COUNT)]
     images = np.array([np.array(image)[0].mean(axis=1) for image in passes])
     if boundary == "rough":  # subtract what the surface reflects
-        black_scene = half_lit_plane(mi, medium, boundary, d_mm, is_black=True)
+        black_scene = half_lit_plane(mi, medium, boundary, burley_width_mm, is_black=True)
         lit = np.array(mi.render(black_scene, spp=samples, seed=99))[0].mean(axis=1)
         images -= np.where(np.arange(_PIXEL_COUNT) >= _PIXEL_COUNT // 2, lit[_PIXEL_COUNT // 2 :].mean(), 0.0)
     # At every distance, the two sides of the edge add up to the same total.
@@ -111,38 +116,45 @@ def measured_edge(
     return response.mean(axis=0), response.std(axis=0, ddof=1) / np.sqrt(_PASS_COUNT), total
 
 
-def pixel_averages(curve: CumulativeProfile, channel: int, d_mm: float) -> Floats:
-    """Return the edge response of a cumulative profile, averaged over each pixel of the view.
+def pixel_edge_response(
+    cumulative_profile: CumulativeProfile, channel: int, burley_width_mm: float
+) -> Floats:
+    """Return the predicted edge response (n,) of one channel of a profile, averaged over each pixel.
 
+    cumulative_profile : cumulative form of the profile
     channel : index of the channel
-    d_mm : Burley width of the profile, which sets the size of the view [mm]
+    burley_width_mm : Burley width of the profile, which sets the size of the view [mm]
     """
-    edges = np.linspace(-_VIEW_HALF_WIDTH_D, _VIEW_HALF_WIDTH_D, _PIXEL_COUNT + 1) * d_mm
+    edges = np.linspace(-_VIEW_HALF_WIDTH_D, _VIEW_HALF_WIDTH_D, _PIXEL_COUNT + 1) * burley_width_mm
     centres = (
         edges[:-1, None]
         + np.diff(edges)[:, None] * (np.arange(_SAMPLES_PER_PIXEL_AVERAGE) + 0.5) / _SAMPLES_PER_PIXEL_AVERAGE
     )
-    return np.asarray(curve.edge_response(centres)[..., channel].mean(axis=1))
+    return np.asarray(cumulative_profile.edge_response(centres)[..., channel].mean(axis=1))
 
 
 def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int) -> JsonObject:
-    """Return measured edge responses of a skin under a surface model, and their errors, by channel.
+    """Return the measured edge responses of a skin with a model of its surface, and their errors, by channel.
+
+    An edge response is the radiance of a half-lit plane by distance from the edge of the light.
 
     samples : paths per pixel
     """
     target = TARGET.with_variant(boundary)
     version = target.resolve_version(None)
     rows = target.parameters(subject, version)
-    predicted, d = target.predicted_curve(rows, subject, version), fit_burley_width(subject.curve)
+    predicted, d = target.predicted_profile(rows, subject, version), fit_burley_width(subject.curve)
     keys = "predicted", "exported", "noise", "rms", "energy", "edge"
     results: dict[str, list[Any]] = {key: [] for key in keys}
     for c in range(3):
         sigma, albedo = (get_numbers(rows, name)[c] for name in ("sigma_t", "albedo"))
         medium = IsotropicMedium((sigma,) * 3, (albedo,) * 3)
-        edge, error, total = measured_edge(mi, medium, boundary, float(d[c]), samples)
-        difference = edge - pixel_averages(predicted, c, float(d[c]))
+        edge, error, total = measured_edge_response(mi, medium, boundary, float(d[c]), samples)
+        difference = edge - pixel_edge_response(predicted, c, float(d[c]))
         results["predicted"].append(float(np.abs(difference).max()))
-        results["exported"].append(float(np.abs(edge - pixel_averages(subject.curve, c, float(d[c]))).max()))
+        results["exported"].append(
+            float(np.abs(edge - pixel_edge_response(subject.curve, c, float(d[c]))).max())
+        )
         results["noise"].append(float(error.mean()))
         results["rms"].append(float(np.sqrt((difference**2).mean())))
         # Radiance inside the medium is larger by the square of the index.

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.apps.export.fitting import curve_error
+from dermis.apps.export.fitting import profile_error
 from dermis.apps.export.run import evaluate_export, export_skin
 from dermis.apps.export.subject import load_subject
 from dermis.apps.export.target import get_numbers
@@ -26,7 +26,7 @@ _MISSING_PLUGIN_ERROR = "MissingShaderIdInRegistry"  # reported for a plug-in th
 
 
 def skin_errors() -> JsonObject:
-    """Return the radii of each skin as exported to OpenPBR and pbrt, and the predicted scattering errors.
+    """Return the scattering radii that each skin has in OpenPBR and pbrt, and predicted scattering errors.
 
     Errors are given for fitted parameters, for parameters chosen without a fit, and for fitted radii that a
     program interprets as widths of a Burley profile.
@@ -36,7 +36,9 @@ def skin_errors() -> JsonObject:
         subject = load_subject(name)
         walk = evaluate_export(subject, openpbr_target.TARGET, "1.1.1")
         pbrt = evaluate_export(subject, pbrt_target.TARGET, "4")
-        as_profile = curve_error(subject.curve, materialx_profile(fitted_mean_free_path_mm(subject), subject))
+        as_profile = profile_error(
+            subject.curve, materialx_profile(fitted_mean_free_path_mm(subject), subject)
+        )
         results[name] = {
             "model": subject.model,
             "d_mm": float_list(walk.d_mm),
@@ -55,7 +57,7 @@ def skin_errors() -> JsonObject:
     return results
 
 
-def validate_files() -> JsonObject:
+def validate_exported_files() -> JsonObject:
     """Validate exported MaterialX and USD files; return the errors found and the libraries' versions."""
     MaterialX = import_extra("MaterialX", "checking its files")
     import_extra("pxr", "checking USD")
@@ -108,5 +110,5 @@ def openpbr() -> None:
     The errors are also printed. Needs the packages usd-core and MaterialX; no renderer of these formats is
     run.
     """
-    write_results(RESULTS_FILE, {"libraries": validate_files(), "skins": skin_errors()}, 4)
+    write_results(RESULTS_FILE, {"libraries": validate_exported_files(), "skins": skin_errors()}, 4)
     print_lines(*error_table(read_results(RESULTS_FILE)["skins"]))

@@ -48,7 +48,7 @@ def page() -> None:
 def fill_tables(page_text: str) -> str:
     """Return the text of the page with new tables between its markers, such as <!-- mitsuba -->."""
     for name, table in {
-        "predicted": predicted_table,
+        "predicted": predicted_errors_table,
         "mitsuba": mitsuba_table,
         "babylon": babylon_table,
         "heads": heads_table,
@@ -58,8 +58,11 @@ def fill_tables(page_text: str) -> str:
     return page_text
 
 
-def predicted_table() -> str:
-    """Return a Markdown table of predicted errors, by variant of the newest version of each export target."""
+def predicted_errors_table() -> str:
+    """Return a Markdown table with predicted errors of each export target and its variants.
+
+    The errors are those of exports to the target's newest version.
+    """
     lines = []
     subjects = [load_subject(name) for name in COMPARED_SKINS]
     for name in sorted(set(TARGETS) - set(_EXCLUDED_TARGETS), key=str.lower):
@@ -107,7 +110,7 @@ def babylon_table() -> str:
 
 
 def heads_table() -> str:
-    """Return a Markdown table that compares other programs' pictures of a head with the picture by dermis."""
+    """Return a Markdown table that compares pictures of a head by other programs with that by dermis."""
     titles = "program", "outline [px]", "lit skin relative to dermis", "relative RMSE", "pixels"
     return markdown_table(titles, map(_head_row, read_results(RESULTS / "engines_heads.json")["heads"]))
 
@@ -129,8 +132,8 @@ def blender_tables() -> str:
     return "\n".join([_BLENDER_EDGE_HEADER, *edges, "", _BLENDER_HEAD_HEADER, *heads]) + "\n"
 
 
-def _blender_edges_table(edges: list[JsonObject]) -> list[str]:
-    by_key = {(row["version"][:3], row["method"], row["skin"]): row for row in edges}
+def _blender_edges_table(edge_results: list[JsonObject]) -> list[str]:
+    by_key = {(row["version"][:3], row["method"], row["skin"]): row for row in edge_results}
     lines = []
     for (version, method, skin), new in by_key.items():
         if version != "5.2":
@@ -142,9 +145,9 @@ def _blender_edges_table(edges: list[JsonObject]) -> list[str]:
     return lines
 
 
-def _blender_heads_table(heads: list[JsonObject]) -> list[str]:
+def _blender_heads_table(head_results: list[JsonObject]) -> list[str]:
     return [
         f"| {row['version']} | {row['method']} | {row['outline_px']:.1f} | {rgb_cell(row['lit_colour'])} |"
         f" {row['relative_rmse']:.3f} | {row['without_highlights']:.3f} |"
-        for row in heads
+        for row in head_results
     ]

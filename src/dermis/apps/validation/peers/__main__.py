@@ -1,4 +1,4 @@
-"""Command that renders one head by dermis, Cycles and Mitsuba on one CPU and reports times and errors.
+"""Command that renders one head with dermis, Cycles and Mitsuba on one CPU and reports times and errors.
 
 The command takes about twelve minutes on two idle cores, or one to two minutes with --quick. It needs the
 sample data and Mitsuba. Cycles needs a Python program that has the module bpy; the environment variable

@@ -1,4 +1,4 @@
-"""Noise and errors of dermis, Cycles and Mitsuba, and the time in which Cycles reaches dermis's error."""
+"""Noise and errors of dermis, Cycles and Mitsuba, and the time that Cycles needs for equal errors."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class RendererRow:
     setting : technique of dermis, or paths per pixel of a path tracer
     seconds : elapsed time of one image [s]; None if the image is an average of other images
     core_seconds : CPU time of one image [s]; None if the image is an average of other images
-    noise : relative RMSE of the image's own noise [-]
+    noise : relative RMS of the noise in the image [-]
     relrmse : relative RMSE against the reference [-]; None for the reference itself
     relrmse_se : standard error of `relrmse`
     energy_ratio : ratio of the total light to that of the reference [-]; None for the reference itself
@@ -49,33 +49,35 @@ class RendererRow:
 
 @dataclass(frozen=True)
 class MeanImage:
-    """Mean image (h, w, 3) of all passes of a Cycles method, and the variance (h, w, 3) of its noise."""
+    """Mean (h, w, 3) of all images rendered by a Cycles method, and the variance (h, w, 3) of its noise."""
 
     image: Floats
     variance: Floats
 
 
-def scene_results(renders: PeerRenders) -> JsonObject:
+def scene_results(peer_renders: PeerRenders) -> JsonObject:
     """Return the times and errors of all renderers in one scene as a JSON object."""
-    mask = common_mask(renders)
-    means = {method: mean_of_passes(turns) for method, turns in renders.cycles.items()}
-    ours = [_dermis_row(renders, name, mask) for name in DERMIS_VARIANTS]
-    gpu_gems_3 = [_dermis_row(renders, name, mask) for name in GPU_GEMS_3_VARIANTS]
-    rows = [*ours, *gpu_gems_3, _mitsuba_row(renders, mask)]
+    mask = skin_only_mask(peer_renders)
+    means = {method: mean_of_passes(turns) for method, turns in peer_renders.cycles.items()}
+    ours = [_dermis_row(peer_renders, name, mask) for name in DERMIS_VARIANTS]
+    gpu_gems_3 = [_dermis_row(peer_renders, name, mask) for name in GPU_GEMS_3_VARIANTS]
+    rows = [*ours, *gpu_gems_3, _mitsuba_row(peer_renders, mask)]
     for method, mean in means.items():
-        rows += _cycles_rows(renders, method, mean, mask)
+        rows += _cycles_rows(peer_renders, method, mean, mask)
     scene: JsonObject = {
-        "light": renders.light,
-        "region": renders.region,
+        "light": peer_renders.light,
+        "region": peer_renders.region,
         "pixels": int(mask.sum()),
         "rows": [asdict(row) for row in rows],
-        "left_out": renders.left_out,
-        "ours_energy_put_right": {name: _corrected_error(renders, name, mask) for name in DERMIS_VARIANTS},
+        "left_out": peer_renders.left_out,
+        "ours_energy_put_right": {
+            name: _energy_corrected_error(peer_renders, name, mask) for name in DERMIS_VARIANTS
+        },
         "published": {row.setting: _time_ratios(row, ours[0]) for row in gpu_gems_3},
     }
     if "random-walk" in means:
         mean = means["random-walk"]
-        scene["as_near"] = {row.setting: _equal_error_costs(renders, mean, row, mask) for row in ours}
+        scene["as_near"] = {row.setting: _equal_error_costs(peer_renders, mean, row, mask) for row in ours}
     if len(means) == len(CYCLES_NAMES):
         random_walk, burley = means["random-walk"], means["burley"]
         scene["burley_against_random_walk"] = relative_rmse(
@@ -84,21 +86,21 @@ def scene_results(renders: PeerRenders) -> JsonObject:
     return scene
 
 
-def common_mask(renders: PeerRenders) -> Mask:
+def skin_only_mask(peer_renders: PeerRenders) -> Mask:
     """Return the mask (h, w) of pixels that show only skin in the pictures of all renderers."""
-    mask = renders.reference.mask > 0.999
-    for turns in renders.cycles.values():
+    mask = peer_renders.reference.mask > 0.999
+    for turns in peer_renders.cycles.values():
         for one in turns[0]:
             mask = mask & (one.coverage > 0.999)
     return mask
 
 
 def mean_of_passes(passes_by_turn: Sequence[Sequence[CyclesPass]]) -> MeanImage:
-    """Return the mean image of all passes of a Cycles method, and the variance of its noise.
+    """Return the mean of all images rendered by a Cycles method, and the variance of its noise.
 
-    The variance follows from the differences between two passes with equal numbers of paths.
+    The variance is estimated from the differences between images with equal numbers of paths.
 
-    passes_by_turn : two lists of passes; corresponding passes differ only in their random seeds
+    passes_by_turn : two lists of images; images at the same index differ only in their random seeds
     """
     levels = [level[0].samples for level in zip(*passes_by_turn, strict=True)]
     image, variance = np.zeros(passes_by_turn[0][0].image.shape), np.zeros(passes_by_turn[0][0].image.shape)
@@ -112,14 +114,15 @@ def mean_of_passes(passes_by_turn: Sequence[Sequence[CyclesPass]]) -> MeanImage:
 
 
 def pass_noise(
-    first_pass: NDArray[np.floating], second_pass: NDArray[np.floating], mean: MeanImage, mask: Mask
+    first_pass: NDArray[np.floating], second_pass: NDArray[np.floating], mean_image: MeanImage, mask: Mask
 ) -> float:
-    """Return the relative RMSE of the noise of a pass, estimated from a pass with another seed [-].
+    """Return the relative RMS noise of a pair of images that differ only in their random seeds [-].
 
-    mean : mean of all passes
+    first_pass, second_pass : (h, w, 3) images
+    mean_image : mean of all images; the noise is relative to its RMS
     """
     difference = np.subtract(first_pass, second_pass, dtype=np.float64)[mask]
-    return float(np.sqrt(0.5 * (difference**2).sum() / _signal_energy(mean, mask)))
+    return float(np.sqrt(0.5 * (difference**2).sum() / _signal_energy(mean_image, mask)))
 
 
 def samples_for_noise(
@@ -137,17 +140,17 @@ def samples_for_noise(
     return float(samples[nearest] * (noise_by_samples[nearest] / target_noise) ** 2)
 
 
-def _signal_energy(mean: MeanImage, mask: Mask) -> float:
+def _signal_energy(mean_image: MeanImage, mask: Mask) -> float:
     """Return the sum of squares of a picture within a mask, minus the part that is due to noise."""
-    return float((mean.image**2 - mean.variance)[mask].sum())
+    return float((mean_image.image**2 - mean_image.variance)[mask].sum())
 
 
-def _reference_mean(reference: PathTraced) -> MeanImage:
+def _reference_mean_image(reference: PathTraced) -> MeanImage:
     return MeanImage(reference.image.astype(np.float64), reference.variance.astype(np.float64))
 
 
-def _dermis_row(renders: PeerRenders, variant_name: str, mask: Mask) -> RendererRow:
-    frames, reference = renders.ours[variant_name], renders.reference
+def _dermis_row(peer_renders: PeerRenders, variant_name: str, mask: Mask) -> RendererRow:
+    frames, reference = peer_renders.ours[variant_name], peer_renders.reference
     error = relative_rmse(frames.image, reference.image, mask, reference.variance)
     energy = energy_ratio(frames.image, reference.image, mask, reference.variance)
     times = statistics.median(frames.seconds), statistics.median(frames.core_seconds)
@@ -165,38 +168,38 @@ def _time_ratios(renderer_row: RendererRow, dermis_row: RendererRow) -> dict[str
     }
 
 
-def _mitsuba_row(renders: PeerRenders, mask: Mask) -> RendererRow:
-    reference = renders.reference
-    energy = _signal_energy(_reference_mean(reference), mask)
+def _mitsuba_row(peer_renders: PeerRenders, mask: Mask) -> RendererRow:
+    reference = peer_renders.reference
+    energy = _signal_energy(_reference_mean_image(reference), mask)
     noise = float(np.sqrt(reference.variance[mask].sum(dtype=np.float64) / energy))
     setting = _samples_text(reference.samples)
-    times = reference.seconds, renders.reference_core_seconds
+    times = reference.seconds, peer_renders.reference_core_seconds
     return RendererRow("Mitsuba, volpathmis", setting, *times, noise, None, None, None, None)
 
 
 def _cycles_rows(
-    renders: PeerRenders, subsurface_method: str, mean: MeanImage, mask: Mask
+    peer_renders: PeerRenders, subsurface_method: str, mean_image: MeanImage, mask: Mask
 ) -> list[RendererRow]:
-    """Return rows of Cycles: one for each number of paths, and one for the mean image.
+    """Return the rows for a Cycles method: one for each number of paths, and one for the mean image.
 
-    The noise of the mean image is subtracted from its errors.
+    The errors of the mean image are corrected for its noise.
     """
-    reference, rows = renders.reference, []
-    for level in zip(*renders.cycles[subsurface_method], strict=True):
+    reference, rows = peer_renders.reference, []
+    for level in zip(*peer_renders.cycles[subsurface_method], strict=True):
         pairs = [(one.image, reference.image, mask, reference.variance) for one in level]
         error = np.mean([relative_rmse(*one) for one in pairs], axis=0).tolist()
         energy = np.mean([energy_ratio(*one) for one in pairs], axis=0).tolist()
         seconds = statistics.mean(one.seconds for one in level)
         core_seconds = statistics.mean(one.core_seconds for one in level)
-        noise = pass_noise(level[0].image, level[1].image, mean, mask)
+        noise = pass_noise(level[0].image, level[1].image, mean_image, mask)
         setting = _samples_text(level[0].samples)
         rows.append(
             RendererRow(
                 CYCLES_NAMES[subsurface_method], setting, seconds, core_seconds, noise, *error, *energy
             )
         )
-    error = relative_rmse(mean.image, reference.image, mask, reference.variance, mean.variance)
-    energy = energy_ratio(mean.image, reference.image, mask, reference.variance)
+    error = relative_rmse(mean_image.image, reference.image, mask, reference.variance, mean_image.variance)
+    energy = energy_ratio(mean_image.image, reference.image, mask, reference.variance)
     return [
         *rows,
         RendererRow(CYCLES_NAMES[subsurface_method], "noise subtracted", None, None, 0.0, *error, *energy),
@@ -204,49 +207,55 @@ def _cycles_rows(
 
 
 def _equal_error_costs(
-    renders: PeerRenders, mean: MeanImage, dermis_row: RendererRow, mask: Mask
+    peer_renders: PeerRenders, mean_image: MeanImage, dermis_row: RendererRow, mask: Mask
 ) -> JsonObject:
-    """Return the times that Cycles' random walk needs to reach two goals.
+    """Return the times in which the random walk of Cycles reaches the error of dermis, and a low noise.
 
-    The goals are "same_error", the error of dermis, and "clean", a noise of `LOW_NOISE_TARGET`. The first is
-    left out if Cycles never reaches it because of bias.
+    The keys of the result are "same_error" and "clean". The first is missing if Cycles never reaches the
+    error of dermis, because of bias.
 
     dermis_row : row of dermis; its error against the reference is the target for Cycles
     """
-    reference, levels = renders.reference, list(zip(*renders.cycles["random-walk"], strict=True))
-    bias = relative_rmse(mean.image, reference.image, mask, reference.variance, mean.variance).value
+    reference, levels = peer_renders.reference, list(zip(*peer_renders.cycles["random-walk"], strict=True))
+    bias = relative_rmse(
+        mean_image.image, reference.image, mask, reference.variance, mean_image.variance
+    ).value
     samples = [level[0].samples for level in levels]
-    noises = [pass_noise(one.image, other.image, mean, mask) for one, other in levels]
+    noises = [pass_noise(one.image, other.image, mean_image, mask) for one, other in levels]
     sample_counts = {"clean": samples_for_noise(LOW_NOISE_TARGET, samples, noises)}
     assert dermis_row.relrmse is not None
     if dermis_row.relrmse > bias:
         # Errors are relative to the reference, noise to the method's own mean.
-        to_mean = np.sqrt(_signal_energy(_reference_mean(reference), mask) / _signal_energy(mean, mask))
+        to_mean = np.sqrt(
+            _signal_energy(_reference_mean_image(reference), mask) / _signal_energy(mean_image, mask)
+        )
         noise = float(to_mean * np.sqrt(dermis_row.relrmse**2 - bias**2))
         sample_counts["same_error"] = samples_for_noise(noise, samples, noises)
     return {goal: _cycles_cost(count, levels[-1], dermis_row) for goal, count in sample_counts.items()}
 
 
 def _cycles_cost(
-    paths_per_pixel: float, passes: Sequence[CyclesPass], dermis_row: RendererRow
+    paths_per_pixel: float, measured_passes: Sequence[CyclesPass], dermis_row: RendererRow
 ) -> dict[str, float]:
-    """Return the time of Cycles for a number of paths per pixel, also relative to a frame of dermis.
+    """Return the time of Cycles for a number of paths per pixel, and its ratio to the time of dermis.
 
-    passes : measured passes, whose mean time per path is used
+    measured_passes : images rendered by Cycles, from which the mean time per path is taken
     """
-    seconds = paths_per_pixel * statistics.mean(one.seconds / one.samples for one in passes)
-    core_seconds = paths_per_pixel * statistics.mean(one.core_seconds / one.samples for one in passes)
+    seconds = paths_per_pixel * statistics.mean(one.seconds / one.samples for one in measured_passes)
+    core_seconds = paths_per_pixel * statistics.mean(
+        one.core_seconds / one.samples for one in measured_passes
+    )
     assert dermis_row.seconds is not None and dermis_row.core_seconds is not None
     ratios = {"ratio": seconds / dermis_row.seconds, "core_ratio": core_seconds / dermis_row.core_seconds}
     return {"samples": paths_per_pixel, "seconds": seconds, **ratios}
 
 
-def _corrected_error(renders: PeerRenders, variant_name: str, mask: Mask) -> float:
-    """Return the relative RMSE of dermis after scaling each channel to the reference's energy [-].
+def _energy_corrected_error(peer_renders: PeerRenders, variant_name: str, mask: Mask) -> float:
+    """Return the relative RMSE of an image by dermis whose channels are scaled to the reference's energy [-].
 
-    variant_name : name of the variant
+    variant_name : name of the variant of dermis
     """
-    reference, image = renders.reference, renders.ours[variant_name].image.astype(np.float64)
+    reference, image = peer_renders.reference, peer_renders.ours[variant_name].image.astype(np.float64)
     scale = reference.image[mask].sum(axis=0, dtype=np.float64) / image[mask].sum(axis=0)
     return relative_rmse(image * scale, reference.image, mask, reference.variance).value
 

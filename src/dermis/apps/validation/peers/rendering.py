@@ -1,4 +1,7 @@
-"""Renderings of a scene by dermis, Cycles and Mitsuba in turn, so that other load slows all of them alike."""
+"""Timed renderings of a scene by dermis, Cycles and Mitsuba.
+
+The programs take turns, so that other load on the machine slows all of them alike.
+"""
 
 from __future__ import annotations
 
@@ -65,7 +68,7 @@ class PeerPlan:
     side : side of the square image [pixel]
     samples : paths per pixel of each pass of Cycles
     paths : paths per pixel of Mitsuba
-    frames : timed frames of each variant of dermis between two renderings by other programs
+    frames : number of frames of each variant of dermis to time between renderings by other programs
     """
 
     side: int = 512
@@ -101,8 +104,8 @@ class PeerRenders:
     light : name of the scene's light
     region : name of the visible region
     ours : dictionary from a name in `DERMIS_VARIANTS` or `GPU_GEMS_3_VARIANTS` to frames of dermis
-    cycles : dictionary from a method of Cycles to a list of passes for each of `FIRST_SEED_BY_TURN`; the list
-        has one pass for each number of paths in `PeerPlan.samples`
+    cycles : dictionary from a method of Cycles to its images: for each of `FIRST_SEED_BY_TURN`, a list with
+        one image for each number of paths in `PeerPlan.samples`
     left_out : dictionary from a missing method of Cycles to the reason why it is missing
     reference : path-traced image by Mitsuba
     reference_core_seconds : CPU time of Mitsuba, including loading of the scene [s]
@@ -120,72 +123,85 @@ class PeerRenders:
 def render_peers(
     head: Head,
     light: str,
-    plan: PeerPlan,
+    comparison_plan: PeerPlan,
     renderer: Renderer,
     on_progress: Callable[[int], None] = lambda step_count: None,
 ) -> PeerRenders:
-    """Render a head under one light by all renderers.
+    """Render a head under one light with all renderers.
 
     Frames of dermis are timed before, between and after the other renderers.
 
     on_progress : function called with the number of steps since its last call
     """
     medium = published_media()["skin1"].with_eta(1.0)
-    settings = Settings(size=(plan.side, plan.side))
+    settings = Settings(size=(comparison_plan.side, comparison_plan.side))
     cycles: dict[str, list[list[CyclesPass]]] = {method: [] for method in CYCLES_METHODS}
     ours: dict[str, FrameTimes] = {}
     left_out: dict[str, str] = {}
 
-    def report_pass(done: int, total: int) -> None:
+    def report_pass(passes_done: int, pass_count: int) -> None:
         on_progress(SAMPLES_PER_PASS * _PROGRESS_STEPS_BY_RENDERER["path-traced"])
 
     scene_context = medium_scene(head, light, default_region(light), medium)
     with TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES), scene_context as (scene, _):
         for seed in FIRST_SEED_BY_TURN:
             for method in CYCLES_METHODS:
-                _time_frames(ours, renderer, scene, plan)
+                _time_frames(ours, renderer, scene, comparison_plan)
                 on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
                 try:
-                    cycles[method].append(_cycles_passes(scene, medium, plan, settings, method, seed))
+                    cycles[method].append(
+                        _cycles_passes(scene, medium, comparison_plan, settings, method, seed)
+                    )
                 except DermisError as fault:
                     left_out[method] = str(fault)
-                on_progress(_PROGRESS_STEPS_BY_RENDERER[method] * sum(plan.samples))
-        _time_frames(ours, renderer, scene, plan)
+                on_progress(_PROGRESS_STEPS_BY_RENDERER[method] * sum(comparison_plan.samples))
+        _time_frames(ours, renderer, scene, comparison_plan)
         on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
         cpu_started = time.process_time()
-        reference = path_trace(scene, medium, plan.paths, settings, use_cache=False, progress=report_pass)
+        reference = path_trace(
+            scene, medium, comparison_plan.paths, settings, use_cache=False, progress=report_pass
+        )
         core_seconds = time.process_time() - cpu_started
-        _time_frames(ours, renderer, scene, plan)
+        _time_frames(ours, renderer, scene, comparison_plan)
         on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
     complete = {method: turns for method, turns in cycles.items() if method not in left_out}
     return PeerRenders(light, default_region(light), ours, complete, left_out, reference, core_seconds)
 
 
 def _cycles_passes(
-    scene: Scene, medium: Medium, plan: PeerPlan, settings: Settings, method: SubsurfaceMethod, seed: int
+    scene: Scene,
+    medium: Medium,
+    comparison_plan: PeerPlan,
+    settings: Settings,
+    subsurface_method: SubsurfaceMethod,
+    first_seed: int,
 ) -> list[CyclesPass]:
-    """Render the passes of Cycles after an untimed pass in which Cycles builds the scene.
+    """Render the scene with Cycles, once for each number of paths in `plan.samples`.
 
-    seed : random seed of the first pass
+    An earlier pass, in which Cycles builds the scene, is not returned.
+
+    first_seed : random seed of the first pass
     """
-    return cycles_passes(scene, medium, (1, *plan.samples), settings, method=method, seed=seed)[1:]
+    return cycles_passes(
+        scene, medium, (1, *comparison_plan.samples), settings, method=subsurface_method, seed=first_seed
+    )[1:]
 
 
 def _time_frames(
-    dermis_frames: dict[str, FrameTimes], renderer: Renderer, scene: Scene, plan: PeerPlan
+    dermis_frames: dict[str, FrameTimes], renderer: Renderer, scene: Scene, comparison_plan: PeerPlan
 ) -> None:
-    """Time further frames of each variant of dermis; each frame recomputes all stages, with warm caches.
+    """Draw and time frames of each variant of dermis; each frame recomputes all stages.
 
-    dermis_frames : dictionary from variant to frames, to which the times are added
+    dermis_frames : dictionary from the name of a variant to an image and times; new times are appended
     """
     for name, variant in (DERMIS_VARIANTS | GPU_GEMS_3_VARIANTS).items():
         values = {"technique": variant.technique, "atlas": variant.atlas}
-        settings = Settings.model_validate(values | {"size": (plan.side, plan.side)})
+        settings = Settings.model_validate(values | {"size": (comparison_plan.side, comparison_plan.side)})
         skin = Skin(**(scene.skin.model_dump() | {"direction": variant.direction}))
         variant_scene = replace(scene, skin=skin)
         drawn = renderer.draw(variant_scene, settings, force=True)
         frames = dermis_frames.setdefault(name, FrameTimes(drawn.linear()))
-        for _ in range(plan.frames):
+        for _ in range(comparison_plan.frames):
             started, cpu_started = time.perf_counter(), time.process_time()
             renderer.draw(variant_scene, settings, force=True)
             frames.seconds.append(time.perf_counter() - started)

@@ -73,11 +73,12 @@ def peers(
     print_lines(machine, "", scenes)
 
 
-def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) -> JsonObject:
+def compare_peers(head: str, lights: list[str], comparison_plan: PeerPlan, adapter: str) -> JsonObject:
     """Render and compare all scenes, and return the report as a JSON object.
 
-    Rows of Cycles are missing if Cycles cannot run. Raises DermisError for unknown lights, and without
-    Mitsuba, which renders the reference.
+    If Cycles cannot run, its rows are missing.
+
+    Raises DermisError for unknown lights, or if Mitsuba, which renders the reference, is not installed.
     """
     for light in lights:
         if light not in SCENES:
@@ -95,9 +96,9 @@ def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) ->
         def report_steps(step_count: int) -> None:
             nonlocal done
             done += step_count
-            bar(done, len(lights) * plan.progress_steps)
+            bar(done, len(lights) * comparison_plan.progress_steps)
 
-        scenes = [render_peers(loaded, light, plan, renderer, report_steps) for light in lights]
+        scenes = [render_peers(loaded, light, comparison_plan, renderer, report_steps) for light in lights]
     return {
         "date": date.today().isoformat(),
         "head": head,
@@ -106,15 +107,15 @@ def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) ->
         "adapter": renderer.device.adapter.name,
         "versions": software_versions(scenes),
         "denoising": False,
-        "plan": asdict(plan),
+        "plan": asdict(comparison_plan),
         "scenes": [scene_results(one) for one in scenes],
     }
 
 
-def software_versions(scenes: list[PeerRenders]) -> dict[str, str]:
+def software_versions(scene_renders: list[PeerRenders]) -> dict[str, str]:
     """Return the versions of Python, NumPy and all renderers, by name."""
     versions = {name: version(name) for name in ("dermis", "wgpu", "mitsuba", "numpy")}
-    passes = [turns[0][0] for one in scenes for turns in one.cycles.values() if turns]
+    passes = [turns[0][0] for one in scene_renders for turns in one.cycles.values() if turns]
     if passes:
         versions["Blender"] = passes[0].version
     return versions | {"Python": platform.python_version()}
@@ -131,16 +132,16 @@ def cpu_model() -> str:
 
 
 def scenes_text(report: JsonObject) -> str:
-    """Return a Markdown section for the scene with each light."""
+    """Return Markdown sections, one for the scene under each light."""
     sections = (f"## {one['light'].capitalize()}\n\n{scene_text(one)}" for one in report["scenes"])
     return "\n\n".join(sections)
 
 
-def scene_text(scene: JsonObject) -> str:
+def scene_text(scene_report: JsonObject) -> str:
     """Return a Markdown table of the renderers in one scene, and sentences about it."""
     head = f"| {' | '.join(_COLUMN_TITLES)} |\n|{'---|' * len(_COLUMN_TITLES)}"
-    table = [head, *(_table_line(row) for row in scene["rows"])]
-    return "\n".join([*table, "", *(f"- {sentence}" for sentence in _scene_sentences(scene))])
+    table = [head, *(_table_line(row) for row in scene_report["rows"])]
+    return "\n".join([*table, "", *(f"- {sentence}" for sentence in _scene_sentences(scene_report))])
 
 
 def machine_text(report: JsonObject) -> str:
@@ -167,50 +168,57 @@ def _estimate_cell(renderer_row: JsonObject, error_name: str) -> str:
     )
 
 
-def _scene_sentences(scene: JsonObject) -> list[str]:
-    sentences = [_random_walk_sentence(setting, times) for setting, times in scene.get("as_near", {}).items()]
-    corrected = "; ".join(f"{name} {error:.3f}" for name, error in scene["ours_energy_put_right"].items())
+def _scene_sentences(scene_report: JsonObject) -> list[str]:
+    sentences = [
+        _random_walk_sentence(setting, times) for setting, times in scene_report.get("as_near", {}).items()
+    ]
+    corrected = "; ".join(
+        f"{name} {error:.3f}" for name, error in scene_report["ours_energy_put_right"].items()
+    )
     sentences.append(f"Ours, each channel scaled to the reference's energy: {corrected}.")
     sentences += [
         f"The {name} take {ratio['ratio']:.2f} times as long as the first of ours, "
         f"{ratio['core_ratio']:.2f} times in CPU time."
-        for name, ratio in scene.get("published", {}).items()
+        for name, ratio in scene_report.get("published", {}).items()
     ]
-    if "burley_against_random_walk" in scene:
-        sentences.append(_burley_sentence(scene))
-    return sentences + [f"Skipped: {name}. {reason}" for name, reason in scene["left_out"].items()]
+    if "burley_against_random_walk" in scene_report:
+        sentences.append(_burley_sentence(scene_report))
+    return sentences + [f"Skipped: {name}. {reason}" for name, reason in scene_report["left_out"].items()]
 
 
-def _random_walk_sentence(setting: str, times: dict[str, dict[str, float]]) -> str:
-    walk, clean = f"{setting}: Cycles' random walk", f"noise of 5 % takes {_cost_text(times['clean'])}"
-    if "same_error" not in times:
+def _random_walk_sentence(dermis_setting: str, cycles_times: dict[str, dict[str, float]]) -> str:
+    walk, clean = (
+        f"{dermis_setting}: Cycles' random walk",
+        f"noise of 5 % takes {_cost_text(cycles_times['clean'])}",
+    )
+    if "same_error" not in cycles_times:
         return f"{walk} never has as small an error, because its bias is larger; {clean}."
-    same = times["same_error"]
+    same = cycles_times["same_error"]
     reached = "reached" if same["ratio"] >= TARGET_TIME_RATIO else "not reached"
     goal = f"goal {TARGET_TIME_RATIO:.0f} {reached}"
     return f"{walk} has the same error after {_cost_text(same)}, {goal}; {clean}."
 
 
-def _cost_text(times: dict[str, float]) -> str:
-    """Return text with the time and paths of Cycles, and with its time relative to a frame of dermis."""
-    elapsed, cpu = (_ratio_text(times[name]) for name in ("ratio", "core_ratio"))
-    cost = f"{times['seconds']:.3g} s ({times['samples']:.0f} paths per pixel)"
+def _cost_text(cycles_times: dict[str, float]) -> str:
+    """Return text with the number of paths and the time of Cycles, and the ratio to the time of dermis."""
+    elapsed, cpu = (_time_ratio_text(cycles_times[name]) for name in ("ratio", "core_ratio"))
+    cost = f"{cycles_times['seconds']:.3g} s ({cycles_times['samples']:.0f} paths per pixel)"
     return f"{cost}: {elapsed} times our frame, {cpu} in CPU time"
 
 
-def _ratio_text(ratio: float) -> str:
+def _time_ratio_text(ratio: float) -> str:
     return f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.1f}"
 
 
-def _burley_sentence(scene: JsonObject) -> str:
+def _burley_sentence(scene_report: JsonObject) -> str:
     """Return a sentence that compares the error of Burley's profile with that of dermis.
 
     The error of Burley's profile is relative to Cycles' random walk, the error of dermis to path tracing.
     """
-    burley_error, error = scene["burley_against_random_walk"]
+    burley_error, error = scene_report["burley_against_random_walk"]
     verdicts = []
-    for row in scene["rows"]:
-        if row["setting"] in scene["ours_energy_put_right"]:
+    for row in scene_report["rows"]:
+        if row["setting"] in scene_report["ours_energy_put_right"]:
             reached = "reached" if row["relrmse"] <= burley_error else "not reached"
             verdicts.append(f"{row['setting']} {row['relrmse']:.4f}, {reached}")
     return (

@@ -1,1 +1,1 @@
-"""Skin of people in a spectral archive: tables for the package, and comparison with drawn people."""
+"""Skin of the people in a spectral archive: statistics, and comparison with randomly drawn people."""

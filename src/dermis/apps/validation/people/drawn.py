@@ -1,4 +1,4 @@
-"""Randomly drawn people compared with the archive: colours of the cheek by group, and medians by site."""
+"""Skin colours of randomly drawn people, compared with those of the people in a spectral archive."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _MIN_OLD_AGE_YEARS = 55.0  # least age of the older people [years]
 
 
 class DrawnPeople(NamedTuple):
-    """Colours of n people of one group at the sites of `HEAD_SITES`.
+    """Skin colours of n randomly drawn people of one group, at each of `HEAD_SITES`.
 
     cielab : (n, 7, 3) colours under D65
     age : (n,) ages [years]
@@ -44,9 +44,9 @@ class DrawnPeople(NamedTuple):
     sex: Doubles
 
 
-def site_variables(look: SkinLook) -> Doubles:
-    """Return the variables (7, 4) of `model_spectra` for a skin look, one row for each of `HEAD_SITES`."""
-    differences = np.vstack([np.zeros(3), look.sites.array()])
+def site_skin_variables(look: SkinLook) -> Doubles:
+    """Return the arguments (7, 4) of `model_spectra` for a skin look, one row for each of `HEAD_SITES`."""
+    differences = np.vstack([np.zeros(3), look.sites.as_array()])
     cheek = np.log2([look.melanin, look.blood])
     oxygen = np.clip(look.oxygen + differences[:, 2], 0.0, 1.0)
     thickness = np.full(len(differences), np.log2(look.epidermis_mm))
@@ -54,21 +54,21 @@ def site_variables(look: SkinLook) -> Doubles:
 
 
 @logged_step("drawing people")
-def draw_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
-    """Return randomly drawn people of a measured group; the spectral model gives their colours."""
+def draw_random_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
+    """Draw random people of a group, and compute their skin colours with the spectral model."""
     drawn = [Human.drawn(seed, skin_ancestry=group) for seed in seeds]
-    variables = np.concatenate([site_variables(one.look) for one in drawn])
+    variables = np.concatenate([site_skin_variables(one.look) for one in drawn])
     colours = model_lab(variables).reshape(len(drawn), len(HEAD_SITES), 3)
     return DrawnPeople(colours, np.array([one.age for one in drawn]), np.array([one.sex for one in drawn]))
 
 
-def draw_all_groups(seed_count: int = _SEED_COUNT) -> dict[str, DrawnPeople]:
-    """Return a dictionary from each group to drawn people; all groups have the same random seeds."""
-    return {group: draw_people(group, range(seed_count)) for group in GROUP_OF_CODE.values()}
+def draw_random_people_by_group(seed_count: int = _SEED_COUNT) -> dict[str, DrawnPeople]:
+    """Return a dictionary from each group to randomly drawn people, with the same seeds for all groups."""
+    return {group: draw_random_people(group, range(seed_count)) for group in GROUP_OF_CODE.values()}
 
 
 def people(seeds: int = _SEED_COUNT) -> None:
-    """Print a comparison of drawn people with the archive.
+    """Print a comparison of randomly drawn people with the people in the archive.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def people(seeds: int = _SEED_COUNT) -> None:
 
 
 def page(seeds: int = _SEED_COUNT) -> None:
-    """Compare drawn people with the archive, and write docs/measured.md.
+    """Compare randomly drawn people with the people in the archive, and write docs/measured.md.
 
     Parameters
     ----------
@@ -90,19 +90,22 @@ def page(seeds: int = _SEED_COUNT) -> None:
     write_measured_page()
 
 
-def _people_tables(seeds: int) -> dict[str, str]:
-    archive, drawn = read_archive(), draw_all_groups(seeds)
+def _people_tables(seed_count: int) -> dict[str, str]:
+    archive, drawn = read_archive(), draw_random_people_by_group(seed_count)
     return {
         "people_cheek": cheek_table(archive, drawn),
         "people_sites": sites_table(archive, drawn),
         "people_sex_age": sex_age_table(archive, drawn),
         "people_empty": unmeasured_sites_text(archive),
-        "people_seeds": f"{seeds:,}",
+        "people_seeds": f"{seed_count:,}",
     }
 
 
-def cheek_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
-    """Return a Markdown table of the cheek's colour by group: medians and energy distances."""
+def cheek_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> str:
+    """Return a Markdown table that compares the colour of the cheek in the archive and of drawn people.
+
+    It has medians, ranges and energy distances for each group.
+    """
     lines = [
         "| group | quantity | archive: median | 5 to 95 % | drawn: median | 5 to 95 % | distance | expected "
         "| 95 % |",
@@ -110,7 +113,7 @@ def cheek_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
     ]
     for code, group in GROUP_OF_CODE.items():
         measured = _measured_colours(archive, code, "cheek")
-        both = [_with_ita(one) for one in (measured.cielab, drawn[group].cielab[:, 0])]
+        both = [_with_ita(one) for one in (measured.cielab, drawn_people[group].cielab[:, 0])]
         for k, name in enumerate(_COLOUR_QUANTITIES):
             a, b = both[0][:, k], both[1][:, k]
             distance, expected, limit = two_sample_distance(a, b)
@@ -123,9 +126,10 @@ def cheek_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
 
 
 def two_sample_distance(first_sample: Doubles, second_sample: Doubles) -> tuple[float, float, float]:
-    """Return the energy distance of two samples, and its mean and 95 % quantile for equal populations.
+    """Return the energy distance of two samples, and its mean and 95 % quantile for the null hypothesis.
 
-    The mean and the quantile are estimated by permutation.
+    The null hypothesis is that both samples are from one population. Its mean and quantile are estimated by
+    permutation.
     """
     rng, both = np.random.default_rng(0), np.concatenate([first_sample, second_sample])
     permuted = []
@@ -140,29 +144,29 @@ def two_sample_distance(first_sample: Doubles, second_sample: Doubles) -> tuple[
 
 
 def site_differences(
-    archive: Archive, drawn: Mapping[str, DrawnPeople]
+    archive: Archive, drawn_people: Mapping[str, DrawnPeople]
 ) -> Iterator[tuple[str, str, int, Doubles, Doubles]]:
-    """Yield the difference of median colours between drawn people and the archive, by group and site.
+    """Yield median colours in the archive, and their differences from drawn people, by group and site.
 
-    Each item is a group, a site, the number of measured people, the measured median (3,), and the median of
-    drawn people minus the measured median (3,).
+    Each tuple has the group, the site, the number of measured people, their median colour (3,), and the
+    median colour of drawn people minus that (3,).
     """
     for code, group in GROUP_OF_CODE.items():
         for k, site in enumerate(HEAD_SITES):
             measured = _measured_colours(archive, code, site)
             if len(measured.person):
                 median = np.median(measured.cielab, axis=0)
-                difference = np.median(drawn[group].cielab[:, k], axis=0) - median
+                difference = np.median(drawn_people[group].cielab[:, k], axis=0) - median
                 yield group, site, len(np.unique(measured.person)), median, difference
 
 
-def sites_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
-    """Return a Markdown table of the items of `site_differences`."""
+def sites_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> str:
+    """Return a Markdown table with the results of `site_differences`."""
     lines = [
         "| group | site | people | archive: L*, a*, b* | drawn minus archive | |",
         "|---|---|---|---|---|---|",
     ]
-    for group, site, count, median, difference in site_differences(archive, drawn):
+    for group, site, count, median, difference in site_differences(archive, drawn_people):
         outside = count >= _MIN_COMPARED_PEOPLE and np.abs(difference).max() > _MEDIAN_TOLERANCE_LAB
         texts = (
             ", ".join(f"{one:{form}}" for one in values)
@@ -174,8 +178,8 @@ def sites_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
     return "\n".join(lines)
 
 
-def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
-    """Return a Markdown table of the cheek's colour differences between sexes and between ages.
+def sex_age_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> str:
+    """Return a Markdown table of how the colour of the cheek differs between sexes and between ages.
 
     The differences are averaged over the groups.
     """
@@ -185,7 +189,7 @@ def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
         for is_drawn in (False, True):
             differences, counts = [], []
             for code, group in GROUP_OF_CODE.items():
-                measured, drawn_group = _measured_colours(archive, code, "cheek"), drawn[group]
+                measured, drawn_group = _measured_colours(archive, code, "cheek"), drawn_people[group]
                 colours = drawn_group.cielab[:, 0] if is_drawn else measured.cielab
                 sex, age = (drawn_group.sex, drawn_group.age) if is_drawn else (measured.sex, measured.age)
                 first, second = (
@@ -200,9 +204,9 @@ def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
 
 
 def unmeasured_sites_text(archive: Archive) -> str:
-    """Return text that lists, for each group, the sites without measurements.
+    """Return text that lists the sites without measurements for each group.
 
-    The package uses pooled values for these sites.
+    For these sites, the package derives values from the other groups.
     """
     parts = []
     for code, group in GROUP_OF_CODE.items():

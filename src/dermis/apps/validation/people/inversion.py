@@ -1,4 +1,4 @@
-"""Conversion between spectra of skin and the four variables of the table of measured people."""
+"""Conversion between reflectance spectra of skin and four variables: melanin, blood, oxygen, thickness."""
 
 from __future__ import annotations
 
@@ -22,39 +22,44 @@ match would get an epidermis of the least thickness, which melanin cannot darken
 _CIELAB_SD = 0.3
 """Standard deviation of colours in the fit [CIELAB]; small, so that colours take precedence over spectra."""
 _REFLECTANCE_SD = 0.01
-_INDEPENDENT_WAVELENGTHS = 9.0  # number of wavelengths whose errors are independent; neighbours err together
+_INDEPENDENT_WAVELENGTH_COUNT = (
+    9.0  # number of wavelengths whose errors are independent; neighbours err together
+)
 
 
-def model_spectra(variables: Doubles) -> Doubles:
+def model_spectra(skin_variables: Doubles) -> Doubles:
     """Return the diffuse reflectance (n, 31) of skins, by the package's spectral model.
 
-    variables : (n, 4) log2 of the melanin fraction, log2 of the blood fraction, oxygenation, and log2 of the
-        thickness of the epidermis in mm; clipped to the limits of the inversion
+    skin_variables : (n, 4) log2 of the melanin fraction, log2 of the blood fraction, oxygenation, and log2 of
+        the thickness of the epidermis in mm; values are clipped to the range that `invert_spectra` returns
     """
-    melanin, blood, oxygen, mm = np.clip(variables, _MIN_VARIABLES, _MAX_VARIABLES).T
+    melanin, blood, oxygen, mm = np.clip(skin_variables, _MIN_VARIABLES, _MAX_VARIABLES).T
     values = {"melanin": np.exp2(melanin), "blood": np.exp2(blood), "oxygen": oxygen}
     return skin_model_spectra()(values | {"epidermis_mm": np.exp2(mm)})
 
 
-def model_lab(variables: Doubles) -> Doubles:
-    """Return the CIELAB colours (n, 3) of skins, whose variables are described in `model_spectra`."""
-    return lab(model_spectra(variables) @ rgb_weights(WAVELENGTHS_NM).T)
+def model_lab(skin_variables: Doubles) -> Doubles:
+    """Return the CIELAB colours (n, 3) of skins.
+
+    skin_variables : (n, 4) variables as in `model_spectra`
+    """
+    return lab(model_spectra(skin_variables) @ rgb_weights(WAVELENGTHS_NM).T)
 
 
 def invert_spectra(reflectance: Doubles) -> Doubles:
-    """Return the variables (n, 4) of `model_spectra` that fit spectra best.
+    """Return the arguments (n, 4) of `model_spectra` for which the model fits spectra best.
 
-    Agreement of colours has precedence over agreement of the shapes of spectra.
+    The fit minimises differences in colour first, and then differences between the spectra.
 
-    reflectance : (n, 31) at `WAVELENGTHS_NM`, without surface reflection [-]
+    reflectance : (n, 31) spectra at `WAVELENGTHS_NM`, without surface reflection [-]
     """
     target = lab(reflectance @ rgb_weights(WAVELENGTHS_NM).T)
-    spectrum_sd = _REFLECTANCE_SD * np.sqrt(len(WAVELENGTHS_NM) / _INDEPENDENT_WAVELENGTHS)
+    spectrum_sd = _REFLECTANCE_SD * np.sqrt(len(WAVELENGTHS_NM) / _INDEPENDENT_WAVELENGTH_COUNT)
 
-    def residual(x: Doubles) -> Doubles:
-        spectra = model_spectra(x)
+    def residual(skin_variables: Doubles) -> Doubles:
+        spectra = model_spectra(skin_variables)
         colours = lab(spectra @ rgb_weights(WAVELENGTHS_NM).T) - target
-        prior = (x[:, 2:] - _PRIOR_MEAN) / _PRIOR_SD
+        prior = (skin_variables[:, 2:] - _PRIOR_MEAN) / _PRIOR_SD
         return np.hstack([(spectra - reflectance) / spectrum_sd, colours / _CIELAB_SD, prior])
 
     start = np.array([np.log2(_START_MELANIN), np.log2(_START_BLOOD), *_PRIOR_MEAN])

@@ -1,4 +1,4 @@
-"""Table of measured people in the package, built from the spectra of the archive."""
+"""Statistics of measured skin in the package's data files, computed from the spectral archive."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from dermis.human.skin.measured import (
     SITES,
     MeasuredTable,
     age_term,
-    parse_table,
+    parse_measured_table,
     symmetric_square_root,
 )
 from dermis.images.skin_tone import ita_degrees
@@ -48,10 +48,10 @@ _MEDIAN_COLOUR_SD = 0.05
 _ARCHIVE_SOURCE = (
     "Lu et al. 2025, International Skin Spectra Archive, CC BY 4.0, doi 10.6084/m9.figshare.28228571.v4"
 )
-_LOG_THICKNESS_TRIALS = (-0.6, -0.4, -0.2, 0.0, 0.2)
+_LOG2_THICKNESS_CHANGES = (-0.6, -0.4, -0.2, 0.0, 0.2)
 """Changes of the thickness of the epidermis that are tried [doublings]."""
 _MAX_CORRECTION_STEP = 1.0  # of a correction, in `_VARIABLE_SHIFT_SD`
-_CALIBRATION_STEPS = 6
+_CALIBRATION_STEP_COUNT = 6
 _WINSOR_PERCENT = 5.0
 _TRUE_SPREAD_FRACTION = 0.5
 """Fraction of the measured spread of differences between sites that is due to people; pressure and placing of
@@ -69,64 +69,73 @@ _CELLS_CSV_HEADER = """\
 
 
 def table() -> None:
-    """Write the table of measured people in the package from the archive."""
+    """Compute statistics of measured skin from the spectral archive, and write them to data files."""
     archive = read_archive()
-    variables = invert_spectra(archive.spectra)
-    document = build_table(archive, variables)
+    skin_variables = invert_spectra(archive.spectra)
+    document = build_measured_table(archive, skin_variables)
     folder = require_in_checkout(HUMAN_DATA_FOLDER)
     with atomic_file(folder / TABLE_FILE) as file:
         file.write_text(json.dumps(document, separators=(",", ":")) + "\n", "utf-8")
-    text = cells_text(archive, variables, parse_table(document))
+    text = cells_csv(archive, skin_variables, parse_measured_table(document))
     with atomic_file(folder / CELLS_FILE) as file:
         file.write_text(text, "utf-8")
     sizes = ((folder / name).stat().st_size for name in (TABLE_FILE, CELLS_FILE))
     print_lines(f"{TABLE_FILE} and {CELLS_FILE}: {' and '.join(f'{size:,}' for size in sizes)} bytes")
 
 
-def build_table(archive: Archive, variables: Doubles) -> dict[str, Any]:
-    """Return the JSON object of a `MeasuredTable`.
+def build_measured_table(archive: Archive, skin_variables: Doubles) -> dict[str, Any]:
+    """Return the statistics in a `MeasuredTable` as a JSON object.
 
-    variables : (n, 4) variables of the measurements, from `invert_spectra`
+    skin_variables : (n, 4) skin variables of the measurements, from `invert_spectra`
     """
-    cheek, y = person_medians(archive, variables, _CHEEK_SITE_INDEX)
+    cheek, y = person_median_measurements(archive, skin_variables, _CHEEK_SITE_INDEX)
     sex, age = _sex_age_effects(cheek, y)
-    ages, sexes = _population()
-    document: dict[str, Any] = {
+    ages, sexes = _random_ages_and_sexes()
+    table_document: dict[str, Any] = {
         "source": _ARCHIVE_SOURCE,
         "probabilities": list(_QUANTILE_PROBABILITIES),
-        "sex": _rounded(sex),
-        "age": _rounded(age),
+        "sex": _rounded_lists(sex),
+        "age": _rounded_lists(age),
         "mean_age_term": round(float(age_term(ages).mean()), 4),
     }
-    adjusted = y - _centred_terms(cheek, sex, age)
+    adjusted = y - _centred_sex_age_effects(cheek, sex, age)
     scores = {
         code: _normal_scores(adjusted[rows], cheek.select_rows(rows)) for code, rows in _group_masks(cheek)
     }
     pooled = np.corrcoef(np.concatenate(list(scores.values())).T)
-    shifts, slope, spread = _site_differences(archive, variables)
-    document |= {"site_slope": _rounded(slope), "site_spread": _rounded(spread), "groups": {}}
+    shifts, slope, spread = _site_differences(archive, skin_variables)
+    table_document |= {
+        "site_slope": _rounded_lists(slope),
+        "site_spread": _rounded_lists(spread),
+        "groups": {},
+    }
     for code, rows in _group_masks(cheek):
         n, own = int(rows.sum()), np.corrcoef(scores[code].T)
         mixed = (n * own + _POOLED_CORRELATION_WEIGHT * pooled) / (n + _POOLED_CORRELATION_WEIGHT)
         ita = ita_degrees(cheek.select_rows(rows).cielab)
-        document["groups"][GROUP_OF_CODE[code]] = {
-            "quantiles": _rounded(np.quantile(adjusted[rows], _QUANTILE_PROBABILITIES, axis=0).T),
-            "ita": _rounded(np.quantile(ita, _QUANTILE_PROBABILITIES), 2),
-            "correlation": _rounded(mixed, 3),
-            "sites": _rounded(shifts[list(GROUP_OF_CODE).index(code)]),
+        table_document["groups"][GROUP_OF_CODE[code]] = {
+            "quantiles": _rounded_lists(np.quantile(adjusted[rows], _QUANTILE_PROBABILITIES, axis=0).T),
+            "ita": _rounded_lists(np.quantile(ita, _QUANTILE_PROBABILITIES), 2),
+            "correlation": _rounded_lists(mixed, 3),
+            "sites": _rounded_lists(shifts[list(GROUP_OF_CODE).index(code)]),
         }
-    _calibrate(document, archive, ages, sexes)
-    return document
+    _calibrate_median_colours(table_document, archive, ages, sexes)
+    return table_document
 
 
-def person_medians(archive: Archive, variables: Doubles, site_index: int) -> tuple[Archive, Doubles]:
-    """Return one measurement for each person at a site: the measurement of median lightness."""
+def person_median_measurements(
+    archive: Archive, skin_variables: Doubles, site_index: int
+) -> tuple[Archive, Doubles]:
+    """Return the measurement of median lightness for each person at a site, and its skin variables (n, 4).
+
+    skin_variables : skin variables of all measurements, from `invert_spectra`
+    """
     rows = np.flatnonzero(archive.site == site_index)
     order = rows[np.lexsort((archive.cielab[rows, 0], archive.person[rows]))]
     people, first, counts = np.unique(archive.person[order], return_index=True, return_counts=True)
     middle = order[first + counts // 2]
     assert len(middle) == len(people)
-    return Archive(*(column[middle] for column in archive)), variables[middle]
+    return Archive(*(column[middle] for column in archive)), skin_variables[middle]
 
 
 def _group_masks(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
@@ -134,7 +143,7 @@ def _group_masks(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
         yield code, archive.group == code
 
 
-def _sex_age_effects(cheek: Archive, variables: Doubles) -> tuple[Doubles, Doubles]:
+def _sex_age_effects(cheek: Archive, skin_variables: Doubles) -> tuple[Doubles, Doubles]:
     """Return the effects (4,) of sex and of `age_term` on the four skin variables of `model_spectra`.
 
     The effects are fitted by least squares, with an intercept for each group.
@@ -142,12 +151,12 @@ def _sex_age_effects(cheek: Archive, variables: Doubles) -> tuple[Doubles, Doubl
     known = np.isfinite(cheek.sex) & np.isfinite(cheek.age)
     levels = (cheek.group[known, None] == np.array(list(GROUP_OF_CODE))).astype(np.float64)
     terms = np.column_stack([levels, cheek.sex[known], age_term(cheek.age[known])])
-    low, high = np.percentile(variables, (1.0, 99.0), axis=0)
-    found = np.linalg.lstsq(terms, np.clip(variables[known], low, high), rcond=None)[0]
+    low, high = np.percentile(skin_variables, (1.0, 99.0), axis=0)
+    found = np.linalg.lstsq(terms, np.clip(skin_variables[known], low, high), rcond=None)[0]
     return found[-2], found[-1]
 
 
-def _centred_terms(cheek: Archive, sex_effect: Doubles, age_effect: Doubles) -> Doubles:
+def _centred_sex_age_effects(cheek: Archive, sex_effect: Doubles, age_effect: Doubles) -> Doubles:
     """Return the deviations (n, 4) from group means that sex and age explain, for each skin variable.
 
     sex_effect, age_effect : (4,) effects of sex and of `age_term` on the variables
@@ -161,24 +170,24 @@ def _centred_terms(cheek: Archive, sex_effect: Doubles, age_effect: Doubles) -> 
     return result
 
 
-def _normal_scores(variables: Doubles, archive_rows: Archive) -> Doubles:
-    """Return standard normal scores (n, 5) of the ranks of the four skin variables and of the ITA."""
-    columns = np.column_stack([variables, ita_degrees(archive_rows.cielab)])
+def _normal_scores(skin_variables: Doubles, archive_rows: Archive) -> Doubles:
+    """Return the normal scores (n, 5) for the ranks of the four skin variables and of the ITA."""
+    columns = np.column_stack([skin_variables, ita_degrees(archive_rows.cielab)])
     return np.asarray(ndtri((rankdata(columns, axis=0) - 0.5) / len(columns)))
 
 
-def _site_differences(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doubles]:
+def _site_differences(archive: Archive, skin_variables: Doubles) -> tuple[Doubles, Doubles, Doubles]:
     """Return how sites differ from the cheek: medians (g, 12, 3), slopes (12, 2) and spreads (12, 2).
 
-    Slopes say how much of a person's deviation from the median of the group, measured at the cheek, adds to
-    the difference of the site. Medians of groups with too few people are blended with the mean over groups
-    with enough people.
+    A median is the difference between site and cheek in one of the g groups. In small groups it is blended
+    with the mean of larger groups. A slope is the change of this difference per unit of a person's deviation
+    from the group at the cheek. A spread is the standard deviation of the remaining differences.
     """
     shifts, counts = np.zeros((len(GROUP_OF_CODE), len(SITES), 3)), np.zeros((len(GROUP_OF_CODE), len(SITES)))
     slope, spread = np.zeros((len(SITES), 2)), np.zeros((len(SITES), 2))
-    cheek, y = person_medians(archive, variables, _CHEEK_SITE_INDEX)
+    cheek, y = person_median_measurements(archive, skin_variables, _CHEEK_SITE_INDEX)
     for site in (k for k in range(len(SITES)) if k != _CHEEK_SITE_INDEX):
-        other, z = person_medians(archive, variables, site)
+        other, z = person_median_measurements(archive, skin_variables, site)
         _, here, there = np.intersect1d(cheek.person, other.person, return_indices=True)
         difference, deviation = z[there, :3] - y[here, :3], y[here].copy()
         group = np.array([list(GROUP_OF_CODE).index(code) for code in cheek.group[here]])
@@ -190,7 +199,7 @@ def _site_differences(archive: Archive, variables: Doubles) -> tuple[Doubles, Do
                 deviation[rows] -= np.median(deviation[rows], axis=0)
                 difference[rows] -= shifts[k, site]
         used = counts[group, site] >= _MIN_CELL_PEOPLE
-        x, d = (_winsorised(one[used, :2]) for one in (deviation, difference))
+        x, d = (_winsorise(one[used, :2]) for one in (deviation, difference))
         slope[site] = (x * d).sum(axis=0) / (x * x).sum(axis=0)
         spread[site] = _TRUE_SPREAD_FRACTION * np.std(d - slope[site] * x, axis=0)
         filled = counts[:, site] >= _MIN_CELL_PEOPLE
@@ -200,12 +209,12 @@ def _site_differences(archive: Archive, variables: Doubles) -> tuple[Doubles, Do
     return shifts, slope, spread
 
 
-def _winsorised(samples: Doubles) -> Doubles:
+def _winsorise(samples: Doubles) -> Doubles:
     low, high = np.percentile(samples, (_WINSOR_PERCENT, 100.0 - _WINSOR_PERCENT), axis=0)
     return np.clip(samples, low, high)
 
 
-def _population() -> tuple[Doubles, Doubles]:
+def _random_ages_and_sexes() -> tuple[Doubles, Doubles]:
     """Return ages and sexes (n,) of adults, distributed as in `Human.drawn`."""
     rng = np.random.default_rng(0)
     return 25.0 + 65.0 * rng.beta(1.2, 2.2, _POPULATION_SIZE), rng.integers(0, 2, _POPULATION_SIZE).astype(
@@ -213,11 +222,14 @@ def _population() -> tuple[Doubles, Doubles]:
     )
 
 
-def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes: Doubles) -> None:
-    """Adjust quantiles and site differences so that median colours of drawn people equal the archive's.
+def _calibrate_median_colours(
+    table_document: dict[str, Any], archive: Archive, ages: Doubles, sexes: Doubles
+) -> None:
+    """Adjust statistics so that drawn people have the same median colours as people in the archive.
 
-    The table `document` is changed in place. Spectra do not determine the thickness of the epidermis, so
-    several values are tried, and the value that best reproduces the colours of the head is kept.
+    The quantiles and the differences between sites in `table_document` are changed in place. Spectra do not
+    determine the thickness of the epidermis. Several values are therefore tried for each group, and the value
+    that best reproduces the colours of the head is kept.
     """
     rng = np.random.default_rng(1)
     population = _Population(
@@ -229,16 +241,16 @@ def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes:
     for code, rows in _group_masks(archive):
         name, own = GROUP_OF_CODE[code], archive.select_rows(rows)
         trials = []
-        for thickness in _LOG_THICKNESS_TRIALS:
-            group = dict(document["groups"][name])
+        for thickness in _LOG2_THICKNESS_CHANGES:
+            group = dict(table_document["groups"][name])
             quantiles = np.array(group["quantiles"]) + np.array([0.0, 0.0, 0.0, thickness])[:, None]
-            trial = {**document, "groups": {name: group | {"quantiles": quantiles.tolist()}}}
+            trial = {**table_document, "groups": {name: group | {"quantiles": quantiles.tolist()}}}
             trials.append((_calibrate_group(trial, name, own, population), thickness, trial["groups"][name]))
-        document["groups"][name] = min(trials, key=lambda one: one[0])[2]
+        table_document["groups"][name] = min(trials, key=lambda one: one[0])[2]
 
 
 class _Population(NamedTuple):
-    """People for whom medians are calibrated: ages and sexes (n,), and random numbers.
+    """Random people for calibrating median colours: ages and sexes (n,), and normal random numbers.
 
     normals : (n, 4) standard normal random numbers for the variables of the cheek
     site_normals : (n, 12, 2) standard normal random numbers for the differences of sites
@@ -251,49 +263,60 @@ class _Population(NamedTuple):
 
 
 def _calibrate_group(
-    document: dict[str, Any], group_name: str, group_archive: Archive, people: _Population
+    table_document: dict[str, Any], group_name: str, group_archive: Archive, random_people: _Population
 ) -> float:
-    """Calibrate one group in place, and return the sum of squared errors of median colours on the head."""
-    group = document["groups"][group_name]
+    """Adjust the statistics of one group in place, as in `_calibrate_median_colours`.
+
+    Returns the sum of squared errors of the median colours at sites of the head.
+    """
+    group = table_document["groups"][group_name]
     target, loss = np.median(group_archive.cielab[group_archive.site == _CHEEK_SITE_INDEX], axis=0), 0.0
-    shift, error = _matching_shift(_drawn_cheeks(document, group_name, people)[1], target, 3)
+    shift, error = _colour_matching_shift(
+        _drawn_cheek_variables(table_document, group_name, random_people)[1], target, 3
+    )
     loss += float(error @ error)
-    group["quantiles"] = _rounded(np.array(group["quantiles"]) + shift[:, None])
-    found, y = _drawn_cheeks(document, group_name, people)
-    differences = found.site_differences({group_name: 1.0}, y, people.site_normals)
+    group["quantiles"] = _rounded_lists(np.array(group["quantiles"]) + shift[:, None])
+    found, y = _drawn_cheek_variables(table_document, group_name, random_people)
+    differences = found.site_differences({group_name: 1.0}, y, random_people.site_normals)
     sites = np.array(group["sites"])
     for site in range(len(SITES)):
         measured = group_archive.site == site
         if site != _CHEEK_SITE_INDEX and len(np.unique(group_archive.person[measured])) >= _MIN_CELL_PEOPLE:
             z = y.copy()
             z[:, :3] += differences[:, site]
-            shift, error = _matching_shift(z, np.median(group_archive.cielab[measured], axis=0), 3)
+            shift, error = _colour_matching_shift(z, np.median(group_archive.cielab[measured], axis=0), 3)
             sites[site] += shift[:3]
             loss += float(error @ error) * (SITES[site].replace(" ", "_") in FACE_SITES)
-    group["sites"] = _rounded(sites)
+    group["sites"] = _rounded_lists(sites)
     return loss
 
 
-def _drawn_cheeks(document: dict[str, Any], group: str, people: _Population) -> tuple[MeasuredTable, Doubles]:
-    """Return the parsed table, and the variables (n, 4) of the cheeks of people drawn from a group."""
-    found, weights = parse_table(document), {group: 1.0}
-    scores = people.normals @ symmetric_square_root(found.group_mean("correlation", weights)[:4, :4])
-    return found, found.cheek_variables(weights, people.sexes, people.ages, scores)
+def _drawn_cheek_variables(
+    table_document: dict[str, Any], group: str, random_people: _Population
+) -> tuple[MeasuredTable, Doubles]:
+    """Return the parsed statistics, and skin variables (n, 4) at the cheek of people drawn from a group."""
+    found, weights = parse_measured_table(table_document), {group: 1.0}
+    scores = random_people.normals @ symmetric_square_root(found.group_mean("correlation", weights)[:4, :4])
+    return found, found.cheek_variables(weights, random_people.sexes, random_people.ages, scores)
 
 
-def _matching_shift(variables: Doubles, target_colour: Doubles, free_count: int) -> tuple[Doubles, Doubles]:
-    """Return the shift (4,) of skin variables that moves their median colour to a target, and the error left.
+def _colour_matching_shift(
+    skin_variables: Doubles, target_colour: Doubles, shifted_variable_count: int
+) -> tuple[Doubles, Doubles]:
+    """Return a shift (4,) of skin variables after which the median colour is near a target.
 
-    variables : (n, 4) variables of people
+    Also returns the remaining error (3,) of the median colour.
+
+    skin_variables : (n, 4) variables of people
     target_colour : (3,) median colour to reach [CIELAB]
-    free_count : number of variables that may be shifted, counted from the first
+    shifted_variable_count : number of variables that may be shifted, counted from the first
     """
-    shift, used = np.zeros(4), np.arange(4) < free_count
+    shift, used = np.zeros(4), np.arange(4) < shifted_variable_count
 
-    def median_colour(offset: Doubles) -> Doubles:
-        return np.asarray(np.median(model_lab(variables + offset), axis=0))
+    def median_colour(variable_shift: Doubles) -> Doubles:
+        return np.asarray(np.median(model_lab(skin_variables + variable_shift), axis=0))
 
-    for _ in range(_CALIBRATION_STEPS):
+    for _ in range(_CALIBRATION_STEP_COUNT):
         error = target_colour - median_colour(shift)
         steps = 0.1 * np.diag(_VARIABLE_SHIFT_SD)
         J = np.column_stack(
@@ -310,10 +333,10 @@ def _matching_shift(variables: Doubles, target_colour: Doubles, free_count: int)
     return shift, target_colour - median_colour(shift)
 
 
-def cells_text(archive: Archive, variables: Doubles, measured_table: MeasuredTable) -> str:
+def cells_csv(archive: Archive, skin_variables: Doubles, measured_table: MeasuredTable) -> str:
     """Return a CSV table of medians and covariances, with one row for each group and site.
 
-    Further rows are for one sex or one age group.
+    Further rows are for the people of one sex or one age group.
     """
     out = StringIO()
     out.write(_CELLS_CSV_HEADER)
@@ -333,32 +356,36 @@ def cells_text(archive: Archive, variables: Doubles, measured_table: MeasuredTab
                         "",
                         0,
                         0,
-                        *_pooled_cell(measured_table, GROUP_OF_CODE[code], site),
+                        *_pooled_cell_texts(measured_table, GROUP_OF_CODE[code], site),
                         "",
                         "",
                     ]
                 )
                 continue
-            writer.writerow(_cell_row(archive, variables, here, (GROUP_OF_CODE[code], name, "", ""), True))
+            writer.writerow(
+                _cell_row(archive, skin_variables, here, (GROUP_OF_CODE[code], name, "", ""), True)
+            )
             for sex, value in (("F", 0.0), ("M", 1.0)):
                 if (own := here & (archive.sex == value)).sum() >= _MIN_CELL_PEOPLE:
-                    writer.writerow(_cell_row(archive, variables, own, (GROUP_OF_CODE[code], name, sex, "")))
+                    writer.writerow(
+                        _cell_row(archive, skin_variables, own, (GROUP_OF_CODE[code], name, sex, ""))
+                    )
             for number, middle in AGE_MIDDLES.items():
                 if (own := here & (archive.age == middle)).sum() >= _MIN_CELL_PEOPLE:
                     writer.writerow(
-                        _cell_row(archive, variables, own, (GROUP_OF_CODE[code], name, "", number))
+                        _cell_row(archive, skin_variables, own, (GROUP_OF_CODE[code], name, "", number))
                     )
     return out.getvalue()
 
 
 def _cell_row(
     archive: Archive,
-    variables: Doubles,
+    skin_variables: Doubles,
     row_mask: NDArray[np.bool_],
-    cell_names: tuple[object, ...],
+    cell_labels: tuple[object, ...],
     has_covariance: bool = False,
 ) -> list[object]:
-    colours, y = archive.cielab[row_mask], variables[row_mask]
+    colours, y = archive.cielab[row_mask], skin_variables[row_mask]
     people = len(np.unique(archive.person[row_mask]))
     melanin, blood, oxygen, thickness = np.median(y, axis=0)
     values = [f"{one:.2f}" for one in np.median(colours, axis=0)]
@@ -373,11 +400,11 @@ def _cell_row(
         if has_covariance and people > 2
         else ["", ""]
     )
-    return [*cell_names, people, int(row_mask.sum()), *values, *covariances]
+    return [*cell_labels, people, int(row_mask.sum()), *values, *covariances]
 
 
-def _pooled_cell(measured_table: MeasuredTable, group: str, site_index: int) -> list[str]:
-    """Return the median colour and pigments that the table predicts for a site without measurements."""
+def _pooled_cell_texts(measured_table: MeasuredTable, group: str, site_index: int) -> list[str]:
+    """Return texts with the predicted median colour and pigments of a site without measurements."""
     y = measured_table.cheek_variables({group: 1.0}, 0.5, 30.0, np.zeros((1, 4)))
     y[:, :3] += measured_table.site_differences({group: 1.0}, y, np.zeros((1, len(SITES), 2)))[:, site_index]
     colour, (melanin, blood, oxygen, thickness) = model_lab(y)[0], y[0]
@@ -390,10 +417,10 @@ def _pooled_cell(measured_table: MeasuredTable, group: str, site_index: int) -> 
     return [f"{one:.2f}" for one in colour] + pigments
 
 
-def _lower_triangle_text(matrix: Doubles, digits: int) -> str:
-    covariance = np.cov(matrix.T)
+def _lower_triangle_text(samples: Doubles, digits: int) -> str:
+    covariance = np.cov(samples.T)
     return " ".join(f"{one:.{digits}f}" for one in covariance[np.triu_indices(len(covariance))])
 
 
-def _rounded(numbers: Doubles, digits: int = 4) -> Any:
+def _rounded_lists(numbers: Doubles, digits: int = 4) -> Any:
     return (np.round(np.asarray(numbers, np.float64), digits) + 0.0).tolist()

@@ -38,7 +38,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         self._startup_message: dict[str, object] | None = None  # shown by pages before the first frame
         super().__init__(**kwargs)
 
-    def send_stage(self, stage_name: str, stage_number: int, stage_count: int) -> None:
+    def send_progress(self, stage_name: str, stage_number: int, stage_count: int) -> None:
         """Send the progress of the preparation to all pages; they display it until the first picture.
 
         stage_name : name of the stage, such as "compiling shaders"
@@ -56,7 +56,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         asgi.send_all(message)
 
     def request_file(self) -> None:
-        """Ask the page that has control to let the user choose a file to upload."""
+        """Ask the page that controls the viewer to let the user choose a file to upload."""
         asgi.send_to({"type": "choose", "kinds": ",".join(HEAD_FILE_SUFFIXES)}, [], self._active_client)
 
     def _rc_close(self) -> None:
@@ -74,9 +74,11 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         if self._startup_message and not self._sent_number:
             asgi.send_all(self._startup_message)
 
-    def offer_download(self, file_name: str, content: bytes) -> None:
-        """Send a file to the page that has control; the page offers it to the user as a download."""
-        asgi.send_to({"type": "download", "name": file_name, "nbuffers": 1}, [content], self._active_client)
+    def offer_download(self, file_name: str, file_content: bytes) -> None:
+        """Send a file to the page that controls the viewer, which offers the file as a download."""
+        asgi.send_to(
+            {"type": "download", "name": file_name, "nbuffers": 1}, [file_content], self._active_client
+        )
 
     def _on_event(self, event: dict[str, Any], id: int) -> None:
         kind = str(event.get("type"))
@@ -113,7 +115,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         future.add_done_callback(partial(self._send_frame, self._drawn_number, is_lossless_redraw))
 
     def _cancel_lossless_draw(self) -> None:
-        """Cancel the lossless redraw of the last frame, even if it is already being encoded."""
+        """Cancel the lossless redraw of the last frame, even after its encoding has started."""
         self._lossless_number = 0
         super()._cancel_lossless_draw()
 

@@ -25,7 +25,7 @@ ShortText = Annotated[str, Field(max_length=32)]
 
 
 class _StrictModel(BaseModel):
-    """Base class of the models of messages: unknown fields are ignored, and numbers must be finite."""
+    """Base class of message models: types are checked, numbers are finite, unknown fields are dropped."""
 
     model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False)
 
@@ -61,7 +61,7 @@ class Pointer(_InputMessage):
 
 
 class Wheel(_InputMessage):
-    """Event of the mouse wheel, in pixels of the browser."""
+    """Event of the mouse wheel, in CSS pixels."""
 
     type: Literal["wheel"]
     x: Coordinate
@@ -155,13 +155,13 @@ _TOO_MANY_PAGES_REASON = "Too many pages are open: close one of them."
 class RequestFilter:
     """ASGI middleware that rejects requests without the token or from other web sites.
 
-    app : ASGI application of rendercanvas
+    asgi_app : ASGI application of rendercanvas
     token : secret in the query of the URL and later in a cookie; empty if no secret is required
     cookie : name of the cookie, different for each port because browsers share cookies between ports
     """
 
-    def __init__(self, app: App, token: str, cookie: str = "dermis") -> None:
-        self._app, self._token, self._cookie = app, token, cookie
+    def __init__(self, asgi_app: App, token: str, cookie: str = "dermis") -> None:
+        self._app, self._token, self._cookie = asgi_app, token, cookie
         self._pages = 0
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
@@ -181,24 +181,34 @@ class RequestFilter:
                 send = self._add_cookie(send)
             await self._app(scope, receive, send)
 
-    def _refusal_reason(self, scope: Message) -> str:
+    def _refusal_reason(self, request_scope: Message) -> str:
         """Return the reason why a request is rejected, or an empty string if it is accepted."""
-        host = next(iter(_header_values(scope, b"host")), "")
-        if not self._token and not is_local(_host_name(host)):
+        host = next(iter(_header_values(request_scope, b"host")), "")
+        if not self._token and not is_local_host(_host_name(host)):
             return _WRONG_HOST_REASON  # DNS rebinding: the name of another site resolves to this machine
-        scheme = _HTTP_SCHEMES.get(scope["scheme"], scope["scheme"])
-        if any(origin != f"{scheme}://{host}" for origin in _header_values(scope, b"origin")):
+        scheme = _HTTP_SCHEMES.get(request_scope["scheme"], request_scope["scheme"])
+        if any(origin != f"{scheme}://{host}" for origin in _header_values(request_scope, b"origin")):
             return _OTHER_SITE_REASON
-        if self._token and not self._has_query_token(scope) and not self._has_cookie_token(scope):
+        if (
+            self._token
+            and not self._has_query_token(request_scope)
+            and not self._has_cookie_token(request_scope)
+        ):
             return _NO_TOKEN_REASON
-        return _TOO_MANY_PAGES_REASON if scope["type"] == "websocket" and self._pages >= MAX_PAGES else ""
+        return (
+            _TOO_MANY_PAGES_REASON
+            if request_scope["type"] == "websocket" and self._pages >= MAX_PAGES
+            else ""
+        )
 
-    def _has_query_token(self, scope: Message) -> bool:
-        tokens = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [])
+    def _has_query_token(self, request_scope: Message) -> bool:
+        tokens = parse_qs(request_scope.get("query_string", b"").decode("latin-1")).get("token", [])
         return bool(self._token) and any(map(self._equals_token, tokens))
 
-    def _has_cookie_token(self, scope: Message) -> bool:
-        cookies = (cookie.strip() for line in _header_values(scope, b"cookie") for cookie in line.split(";"))
+    def _has_cookie_token(self, request_scope: Message) -> bool:
+        cookies = (
+            cookie.strip() for line in _header_values(request_scope, b"cookie") for cookie in line.split(";")
+        )
         pairs = (cookie.partition("=") for cookie in cookies)
         return any(self._equals_token(value) for name, _, value in pairs if name == self._cookie)
 
@@ -217,7 +227,7 @@ class RequestFilter:
         return send_with_cookie
 
 
-def is_local(host: str) -> bool:
+def is_local_host(host: str) -> bool:
     """Return whether a host name or address can be reached only from this machine."""
     if host == "localhost":
         return True
@@ -252,7 +262,7 @@ def _drop_invalid_messages(receive: Receive) -> Receive:
     return next_message
 
 
-async def _send_rejection(reason: str, scope: Message, receive: Receive, send: Send) -> None:
+async def _send_rejection(rejection_reason: str, scope: Message, receive: Receive, send: Send) -> None:
     if scope["type"] == "websocket":
         await receive()
         await send({"type": "websocket.close", "code": 1008})
@@ -260,4 +270,4 @@ async def _send_rejection(reason: str, scope: Message, receive: Receive, send: S
     # Close the connection, otherwise the client could send an endless body.
     headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"connection", b"close")]
     await send({"type": "http.response.start", "status": 403, "headers": headers})
-    await send({"type": "http.response.body", "body": reason.encode()})
+    await send({"type": "http.response.body", "body": rejection_reason.encode()})

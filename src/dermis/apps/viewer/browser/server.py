@@ -14,7 +14,7 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from dermis.apps.viewer.browser.canvas import PageCanvas
-from dermis.apps.viewer.browser.request_filter import RequestFilter, is_local
+from dermis.apps.viewer.browser.request_filter import RequestFilter, is_local_host
 from dermis.apps.viewer.browser.uploads import Uploads
 from dermis.apps.viewer.player import MotionFile
 from dermis.apps.viewer.state import ViewerState
@@ -42,34 +42,34 @@ class LimitedConnection(H11Protocol):  # type: ignore[misc]
         if len(self.connections) > MAX_CONNECTIONS:
             transport.abort()
         else:
-            self._start_deadline()
+            self._start_header_timeout()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Cancel the header timeout of a closed connection."""
-        self._cancel_deadline()
+        self._cancel_header_timeout()
         super().connection_lost(exc)
 
     def handle_events(self) -> None:
         """Handle received data, and limit how long the headers of a request may take to arrive."""
         super().handle_events()
         if self.conn.their_state is not h11.IDLE or self.timeout_keep_alive_task is not None:
-            self._cancel_deadline()
+            self._cancel_header_timeout()
         elif self._deadline is None:
-            self._start_deadline()
+            self._start_header_timeout()
 
     def handle_websocket_upgrade(self, event: object) -> None:
         """Cancel the header timeout of a WebSocket, which has its own keep-alive."""
-        self._cancel_deadline()
+        self._cancel_header_timeout()
         super().handle_websocket_upgrade(event)
 
     def send_400_response(self, msg: str) -> None:
         """Close the connection of a client that does not speak HTTP."""
         self.transport.abort()
 
-    def _start_deadline(self) -> None:
+    def _start_header_timeout(self) -> None:
         self._deadline = self.loop.call_later(HEADER_TIMEOUT_S, self.transport.abort)
 
-    def _cancel_deadline(self) -> None:
+    def _cancel_header_timeout(self) -> None:
         if self._deadline is not None:
             self._deadline.cancel()
             self._deadline = None
@@ -103,24 +103,24 @@ async def prepare_viewer(
     """
     loop, stages = asyncio.get_running_loop(), iter(enumerate(PREPARATION_STAGES, 1))
 
-    def begin_stage() -> None:
+    def begin_preparation_stage() -> None:
         if http_server.should_exit:
             raise InterruptedError  # the server has stopped
         number, stage = next(stages)
-        loop.call_soon_threadsafe(canvas.send_stage, stage, number, len(PREPARATION_STAGES))
+        loop.call_soon_threadsafe(canvas.send_progress, stage, number, len(PREPARATION_STAGES))
 
-    def prepare() -> tuple[ViewerState, ViewRenderer, MotionFile | None]:
-        begin_stage()
+    def prepare_first_frame() -> tuple[ViewerState, ViewRenderer, MotionFile | None]:
+        begin_preparation_stage()
         state, motion = load_state()
-        begin_stage()
+        begin_preparation_stage()
         view_renderer = ViewRenderer(adapter)
-        begin_stage()
-        view_renderer.prepare(state, begin_stage)
+        begin_preparation_stage()
+        view_renderer.prepare(state, begin_preparation_stage)
         return state, view_renderer, motion
 
     try:
-        state, view_renderer, motion = await asyncio.wrap_future(run_in_thread(prepare))
-        canvas.send_stage(PREPARATION_STAGES[-1], len(PREPARATION_STAGES), len(PREPARATION_STAGES))
+        state, view_renderer, motion = await asyncio.wrap_future(run_in_thread(prepare_first_frame))
+        canvas.send_progress(PREPARATION_STAGES[-1], len(PREPARATION_STAGES), len(PREPARATION_STAGES))
         return Viewer(state, canvas, adapter, motion=motion, view_renderer=view_renderer)
     except Exception as error:
         canvas.send_failure(str(error))
@@ -182,7 +182,7 @@ def bind(host: str, port: int, *, require_token: bool = False) -> tuple[socket.s
     except OSError as error:
         listener.close()
         refuse(f"{host}:{port}", "an address to listen on", f"{error.strerror}", "Choose another --port")
-    token = "" if is_local(host) and not require_token else secrets.token_urlsafe(_ACCESS_TOKEN_BYTES)
+    token = "" if is_local_host(host) and not require_token else secrets.token_urlsafe(_ACCESS_TOKEN_BYTES)
     return listener, Address(host, int(listener.getsockname()[1]), token)
 
 

@@ -32,16 +32,16 @@ _MAX_DISPLAYED_NAME_CHARACTERS = 80
 
 
 class Uploads:
-    """ASGI middleware that receives files at upload/NAME from the page that has control.
+    """ASGI middleware that receives files at upload/NAME from the page that controls the viewer.
 
-    app : application that handles all other requests
+    asgi_app : application that handles all other requests
     canvas : canvas of the page; it issues the ticket required for an upload, and opens each received file
-    folder : folder for the received files; the file names that pages send are only displayed, and not used in
-        paths
+    upload_folder : folder for the received files; the file names that pages send are only displayed, and not
+        used in paths
     """
 
-    def __init__(self, app: App, canvas: PageCanvas, folder: Path) -> None:
-        self._app, self._canvas, self._folder = app, canvas, folder
+    def __init__(self, asgi_app: App, canvas: PageCanvas, upload_folder: Path) -> None:
+        self._app, self._canvas, self._folder = asgi_app, canvas, upload_folder
         self._count = self._bytes = 0
         self._is_busy = False
 
@@ -92,10 +92,10 @@ class Uploads:
         if self._count >= MAX_FILES:
             refuse(file_name, f"at most {MAX_FILES} files", "this is one more", "Restart the viewer")
         length = headers.get(b"content-length", b"0")
-        self._check_size(file_name, int(length) if length.isdigit() and len(length) < 16 else 0)
+        self._check_upload_size(file_name, int(length) if length.isdigit() and len(length) < 16 else 0)
         return suffix, on_file
 
-    def _check_size(self, file_name: str, byte_count: int) -> None:
+    def _check_upload_size(self, file_name: str, byte_count: int) -> None:
         if byte_count > MAX_FILE_BYTES:
             refuse(file_name, f"at most {MAX_FILE_BYTES >> 20} MB", "it is larger", "Make it smaller")
         if self._bytes + byte_count > MAX_TOTAL_BYTES:
@@ -115,7 +115,7 @@ class Uploads:
             folder.mkdir(mode=0o700)
             try:
                 with path.open("xb") as file:
-                    await self._copy_body(file_name, receive, file)
+                    await self._copy_request_body(file_name, receive, file)
             except BaseException:
                 path.unlink(missing_ok=True)
                 folder.rmdir()
@@ -135,7 +135,7 @@ class Uploads:
         finally:
             self._is_busy = False
 
-    async def _copy_body(self, file_name: str, receive: Receive, file: BinaryIO) -> None:
+    async def _copy_request_body(self, file_name: str, receive: Receive, file: BinaryIO) -> None:
         more, size = True, 0
         while more:
             try:
@@ -150,7 +150,7 @@ class Uploads:
             if message["type"] != "http.request":
                 refuse(file_name, "a complete file", "the connection was closed", "Send it again")
             size += len(message.get("body", b""))
-            self._check_size(file_name, size)
+            self._check_upload_size(file_name, size)
             file.write(message.get("body", b""))
             more = message.get("more_body", False)
 

@@ -22,7 +22,7 @@ from dermis.scene.frozen_model import (
     field_slider_range,
 )
 
-FieldsToState = Callable[..., ViewerState]
+StateWithFields = Callable[..., ViewerState]
 ToState = Callable[[Any], ViewerState]
 _LOG_SLIDER_FLAG = int(imgui.SliderFlags_.logarithmic)
 _HDR_COLOUR_FLAGS = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
@@ -67,65 +67,85 @@ _COLOUR_TYPE: Any = Colour
 
 def draw_fields(
     session: Session,
-    model: FrozenModel,
-    make_state: FieldsToState,
-    styles: Mapping[str, FieldStyle],
+    pydantic_model: FrozenModel,
+    state_with_fields: StateWithFields,
+    field_styles: Mapping[str, FieldStyle],
     field_names: Iterable[str] | None = None,
     label_suffix: str = "",
 ) -> None:
     """Draw a control for each field of a model; fields without a suitable control are skipped.
 
-    make_state : function that returns a state, given the new value of a field as keyword argument
-    styles : presentation of each field that differs from the defaults, by field name
+    state_with_fields : function that returns a state, given the new value of a field as keyword argument
+    field_styles : presentation of each field that differs from the defaults, by field name
     field_names : names of the fields to draw; None for all fields
     label_suffix : suffix "##id" that is not shown and distinguishes controls with equal labels
     """
-    for name in type(model).model_fields if field_names is None else field_names:
-        _draw_field(session, model, name, make_state, styles.get(name, _DEFAULT_STYLE), label_suffix)
+    for name in type(pydantic_model).model_fields if field_names is None else field_names:
+        _draw_field(
+            session,
+            pydantic_model,
+            name,
+            state_with_fields,
+            field_styles.get(name, _DEFAULT_STYLE),
+            label_suffix,
+        )
 
 
 def _draw_field(
     session: Session,
-    model: FrozenModel,
+    pydantic_model: FrozenModel,
     field_name: str,
-    make_state: FieldsToState,
-    style: FieldStyle,
+    state_with_fields: StateWithFields,
+    field_style: FieldStyle,
     label_suffix: str,
 ) -> None:
-    kind, value = type(model), getattr(model, field_name)
-    label = (style.label or _field_label(field_name)) + label_suffix
-    value_range = style.value_range or field_slider_range(kind, field_name) or SliderRange(0.0, 1.0)
+    kind, value = type(pydantic_model), getattr(pydantic_model, field_name)
+    label = (field_style.label or _field_label(field_name)) + label_suffix
+    value_range = field_style.value_range or field_slider_range(kind, field_name) or SliderRange(0.0, 1.0)
 
-    def with_value(new_value: object) -> ViewerState:
-        return make_state(**{field_name: new_value})
+    def state_with_value(new_value: object) -> ViewerState:
+        return state_with_fields(**{field_name: new_value})
 
     if keywords := field_keywords(kind, field_name):
-        _draw_keywords(session, label, value, keywords, with_value, style)
+        _draw_keywords(session, label, value, keywords, state_with_value, field_style)
         draw_tooltip(field_help(kind, field_name))
         if isinstance(value, str):
             return
     if isinstance(value, bool):
-        edit_value(session, label, imgui.checkbox(label, value), with_value)
-    elif style.options:
-        draw_combo(session, label, str(value), map(str, style.options), lambda text: with_value(int(text)))
+        apply_edited_value(session, label, imgui.checkbox(label, value), state_with_value)
+    elif field_style.options:
+        draw_combo(
+            session,
+            label,
+            str(value),
+            map(str, field_style.options),
+            lambda text: state_with_value(int(text)),
+        )
     elif isinstance(value, (int, float)):
-        unit, convert = style.unit, round if isinstance(value, int) else float
+        unit, convert = field_style.unit, round if isinstance(value, int) else float
         formats = (_UNIT_FORMATS[end] for end in _UNIT_FORMATS if field_name.endswith(end))
-        number = style.number_format or next(formats, "%.3f")
+        number = field_style.number_format or next(formats, "%.3f")
         displayed = SliderRange(value_range.low / unit, value_range.high / unit, value_range.logarithmic)
         draw_slider(
-            session, label, value / unit, lambda new: with_value(convert(unit * new)), displayed, number
+            session, label, value / unit, lambda new: state_with_value(convert(unit * new)), displayed, number
         )
     elif kind.model_fields[field_name].annotation == _COLOUR_TYPE:
         result = imgui.color_edit3(label, list(value), _HDR_COLOUR_FLAGS)
-        edit_value(session, label, result, lambda new: with_value(tuple(max(0.0, c) for c in new)))
+        apply_edited_value(
+            session, label, result, lambda new: state_with_value(tuple(max(0.0, c) for c in new))
+        )
     elif isinstance(value, tuple) and value_range.logarithmic:
         result = imgui.slider_float3(
             label, list(value), value_range.low, value_range.high, "%.3g", _LOG_SLIDER_FLAG
         )
-        edit_value(session, label, result, lambda new: with_value(tuple(clamp(c, value_range) for c in new)))
+        apply_edited_value(
+            session,
+            label,
+            result,
+            lambda new: state_with_value(tuple(clamp_to_range(c, value_range) for c in new)),
+        )
     elif len(keywords := field_choices(kind, field_name)) > 1:
-        draw_combo(session, label, str(value), keywords, with_value, style.names)
+        draw_combo(session, label, str(value), keywords, state_with_value, field_style.names)
     else:
         return
     draw_tooltip(field_help(kind, field_name))
@@ -134,29 +154,29 @@ def _draw_field(
 def _draw_keywords(
     session: Session,
     label: str,
-    value: object,
+    current_value: object,
     keywords: tuple[str, ...],
-    with_value: ToState,
-    style: FieldStyle,
+    state_with_value: ToState,
+    field_style: FieldStyle,
 ) -> None:
     """Draw a drop-down list of the keywords that a field accepts instead of a number or colour.
 
-    with_value : function that returns a state, given the new value
+    state_with_value : function that returns a state, given the new value
     """
-    custom_value = style.custom_value
+    custom_value = field_style.custom_value
 
-    def with_keyword(keyword: str) -> ViewerState:
-        return with_value(
+    def state_with_keyword(keyword: str) -> ViewerState:
+        return state_with_value(
             custom_value(session) if custom_value and keyword == _CUSTOM_VALUE_CHOICE else keyword
         )
 
-    chosen = value if isinstance(value, str) else _CUSTOM_VALUE_CHOICE
+    chosen = current_value if isinstance(current_value, str) else _CUSTOM_VALUE_CHOICE
     draw_combo(
         session,
         f"{label} from",
         chosen,
         (*keywords, _CUSTOM_VALUE_CHOICE) if custom_value else keywords,
-        with_keyword,
+        state_with_keyword,
     )
 
 
@@ -199,37 +219,39 @@ def draw_rows(label: str, row_count: int, draw_row: Callable[[int], None]) -> No
 def draw_slider(
     session: Session,
     label: str,
-    value: float,
-    with_value: ToState,
+    current_value: float,
+    state_with_value: ToState,
     value_range: SliderRange,
     number_format: str,
 ) -> None:
     """Draw a slider that changes a number of the state.
 
-    value : displayed number
-    with_value : function that returns a state, given the new number
+    current_value : displayed number
+    state_with_value : function that returns a state, given the new number
     number_format : printf format of the number
     """
     flags = _LOG_SLIDER_FLAG if value_range.logarithmic else 0
-    result = imgui.slider_float(label, value, value_range.low, value_range.high, number_format, flags)
-    edit_value(session, label, result, lambda new: with_value(clamp(new, value_range)))
+    result = imgui.slider_float(label, current_value, value_range.low, value_range.high, number_format, flags)
+    apply_edited_value(session, label, result, lambda new: state_with_value(clamp_to_range(new, value_range)))
 
 
-def clamp(value: float, value_range: SliderRange) -> float:
-    """Clamp a value to a range that typed or rounded values may exceed."""
-    return min(value_range.high, max(value_range.low, value))
+def clamp_to_range(unclamped_value: float, value_range: SliderRange) -> float:
+    """Clamp a value, such as one that the user has typed, to the range of a slider."""
+    return min(value_range.high, max(value_range.low, unclamped_value))
 
 
-def edit_value(session: Session, label: str, change_and_value: tuple[bool, Any], with_value: ToState) -> None:
+def apply_edited_value(
+    session: Session, label: str, change_and_value: tuple[bool, Any], state_with_value: ToState
+) -> None:
     """Apply the new value of a control to the state; all changes of one drag are undone together.
 
     change_and_value : whether the control has changed, and its value
-    with_value : function that returns a state, given the new value
+    state_with_value : function that returns a state, given the new value
     """
     record_position(session, label)
     is_changed, new_value = change_and_value
     if is_changed:
-        run_action(session, lambda: session.change(with_value(new_value), f"hold {label}"))
+        run_action(session, lambda: session.change(state_with_value(new_value), f"hold {label}"))
     if imgui.is_item_deactivated():
         session.history.end_gesture()
 
@@ -238,35 +260,35 @@ def draw_combo(
     session: Session,
     label: str,
     current_name: str,
-    choices: Iterable[str],
-    with_value: ToState,
+    names: Iterable[str],
+    state_with_value: ToState,
     display_names: Mapping[str, str] = _EMPTY_DISPLAY_NAMES,
 ) -> None:
     """Draw a drop-down list, and change the state when a name is chosen.
 
-    choices : names to choose from; "" draws a separator
-    with_value : function that returns a state, given the chosen name
+    names : names to choose from; "" draws a separator
+    state_with_value : function that returns a state, given the chosen name
     display_names : text to show for each name whose text differs from the name
     """
-    chosen = choose_name(session, label, current_name, choices, display_names)
+    chosen = choose_name(session, label, current_name, names, display_names)
     if chosen is not None:
-        run_action(session, lambda: session.change(with_value(chosen)))
+        run_action(session, lambda: session.change(state_with_value(chosen)))
 
 
 def choose_name(
-    session: Session, label: str, current_name: str, choices: Iterable[str], display_names: Mapping[str, str]
+    session: Session, label: str, current_name: str, names: Iterable[str], display_names: Mapping[str, str]
 ) -> str | None:
     """Draw a drop-down list; return the name that was clicked, or None if no name was clicked.
 
     current_name : name that is selected now
-    choices : names to choose from; "" draws a separator
+    names : names to choose from; "" draws a separator
     display_names : text to show for each name whose text differs from the name
     """
     chosen = None
     if not imgui.begin_combo(label, display_names.get(current_name, current_name), _TALL_LIST_FLAG):
         record_position(session, label)
         return None
-    for name in choices:
+    for name in names:
         if not name:
             imgui.separator()
             continue

@@ -70,22 +70,22 @@ class ImguiFrames:
         # A context holds its font texture, which belongs to one device.
         self._context = imgui.create_context()
         self._plot_context = implot.create_context()
-        self.enter()
+        self.make_context_current()
         set_style()
         self._is_new = True
         self._device, self._target = device, target_format
         self._imgui_backend = ImguiWgpuBackend(device.handle, target_format)
 
-    def enter(self) -> None:
+    def make_context_current(self) -> None:
         """Make the context of this object the current context of Dear ImGui."""
         imgui.set_current_context(self._context)
         implot.set_current_context(self._plot_context)
 
-    def lay_out(self, window_size: tuple[float, float], draw: Callable[[], None]) -> None:
+    def lay_out(self, window_size: tuple[float, float], declare_controls: Callable[[], None]) -> None:
         """Process pending input and lay out the next frame; `render` draws this frame.
 
         window_size : logical size of the window
-        draw : function that declares the windows and controls
+        declare_controls : function that declares the windows and controls
         """
         try:
             imgui.get_io().display_size = imgui.ImVec2(*window_size)
@@ -93,7 +93,7 @@ class ImguiFrames:
                 self._is_new = False
                 imgui.new_frame()
                 with recover_imgui(self._report_error):
-                    draw()
+                    declare_controls()
                 imgui.render()
             self._has_layout = True
         except Exception as error:  # raised by Dear ImGui itself, whose context is then unusable
@@ -172,11 +172,11 @@ def feed_key(event: Event, lay_out_frame: Callable[[], None]) -> None:
     lay_out_frame()
 
 
-def _change_key(io: imgui.IO, key_name: str, is_down: bool) -> None:
+def _change_key(imgui_io: imgui.IO, key_name: str, is_down: bool) -> None:
     key = ImguiRenderer.KEY_MAP.get(key_name)
     if key is None and len(key_name) == 1 and key_name.isascii() and key_name.isalnum():
         key = getattr(imgui.Key, f"_{key_name}" if key_name.isdigit() else key_name.lower(), None)
     if key is not None:
-        io.add_key_event(key, is_down)
+        imgui_io.add_key_event(key, is_down)
     if key_name in ImguiRenderer.KEY_MAP_MOD:
-        io.add_key_event(ImguiRenderer.KEY_MAP_MOD[key_name], is_down)
+        imgui_io.add_key_event(ImguiRenderer.KEY_MAP_MOD[key_name], is_down)

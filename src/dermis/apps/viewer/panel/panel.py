@@ -47,17 +47,17 @@ _DIVIDER_HANDLE_RADIUS = 7.0  # of the divider
 _HELP_WIDTH, _SHORTCUT_COLUMN_FRACTION = 460.0, 0.4
 
 
-def draw_divider(split: SplitView, picture_left: float, window_size: tuple[float, float]) -> None:
+def draw_divider(split_view: SplitView, picture_left: float, window_size: tuple[float, float]) -> None:
     """Draw the divider of the before/after comparison, with a handle in its centre.
 
     picture_left : left edge of the picture
     window_size : width and height of the window [logical pixel]
     """
-    if split.frozen_state is None:
+    if split_view.frozen_state is None:
         return
     draw_list, x = (
         imgui.get_background_draw_list(),
-        picture_left + split.divider_position * (window_size[0] - picture_left),
+        picture_left + split_view.divider_position * (window_size[0] - picture_left),
     )
     light, dark = imgui.IM_COL32(230, 230, 230, 255), imgui.IM_COL32(0, 0, 0, 255)
     draw_list.add_line(imgui.ImVec2(x, 0.0), imgui.ImVec2(x, window_size[1]), light, 1.0)
@@ -140,8 +140,8 @@ class Panel:
 
     The panel processes the input events that concern it, and leaves all others to the picture.
 
-    is_visible : whether the panel is shown while the window is wide, beside the picture
-    is_drawer_open : whether the panel is shown while the window is narrow, as a drawer over the picture
+    is_visible : whether a wide window shows the panel beside the picture
+    is_drawer_open : whether a narrow window shows the panel as a drawer over the picture
     """
 
     def __init__(self, session: Session) -> None:
@@ -189,7 +189,7 @@ class Panel:
 
         window_size : width and height of the window [logical pixel]
         """
-        self._frames.enter()
+        self._frames.make_context_current()
         self._size = window_size
         io, kind = imgui.get_io(), event["event_type"]
         if kind == "key_down" and not io.want_text_input and self._run_shortcut(event):
@@ -213,7 +213,7 @@ class Panel:
 
         window_size : width and height of the window [logical pixel]
         """
-        self._frames.enter()
+        self._frames.make_context_current()
         imgui.get_io().display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
         self._lay_out_frame(window_size)
         self._frames.render(target_view)
@@ -242,7 +242,10 @@ class Panel:
         return True
 
     def _close_topmost(self) -> bool:
-        """Close the popup, else the help, else clear the search; return False if nothing was open."""
+        """Close the popup or the help, or clear the search text; return False if there was none of these.
+
+        Only the first of these that exists is closed.
+        """
         if self._has_popup:
             imgui.internal.close_popup_to_level(0, False)
             self._has_popup = False
@@ -255,7 +258,7 @@ class Panel:
         return True
 
     def _is_over_panel(self, x: float, y: float, window_size: tuple[float, float]) -> bool:
-        """Return whether the pointer is over the panel; Dear ImGui would only know this one frame later.
+        """Return whether the pointer is over the panel, its button or a popup.
 
         x, y : position of the pointer in the window
         window_size : width and height of the window [logical pixel]
@@ -280,7 +283,9 @@ class Panel:
         draw_divider(session.split, left, window_size)
         status = "" if self._covered_width(window_size) > left else session.status
         draw_messages(
-            [line for line in (session.message, session.heads.note, status) if line], left, window_size
+            [line for line in (session.message, session.heads.loading_message, status) if line],
+            left,
+            window_size,
         )
 
     def _draw_panel_button(self) -> None:

@@ -22,16 +22,16 @@ from dermis.apps.viewer.panel.fields import (
     SURFACE_STYLES,
     TECHNIQUE_STYLES,
     FieldStyle,
+    apply_edited_value,
     begin_plot,
     choose_name,
-    clamp,
+    clamp_to_range,
     draw_button,
     draw_combo,
     draw_fields,
     draw_rows,
     draw_slider,
     draw_tooltip,
-    edit_value,
     record_position,
     run_action,
 )
@@ -53,7 +53,7 @@ _NEW_LIGHT_POSITION_MM = (-500.0, 400.0, 800.0)  # position of a new light, at t
 _MIN_CONE_DIFFERENCE_DEGREES = 0.5  # least difference of the cones of a spotlight
 _ENVIRONMENT_STYLES = {"exposure": FieldStyle("brightness")}
 _TARGET_WEIGHT_RANGE, _BONE_ANGLE_RANGE = SliderRange(0.0, 1.0), SliderRange(-60.0, 60.0)
-_MAX_LABEL_LENGTH = 16  # characters that fit into a narrow panel
+_MAX_STAGE_LABEL_LENGTH = 16  # characters that fit into a narrow panel
 Floats = NDArray[np.float64]
 _WHOLE_FRAME_LABEL = "total"
 _STAGE_HUE_STEP = 0.618034  # golden ratio of the hue circle, so that colours of neighbouring stages differ
@@ -77,14 +77,16 @@ def draw_lights(session: Session) -> None:
     """Draw the controls of the light preset, the selected light and the environment."""
     draw_combo(session, "rig", session.state.rig or _CUSTOM_CHOICE, light_presets(), session.state.with_rig)
     _draw_light_selector(session)
-    draw_combo(session, "add", "a light", LIGHTS, lambda kind: _add_light(session, kind), LIGHT_KIND_NAMES)
+    draw_combo(
+        session, "add", "a light", LIGHTS, lambda kind: _with_new_light(session, kind), LIGHT_KIND_NAMES
+    )
     lights, index = session.state.scene.lights, session.controls.light
     if index < len(lights):
         _draw_light(session, index, lights[index])
     _draw_environment(session)
 
 
-def _add_light(session: Session, light_kind: str) -> ViewerState:
+def _with_new_light(session: Session, light_kind: str) -> ViewerState:
     """Return the state with a new light of the given kind, and select that light."""
     values: dict[str, Any] = {
         "position": _NEW_LIGHT_POSITION_MM,
@@ -113,18 +115,23 @@ def _draw_light(session: Session, light_index: int, light: Light) -> None:
     """Draw controls for all fields of a light but its position, which the user changes by Shift-drag."""
     strength = max(*light.irradiance, 1e-6)
 
-    def make_state(**fields: object) -> ViewerState:
+    def state_with_fields(**fields: object) -> ViewerState:
         return session.state.with_light(light_index, **fields)
 
-    def with_stops(stops: float) -> ViewerState:
-        factor = 2.0**stops * math.pi / strength
-        return make_state(irradiance=tuple(factor * c for c in light.irradiance))
+    def state_with_exposure_stops(exposure_stops: float) -> ViewerState:
+        factor = 2.0**exposure_stops * math.pi / strength
+        return state_with_fields(irradiance=tuple(factor * c for c in light.irradiance))
 
     imgui.text_disabled(f"{LIGHT_KIND_NAMES.get(light.kind, light.kind)}, Shift and drag to move")
     draw_slider(
-        session, "strength", math.log2(strength / math.pi), with_stops, _EXPOSURE_STOP_RANGE, "%.2f stops"
+        session,
+        "strength",
+        math.log2(strength / math.pi),
+        state_with_exposure_stops,
+        _EXPOSURE_STOP_RANGE,
+        "%.2f stops",
     )
-    draw_fields(session, light, make_state, LIGHT_STYLES | _cone_styles(light))
+    draw_fields(session, light, state_with_fields, LIGHT_STYLES | _cone_styles(light))
     if draw_button(session, "copy"):  # raises DermisError if there are too many lights
         lights = session.state.scene.lights
         run_action(session, lambda: session.change(session.state.with_lights([*lights, light])))
@@ -152,19 +159,25 @@ def _draw_environment(session: Session) -> None:
     environment, with_environment = session.state.scene.environment, session.state.with_environment
     samples = [name for name, sample in SAMPLES.items() if sample.kind == "environment"]
 
-    def with_name(environment_name: str) -> ViewerState:
+    def state_with_environment(environment_name: str) -> ViewerState:
         return with_environment(
             None if environment_name == _NO_ENVIRONMENT else Environment(name=environment_name)
         )
 
-    def make_state(**fields: object) -> ViewerState:
+    def state_with_fields(**fields: object) -> ViewerState:
         assert environment is not None
         return with_environment(validated_copy(environment, **fields))
 
     names = (_NO_ENVIRONMENT, "uniform", *samples)
-    draw_combo(session, "environment", environment.name if environment else _NO_ENVIRONMENT, names, with_name)
+    draw_combo(
+        session,
+        "environment",
+        environment.name if environment else _NO_ENVIRONMENT,
+        names,
+        state_with_environment,
+    )
     if environment:
-        draw_fields(session, environment, make_state, _ENVIRONMENT_STYLES)
+        draw_fields(session, environment, state_with_fields, _ENVIRONMENT_STYLES)
 
 
 def has_pose_controls(session: Session) -> bool:
@@ -173,7 +186,7 @@ def has_pose_controls(session: Session) -> bool:
     return bool(head.targets or head.bones)
 
 
-def can_move(session: Session) -> bool:
+def has_motion_controls(session: Session) -> bool:
     """Return whether a motion is loaded, or the head has morph targets or bones."""
     return has_pose_controls(session) or session.player.has_motion
 
@@ -204,7 +217,7 @@ def draw_expressions(session: Session) -> None:
             imgui.tree_pop()
 
 
-def draw_motion(session: Session) -> None:
+def draw_motion_controls(session: Session) -> None:
     """Draw the controls of the motion: its file, play and pause, and the time slider."""
     player, clip = session.player, session.player.clip
     _, session.motion_file = imgui.input_text("file", session.motion_file)
@@ -225,20 +238,20 @@ def draw_motion(session: Session) -> None:
 
 
 def _animated_names(session: Session) -> frozenset[str]:
-    """Return the names of all morph targets and bones that the playing motion sets, to lock their sliders."""
+    """Return the names of morph targets and bones that the playing motion sets; their sliders are locked."""
     clip = session.player.clip if session.player.is_playing else None
     return frozenset() if clip is None else frozenset((*clip.targets, *clip.bones))
 
 
 def _draw_target_weight(session: Session, target_name: str, animated_names: frozenset[str]) -> None:
-    def with_value(weight: float) -> ViewerState:
+    def state_with_value(weight: float) -> ViewerState:
         return session.state.with_pose(posing.with_target_weight(session.state.scene, target_name, weight))
 
     weight = posing.target_weight(session.displayed_state.scene, target_name)
     imgui.begin_disabled(target_name in animated_names)
-    draw_slider(session, f"{target_name}##target", weight, with_value, _TARGET_WEIGHT_RANGE, "%.2f")
+    draw_slider(session, f"{target_name}##target", weight, state_with_value, _TARGET_WEIGHT_RANGE, "%.2f")
     imgui.end_disabled()
-    if len(target_name) > _MAX_LABEL_LENGTH:
+    if len(target_name) > _MAX_STAGE_LABEL_LENGTH:
         draw_tooltip(target_name)
 
 
@@ -249,10 +262,10 @@ def _draw_bone_angles(session: Session, bone_name: str, animated_names: frozense
     """
     angles = posing.bone_angles(session.displayed_state.scene, bone_name)
 
-    def with_value(new_angles: list[float]) -> ViewerState:
+    def state_with_value(new_angles: list[float]) -> ViewerState:
         axis = max(range(3), key=lambda k: abs(new_angles[k] - angles[k]))
         degrees = [*angles]
-        degrees[axis] = clamp(new_angles[axis], _BONE_ANGLE_RANGE)
+        degrees[axis] = clamp_to_range(new_angles[axis], _BONE_ANGLE_RANGE)
         x, y, z = degrees
         return session.state.with_pose(posing.with_bone_angles(session.state.scene, bone_name, (x, y, z)))
 
@@ -261,12 +274,12 @@ def _draw_bone_angles(session: Session, bone_name: str, animated_names: frozense
         f"{bone_name}##bone", [*angles], _BONE_ANGLE_RANGE.low, _BONE_ANGLE_RANGE.high, "%.0f"
     )
     imgui.end_disabled()
-    edit_value(session, f"{bone_name}##bone", result, with_value)
-    if len(bone_name) > _MAX_LABEL_LENGTH:
+    apply_edited_value(session, f"{bone_name}##bone", result, state_with_value)
+    if len(bone_name) > _MAX_STAGE_LABEL_LENGTH:
         draw_tooltip(bone_name)
 
 
-def draw_head(session: Session) -> None:
+def draw_head_chooser(session: Session) -> None:
     """Draw the controls that choose a head: a list, the seed of a random person, and a file to open."""
     _draw_head_list(session)
     seed = _person_seed(session)
@@ -327,10 +340,10 @@ def draw_view(session: Session) -> None:
     draw_combo(session, "show", state.view, VIEW_NAMES, state.with_view)
     if state.view == ATLAS_VIEW_NAME:
 
-        def with_layer(layer_name: str) -> ViewerState:
+        def state_with_atlas_layer(layer_name: str) -> ViewerState:
             return state.with_atlas_view(replace(state.atlas_view, layer=layer_name))
 
-        draw_combo(session, "layer", state.atlas_view.layer, ATLAS_LAYERS, with_layer)
+        draw_combo(session, "layer", state.atlas_view.layer, ATLAS_LAYERS, state_with_atlas_layer)
         imgui.text_disabled("wheel: zoom; double click: show all")
     for index, name in enumerate(PRESET_NAMES):
         if index % _PRESET_BUTTONS_PER_ROW:
@@ -357,7 +370,7 @@ def draw_comparison(session: Session) -> None:
         split.release()
 
 
-def draw_technique(session: Session) -> None:
+def draw_technique_settings(session: Session) -> None:
     """Draw controls for the settings that no other section shows, drop-down lists first.
 
     A new field of `Settings` appears in this section unless another section shows it.
@@ -371,15 +384,15 @@ def draw_technique(session: Session) -> None:
     draw_fields(session, settings, session.state.with_settings, _SETTING_STYLES, names)
 
 
-def draw_picture(session: Session) -> None:
+def draw_picture_settings(session: Session) -> None:
     """Draw controls for the conversion of radiance to the picture: exposure, tone curve, bloom, ..."""
     draw_fields(
         session, session.state.settings, session.state.with_settings, _SETTING_STYLES, _PICTURE_SETTINGS
     )
 
 
-def draw_talk_comparisons(session: Session) -> None:
-    """Draw controls that reproduce faults and historical methods for comparison.
+def draw_historical_comparisons(session: Session) -> None:
+    """Draw the controls that switch on older methods and rendering faults, for comparison.
 
     Source: [dEonLuebke2007].
     """
@@ -391,7 +404,7 @@ def draw_talk_comparisons(session: Session) -> None:
     draw_fields(session, settings, state.with_settings, _SETTING_STYLES, names)
 
 
-def draw_files(session: Session) -> None:
+def draw_file_controls(session: Session) -> None:
     """Draw the controls that save and load the scene, and that write screenshots."""
     _, session.scene_file = imgui.input_text("scene", session.scene_file)
     if draw_button(session, "save"):
@@ -413,7 +426,7 @@ def draw_files(session: Session) -> None:
             session.picture_size = 0, 0
 
 
-def draw_timing(session: Session) -> None:
+def plot_stage_times(session: Session) -> None:
     """Plot the device time of each rendering stage in the last frames, and list the last frame's times."""
     series = stage_times_by_name(list(session.view_renderer.stage_times))
     if not series:
@@ -441,19 +454,21 @@ def stage_times_by_name(frame_times_ms: Sequence[dict[str, float]]) -> dict[str,
 
 
 def _plot_stacked_areas(
-    times_ms: dict[str, Floats], colours: Sequence[tuple[float, float, float]], total_ms: Floats
+    stage_times_ms: dict[str, Floats],
+    stage_colours: Sequence[tuple[float, float, float]],
+    total_frame_times_ms: Floats,
 ) -> None:
     """Plot the times of stages over the frames as stacked areas, with the last frame at the right edge.
 
-    times_ms : (n,) times of each stage, by stage name [ms]
-    colours : colour of each stage
-    total_ms : (n,) total times of the frames [ms]
+    stage_times_ms : (n,) times of each stage, by stage name [ms]
+    stage_colours : colour of each stage
+    total_frame_times_ms : (n,) total times of the frames [ms]
     """
-    last = max(1.0, len(total_ms) - 1.0)
-    if not begin_plot("stages", ("frames", "ms"), (0.0, last), max(float(total_ms.max()), 1e-3)):
+    last = max(1.0, len(total_frame_times_ms) - 1.0)
+    if not begin_plot("stages", ("frames", "ms"), (0.0, last), max(float(total_frame_times_ms.max()), 1e-3)):
         return
-    x, below = np.arange(len(total_ms), dtype=np.float64), np.zeros(len(total_ms))
-    for (name, values), colour in zip(times_ms.items(), colours, strict=True):
+    x, below = np.arange(len(total_frame_times_ms), dtype=np.float64), np.zeros(len(total_frame_times_ms))
+    for (name, values), colour in zip(stage_times_ms.items(), stage_colours, strict=True):
         spec = implot.Spec()
         spec.fill_color = imgui.ImVec4(*colour, 1.0)
         implot.plot_shaded(name, x, below, below + values, spec)
@@ -462,17 +477,17 @@ def _plot_stacked_areas(
 
 
 SECTIONS = (
-    Section("Head", draw_head, is_open=True),
+    Section("Head", draw_head_chooser, is_open=True),
     Section("View", draw_view, is_open=True),
     Section("Before and after", draw_comparison),
     Section("Expressions", draw_expressions, is_open=True, applies=has_pose_controls),
-    Section("Motion", draw_motion, is_open=True, applies=can_move),
+    Section("Motion", draw_motion_controls, is_open=True, applies=has_motion_controls),
     Section("Profile", draw_profile, is_open=True),
     Section("Surface", draw_surface, is_open=True),
     Section("Light", draw_lights),
-    Section("Technique", draw_technique),
-    Section("Picture", draw_picture),
-    Section("Timing", draw_timing),
-    Section("Scene", draw_files, is_open=True),
-    Section(COMPARISONS_HEADING, draw_talk_comparisons),
+    Section("Technique", draw_technique_settings),
+    Section("Picture", draw_picture_settings),
+    Section("Timing", plot_stage_times),
+    Section("Scene", draw_file_controls, is_open=True),
+    Section(COMPARISONS_HEADING, draw_historical_comparisons),
 )

@@ -21,7 +21,7 @@ from dermis.apps.viewer.panel.fields import (
     record_position,
     run_action,
 )
-from dermis.apps.viewer.session import Session, apply_regions
+from dermis.apps.viewer.session import Session, with_region_table
 from dermis.apps.viewer.state import ViewerState, validated_copy
 from dermis.base.errors import DermisError
 from dermis.human.regions.region_table import DEFAULT_TABLE_NAME
@@ -58,12 +58,17 @@ def draw_profile(session: Session) -> None:
     """Draw the controls of the diffusion profile: its name, its colour, and its pigments or layers."""
     skin, with_skin = session.state.scene.skin, session.state.with_skin
 
-    def with_profile(profile_name: str) -> ViewerState:
+    def state_with_profile(profile_name: str) -> ViewerState:
         return with_skin(profile=profile_name, pigments=None, layers=())
 
     other_media = (name for name in preset_names() if name not in _SKIN_PROFILES)
     draw_combo(
-        session, "profile", skin.profile, (*_SKIN_PROFILES, "", *other_media), with_profile, PROFILE_NAMES
+        session,
+        "profile",
+        skin.profile,
+        (*_SKIN_PROFILES, "", *other_media),
+        state_with_profile,
+        PROFILE_NAMES,
     )
     draw_fields(session, skin, with_skin, ALBEDO_STYLES, ["albedo"])
     if skin.profile in SKINS:
@@ -85,17 +90,21 @@ def draw_surface(session: Session) -> None:
             current = str(state.head.get("regions", AUTO))
             names = dict.fromkeys((AUTO, NO_REGIONS, DEFAULT_TABLE_NAME, current))
             draw_combo(
-                session, "regions", current, names, lambda name: apply_regions(state, name, earlier_states)
+                session,
+                "regions",
+                current,
+                names,
+                lambda name: with_region_table(state, name, earlier_states),
             )
         if name == "rho_s" and has_region_table(state.head):
             imgui.text_disabled("rho_s is set by the regions")
         elif name not in _PROFILE_FIELDS:
             draw_fields(session, state.scene.skin, state.with_skin, SURFACE_STYLES, [name])
-    _draw_tone(session)
+    _draw_skin_tone_text(session)
 
 
-def _draw_tone(session: Session) -> None:
-    """Draw a text that describes the mean colour of the head's skin."""
+def _draw_skin_tone_text(session: Session) -> None:
+    """Display a description of the mean colour of the head's skin."""
     colour = session.state.scene.head.maps.mean_colour
     if colour is not None:
         imgui.text_disabled(skin_tone(colour).as_text())
@@ -108,20 +117,20 @@ def _draw_pigments(session: Session, skin: Skin) -> None:
     numbers = [name for name in Pigments.model_fields if name != "structure"]
     defaults = {name: getattr(preset, name) for name in numbers} | {"structure": DEFAULT_STRUCTURE}
     values = Pigments(**defaults | pigments.model_dump(exclude_none=True))
-    make_state = session.state.with_pigments
-    draw_fields(session, values, make_state, _PIGMENT_STYLES, ["structure"])
+    state_with_fields = session.state.with_pigments
+    draw_fields(session, values, state_with_fields, _PIGMENT_STYLES, ["structure"])
     if values.structure != _EPIDERMAL_BLOOD_STRUCTURE:
         numbers.remove("epidermal_blood")
     imgui.separator_text("epidermis")
     draw_fields(
         session,
         values,
-        make_state,
+        state_with_fields,
         _PIGMENT_STYLES,
         [name for name in numbers if name not in _DERMIS_PIGMENTS],
     )
     imgui.separator_text("dermis")
-    draw_fields(session, values, make_state, _PIGMENT_STYLES, _DERMIS_PIGMENTS)
+    draw_fields(session, values, state_with_fields, _PIGMENT_STYLES, _DERMIS_PIGMENTS)
 
 
 def _plot_profile(session: Session) -> None:
@@ -147,7 +156,7 @@ def _plot_profile(session: Session) -> None:
 
 @lru_cache(maxsize=16)
 def _profile_layers(profile_name: str) -> tuple[TissueLayer, ...]:
-    """Return the tissue layers of a named profile, or () if the profile is a sum of Gaussians (cached)."""
+    """Return the tissue layers of a named profile, or () if the profile is a sum of Gaussians."""
     try:
         return tissue_layers(Skin(profile=profile_name))
     except (
@@ -156,36 +165,38 @@ def _profile_layers(profile_name: str) -> tuple[TissueLayer, ...]:
         return ()
 
 
-def _draw_layers(session: Session, layers: Layers) -> None:
+def _draw_layers(session: Session, tissue_layers: Layers) -> None:
     """Draw controls for the coefficients of all tissue layers, starting with the topmost layer."""
-    for index, layer in enumerate(layers):
+    for index, layer in enumerate(tissue_layers):
         depth = "semi-infinite" if layer.thickness_mm is None else f"{layer.thickness_mm:.3g} mm"
         is_open = imgui.tree_node_ex(f"layer{index}", 0, f"{index + 1} {layer.name}, {depth}")
         record_position(session, f"layer {index + 1}")
         if is_open:
-            _draw_layer(session, layers, index)
+            _draw_layer(session, tissue_layers, index)
             imgui.tree_pop()
 
 
-def _draw_layer(session: Session, layers: Layers, layer_index: int) -> None:
-    layer, label_suffix = layers[layer_index], f"##{layer_index + 1}"
+def _draw_layer(session: Session, tissue_layers: Layers, layer_index: int) -> None:
+    layer, label_suffix = tissue_layers[layer_index], f"##{layer_index + 1}"
 
-    def make_state(**fields: object) -> ViewerState:
-        return _replace_layer(session, layers, layer_index, validated_copy(layer, **fields))
+    def state_with_fields(**fields: object) -> ViewerState:
+        return _replace_layer(session, tissue_layers, layer_index, validated_copy(layer, **fields))
 
-    draw_fields(session, layer, make_state, LAYER_STYLES, label_suffix=label_suffix)
+    draw_fields(session, layer, state_with_fields, LAYER_STYLES, label_suffix=label_suffix)
     imgui.text_disabled("red, green, blue [1/mm]")
-    if len(layers) < MAX_LAYERS and draw_button(session, f"add above{label_suffix}"):
+    if len(tissue_layers) < MAX_LAYERS and draw_button(session, f"add above{label_suffix}"):
         copy = validated_copy(layer, thickness_mm=layer.thickness_mm or _NEW_LAYER_THICKNESS_MM)
-        run_action(session, lambda: session.change(_replace_layer(session, layers, layer_index, copy, layer)))
+        run_action(
+            session, lambda: session.change(_replace_layer(session, tissue_layers, layer_index, copy, layer))
+        )
     imgui.same_line()
-    if len(layers) > 1 and draw_button(session, f"remove{label_suffix}"):
-        run_action(session, lambda: session.change(_replace_layer(session, layers, layer_index)))
+    if len(tissue_layers) > 1 and draw_button(session, f"remove{label_suffix}"):
+        run_action(session, lambda: session.change(_replace_layer(session, tissue_layers, layer_index)))
 
 
 def _replace_layer(
-    session: Session, layers: Layers, layer_index: int, *new_layers: TissueLayer
+    session: Session, tissue_layers: Layers, layer_index: int, *new_layers: TissueLayer
 ) -> ViewerState:
     """Return the state in which one tissue layer is replaced by zero or more new layers."""
-    all_layers = (*layers[:layer_index], *new_layers, *layers[layer_index + 1 :])
+    all_layers = (*tissue_layers[:layer_index], *new_layers, *tissue_layers[layer_index + 1 :])
     return session.state.with_skin(layers=[layer.model_dump() for layer in all_layers])

@@ -1,4 +1,4 @@
-"""Atlas on the device: its layouts, their blend, stretch maps, and gutters that are stitched across seams."""
+"""Atlas on the device: its textures, stretch maps and gutters, and the blend of two atlas layouts."""
 
 from dermis.frame.features.atlas.textures import atlas_constants as shader_constants
 

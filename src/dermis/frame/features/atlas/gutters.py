@@ -1,6 +1,7 @@
-"""Gutters of a stitched atlas: texels beside the charts that copy light from points across the seams.
+"""Gutters of a stitched atlas: texels beside a chart that copy light from the surface across the seam.
 
-These points, the sources, are found by tracing paths over the surface of each person at rest.
+The position from which a gutter texel copies is called its source. It is found by tracing a path over the
+surface of each person at rest.
 """
 
 from __future__ import annotations
@@ -26,12 +27,14 @@ _NO_NEIGHBOUR_WORD = 0xFFFFFFFF  # word of a triangle edge without skin across i
 
 @dataclass(frozen=True, eq=False)
 class GutterTracing:
-    """Constant inputs of the passes that trace paths from charts to the sources of gutter texels.
+    """Constant inputs of the passes that determine from where on the surface each gutter texel copies light.
 
-    starts : buffer of the start of each path, for gutter_trace.wgsl
+    The passes trace a path from the edge of the chart across the seam.
+
+    starts : buffer of the point at which each path starts, for gutter_trace.wgsl
     sides : buffer of the neighbouring triangle across each edge of each triangle, for gutter_trace.wgsl
-    halvings : a dictionary for each coarser resolution of the atlas, from names in gutter_halve.wgsl to the
-        buffers that list the finer gutter texels averaged by each coarser gutter texel
+    halvings : for each coarser resolution of the atlas, a dictionary from names in gutter_halve.wgsl to
+        buffers. The buffers list the finer gutter texels that each coarser gutter texel averages
     """
 
     starts: Buffer
@@ -40,7 +43,7 @@ class GutterTracing:
 
 
 def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: AtlasTextures) -> GutterTracing:
-    """Upload the constant inputs of gutter tracing, for an atlas that has gutters."""
+    """Upload the buffers of `GutterTracing` for an atlas that has gutters."""
     starts, sides = (
         device.buffer(words, "STORAGE") for words in (_path_start_words(atlas), _neighbour_words(mesh))
     )
@@ -50,20 +53,27 @@ def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: Atla
 
 
 def with_separate_gutters(device: Device, textures: AtlasTextures) -> AtlasTextures:
-    """Return a copy of the atlas with separate, empty gutter buffers, which `draw` fills for a person."""
+    """Return a copy of the atlas with gutter buffers of its own, which `draw` fills for each person."""
 
-    def with_gutter_list(level: AtlasTextures) -> AtlasTextures:
-        words = np.zeros((len(level.gutter_texels), GUTTER_ENTRY_BYTES // 4), np.uint32)
-        return replace(level, gutter=device.buffer(words, "STORAGE")) if len(words) else level
+    def with_empty_gutter_buffer(textures_at_mip: AtlasTextures) -> AtlasTextures:
+        words = np.zeros((len(textures_at_mip.gutter_texels), GUTTER_ENTRY_BYTES // 4), np.uint32)
+        return (
+            replace(textures_at_mip, gutter=device.buffer(words, "STORAGE"))
+            if len(words)
+            else textures_at_mip
+        )
 
-    return replace(with_gutter_list(textures), coarser=tuple(map(with_gutter_list, textures.coarser)))
+    return replace(
+        with_empty_gutter_buffer(textures), coarser=tuple(map(with_empty_gutter_buffer, textures.coarser))
+    )
 
 
 def _path_start_words(atlas: Atlas) -> Words:
     """Return (a, 5) words for gutter_trace.wgsl, one row for each gutter texel.
 
-    The words are the packed texel, the triangle and the two packed barycentric weights of the point where
-    the path to its source starts, and as floats the source position (x, y) to use if tracing fails.
+    Word 0 packs the coordinates of the texel. Words 1 and 2 are the point where the traced path starts: a
+    triangle, and two packed barycentric weights. Words 3 and 4 are, as floats, the position (x, y) from which
+    to copy light if tracing fails.
     """
     root = np.full((atlas.size, atlas.size), -1, np.int64)
     root[atlas.outside[:, 1], atlas.outside[:, 0]] = np.arange(len(atlas.outside))
@@ -88,16 +98,18 @@ def _neighbour_words(mesh: Mesh) -> Words:
     return np.where((neighbour >= 0) & skin[neighbour], word, _NO_NEIGHBOUR_WORD).astype(np.uint32)
 
 
-def _halving_buffers(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> Bindings:
-    """Upload, for each coarser gutter texel, the list of finer gutter texels that it averages."""
-    width = int(finer.gutter_texels.max()) + 1
+def _halving_buffers(
+    device: Device, finer_textures: AtlasTextures, coarser_textures: AtlasTextures
+) -> Bindings:
+    """Upload, for each gutter texel of the coarser atlas, the list of finer gutter texels to average."""
+    width = int(finer_textures.gutter_texels.max()) + 1
 
     def texel_index(texels: NDArray[np.integer]) -> NDArray[np.int64]:
         return texels[:, 1].astype(np.int64) * width + texels[:, 0]
 
-    fine, coarse = texel_index(finer.gutter_texels // 2), texel_index(coarser.gutter_texels)
+    fine, coarse = texel_index(finer_textures.gutter_texels // 2), texel_index(coarser_textures.gutter_texels)
     order = np.argsort(fine, kind="stable")
-    x, y = coarser.gutter_texels.T.astype(np.uint32)
+    x, y = coarser_textures.gutter_texels.T.astype(np.uint32)
     squares = np.column_stack([x | (y << 16), run_bounds(fine[order], coarse)])
     return {
         "squares": device.buffer(squares, "STORAGE"),
@@ -105,22 +117,24 @@ def _halving_buffers(device: Device, finer: AtlasTextures, coarser: AtlasTexture
     }
 
 
-def draw(graph: Recorder, atlas: AtlasTextures, tracing: GutterTracing, rest_head: HeadGeometry) -> None:
-    """Declare the passes that trace the source of each gutter texel, at all resolutions of the atlas.
+def draw(
+    graph: Recorder, atlas: AtlasTextures, gutter_tracing: GutterTracing, rest_head: HeadGeometry
+) -> None:
+    """Declare the passes that trace from where each gutter texel copies light, at all atlas resolutions.
 
     atlas : result of `with_separate_gutters`; the passes fill its gutter buffers
     rest_head : surface of the person at rest
     """
     device, size = graph.device, (("SIZE", atlas.resources["atlas"].size[0]),)
     assert atlas.gutter is not None
-    paths = {"starts": tracing.starts, "sides": tracing.sides, "gutter": atlas.gutter}
+    paths = {"starts": gutter_tracing.starts, "sides": gutter_tracing.sides, "gutter": atlas.gutter}
     trace = program(device, "atlas/gutter_trace.wgsl", size)
     halve = program(device, "atlas/gutter_halve.wgsl")
     graph.dispatch(
         "gutters", trace, {**rest_head.resources, **paths}, workgroup_grid(len(atlas.gutter_texels))
     )
     levels = [level for level in (atlas, *atlas.coarser) if level.gutter]
-    for (finer, coarser), halving in zip(pairwise(levels), tracing.halvings, strict=True):
+    for (finer, coarser), halving in zip(pairwise(levels), gutter_tracing.halvings, strict=True):
         assert finer.gutter is not None and coarser.gutter is not None
         bound = {**halving, "finer": finer.gutter, "coarser": coarser.gutter}
         graph.dispatch("gutters", halve, bound, workgroup_grid(len(coarser.gutter_texels)))

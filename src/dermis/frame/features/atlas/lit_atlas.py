@@ -12,9 +12,9 @@ from dermis.gpu import MutableBindings, Texture
 
 @dataclass(frozen=True, eq=False)
 class GutterUpdate:
-    """Inputs of the passes that trace the gutters of an atlas over the surface of a person.
+    """Inputs of the passes that determine, for each person, from where gutter texels copy light.
 
-    tracing : constant inputs of the passes
+    tracing : inputs that are the same for all people
     head : surface of the person at rest
     """
 
@@ -30,7 +30,7 @@ class LitAtlas:
     head : triangles with their coordinates in the atlas
     bindings : dictionary from names in the shaders to resources: geometry, maps, lights, shadows, environment
     surfaces : texture of the surface properties at each texel, packed by surface_texels.wgsl
-    scattered : texture of the exitance of light that scattered below the surface
+    scattered : texture of the exitance by subsurface scattering at each texel
     gutter_update : inputs of the passes that trace the gutters for each person, None if the gutters are
         constant
     """

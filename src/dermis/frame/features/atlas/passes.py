@@ -56,8 +56,8 @@ def draw_gutters(
     if atlas.gutter is None or atlas.gutter_light is None:
         return
     device = graph.device
-    gather = program(device, "atlas/stitch_gather.wgsl", source=texel_format)
-    place = program(device, "atlas/stitch_place.wgsl", store=texel_format)
+    gather = program(device, "atlas/stitch_gather.wgsl", source_format=texel_format)
+    place = program(device, "atlas/stitch_place.wgsl", store_format=texel_format)
     linear = device.sampler(mag_filter="linear", min_filter="linear")
     size = (_GUTTER_ENTRIES_PER_ROW, -(-atlas.gutter.size // (GUTTER_ENTRY_BYTES * _GUTTER_ENTRIES_PER_ROW)))
     lists = {"gutter": atlas.gutter, "gathered": atlas.gutter_light}
@@ -70,7 +70,9 @@ def draw_gutters(
 def draw_blend(
     graph: Recorder, first_layout: LitAtlas, second_layout: LitAtlas, blended_light: Texture
 ) -> None:
-    """Declare the pass that, near the seams of a layout, fades to the light of a layout with other seams.
+    """Declare the pass that replaces the light near the seams of one layout by the light of another layout.
+
+    The seams of the two layouts are in different places. The transition between the two lights is smooth.
 
     first_layout : layout whose light is used away from its seams
     second_layout : layout whose light is used near the seams of the first layout

@@ -46,12 +46,12 @@ class AtlasTextures:
     """Textures and buffers of an atlas.
 
     resources : dictionary from names in shaders to textures: atlas, stretch_map (filled by `draw_stretch`),
-        reach_map and, for two layouts or feathered seams, edge_map; coarser resolutions have only
-        stretch_map and reach_map
+        reach_map (`AtlasMip.reach`) and, for two layouts or feathered seams, edge_map; coarser resolutions
+        have only stretch_map and reach_map
     sheared : whether blurs account for an angle between the u and v directions that is not a right angle
     stretch_constants : pipeline constants of the stretch passes
-    stretch_sources : buffer of gutter texels and of the surface points whose stretch they copy, None if there
-        are no gutters
+    stretch_sources : buffer of the texels outside charts, each with the surface point whose stretch it
+        copies; None if there are no such texels
     gutter : buffer of the gutter texels, None if there are no gutters
     gutter_light : buffer of the light of the gutter texels, None if there are no gutters
     gutter_texels : (a, 2) coordinates x and y of the gutter texels
@@ -70,7 +70,7 @@ class AtlasTextures:
     coarser: tuple[AtlasTextures, ...] = ()
     median_texels_per_mm: float = 0.0
 
-    def mips_for(self, edge_mode: str) -> tuple[AtlasTextures, ...]:
+    def mips_for_blurs(self, edge_mode: str) -> tuple[AtlasTextures, ...]:
         """Return the atlas at all resolutions that blurs may use, the finest first.
 
         edge_mode : filter mode at the edges of charts; only "repeated" permits coarser resolutions
@@ -158,10 +158,10 @@ def _upload_mip(
 
 
 def _stretch_sources(atlas: Atlas) -> NDArray[np.uint32]:
-    """Return (r, 3) words for stretch_beyond.wgsl, one row for each gutter texel.
+    """Return (r, 3) words for stretch_beyond.wgsl, one row for each texel outside the triangles of its chart.
 
-    The words are the packed texel, and the surface point whose stretch it copies: the triangle, and two
-    packed barycentric weights.
+    Word 0 packs the coordinates of the texel. Words 1 and 2 are the surface point whose stretch the texel
+    copies: a triangle, and two packed barycentric weights.
     """
     (x, y), (second, third) = (pair.T.astype(np.uint32) for pair in (atlas.outside, atlas.border_weights))
     return np.stack([x | (y << 16), atlas.border_triangle.astype(np.uint32), second | (third << 16)], axis=1)
@@ -170,20 +170,23 @@ def _stretch_sources(atlas: Atlas) -> NDArray[np.uint32]:
 def _upload_coarser(device: Device, mip: AtlasMip) -> tuple[AtlasTextures, ...]:
     """Upload the atlas at half, a quarter, ... of its resolution.
 
-    The data are computed or read from the disk cache."""
+    The coarser masks and gutters are computed, or read from the disk cache.
+    """
     parts = [field.name for field in fields(AtlasMip)]
     count = 0
     while count < MAX_ATLAS_HALVINGS and len(mip.reach) % (2 << count) == 0:
         count += 1
 
-    def compute() -> dict[str, NDArray[np.generic]]:
+    def compute_coarser_mips() -> dict[str, NDArray[np.generic]]:
         mips = [mip]
         for _ in range(count):
             mips.append(halve_mip(mips[-1]))
         return {f"{k} {part}": getattr(coarser, part) for k, coarser in enumerate(mips[1:]) for part in parts}
 
     names = [f"{k} {part}" for k in range(count) for part in parts]
-    arrays = cached_arrays([getattr(mip, part) for part in parts], _HALVING_CACHE_KEY, names, compute)
+    arrays = cached_arrays(
+        [getattr(mip, part) for part in parts], _HALVING_CACHE_KEY, names, compute_coarser_mips
+    )
     mips = (AtlasMip(**{part: arrays[f"{k} {part}"] for part in parts}) for k in range(count))
     return tuple(_upload_mip(device, coarser, {}) for coarser in mips)
 
@@ -249,28 +252,28 @@ def halve_mip(atlas_mip: AtlasMip) -> AtlasMip:
     )
 
 
-def _split_squares(texel_values: NDArray[np.generic]) -> NDArray[np.generic]:
+def _split_squares(image: NDArray[np.generic]) -> NDArray[np.generic]:
     """Rearrange an (n, n) image as (4, n/2, n/2); the first axis counts the texels of a 2 x 2 square."""
-    return np.stack([texel_values[y::2, x::2] for y in (0, 1) for x in (0, 1)])
+    return np.stack([image[y::2, x::2] for y in (0, 1) for x in (0, 1)])
 
 
-def _halved_reach(reach: NDArray[np.uint16], measured_texels: NDArray[np.bool_]) -> NDArray[np.uint16]:
+def _halved_reach(reach: NDArray[np.uint16], counted_texels: NDArray[np.bool_]) -> NDArray[np.uint16]:
     """Return the reach of each 2 x 2 square of texels, (n/2, n/2, 4) [squares].
 
-    The reach of a square is the smallest reach of its texels; texels outside `measured_texels` do not count.
+    The reach of a square is the smallest reach of its texels; texels outside `counted_texels` do not count.
 
     reach : (n, n, 4) reach of each texel, see `AtlasMip` [texels]
-    measured_texels : (4, n/2, n/2) mask of texels, as split by `_split_squares`
+    counted_texels : (4, n/2, n/2) mask of texels, as split by `_split_squares`
     """
-    squares = np.zeros((*measured_texels.shape[1:], 4), np.uint16)
+    squares = np.zeros((*counted_texels.shape[1:], 4), np.uint16)
     within = np.array([[0, 1, 0, 1], [1, 0, 1, 0], [0, 0, 1, 1], [1, 1, 0, 0]])  # steps inside the square
     for side in range(4):
         steps = (
             _split_squares(reach[..., side]).astype(np.int16) - within[side].astype(np.int16)[:, None, None]
         )
-        steps[~measured_texels] = np.iinfo(np.int16).max
+        steps[~counted_texels] = np.iinfo(np.int16).max
         squares[..., side] = np.maximum(steps.min(axis=0), 0) // 2
-    squares[~measured_texels.any(axis=0)] = 0
+    squares[~counted_texels.any(axis=0)] = 0
     return squares
 
 
@@ -279,8 +282,8 @@ def _halved_gutter(
 ) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
     """Return the gutter texels of the halved atlas, and the positions from which they copy light.
 
-    Both results have the shape (b, 2) and are in texels of the halved atlas, as in `AtlasMip`. A position is
-    the mean over the finer gutter texels that become one coarser texel, without outliers.
+    Both results have the shape (b, 2) and are in texels of the halved atlas, as in `AtlasMip`. The position
+    for a coarser texel is the mean of the positions for its finer texels, without outliers.
 
     mip : atlas at the finer resolution
     stitched_squares : mask of the coarser texels that copy light from across a seam

@@ -1,4 +1,4 @@
-"""Passes that fill the blur pyramid: each level is the level before it, blurred along u and then along v."""
+"""Passes that fill the blur pyramid: each level is the previous level, blurred along u and then along v."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dermis.frame.features.diffusion.kernels import (
     MAX_CHAINED_SIGMA_TEXELS,
     MAX_TABLE_VARIANCE,
     ROWS_PER_UNIT_VARIANCE,
-    kernel_table,
+    kernel_ratio_table,
 )
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
 from dermis.frame.programs import TILE_SIDE, program
@@ -29,8 +29,8 @@ _AVERAGING_VARIANCE, _INTERPOLATION_VARIANCE = 1 / 16, 3 / 16
 
 
 def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
-    """Declare the passes that fill each level k with level 0 blurred by the k-th Gaussian of `blur`."""
-    variance_mm2, sheets = blur.variance_mm2, atlas.mips_for(blur.edge)
+    """Declare the passes that fill each level k with level 0, blurred by the k-th Gaussian of `blur`."""
+    variance_mm2, sheets = blur.variance_mm2, atlas.mips_for_blurs(blur.edge)
     source: TextureOrView = levels.layer(0)
     first_deviation = np.sqrt(variance_mm2[0]) * atlas.median_texels_per_mm  # [texel]
     full_first = len(variance_mm2) == 1 or first_deviation > MAX_CHAINED_SIGMA_TEXELS
@@ -50,7 +50,7 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
             spread = shader.record("Spread", truncation=truncation, clear=clear, **members)
             bindings: MutableBindings = {**sheets[halvings].resources, "source": source, "stored": blurred}
             bindings |= {"spread": spread, "kernel_table": _kernel_texture(graph.device)}
-            _dispatch(graph, shader, bindings, levels.size >> halvings)
+            _dispatch_over_level(graph, shader, bindings, levels.size >> halvings)
             source = blurred
 
 
@@ -65,15 +65,15 @@ def _draw_halved_level(
     """
     halved = levels.layer(level_index, halvings)
     shader = program(graph.device, "diffusion/diffuse_halve.wgsl", (), levels.texel, levels.texel)
-    _dispatch(graph, shader, {"source": finer_level, "stored": halved}, levels.size >> halvings)
+    _dispatch_over_level(graph, shader, {"source": finer_level, "stored": halved}, levels.size >> halvings)
     return halved
 
 
-def _dispatch(
-    graph: Recorder, blur_program: ComputeProgram, bindings: MutableBindings, atlas_side: int
+def _dispatch_over_level(
+    graph: Recorder, shader: ComputeProgram, bindings: MutableBindings, level_side: int
 ) -> None:
     linear = graph.device.sampler(mag_filter="linear", min_filter="linear")
-    graph.compute("diffuse", blur_program, bindings | {"linear": linear}, (atlas_side, atlas_side), TILE_SIDE)
+    graph.compute("diffuse", shader, bindings | {"linear": linear}, (level_side, level_side), TILE_SIDE)
 
 
 def _axis_program(
@@ -92,17 +92,20 @@ def _axis_program(
 
 
 def _kernel_texture(device: Device) -> Texture:
-    def make() -> Texture:
-        table = kernel_table()
+    def upload_table() -> Texture:
+        table = kernel_ratio_table()
         return texture_from_array(device, np.dstack([table[:-1], table[1:]]), "rg32float")
 
-    return device.cached("kernels", make)
+    return device.cached("kernels", upload_table)
 
 
 def _spread_members(
     variance_mm2: NDArray[np.float64], halvings: tuple[int, ...]
 ) -> Iterator[dict[str, float]]:
-    """Yield the members of the shader struct `Spread` for each blurred level: variances of its blurs."""
+    """Yield the members of the shader struct `Spread` for each blurred level.
+
+    They are the variance that the blur of the level adds, and the variances that resampling adds.
+    """
     source_mm2 = previous_resampling = previous_mm2 = 0.0
     for variance, (source_halvings, level_halvings) in zip(variance_mm2, pairwise(halvings), strict=True):
         halved = level_halvings > source_halvings

@@ -1,4 +1,4 @@
-"""Pass that sums the blurred levels, weighted by the Gaussians of the profile."""
+"""Pass that computes the weighted sum of the blurred levels, with the weights of the profile's Gaussians."""
 
 from __future__ import annotations
 
@@ -27,11 +27,14 @@ def draw(
 ) -> None:
     """Declare the passes that compute the weighted sum of all blurred levels, from coarse to fine resolution.
 
+    Diffusion is computed as in infinitely thick skin. Thin parts of the head, such as ears, return less light
+    and transmit some.
+
     summed_light : texture for the sum
-    transmitted_light : texture of light through thin parts, which is added to the sum; None if no light
-        crosses thin parts
-    lost_fraction : texture of the fraction of blurred light that thin parts do not return; None if there are
-        no thin parts
+    transmitted_light : texture of the light transmitted by thin parts, which is added to the sum; None if no
+        light is transmitted
+    lost_fraction : texture of the fraction of the blurred light that is lost because a part is thin; None if
+        the head has no thin parts
     """
     device, halvings = graph.device, blur.halvings[1 : len(blur.weight) + 1]
     coarsest = max(halvings)

@@ -47,14 +47,15 @@ def taps_per_side(variance: float, truncation_sigmas: float = KERNEL_TRUNCATION_
 
 
 @cache
-def kernel_table() -> NDArray[np.float32]:
+def kernel_ratio_table() -> NDArray[np.float32]:
     """Return a table of the ratio q for which the kernel w(n) = q^(n^2) has a given variance [-].
 
-    w(n) is the weight of tap n on either side of the centre, so q = w(1) / w(0). Row i is for a variance of
-    i / 64, in units of the squared distance between taps; column j is for j taps on each side of the centre.
+    w(n) is the weight of the n-th tap on either side of the centre, so q = w(1) / w(0). Row i of the table is
+    for a variance of i / 64, in units of the squared distance between taps. Column j is for a kernel with j
+    taps on each side of the centre.
 
-    Sampling and truncation reduce the variance of a Gaussian, especially of a narrow Gaussian. Therefore q is
-    determined numerically, such that the truncated kernel has exactly the desired variance.
+    A sampled and truncated Gaussian has a smaller variance than the Gaussian. Therefore q is determined
+    numerically, such that the truncated kernel has exactly the desired variance.
     """
     variance = np.arange(MAX_TABLE_VARIANCE * ROWS_PER_UNIT_VARIANCE + 2)[:, None] / ROWS_PER_UNIT_VARIANCE
     n = np.arange(_MAX_TAPS_PER_SIDE + 1)
@@ -78,17 +79,16 @@ def _kernel_variance(weight_ratio: Floats, tap_mask: NDArray[np.bool_]) -> Float
 def add_intermediate_levels(
     variance_mm2: NDArray[np.float64], texels_per_mm: float, max_halvings: int
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    """Return the variances of the cheapest chain of blurs [mm^2], and the indices of its intermediate levels.
+    """Insert levels into a chain of blurs that make the chain cheaper.
 
-    An intermediate level is an additional blur; the levels after it can use half the resolution, which saves
-    texel reads.
+    Return the variances of all levels [mm^2], and the indices of the inserted levels. In the chain, each
+    level is computed by blurring the previous level; level 0 is the unblurred light. An inserted level is
+    blurred just enough for `choose_halvings` to halve the resolution of the next level, which saves texel
+    reads.
 
     variance_mm2 : (k,) increasing variances of the profile's levels [mm^2]
     texels_per_mm : texel density of the atlas at full resolution
     max_halvings : largest number of times that the resolution may be halved
-
-    An intermediate level is blurred just enough for `choose_halvings` to halve the resolution of the next
-    level. Level 0 is the unblurred light.
     """
     profile_mm2 = tuple(float(v) for v in variance_mm2)
     return _add_intermediate_levels(profile_mm2, float(texels_per_mm), max_halvings)
@@ -96,28 +96,28 @@ def add_intermediate_levels(
 
 @cache
 def _add_intermediate_levels(
-    profile_mm2: tuple[float, ...], texels_per_mm: float, max_halvings: int
+    profile_variances_mm2: tuple[float, ...], texels_per_mm: float, max_halvings: int
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    chain = list(profile_mm2)
-    min_cost = chain_cost(chain, texels_per_mm, max_halvings)
+    chain = list(profile_variances_mm2)
+    min_cost = blur_chain_cost(chain, texels_per_mm, max_halvings)
     for side in (2.0**times / texels_per_mm for times in range(max_halvings)):  # side of a texel
         level_mm2 = (
             _HALVING_VARIANCE_MARGIN
             * max(MIN_SMOOTHNESS * (2.0 * side) ** 2, _MIN_LEVEL_SIGMA_TEXELS * side) ** 2
         )
-        if level_mm2 >= profile_mm2[-1]:
+        if level_mm2 >= profile_variances_mm2[-1]:
             continue
         if any(level_mm2 < _MIN_VARIANCE_RATIO * v and v < _MIN_VARIANCE_RATIO * level_mm2 for v in chain):
             continue
         candidate = sorted({*chain, level_mm2})
-        cost = chain_cost(candidate, texels_per_mm, max_halvings)
+        cost = blur_chain_cost(candidate, texels_per_mm, max_halvings)
         if cost < (1.0 - _MIN_SAVED_COST_FRACTION) * min_cost:
             chain, min_cost = candidate, cost
-    intermediate_levels = tuple(k for k, v in enumerate(chain, start=1) if v not in profile_mm2)
+    intermediate_levels = tuple(k for k, v in enumerate(chain, start=1) if v not in profile_variances_mm2)
     return np.array(chain), intermediate_levels
 
 
-def chain_cost(variance_mm2: list[float], texels_per_mm: float, max_halvings: int) -> float:
+def blur_chain_cost(variance_mm2: list[float], texels_per_mm: float, max_halvings: int) -> float:
     """Estimate the number of texel reads of a chain of blurs, per texel of the full resolution.
 
     variance_mm2 : increasing variances of the levels [mm^2]

@@ -1,4 +1,4 @@
-"""Profiles that are blended by a map: blend weights over the atlas, and the light of each profile."""
+"""Blend of diffusion profiles by a map: blend weights over the atlas, and the light of each profile."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dermis.gpu import Bindings, Device, Recorder, Texture, TextureView, make_te
 from dermis.gpu.textures import make_view
 from dermis.images.filters import mip_chain
 
-_CACHED_BLEND_MAPS = 4
+_CACHED_BLEND_MAP_COUNT = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,12 +28,12 @@ class Mixture:
     """Textures for skin where a map blends a first profile with one or two others.
 
     uv_weights : texture over uv of the blend weights of all profiles but the first
-    entering : for each profile but the first, a blur pyramid of the entering light times the profile's blend
-        weight
+    entering : for each profile but the first, the blur pyramid of the light that enters the skin, multiplied
+        by the blend weight of the profile
     atlas_weights : for each layout, a texture over the atlas of the same blend weights
-    sums : texture array. Layer 0 holds the exitance of skin that has the first profile everywhere. Two more
-        layers for each other profile hold the change of exitance when the first profile is replaced by that
-        profile: one layer for all entering light, one layer for the weighted light in `entering`
+    sums : texture array. Layer 0 is the exitance if all skin has the first profile. Each other profile has
+        two more layers: the changes of the exitance if this profile replaces the first, for all entering
+        light and for the weighted light in `entering`
     """
 
     uv_weights: Texture
@@ -50,24 +50,24 @@ class Mixture:
 
 
 def make_mixture(
-    device: Device, uv_weights: Texture, entering_light: tuple[PyramidLevels, ...], layout_count: int
+    device: Device, uv_weights: Texture, entering_pyramids: tuple[PyramidLevels, ...], layout_count: int
 ) -> Mixture:
     """Allocate the textures of a mixture of profiles.
 
     uv_weights : texture over uv of the blend weights
-    entering_light : blur pyramids of the entering light, one for each profile but the first
+    entering_pyramids : for each profile but the first, the blur pyramid of entering light times blend weight
     layout_count : number of atlas layouts
     """
-    side, texel = entering_light[0].size, entering_light[0].texel
+    side, texel = entering_pyramids[0].size, entering_pyramids[0].texel
     atlas_weights = tuple(
         make_texture(device, (side, side), texel, texture_name="shares of profiles")
         for _ in range(layout_count)
     )
-    layers = sum_layer_count(len(entering_light))
+    layers = sum_layer_count(len(entering_pyramids))
     sums = make_texture(
         device, (side, side), FLOAT_TEXEL_FORMAT, layer_count=layers, texture_name="light of mixed profiles"
     )
-    return Mixture(uv_weights, entering_light, atlas_weights, sums)
+    return Mixture(uv_weights, entering_pyramids, atlas_weights, sums)
 
 
 def sum_layer_count(other_profile_count: int) -> int:
@@ -106,13 +106,13 @@ def load_blend_weights(image_path: str) -> NDArray[np.float32]:
     return _load_blend_map(path, (status.st_mtime_ns, status.st_size, status.st_ino))
 
 
-@lru_cache(_CACHED_BLEND_MAPS)
+@lru_cache(_CACHED_BLEND_MAP_COUNT)
 def _load_blend_map(path: Path, _: tuple[int, ...]) -> NDArray[np.float32]:
     return mixture_map(path)
 
 
 def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, layout_index: int) -> None:
-    """Declare the pass that resamples the blend weights from uv to the atlas, gutters included.
+    """Declare the passes that resample the blend weights from uv to the atlas, gutters included.
 
     layout_index : index of the atlas layout
     """
@@ -123,7 +123,7 @@ def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, layo
         "weight_map": mixture.uv_weights,
         "stored": into,
     }
-    shader = program(graph.device, "diffusion/profile_blend_weights.wgsl", store=texel)
+    shader = program(graph.device, "diffusion/profile_blend_weights.wgsl", store_format=texel)
     graph.compute("profiles", shader, bindings, into.size[:2])
     draw_gutters(graph, "profiles", layout.atlas, into, texel)
 
@@ -131,9 +131,9 @@ def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, layo
 def draw_entering_light(
     graph: Recorder, levels: PyramidLevels, mixture: Mixture, layout_index: int, profile_index: int
 ) -> None:
-    """Declare the pass that fills level 0 of a profile's pyramid with entering light times blend weight.
+    """Declare the pass that fills level 0 of a profile's pyramid with entering light times the blend weight.
 
-    levels : pyramid whose level 0 holds all light that enters
+    levels : pyramid whose level 0 holds all light that enters the skin
     layout_index : index of the atlas layout
     profile_index : index of the profile among all profiles but the first
     """
@@ -146,10 +146,12 @@ def draw_entering_light(
 
 
 def draw(graph: Recorder, mixture: Mixture, layout_index: int, blended_exitance: Texture) -> None:
-    """Declare the pass that blends the sums of all profiles; alpha stores the packed blend weights.
+    """Declare the pass that blends the layers of `Mixture.sums` to the exitance of the skin.
+
+    The alpha channel of the result stores the blend weights, packed.
 
     layout_index : index of the atlas layout
-    blended_exitance : texture for the blended exitance
+    blended_exitance : texture for the result
     """
     shader = program(graph.device, "diffusion/profile_mixture.wgsl", (("OTHERS", len(mixture.entering)),))
     weights = mixture.atlas_weights[layout_index]

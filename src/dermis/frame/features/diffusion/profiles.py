@@ -1,4 +1,4 @@
-"""Diffusion profiles of skin, which are fitted again when pigments or layers change between frames."""
+"""Diffusion profiles of skin, which are fitted again when the pigments or layers of the skin change."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _CACHED_FIT_COUNT = 4  # the current skin, one to compare with, and two previous
 
 
 class SkinProfiles:
-    """Cache of the diffusion profiles of the last few skins.
+    """Cache of the diffusion profiles of the most recent skins.
 
-    A fit with a similar profile as initial guess is several times faster. For skin described by pigments
-    alone, the guess is the published profile, so that results do not depend on the people rendered before.
-    For skin that defines its layers or its structure, the guess is the last fit of a skin with the same
-    number of layers.
+    A profile is fitted several times faster if the fit starts from a similar profile. For skin described by
+    pigments alone, it starts from the published profile, so that results do not depend on the people rendered
+    before. For skin that defines its layers or its structure, it starts from the last profile fitted for a
+    skin with the same number of layers.
     """
 
     def __init__(self) -> None:
@@ -34,9 +34,9 @@ class SkinProfiles:
         self._current: tuple[Skin, GaussianSum] | None = None
 
     def profile(self, skin: Skin) -> GaussianSum:
-        """Return the diffusion profile of a skin, or the first of the profiles that a map blends.
+        """Return the diffusion profile of a skin; if a map blends several profiles, return the first of them.
 
-        Profile files are read again when the skin changes, not for each frame of the same skin.
+        A profile file is read again for another skin, but not for each frame of the same skin.
 
         Raises DermisError if the skin has pigments or layers, but names a profile that cannot be computed
         from them.

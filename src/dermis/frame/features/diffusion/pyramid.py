@@ -29,9 +29,9 @@ class PyramidLevels:
     """Textures of the blur pyramid: unblurred light as level 0, the blurred levels, and scratch space.
 
     stacks : one texture array for each resolution, finest first, with a layer for each level of that
-        resolution. All arrays but the first begin with a copy, at half the resolution, of the last level of
-        the array before
-    first : index of the level in layer 0 of each array in `stacks`
+        resolution. In all arrays but the first, layer 0 is a copy of the last layer of the previous array, at
+        half its resolution
+    first : for each array in `stacks`, the index of the level that layer 0 holds
     scratch : texture for light that is blurred along u but not yet along v
     size : side of the atlas at full resolution [texels]
     texel : texture format
@@ -45,14 +45,14 @@ class PyramidLevels:
     _views: dict[tuple[int, int], TextureView] = field(default_factory=dict)
 
     def layer(self, level_index: int, halvings: int = 0) -> TextureView:
-        """Return a view of a level in the texture array whose resolution is halved `halvings` times."""
+        """Return a view of a level, from the texture array whose resolution is halved `halvings` times."""
         if (level_index, halvings) not in self._views:
             layer = level_index - self.first[halvings]
             self._views[level_index, halvings] = make_view(self.stacks[halvings], layer=layer)
         return self._views[level_index, halvings]
 
     def scratch_view(self, halvings: int = 0) -> TextureView:
-        """Return a view of the scratch texture at a resolution that is halved `halvings` times."""
+        """Return a view of the scratch texture at the full resolution halved `halvings` times."""
         if (-1, halvings) not in self._views:
             self._views[-1, halvings] = make_view(self.scratch, mip=halvings)
         return self._views[-1, halvings]
@@ -63,9 +63,9 @@ class Blur:
     """Gaussian blurs of one atlas layout.
 
     variance_mm2 : (k,) variances of the Gaussians, increasing [mm^2]
-    weight : (k, 3) weights of the Gaussians [-]
+    weight : (k, 3) weights of the Gaussians for red, green and blue [-]
     halvings : (k + 1,) number of times that the resolution of each level is halved; level 0 is unblurred
-    scale : factor from irradiance to the texels of the levels
+    scale : factor that converts irradiance to the values stored in the levels
     edge : how blurs treat texels beyond a chart and its gutter: "repeated", "cleared" or "skipped"
     clear : irradiance that blurs read from empty texels if `edge` is "cleared"
     intermediate_levels : indices of levels without weight, which only serve as the source of wider blurs
@@ -83,7 +83,7 @@ class Blur:
 
     @property
     def profile_levels(self) -> tuple[int, ...]:
-        """Return the indices of level 0 and of the levels that have weights in the profile."""
+        """Return the indices of level 0 and of the levels that are not intermediate."""
         return tuple(k for k in range(len(self.halvings)) if k not in self.intermediate_levels)
 
 
@@ -121,8 +121,8 @@ def make_levels(device: Device, atlas_side: int, halvings: Halvings, texel_forma
 def levels_by_resolution(halvings: Halvings) -> tuple[range, ...]:
     """Return the range of level indices that each resolution stores, finest resolution first.
 
-    A range covers the levels of all layouts. At all resolutions but the finest, it begins with the last
-    level of the next finer resolution, of which a copy at half the resolution is stored.
+    A range covers the levels of all layouts. At all resolutions but the finest, the first index is that of a
+    copy: the last level of the next finer resolution, stored at half its resolution.
 
     halvings : for each layout, the number of times that the resolution of each level is halved
     """
@@ -158,9 +158,8 @@ def choose_halvings(
     texels_per_mm : texel density of the atlas at full resolution
     max_halvings : largest number of times that the resolution of any level may be halved
 
-    A level is computed by blurring the level before it. Its resolution is halved once more if the level
-    before it is smooth enough to be sampled at half the resolution, as set by `MIN_SMOOTHNESS`.
-    docs/performance.md lists the errors.
+    A level is computed by blurring the previous level. Its resolution is halved once more than that of the
+    previous level if the previous level is smooth enough, as set by `MIN_SMOOTHNESS`.
     """
     halvings = [0]
     for source_mm2 in (0.0, *variance_mm2[:-1]):

@@ -18,15 +18,17 @@ from dermis.gpu import Device, Memo
 
 
 class BlurScheme(Protocol):
-    """Interface of a technique that chooses the formats and resolutions of its blurs."""
+    """Interface of techniques, which choose the texture format and the resolutions of their blurs."""
 
     def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
-        """Allocate the blur pyramid for an atlas of side x side texels."""
+        """Allocate the blur pyramid for a square atlas with a side of `atlas_side` texels."""
 
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and their level indices.
+        """Insert intermediate levels of weight 0, which make the chain of blurs cheaper.
+
+        Return the new split of the profile, and the indices of the inserted levels.
 
         edge_mode : filter mode at the edges of charts
         """
@@ -52,7 +54,7 @@ class Resources:
     mixture: Mixture | None
 
 
-def make(
+def make_resources(
     memo: Memo,
     device: Device,
     request: FrameRequest,
@@ -106,6 +108,9 @@ def _make_levels(
 
 
 def _cached_mixture(
-    device: Device, blend_weights: NDArray[np.float32], entering: tuple[PyramidLevels, ...], layout_count: int
+    device: Device,
+    blend_weights: NDArray[np.float32],
+    entering_pyramids: tuple[PyramidLevels, ...],
+    layout_count: int,
 ) -> Mixture:
-    return make_mixture(device, upload_blend_weights(device, blend_weights), entering, layout_count)
+    return make_mixture(device, upload_blend_weights(device, blend_weights), entering_pyramids, layout_count)

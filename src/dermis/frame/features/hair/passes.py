@@ -1,4 +1,4 @@
-"""Passes of hair: posing, shadows, shading at the knots, and drawing over the picture."""
+"""Passes of hair: pose the strands, render their shadows, shade their knots, draw them over the picture."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 
 from dermis.frame.features.hair.resources import (
     KNOTS_PER_WINDOW,
-    TILE_PIXELS,
+    TILE_SIDE_PIXELS,
     Resources,
     StrandCounts,
     StrandTables,
-    drawn_counts,
+    drawn_strand_counts,
 )
 from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.frame.features.shape.shape import Shape
@@ -40,147 +40,166 @@ _SHADOW_RAY_STRIDE = 4  # one of four rays to an area light is traced: pictures 
 
 
 def draw_shadows(
-    graph: Graph, strands: Resources, shape: Shape, shadow_views: Views, lighting: Bindings
+    graph: Graph, strands: Resources, shape: Shape, shadow_views: Views, lighting_bindings: Bindings
 ) -> None:
-    """Declare the passes that pose the strands, and fill the deep opacity maps of their shadows."""
+    """Declare the passes that move the hair with the skin, and fill the deep opacity maps for its shadows."""
     graph.repeat(pose_guides, strands.tables, shape)
     if len(shadow_views.clips):
-        _draw_deep_opacity(graph, strands, shape, lighting)
+        _draw_deep_opacity(graph, strands, shape, lighting_bindings)
 
 
-def pose_guides(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
-    """Declare the passes that move the guides of hair with the skin."""
-    if tables.groom is None:
+def pose_guides(graph: Recorder, strand_tables: StrandTables, shape: Shape) -> None:
+    """Declare the passes that move the guide strands of a hair style with the skin."""
+    if strand_tables.groom is None:
         return
-    style = tables.groom.style
+    style = strand_tables.groom.style
     guides: Bindings = {"guide_rest": style.guide_rest, "bound_guides": style.bound_guides}
     knots, points = style.guide_rest.size // 16, shape.surface["points"]
-    _dispatch(graph, "hair/guides_pose.wgsl", {**guides, "points": points, "anchors": style.anchors}, knots)
-    _dispatch(graph, "hair/guides_smooth.wgsl", {**guides, "guides": style.guides}, knots)
+    _dispatch_hair(
+        graph, "hair/guides_pose.wgsl", {**guides, "points": points, "anchors": style.anchors}, knots
+    )
+    _dispatch_hair(graph, "hair/guides_smooth.wgsl", {**guides, "guides": style.guides}, knots)
 
 
 def pose_strands(
-    graph: Recorder, tables: StrandTables, shape: Shape, posed_strands: Buffer, coarse: StrandCounts
+    graph: Recorder,
+    strand_tables: StrandTables,
+    shape: Shape,
+    posed_strands: Buffer,
+    coarse_counts: StrandCounts,
 ) -> None:
-    """Declare the passes that move brows and lashes with the skin, and grow all other hair between guides.
+    """Declare the passes that move brows and lashes with the skin, and interpolate other strands from guides.
 
     posed_strands : buffer to which the posed strands are written
-    coarse : number of coarse strands to grow, and number of knots of each
+    coarse_counts : number of interpolated strands (scalp hair and beard), and number of knots of each
     """
     shared: Bindings = {
         "points": shape.surface["points"],
-        "hairs": tables.record(coarse),
+        "hairs": strand_tables.hairs_record(coarse_counts),
         "posed": posed_strands,
     }
-    if tables.fine.hairs:
-        fine: Bindings = {"strands": tables.strands, "knots": tables.knots}
-        _dispatch(graph, "hair/strands_pose.wgsl", {**shared, **fine}, tables.fine.all_knots())
-    if tables.groom is not None:
-        groom, style = tables.groom, tables.groom.style
+    if strand_tables.fine.hairs:
+        fine: Bindings = {"strands": strand_tables.strands, "knots": strand_tables.knots}
+        _dispatch_hair(graph, "hair/strands_pose.wgsl", {**shared, **fine}, strand_tables.fine.all_knots())
+    if strand_tables.groom is not None:
+        groom, style = strand_tables.groom, strand_tables.groom.style
         person: Bindings = {"roots": groom.roots, "parts": groom.parts, "hairline": groom.hairline}
         guides: Bindings = {"guides": style.guides, "guide_cuts": style.guide_cuts}
-        _dispatch(graph, "hair/strands_grow.wgsl", {**shared, **person, **guides}, coarse.all_knots())
+        _dispatch_hair(
+            graph, "hair/strands_grow.wgsl", {**shared, **person, **guides}, coarse_counts.all_knots()
+        )
 
 
-def _draw_deep_opacity(graph: Recorder, strands: Resources, shape: Shape, lighting: Bindings) -> None:
+def _draw_deep_opacity(
+    graph: Recorder, strands: Resources, shape: Shape, lighting_bindings: Bindings
+) -> None:
     """Declare the passes that fill the deep opacity maps of all lights that cast shadows."""
     tables, posed = strands.tables, strands.tables.buffers.casters
     pose_strands(graph, tables, shape, posed, tables.casters)
     segments = tables.fine.all_segments() + tables.casters.all_segments()
     knots = tables.fine.all_knots() + tables.casters.all_knots()
-    bindings: MutableBindings = {**lighting, "posed": posed, "hairs": tables.record(tables.casters)}
+    bindings: MutableBindings = {
+        **lighting_bindings,
+        "posed": posed,
+        "hairs": tables.hairs_record(tables.casters),
+    }
     bindings |= {"windows": strands.shadows, "opacity": strands.shadows}
     clear = program(graph.device, "hair/strands_clear.wgsl")
     graph.dispatch("strands", clear, bindings, (_CLEARING_WORKGROUP_COUNT, 1, 1))
     windows = program(graph.device, "hair/strands_window.wgsl")
     graph.dispatch("strands", windows, bindings, (max(1, -(-knots // KNOTS_PER_WINDOW)), 1, 1))
     for adds_cover in (0, 1):
-        _dispatch(graph, "hair/strands_shadow.wgsl", bindings, segments, (("ADDS_COVER", adds_cover),))
+        _dispatch_hair(graph, "hair/strands_shadow.wgsl", bindings, segments, (("ADDS_COVER", adds_cover),))
 
 
 def draw(
     graph: Recorder,
     strands: Resources,
     geometry: tuple[Shape, HeadGeometry],
-    shading: ShadingInputs,
-    visibility: Texture,
+    shading_inputs: ShadingInputs,
+    visibility_buffer: Texture,
     radiance: Texture,
     labels: Bindings | None = None,
 ) -> Texture:
     """Declare the passes that shade the strands and draw them over the picture; return the new picture.
 
-    geometry : shape of the head, and its vertices and triangles
-    shading : resources of the lighting, uniform record of the shading pass, and constants of the lights
-    visibility : texture of the triangle at each sample
+    geometry : current shape of the head, and its vertices and triangles
+    shading_inputs : resources of the lighting, uniform record of the shading pass, and pipeline constants of
+        the lights
+    visibility_buffer : texture with the index of the triangle that is visible at each sample
     radiance : texture of the picture without hair
     labels : resources with which the pass labels pixels of hair, None if no labels are requested
     """
-    tables, picture, (lighting, view, light_constants) = strands.tables, strands.picture, shading
+    tables, picture, (lighting, view, light_constants) = strands.tables, strands.picture, shading_inputs
     shape, head = geometry
     width, height = picture.result.size[:2]
-    pixel_mm = _pixel_mm(view, tables, height)
-    coarse, posed = drawn_counts(tables, pixel_mm), tables.buffers.drawn
+    pixel_mm = _pixel_footprint_mm(view, tables, height)
+    coarse, posed = drawn_strand_counts(tables, pixel_mm), tables.buffers.drawn
     pose_strands(graph, tables, shape, posed, coarse)
     segments = tables.fine.all_segments() + coarse.all_segments()
     knots = tables.fine.all_knots() + coarse.all_knots()
     light_constants = (*light_constants, ("RAY_STRIDE", _SHADOW_RAY_STRIDE))
     light = program(graph.device, "hair/strands_light.wgsl", light_constants)
-    record = _view_record(light, strands, view, coarse.hairs)
-    hairs = tables.record(coarse)
+    record = _strand_view_record(light, strands, view, coarse.hairs)
+    hairs = tables.hairs_record(coarse)
     shared: Bindings = {"strand_view": record, "projected": tables.buffers.projected, "hairs": hairs}
     graph.dispatch("strands", light, {**lighting, **shared, "posed": posed}, workgroup_grid(knots))
     lists: Bindings = {"chains": picture.chains, "links": picture.links}
-    _dispatch(graph, "hair/strands_empty.wgsl", lists, picture.chains.size // 4)
+    _dispatch_hair(graph, "hair/strands_empty.wgsl", lists, picture.chains.size // 4)
     chains = (("CHAINS", picture.chains_per_tile),)
-    _dispatch(graph, "hair/strands_bin.wgsl", {**shared, **lists}, segments, chains)
-    images: Bindings = {"visibility_buffer": visibility, "behind": radiance, "image": picture.result}
+    _dispatch_hair(graph, "hair/strands_bin.wgsl", {**shared, **lists}, segments, chains)
+    images: Bindings = {"visibility_buffer": visibility_buffer, "behind": radiance, "image": picture.result}
     bindings = {**head.resources, **shared, **lists, **images, **(labels or {})}
     if picture.chains_per_tile > 1:
-        shader = program(graph.device, "hair/strands_draw_tiles.wgsl", chains, labels=labels is not None)
+        shader = program(graph.device, "hair/strands_draw_tiles.wgsl", chains, with_labels=labels is not None)
         graph.compute("strands", shader, bindings, (width, height))
         return picture.result
     rows = rows_per_invocation(graph.device, _max_segments_in_tile(tables, segments, pixel_mm))
-    shader = program(graph.device, "hair/strands_draw.wgsl", (("ROWS", rows),), labels=labels is not None)
+    shader = program(
+        graph.device, "hair/strands_draw.wgsl", (("ROWS", rows),), with_labels=labels is not None
+    )
     graph.compute("strands", shader, bindings, (width, -(-height // rows)))
     return picture.result
 
 
-def _view_record(
-    shader: ComputeProgram, strands: Resources, view: UniformRecord, coarse_count: int
+def _strand_view_record(
+    shader: ComputeProgram, strands: Resources, shade_record: UniformRecord, coarse_count: int
 ) -> UniformRecord:
-    """Return a record of the shader's struct StrandView: camera, samples and number of coarse strands.
+    """Return a record of the shader's struct StrandView: camera, samples and number of strands.
 
-    view : uniform record of the shading pass
-    coarse_count : number of coarse strands to draw
+    shade_record : uniform record of the shading pass
+    coarse_count : number of strands of scalp hair and beard to draw
     """
     members = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "light_factors")
-    record = shader.record("StrandView", **{name: view[name] for name in members})
+    record = shader.record("StrandView", **{name: shade_record[name] for name in members})
     record["coarse"], record["size"] = coarse_count, strands.picture.result.size[:2]
     record["skin"] = strands.skin_albedo
     return record
 
 
-def _pixel_mm(view: UniformRecord, tables: StrandTables, picture_height: int) -> float:
-    """Return the side of a pixel at the depth of the coarse strands [mm].
+def _pixel_footprint_mm(
+    shade_record: UniformRecord, strand_tables: StrandTables, picture_height: int
+) -> float:
+    """Return the side of the square that a pixel covers at the depth of scalp hair and beard [mm].
 
-    view : uniform record of the shading pass
+    shade_record : uniform record of the shading pass
     picture_height : height of the picture [pixels]
     """
-    depth = float(np.dot(tables.centre_mm - view["eye"], view["forward"]))
-    return 2.0 * float(np.linalg.norm(view["up"])) * max(depth, 1.0) / picture_height
+    depth = float(np.dot(strand_tables.centre_mm - shade_record["eye"], shade_record["forward"]))
+    return 2.0 * float(np.linalg.norm(shade_record["up"])) * max(depth, 1.0) / picture_height
 
 
-def _max_segments_in_tile(tables: StrandTables, segment_count: int, pixel_mm: float) -> int:
+def _max_segments_in_tile(strand_tables: StrandTables, segment_count: int, pixel_mm: float) -> int:
     """Estimate the number of strand segments in a crowded tile of the picture.
 
-    The tile is assumed to contain all segments of fine strands, and several times the mean number of segments
-    of coarse strands per tile.
+    The tile is assumed to contain all segments of brows and lashes, and several times as many segments of
+    other strands as the mean tile.
 
     segment_count : number of segments of all strands that are drawn
-    pixel_mm : side of a pixel at the depth of the strands [mm]
+    pixel_mm : side of the square that a pixel covers at the depth of the strands [mm]
     """
-    tiles = max(1.0, (_HAIR_EXTENT_MM / (TILE_PIXELS * pixel_mm)) ** 2)
-    fine = tables.fine.all_segments()
+    tiles = max(1.0, (_HAIR_EXTENT_MM / (TILE_SIDE_PIXELS * pixel_mm)) ** 2)
+    fine = strand_tables.fine.all_segments()
     return int(fine + min(1.0, _CROWDING_FACTOR / tiles) * (segment_count - fine))
 
 
@@ -198,7 +217,7 @@ def rows_per_invocation(device: Device, segment_count: int) -> int:
     return 1 << rows.bit_length() - 1
 
 
-def _dispatch(
+def _dispatch_hair(
     graph: Recorder, shader_path: str, bindings: Bindings, invocation_count: int, constants: Constants = ()
 ) -> None:
     """Declare a hair pass with one shader invocation for each of `invocation_count` elements."""

@@ -1,4 +1,4 @@
-"""Resources of hair: tables of strands, and buffers for the picture and for shadows."""
+"""Resources of hair: buffers of the strands, the picture with hair, and deep opacity maps for shadows."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dermis.mesh.strands import Strands, quad_corners, quad_weights
 from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_constants
 
-TILE_PIXELS = 8
+TILE_SIDE_PIXELS = 8
 """Side of a tile of the picture, for which strand segments are listed [pixels]."""
 _GPU_CHAINS_PER_TILE = 64  # linked lists of a tile on GPUs: one for each invocation of the tile's workgroup
 DEEP_OPACITY_WIDTH = 256
@@ -28,8 +28,8 @@ DEEP_OPACITY_LAYERS = 6
 """Number of depth intervals of a deep opacity map, each with the cover of the hair within it."""
 DEEP_OPACITY_HEADER_WORDS = 8
 """Number of words that precede the texels of each light's deep opacity map."""
-_LINKS_PER_KNOT = 4
-_MAX_LINKS = 1 << 22
+_SEGMENT_LINKS_PER_KNOT = 4
+_MAX_SEGMENT_LINKS = 1 << 22
 # Steps to which capacities for fine strands and for knots are rounded up, so that most heads share them.
 _FINE_CAPACITY_STEP, _KNOT_CAPACITY_STEP = 1 << 12, 1 << 19
 _PROJECTED_KNOT_BYTES = 32
@@ -54,12 +54,12 @@ _HAIR_COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_
 _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _HAIR_COUNT_MEMBERS), ("width_scale", "f4")])
 
 
-class Detail(NamedTuple):
-    """Level of detail of coarse strands (scalp hair and beard) on one kind of adapter.
+class StrandDetail(NamedTuple):
+    """Limits of the detail of coarse strands (scalp hair and beard) on one kind of adapter.
 
     drawn_knots : largest total number of knots of the drawn strands
     casters : largest number of strands that are drawn into shadow maps to represent all strands
-    caster_knots : largest number of knots of each of these strands
+    caster_knots : largest number of knots of a strand in shadow maps
     width_px : least width of drawn strands [pixel]
     segment_px : least length of the segments of drawn strands [pixel]
     """
@@ -71,11 +71,14 @@ class Detail(NamedTuple):
     segment_px: float
 
 
-_GPU_DETAIL, _SOFTWARE_DETAIL = Detail(1 << 23, 10_000, 24, 0.6, 2.0), Detail(1 << 20, 5_000, 10, 0.9, 4.0)
+_GPU_DETAIL, _SOFTWARE_DETAIL = (
+    StrandDetail(1 << 23, 10_000, 24, 0.6, 2.0),
+    StrandDetail(1 << 20, 5_000, 10, 0.9, 4.0),
+)
 
 
 class StrandCounts(NamedTuple):
-    """Number of strands of one group (fine or coarse), and number of knots of each strand."""
+    """Number of strands of a group, such as scalp hair and beard, and number of knots of each strand."""
 
     hairs: int
     knots: int
@@ -85,15 +88,15 @@ class StrandCounts(NamedTuple):
         return (self.hairs if strand_count is None else strand_count) * self.knots
 
     def all_segments(self, strand_count: int | None = None) -> int:
-        """Return the number of segments between knots of the first `strand_count` strands or all strands."""
+        """Return the total number of segments of the first `strand_count` strands, or of all strands."""
         return (self.hairs if strand_count is None else strand_count) * (self.knots - 1)
 
 
 class StrandCapacity(NamedTuple):
-    """Number of strands and knots that the buffers of hair can hold.
+    """Largest numbers of strands and knots that the buffers of hair can hold.
 
     fine : number of strands of brows and lashes
-    knots : total number of knots of fine and coarse strands
+    knots : total number of knots of all strands
     """
 
     fine: int
@@ -111,7 +114,7 @@ class StrandBuffers:
 
 @dataclass(frozen=True, eq=False)
 class StrandPicture:
-    """Lists of the strand segments in each tile of the picture, and the picture with hair.
+    """Picture with hair, and linked lists of the strand segments in each of its tiles.
 
     chains : buffer of the first link of each linked list of segments, see strands_bin.wgsl
     links : buffer of the links of these lists; a link consists of a segment and the index of the next link
@@ -130,62 +133,67 @@ def strand_counts(strands: Strands | None) -> StrandCounts:
     return StrandCounts(0, 2) if strands is None else StrandCounts(*strands.radius_mm.shape)
 
 
-def coarse_counts(device: Device, head: Head) -> StrandCounts:
-    """Return how many coarse strands to draw at most, and how many knots each may have.
+def max_coarse_counts(device: Device, head: Head) -> StrandCounts:
+    """Return the largest number of coarse strands to draw, and the largest number of knots of each.
 
     Coarse strands are scalp hair and beard. The limits depend on the device.
     """
     if head.hair is None:
         return StrandCounts(0, 2)
     fitting = device.max_storage_bytes // _PROJECTED_KNOT_BYTES - _KNOT_CAPACITY_STEP
-    limit = min(fitting, adapter_detail(device).drawn_knots) // head.hair.knots
+    limit = min(fitting, adapter_strand_detail(device).drawn_knots) // head.hair.knots
     return StrandCounts(min(len(head.hair), limit), head.hair.knots)
 
 
-def caster_counts(device: Device, coarse: StrandCounts) -> StrandCounts:
-    """Return how many strands represent all coarse strands in shadow maps, and how many knots each has.
+def caster_strand_counts(device: Device, coarse_counts: StrandCounts) -> StrandCounts:
+    """Return how many strands represent scalp hair and beard in shadow maps, and how many knots each has.
 
-    coarse : result of `coarse_counts`
+    coarse_counts : result of `max_coarse_counts`
     """
-    detail = adapter_detail(device)
-    return StrandCounts(min(coarse.hairs, detail.casters), min(coarse.knots, detail.caster_knots))
+    detail = adapter_strand_detail(device)
+    return StrandCounts(
+        min(coarse_counts.hairs, detail.casters), min(coarse_counts.knots, detail.caster_knots)
+    )
 
 
-def adapter_detail(device: Device) -> Detail:
-    """Return the level of detail of hair on a device."""
+def adapter_strand_detail(device: Device) -> StrandDetail:
+    """Return the limits of the detail of scalp hair and beard for the adapter of a device."""
     return _SOFTWARE_DETAIL if device.adapter.kind == "CPU" else _GPU_DETAIL
 
 
-def strand_capacity(fine: StrandCounts, coarse: StrandCounts) -> StrandCapacity:
+def strand_capacity(fine_counts: StrandCounts, coarse_counts: StrandCounts) -> StrandCapacity:
     """Return the capacity that buffers of strands need, rounded up so that most heads can share buffers."""
-    knots = fine.all_knots() + coarse.all_knots()
-    step = _KNOT_CAPACITY_STEP if coarse.hairs else _FINE_CAPACITY_STEP
-    return StrandCapacity(_round_up(fine.hairs, _FINE_CAPACITY_STEP), _round_up(knots, step))
+    knots = fine_counts.all_knots() + coarse_counts.all_knots()
+    step = _KNOT_CAPACITY_STEP if coarse_counts.hairs else _FINE_CAPACITY_STEP
+    return StrandCapacity(_round_up(fine_counts.hairs, _FINE_CAPACITY_STEP), _round_up(knots, step))
 
 
 def _round_up(count: int, step: int) -> int:
     return -(-count // step) * step
 
 
-def make_strand_buffers(device: Device, capacity: StrandCapacity, casters: StrandCapacity) -> StrandBuffers:
+def make_strand_buffers(
+    device: Device, capacity: StrandCapacity, caster_capacity: StrandCapacity
+) -> StrandBuffers:
     """Allocate the buffers of posed strands and of projected knots."""
     first, second = (
-        _make_buffer(device, 4 * (one.knots + 2 * (one.knots // 2))) for one in (casters, capacity)
+        _make_word_buffer(device, 4 * (one.knots + 2 * (one.knots // 2)))
+        for one in (caster_capacity, capacity)
     )
-    return StrandBuffers(first, second, _make_buffer(device, 8 * capacity.knots))
+    return StrandBuffers(first, second, _make_word_buffer(device, 8 * capacity.knots))
 
 
 def make_strand_picture(
     device: Device, capacity: StrandCapacity, picture_size: tuple[int, int]
 ) -> StrandPicture:
     """Allocate the segment lists and the texture with hair for a picture of size (width, height)."""
-    across, down = (-(-side // TILE_PIXELS) for side in picture_size)
-    links = _LINKS_PER_KNOT * capacity.knots + capacity.fine * (across + down)
-    links = min(links, _MAX_LINKS, device.max_storage_bytes // 8)
+    across, down = (-(-side // TILE_SIDE_PIXELS) for side in picture_size)
+    links = _SEGMENT_LINKS_PER_KNOT * capacity.knots + capacity.fine * (across + down)
+    links = min(links, _MAX_SEGMENT_LINKS, device.max_storage_bytes // 8)
     per_tile = chains_per_tile(device, across * down)
-    chains = _make_buffer(device, 1 + per_tile * across * down)
+    chains = _make_word_buffer(device, 1 + per_tile * across * down)
     result = make_texture(device, picture_size, "rgba32float")
-    return StrandPicture(chains, _make_buffer(device, 2 * links), result, per_tile)
+    return StrandPicture(chains, _make_word_buffer(device, 2 * links), result, per_tile)
 
 
 def chains_per_tile(device: Device, tile_count: int) -> int:
@@ -199,24 +207,24 @@ def chains_per_tile(device: Device, tile_count: int) -> int:
     return _GPU_CHAINS_PER_TILE if fits and device.adapter.kind != "CPU" else 1
 
 
-def make_deep_opacity(device: Device, light_count: int) -> Buffer:
+def make_deep_opacity_maps(device: Device, light_count: int) -> Buffer:
     """Allocate a buffer for the deep opacity maps of strands, one map for each of `light_count` lights."""
     texels = (1 + DEEP_OPACITY_LAYERS) * DEEP_OPACITY_WIDTH**2 // 2
-    return _make_buffer(device, (DEEP_OPACITY_HEADER_WORDS + texels) * max(1, light_count))
+    return _make_word_buffer(device, (DEEP_OPACITY_HEADER_WORDS + texels) * max(1, light_count))
 
 
 def placeholder_strand_shadows(device: Device) -> Buffer:
-    """Return a placeholder for the deep opacity maps of heads without hair."""
-    return device.cached("no strand shadows", lambda: _make_buffer(device, DEEP_OPACITY_HEADER_WORDS))
+    """Return the buffer that heads without hair bind in place of the deep opacity maps."""
+    return device.cached("no strand shadows", lambda: _make_word_buffer(device, DEEP_OPACITY_HEADER_WORDS))
 
 
-def _make_buffer(device: Device, word_count: int) -> Buffer:
+def _make_word_buffer(device: Device, word_count: int) -> Buffer:
     return device.storage_buffer(4 * word_count)
 
 
 @dataclass(frozen=True, eq=False)
 class GuideTables:
-    """Buffers of the guides of a hair style, named as in guides_pose.wgsl and strands_grow.wgsl."""
+    """Buffers of the guide strands of a hair style, named as in guides_pose.wgsl and strands_grow.wgsl."""
 
     anchors: Buffer
     guide_rest: Buffer
@@ -227,7 +235,7 @@ class GuideTables:
 
 @dataclass(frozen=True, eq=False)
 class GroomTables:
-    """Buffers of a person's groom: tables of the hair style, and parameters such as length and colour."""
+    """Buffers of a person's groom: guides of the hair style, and parameters such as length and colour."""
 
     style: GuideTables
     roots: Buffer
@@ -244,17 +252,17 @@ class StrandTables:
     strands : buffer of the fine strands at rest, see strands_pose.wgsl
     knots : buffer of the knots of the fine strands at rest, see strands_pose.wgsl
     buffers : buffers that each frame fills
-    fine : number of fine strands, and of the knots of each
+    fine : number of fine strands, and number of knots of each
     coarse : largest number of coarse strands to draw, and largest number of knots of each
-    casters : number of strands that represent all coarse strands in shadow maps, and of the knots of each
-    detail : level of detail of the coarse strands
-    groom : tables from which coarse strands grow, None if there are no coarse strands
+    casters : number of strands that represent all coarse strands in shadow maps, and number of knots of each
+    detail : limits of the detail of coarse strands
+    groom : buffers from which coarse strands are interpolated, None if there are no coarse strands
     possible : total number of coarse strands of the person
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
-    length_mm : length of the part of the hair with the longest strands [mm]
-    shortest_mm : length of the part with the shortest strands [mm]
-    width_mm : width of a strand in the part with the longest strands [mm]
-    cover : projected area of hair per area of skin in this part [-]
+    length_mm : length of the longest kind of coarse hair, such as scalp hair or moustache [mm]
+    shortest_mm : length of the shortest kind [mm]
+    width_mm : width of a strand of the longest kind [mm]
+    cover : projected area of hair of the longest kind per area of skin [-]
     """
 
     strands: Buffer
@@ -263,7 +271,7 @@ class StrandTables:
     fine: StrandCounts
     coarse: StrandCounts
     casters: StrandCounts
-    detail: Detail
+    detail: StrandDetail
     groom: GroomTables | None
     possible: int
     centre_mm: NDArray[np.float64]
@@ -272,12 +280,20 @@ class StrandTables:
     width_mm: float
     cover: float
 
-    def record(self, coarse: StrandCounts) -> UniformRecord:
-        """Return the uniform record of the struct Hairs in strand_knots.wgsl.
+    def hairs_record(self, coarse_counts: StrandCounts) -> UniformRecord:
+        """Return the numbers of strands as a uniform record of the struct Hairs in strand_knots.wgsl.
 
-        coarse : number of coarse strands to draw, and number of knots of each"""
-        width_scale = self.possible / max(1, coarse.hairs)
-        values = self.fine.hairs, coarse.hairs, coarse.hairs, self.fine.knots, coarse.knots, width_scale
+        coarse_counts : number of coarse strands to draw, and number of knots of each
+        """
+        width_scale = self.possible / max(1, coarse_counts.hairs)
+        values = (
+            self.fine.hairs,
+            coarse_counts.hairs,
+            coarse_counts.hairs,
+            self.fine.knots,
+            coarse_counts.knots,
+            width_scale,
+        )
         return np.array(values, _HAIRS_DTYPE)
 
 
@@ -302,7 +318,7 @@ def shader_constants() -> dict[str, float]:
     opacity = {"strand_window": DEEP_OPACITY_WIDTH, "strand_layers": DEEP_OPACITY_LAYERS}
     words = {"strand_window_words": DEEP_OPACITY_HEADER_WORDS, "strand_window_knots": KNOTS_PER_WINDOW}
     guides = {"guide_anchors": GUIDE_ANCHORS, "guide_knots": GUIDE_KNOTS}
-    return {"strand_tile": TILE_PIXELS, **opacity, **words, **guides, **hair_constants()}
+    return {"strand_tile": TILE_SIDE_PIXELS, **opacity, **words, **guides, **hair_constants()}
 
 
 def has_strands(head: Head, settings: Settings) -> bool:
@@ -315,33 +331,34 @@ def strand_constants(head: Head, settings: Settings) -> Constants:
     return (("STRANDS", 1),) if has_strands(head, settings) else ()
 
 
-def drawn_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
-    """Return the number of coarse strands to draw, and the number of knots of each.
+def drawn_strand_counts(strand_tables: StrandTables, pixel_mm: float) -> StrandCounts:
+    """Return the number of strands of scalp hair and beard to draw, and the number of knots of each.
 
-    Where strands are thinner than a pixel, fewer but wider strands are drawn, which cover the same area. More
-    strands are drawn of short hair, because few short strands look like dots.
+    Where strands are thinner than a pixel, fewer strands are drawn. They are wider, so that they cover the
+    same area. More strands are drawn of short hair, because few short strands look like dots.
 
-    pixel_mm : side of a pixel at the depth of the strands [mm]
+    pixel_mm : side of the square that a pixel covers at the depth of the strands [mm]
     """
-    if not tables.coarse.hairs:
-        return tables.coarse
+    if not strand_tables.coarse.hairs:
+        return strand_tables.coarse
     pixel_mm = 2.0 ** (np.round(_DETAIL_LEVELS_PER_OCTAVE * np.log2(pixel_mm)) / _DETAIL_LEVELS_PER_OCTAVE)
-    drawn_px = tables.detail.width_px + _WIDTH_PER_COVER_PX * min(tables.cover, _MAX_DRAWN_COVER)
+    tables, detail = strand_tables, strand_tables.detail
+    drawn_px = detail.width_px + _WIDTH_PER_COVER_PX * min(tables.cover, _MAX_DRAWN_COVER)
     hairs = max(_MIN_DRAWN_STRANDS, tables.possible * tables.width_mm / (drawn_px * pixel_mm))
-    knots = max(_MIN_KNOTS, 1 + np.ceil(tables.length_mm / (tables.detail.segment_px * pixel_mm)))
+    knots = max(_MIN_KNOTS, 1 + np.ceil(tables.length_mm / (detail.segment_px * pixel_mm)))
     crossing = _MIN_STRANDS_PER_PIXEL * _ROOT_AREA_MM2 / (pixel_mm * tables.shortest_mm)
-    hairs = max(hairs, min(crossing, _MAX_SHORT_KNOTS_FRACTION * tables.detail.drawn_knots / knots))
+    hairs = max(hairs, min(crossing, _MAX_SHORT_KNOTS_FRACTION * detail.drawn_knots / knots))
     return StrandCounts(int(min(tables.coarse.hairs, hairs)), int(min(tables.coarse.knots, knots)))
 
 
 def make_strand_tables(
-    device: Device, head: Head, coarse: StrandCounts, buffers: StrandBuffers, groom: GroomTables | None
+    device: Device, head: Head, coarse_counts: StrandCounts, buffers: StrandBuffers, groom: GroomTables | None
 ) -> StrandTables:
-    """Upload the fine strands of a head, and collect the tables of its coarse strands.
+    """Upload the brows and lashes of a head, and collect the buffers of its scalp hair and beard.
 
-    coarse : result of `coarse_counts`
+    coarse_counts : result of `max_coarse_counts`
     buffers : buffers that each frame fills
-    groom : tables from which coarse strands grow, None if there are no coarse strands
+    groom : buffers from which scalp hair and beard are interpolated, None if there are none
 
     Raises DermisError for strands whose roots do not lie on the head's mesh.
     """
@@ -357,9 +374,9 @@ def make_strand_tables(
         knots=device.buffer(knots, "STORAGE"),
         buffers=buffers,
         fine=strand_counts(fine),
-        coarse=coarse,
-        casters=caster_counts(device, coarse),
-        detail=adapter_detail(device),
+        coarse=coarse_counts,
+        casters=caster_strand_counts(device, coarse_counts),
+        detail=adapter_strand_detail(device),
         groom=groom,
         possible=0 if hair is None else len(hair.roots),
         centre_mm=np.zeros(3) if hair is None else hair.centre_mm,
@@ -371,11 +388,11 @@ def make_strand_tables(
 
 
 def make_guide_tables(device: Device, guides: Guides) -> GuideTables:
-    """Upload the guides of a hair style, and allocate buffers for the posed guides."""
+    """Upload the guide strands of a hair style, and allocate buffers for the posed guides."""
     anchors = np.empty(guides.weight.shape, _ANCHOR_DTYPE)
     anchors["corner"] = guides.corner
     anchors["local"][..., :3], anchors["local"][..., 3] = guides.local_mm, guides.weight
-    bound, smooth = (_make_buffer(device, 2 * guides.rest_mm.size) for _ in range(2))
+    bound, smooth = (_make_word_buffer(device, 2 * guides.rest_mm.size) for _ in range(2))
     rest, cuts = (device.buffer(array, "STORAGE") for array in (guides.rest_mm, guides.cut))
     return GuideTables(device.buffer(anchors.view(np.uint32), "STORAGE"), rest, cuts, bound, smooth)
 
@@ -396,37 +413,37 @@ def make_groom_tables(device: Device, groom: Groom, guide_tables: GuideTables, r
     """Upload the parameters of a person's groom, such as colour and length.
 
     guide_tables : guides of the hair style, shared by all people with that style
-    roots : buffer of the strand roots of the hair style, shared by the same people
+    roots : buffer of the strand roots of the hair style, shared by all people with that style
     """
     parts = device.buffer(groom.parameters.view(np.float32), "STORAGE")
     return GroomTables(guide_tables, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"))
 
 
-def _fill_strand_rows(rows: NDArray[np.void], head: Head, strands: Strands) -> None:
+def _fill_strand_rows(strand_rows: NDArray[np.void], head: Head, strands: Strands) -> None:
     if int(strands.roots.quad.max()) >= len(head.mesh.quads):
         actual = f"its mesh has {len(head.mesh.quads)} quads"
         refuse(head.name, "hairs rooted in quads of its mesh", actual, "Leave its strands out")
-    rows["corner"] = quad_corners(head.mesh, strands.roots.quad)
-    rows["weight"] = quad_weights(strands.roots.position)
-    rows["absorption"][:, :3] = strands.absorption
+    strand_rows["corner"] = quad_corners(head.mesh, strands.roots.quad)
+    strand_rows["weight"] = quad_weights(strands.roots.position)
+    strand_rows["absorption"][:, :3] = strands.absorption
     if strands.cover is not None:
-        rows["absorption"][:, 3] = strands.cover
+        strand_rows["absorption"][:, 3] = strands.cover
 
 
 def _knot_rows(strands: Strands) -> NDArray[np.float32]:
-    """Return positions and radii of all knots, as (n k, 4) for n strands with k knots each [mm]."""
+    """Return (n k, 4) rows of position and radius [mm], one for each of the k knots of n strands."""
     rows = np.empty((*strands.radius_mm.shape, 4), np.float32)
     rows[..., :3], rows[..., 3] = strands.knots_mm, strands.radius_mm
     return rows.reshape(-1, 4)
 
 
 def mean_skin_albedo(head: Head) -> tuple[float, ...]:
-    """Return the mean (3,) albedo of the colour map, or a default albedo if there is no map [-]."""
+    """Return the mean RGB albedo of the colour map, or a default albedo if there is no map [-]."""
     colour = head.maps.mean_colour
     return (DEFAULT_COLOUR,) * 3 if colour is None else tuple(colour.tolist())
 
 
-def make(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
+def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
     """Return the resources for the hair of the requested head, None if no strands are drawn.
 
     Raises DermisError for strands whose roots do not lie on the head's mesh.
@@ -434,8 +451,8 @@ def make(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
     head, cached, layers = request.head, memo.get, request.shadow_layers
     if not has_strands(head, request.settings):
         return None
-    fine, coarse = strand_counts(head.strands), coarse_counts(device, head)
-    capacity, casters = (strand_capacity(fine, one) for one in (coarse, caster_counts(device, coarse)))
+    fine, coarse = strand_counts(head.strands), max_coarse_counts(device, head)
+    capacity, casters = (strand_capacity(fine, one) for one in (coarse, caster_strand_counts(device, coarse)))
     groom = None
     if head.hair is not None:
         style = cached(make_guide_tables, device, head.hair.guides)
@@ -444,5 +461,5 @@ def make(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
     buffers = cached(make_strand_buffers, device, capacity, casters)
     tables = cached(make_strand_tables, device, head.bare, coarse, buffers, groom)
     picture = cached(make_strand_picture, device, capacity, request.settings.size)
-    shadows = cached(make_deep_opacity, device, layers, caller_name=f"{layers} {request.view_name}")
+    shadows = cached(make_deep_opacity_maps, device, layers, caller_name=f"{layers} {request.view_name}")
     return Resources(tables, picture, shadows, cached(mean_skin_albedo, head))

@@ -31,19 +31,21 @@ def shader_constants() -> dict[str, int]:
 class InterreflectionBuffers:
     """Buffers of interreflection, which do not depend on the appearance of the skin.
 
+    The skin is divided into patches that exchange light. A cell is a square of a coarse grid over the atlas;
+    the cells store the light that reaches the skin from the patches.
+
     sample_points : buffer of the surface points at which patches are lit, and the number of points
     patch_links : dictionary from names in shaders to buffers of the form factors between patches
-    cell_links : dictionary from names in shaders to buffers of the form factors from cells (squares of a
-        coarse grid over the atlas) to patches
-    stores_means : whether a cell stores the mean exitance of the patches that it sees, instead of the
-        irradiance from these patches
+    cell_links : dictionary from names in shaders to buffers of the form factors from cells to patches
+    stores_means : whether a cell stores the mean exitance of the patches that are visible from it, instead of
+        the irradiance from these patches
     sample_exitance : buffer of the exitance of the sample points
     direct_exitance : buffer of the exitance of the patches by direct light
     uniform_exitance : buffer of the exitance of the patches under a uniform irradiance of 1
     bounced_exitance : two buffers of the exitance of the patches after a bounce; bounces alternate between
         them
     from_skin : buffer of the light that reaches each cell from other skin
-    no_light : buffer of zeros that takes the place of `from_skin` while the sample points are lit
+    no_light : buffer of zeros to bind instead of `from_skin` in the pass that lights the sample points
     """
 
     sample_points: tuple[Buffer, int]
@@ -81,7 +83,7 @@ def make_interreflection(
     light_key: str,
     layout_key: str,
 ) -> Interreflection | None:
-    """Return the interreflection of a head, None for a head where no skin sees other skin.
+    """Return the interreflection of a head, None for a head where no skin is visible from other skin.
 
     profile_albedo : (3,) albedo of the skin's diffusion profile [-]
     has_occlusion : whether there is a map of the visible fraction of the sky
@@ -93,7 +95,9 @@ def make_interreflection(
         return None
     uploaded = memo.get(_upload_links, device, form_factors, caller_name=layout_key)
     key = f"{layout_key} {light_key}"
-    buffers = memo.get(_make_buffers, device, uploaded, has_occlusion, light_key, caller_name=key)
+    buffers = memo.get(
+        _make_interreflection_buffers, device, uploaded, has_occlusion, light_key, caller_name=key
+    )
     return Interreflection(buffers, profile_albedo)
 
 
@@ -132,7 +136,7 @@ def _upload_form_factors(
     return {"first": device.buffer(row_start, "STORAGE"), "links": device.buffer(links, "STORAGE")}
 
 
-def _make_buffers(
+def _make_interreflection_buffers(
     device: Device, link_buffers: LinkBuffers, stores_means: bool, _: str
 ) -> InterreflectionBuffers:
     sample_points, patch_links, cell_links = link_buffers
@@ -155,10 +159,12 @@ def _make_buffers(
     )
 
 
-def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, constants: Constants) -> None:
-    """Declare the passes that compute the light that each part of the skin receives from other skin.
+def draw(
+    graph: Recorder, lighting_bindings: Bindings, interreflection: Interreflection, constants: Constants
+) -> None:
+    """Declare the passes that compute the light that skin receives from other skin.
 
-    bindings : resources of the lighting
+    lighting_bindings : resources of the lighting
     constants : pipeline constants of the lights
 
     Source: [Goral1984].
@@ -172,12 +178,12 @@ def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, 
         "sample_exitance": buffers.sample_exitance,
         "from_skin": buffers.no_light,
     }
-    graph.dispatch("interreflection", shader, {**bindings, **own}, workgroup_grid(count))
+    graph.dispatch("interreflection", shader, {**lighting_bindings, **own}, workgroup_grid(count))
     graph.repeat(_draw_bounces, buffers)
 
 
 def _draw_bounces(graph: Recorder, buffers: InterreflectionBuffers) -> None:
-    """Declare the passes in which light bounces between patches of skin and then reaches the atlas."""
+    """Declare the passes that compute the light bounced between patches, and then the light at the atlas."""
     device = graph.device
     team = (
         1 if device.adapter.kind == "CPU" else _INVOCATIONS_PER_PATCH

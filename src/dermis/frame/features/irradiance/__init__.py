@@ -1,4 +1,4 @@
-"""Irradiance at the texels of the atlas, by light that enters the skin."""
+"""Irradiance of the light that enters the skin, at each texel of the atlas."""
 
 from dermis.frame.features.irradiance.irradiance import fine_light_constants as shader_constants
 

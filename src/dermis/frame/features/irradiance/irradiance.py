@@ -1,4 +1,4 @@
-"""Irradiance over the atlas, and parameters of the correction for light that varies within a texel."""
+"""Irradiance over the atlas, and parameters of a correction for light that varies within a texel."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
-from dermis.frame.lights.records import oblique_constants
+from dermis.frame.lights.records import with_oblique_constant
 from dermis.frame.programs import FLOAT_TEXEL_FORMAT, program
 from dermis.gpu import Constants, Recorder, TextureOrView
 
@@ -26,9 +26,9 @@ def fine_light_members(
 ) -> dict[str, float | NDArray[np.floating]]:
     """Return the members of the shader struct `Fine`, which corrects light that varies within a texel.
 
-    variance_mm2 : (k,) variances of the Gaussians that blur [mm^2]
-    weight : (k, 3) weights of the Gaussians that blur [-]
-    relit_mm2 : variance of the relit Gaussian, whose light is evaluated per pixel instead of blurred [mm^2]
+    variance_mm2 : (k,) variances of the Gaussians with which the atlas is blurred [mm^2]
+    weight : (k, 3) weights of these Gaussians for red, green and blue [-]
+    relit_mm2 : variance of the narrowest Gaussian, which is not blurred but evaluated at each pixel [mm^2]
     """
     count = min(len(variance_mm2), MAX_FINE_GAUSSIANS)
     level = np.zeros((MAX_FINE_GAUSSIANS, 4), np.float32)
@@ -51,7 +51,9 @@ def draw(
     irradiance_scale: float = 1.0,
     filter_sigma_texels: float = 0.0,
 ) -> None:
-    """Declare the pass that stores the irradiance at each texel, times the skin colour before scattering.
+    """Declare the pass that stores, at each texel, the irradiance times the skin colour.
+
+    The skin colour is the part of the albedo that is applied before the light scatters.
 
     layout : atlas with the resources that light its texels
     constants : pipeline constants of the lights
@@ -60,11 +62,11 @@ def draw(
     texel_format : format of the texture
     irradiance_scale : factor by which irradiance is multiplied before it is stored
     filter_sigma_texels : standard deviation of the filter for light that varies within a texel [texels]. 0
-        samples only texel centres; this is required if adjacent texels are not adjacent on the surface
+        samples light only at texel centres. Use 0 where adjacent texels may not be adjacent on the surface
     """
     if filter_sigma_texels:  # neighbouring texels are neighbours on the surface
-        constants = oblique_constants(constants)
-    shader = program(graph.device, "irradiance/irradiance.wgsl", constants, store=texel_format)
+        constants = with_oblique_constant(constants)
+    shader = program(graph.device, "irradiance/irradiance.wgsl", constants, store_format=texel_format)
     entering = shader.record("Entering", scale=irradiance_scale, area=filter_sigma_texels)
     bound = {
         **layout.bindings,

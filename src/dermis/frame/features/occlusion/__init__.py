@@ -1,4 +1,4 @@
-"""Ambient occlusion: the visible fraction of the sky, baked for a head at rest, updated as it moves."""
+"""Ambient occlusion: the visible fraction of the sky, baked for a head at rest and updated as it moves."""
 
 from dermis.frame.features.occlusion.moving import VertexSkyVisibility, draw
 

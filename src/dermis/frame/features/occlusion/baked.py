@@ -26,7 +26,7 @@ from dermis.gpu import (
 from dermis.gpu.textures import texture_from_array
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.groom import Groom
-from dermis.mesh.grown_strands import absorbed_by_hair, hair_cover
+from dermis.mesh.grown_strands import hair_cover, mean_hair_absorptance
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 
@@ -63,7 +63,7 @@ def bake_occlusion(
     rows hold the vertices of the mesh.
 
     bindings : resources that lighting shaders read; the geometry and the lights among them are not used
-    surface_texels : texture of the surface point of each atlas texel
+    surface_texels : texture that maps each atlas texel to a surface point
     result_side : side of the atlas in the result [texels]
     direction_count : number of depth maps
     depth_map_side : side of a depth map [texels]
@@ -84,7 +84,11 @@ def bake_occlusion(
         ]
         draw_layers(commands, "occlusion", layers, shadow_map_views(views), geometry)
         sky = shader.record("Sky", directions=len(views), side=result_side, vertices=len(mesh.positions))
-        lights: Bindings = {"lights": _light_record(shader, views), "shadow_maps": layers.texture, "sky": sky}
+        lights: Bindings = {
+            "lights": _depth_views_as_lights(shader, views),
+            "shadow_maps": layers.texture,
+            "sky": sky,
+        }
         resources: Bindings = {
             **bindings,
             **geometry.resources,
@@ -99,7 +103,7 @@ def bake_occlusion(
         return np.asarray(raw[..., 0] / raw[..., 1])
 
 
-def _light_record(shader: ComputeProgram, shadow_views: list[ShadowView]) -> UniformRecord:
+def _depth_views_as_lights(shader: ComputeProgram, shadow_views: list[ShadowView]) -> UniformRecord:
     record = shader.record("Lights")
     for layer, view in enumerate(shadow_views):
         light = record["light"][layer]
@@ -109,7 +113,7 @@ def _light_record(shader: ComputeProgram, shadow_views: list[ShadowView]) -> Uni
     return record
 
 
-def fill_gaps(baked_occlusion: NDArray[np.float32], result_side: int) -> NDArray[np.float32]:
+def fill_occlusion_gaps(baked_occlusion: NDArray[np.float32], result_side: int) -> NDArray[np.float32]:
     """Return a baked occlusion map whose empty texels have the value of the nearest texel on the surface.
 
     The last row of the atlas is repeated, so that filters at the edge of the atlas do not read vertices.
@@ -139,17 +143,17 @@ def cached_occlusion_map(
 
     hair : hair of the head, which hides a part of the sky from the skin below it
     bindings : resources that lighting shaders read; the geometry and the lights among them are not used
-    surface_texels : texture of the surface point of each atlas texel
+    surface_texels : texture that maps each atlas texel to a surface point
     """
     side = min(atlas.size, _MAX_OCCLUSION_MAP_SIDE)
 
     @logged_step("computing the ambient occlusion")
-    def bake() -> NDArray[np.uint16]:
+    def bake_as_integers() -> NDArray[np.uint16]:
         baked = bake_occlusion(device, head, atlas, bindings, surface_texels, side)
-        integers: NDArray[np.uint16] = np.rint(65535.0 * fill_gaps(baked, side)).astype(np.uint16)
+        integers: NDArray[np.uint16] = np.rint(65535.0 * fill_occlusion_gaps(baked, side)).astype(np.uint16)
         return integers
 
-    integers = cached_occlusion(head.mesh, atlas, f"{OCCLUSION_CACHE_VERSION} {side}", bake)
+    integers = cached_occlusion(head.mesh, atlas, f"{OCCLUSION_CACHE_VERSION} {side}", bake_as_integers)
     visible = integers / np.float32(65535.0)
     if hair is not None and len(hair):
         visible = visible * _hair_transmittance(head.mesh, hair, download(device, surface_texels), side)
@@ -162,13 +166,13 @@ def _hair_transmittance(
     """Return the fraction of the sky's light that passes through the hair to each point of the skin [-].
 
     Scalp hair and beard are modelled as a plane layer over the roots, which absorbs some of the diffuse
-    light; light that is not absorbed is scattered and reaches the skin. The result has the shape and the
-    order of the result of `fill_gaps`.
+    light and scatters the rest towards the skin. The points are ordered as in the result of
+    `fill_occlusion_gaps`: rows of texels, then vertices.
 
     packed_texels : (s, s, 2) words of the atlas texels: triangle index plus 1, and packed barycentric weights
     result_side : side of the atlas in the result [texels]
     """
-    absorbed = absorbed_by_hair(hair)
+    absorbed = mean_hair_absorptance(hair)
     passing = np.exp(-DIFFUSIVITY_FACTOR * absorbed * hair_cover(hair, mesh))[mesh.point].astype(np.float32)
     rows = ((np.arange(result_side) + 0.5) * len(packed_texels) / result_side).astype(int)
     chosen = packed_texels[np.ix_(rows, rows)]
@@ -185,7 +189,7 @@ def _hair_transmittance(
 
 
 def placeholder_occlusion(device: Device) -> Texture:
-    """Return a 1 x 1 placeholder for the occlusion map of scenes without occlusion."""
+    """Return the 1 x 1 texture to bind in place of the occlusion map for scenes without occlusion."""
     return device.cached(
         "no occlusion", lambda: make_texture(device, (1, 1), "r32float", content_source="map")
     )

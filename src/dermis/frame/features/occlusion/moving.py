@@ -1,4 +1,4 @@
-"""Ambient occlusion of a moving head: the map baked at rest, corrected by the changes at the vertices."""
+"""Ambient occlusion of a moving head: the map baked at rest, updated by the changes of vertex visibility."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ class SkyViews(NamedTuple):
     views : matrices from world to clip space
     to_map : (k, 3, 4) matrices from world positions to column [texel], row [texel] and depth
     to_sky : (k, 3) unit vectors from the head to the viewpoint
-    steps_mm : (k, 2, 3) vectors in world space from a texel to its right and to its upper neighbour [mm]
+    steps_mm : (k, 2, 3) world-space offsets from a depth map texel to its right and to its upper neighbour
+        [mm]
     """
 
     views: Views
@@ -69,12 +70,14 @@ class RotationAnchors:
 
 
 def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
-    """Return orthographic views from directions all around the head, each as narrow as the shape allows.
+    """Return orthographic views from directions all around the head, each just wide enough to show all of it.
 
     rotation : (3, 3) rotation of the head, which also rotates the view directions
     """
     axes = _sky_view_axes() @ rotation.T
-    local = (axes.reshape(-1, 3).astype(np.float32) @ outline.homogeneous[:3]).reshape(*axes.shape[:2], -1)
+    local = (axes.reshape(-1, 3).astype(np.float32) @ outline.homogeneous_points[:3]).reshape(
+        *axes.shape[:2], -1
+    )
     low, high = local.min(axis=2).astype(np.float64), local.max(axis=2).astype(np.float64)
     half, middle = 0.5 * (high - low) + _VIEW_MARGIN_MM, 0.5 * (high + low)
     half[:, 2] += outline.margin_mm
@@ -98,8 +101,12 @@ def _sky_view_axes() -> Floats:
     return np.array([view_axes_array(-to_sky, up) for to_sky in fibonacci_sphere(SKY_VIEW_COUNT)])
 
 
-def make_anchors(head: Head) -> RotationAnchors:
-    """Return the anchors of a head; a Gaussian around the head's centre makes shoulders count little."""
+def make_rotation_anchors(head: Head) -> RotationAnchors:
+    """Choose control points from whose motion the rotation of a head is estimated.
+
+    Their weights decrease with the distance from the centre of the head, so that moving shoulders have little
+    effect.
+    """
     rig = head.control
     points = np.unique(np.linspace(0, len(rig.positions_mm) - 1, _MAX_ANCHOR_COUNT).astype(np.intp))
     positions = rig.positions_mm[points].astype(np.float64)
@@ -110,7 +117,7 @@ def make_anchors(head: Head) -> RotationAnchors:
 
 
 def head_rotation(anchors: RotationAnchors, motion: Motion) -> Floats:
-    """Return the (3, 3) rotation that best fits the motion of the anchors of a head [Kabsch1976].
+    """Return the (3, 3) rotation that best fits the motion of the control points in `anchors` [Kabsch1976].
 
     Morph targets do not rotate a head and are ignored.
     """
@@ -127,8 +134,8 @@ class MovingOcclusion:
     """Resources from which the occlusion map of a moving head is updated.
 
     rest_map : texture of the occlusion map that was baked at rest
-    corners : texture of the vertices around each texel, and of their weights, see
-        moving_occlusion_corners.wgsl
+    corners : texture of the indices and the weights of the vertices between which each texel interpolates,
+        see moving_occlusion_corners.wgsl
     """
 
     rest_map: Texture
@@ -140,7 +147,7 @@ class VertexSkyVisibility:
     """Visible fraction of the sky at the vertices of a head, and depth maps from which it is computed.
 
     layers : depth maps from directions all around the head
-    occluders : triangles of the simplified head, which are drawn into the depth maps
+    occluders : triangles of a simplified head, which are drawn into the depth maps
     visibility : buffer of two fractions for each vertex: at rest and in the current shape
     vertices : number of vertices
     """
@@ -166,20 +173,20 @@ def make_vertex_sky_visibility(
     )
     views = sky_views(Outline(rig.outline_mm(rig.rest)), np.eye(3))
     _draw_vertex_visibility(
-        commands, sky, views, sky_record(device, views, count), rest_geometry, is_at_rest=True
+        commands, sky, views, sky_views_record(device, views, count), rest_geometry, is_at_rest=True
     )
     commands.submit()
     return sky
 
 
-def make_moving_map(device: Device, rest_map: Texture) -> tuple[Texture, MovingOcclusion]:
+def make_moving_occlusion_map(device: Device, rest_occlusion_map: Texture) -> tuple[Texture, MovingOcclusion]:
     """Return an empty occlusion map for a moving head, and the resources that update it.
 
-    rest_map : texture of the occlusion map that was baked at rest
+    rest_occlusion_map : texture of the occlusion map that was baked at rest
     """
-    side, rows = rest_map.size[:2]
+    side, rows = rest_occlusion_map.size[:2]
     corners = make_texture(device, (side, side), "rgba32uint")
-    return make_texture(device, (side, rows), "r32float"), MovingOcclusion(rest_map, corners)
+    return make_texture(device, (side, rows), "r32float"), MovingOcclusion(rest_occlusion_map, corners)
 
 
 def draw(
@@ -191,7 +198,7 @@ def draw(
 ) -> None:
     """Declare the passes that update the occlusion maps of all atlas layouts for the current shape.
 
-    views_record : uniform record of the views, from `sky_record`
+    views_record : uniform record of `views`, from `sky_views_record`
     occlusion_maps : each atlas layout with the resources that update its occlusion map, None if the layout
         has no map to update
     """
@@ -204,7 +211,7 @@ def draw(
 def _draw_occlusion_map(
     graph: Recorder, vertex_visibility: VertexSkyVisibility, layout: LitAtlas, occlusion: MovingOcclusion
 ) -> None:
-    """Declare the passes that update the occlusion map of a layout from the values at the vertices.
+    """Declare the passes that update the occlusion map of a layout from the fractions at the vertices.
 
     The pass that finds the vertices around each texel runs only once, because its inputs are constant.
     """
@@ -225,7 +232,7 @@ def _draw_occlusion_map(
     graph.compute("occlusion", fill, {**bindings, **maps}, moving_map.size[:2], TILE_SIDE)
 
 
-def sky_record(device: Device, views: SkyViews, vertex_count: int) -> UniformRecord:
+def sky_views_record(device: Device, views: SkyViews, vertex_count: int) -> UniformRecord:
     """Return the uniform record of the sky views for moving_occlusion_vertices.wgsl.
 
     vertex_count : number of vertices of the mesh
@@ -248,7 +255,7 @@ def _draw_vertex_visibility(
 ) -> None:
     """Declare the passes that compute the visible fraction of the sky at the vertices of a shape.
 
-    views_record : uniform record of the views, from `sky_record`
+    views_record : uniform record of `views`, from `sky_views_record`
     is_at_rest : whether to store the fractions as those of the head at rest
     """
     draw_layers(

@@ -1,4 +1,4 @@
-"""Label outputs: the class of the mesh or of the hair in each pixel, such as skin, lips or brow."""
+"""Label outputs: the class of the surface or of the hair in each pixel, such as skin, lips or brow."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ LABEL_STAGE = "label"
 class LabelBuffers:
     """Buffers that label.wgsl and strand_labels.wgsl read and write.
 
-    tables : dictionary from names in label.wgsl to label tables of the mesh
-    field_count : number of distance fields. A field is a signed distance at each vertex, which is 0 on the
-        border of a class that crosses triangles
+    tables : dictionary from names in label.wgsl to tables of the label classes of the mesh
+    field_count : number of classes whose border crosses triangles; such a border is given by a signed
+        distance at each vertex
     hair_classes : buffer of the class of each strand, None if the head has no hair
     hair_labels : buffer of the class of the hair in each pixel, written by the hair pass
     """
@@ -38,7 +38,7 @@ class LabelBuffers:
     def hair_bindings(self, centre_triangles: Texture) -> Bindings | None:
         """Return the resources with which the hair pass labels pixels, None if there is no hair.
 
-        centre_triangles : texture of the triangle at the centre of each pixel
+        centre_triangles : texture with the index of the triangle that covers each pixel centre
         """
         if self.hair_classes is None:
             return None
@@ -72,7 +72,7 @@ def shader_constants() -> dict[str, int]:
 
 
 def draw_labels(graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: StageInputs) -> None:
-    """Declare the pass that writes the class of each pixel."""
+    """Declare the pass that writes the label class of each pixel."""
     constants = ("FIELDS", buffers.field_count), ("HAIRS", buffers.hair_classes is not None)
     shader = stage_program(graph.device, planes, constants)
     bindings = inputs.bindings(shader) | buffers.tables | {"hair_labels": buffers.hair_labels}
@@ -80,7 +80,7 @@ def draw_labels(graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: 
 
 
 def _upload_label_tables(device: Device, labels: MeshLabels) -> MutableBindings:
-    """Upload the label tables of a mesh, and the number of each label class in FaceSynthetics."""
+    """Upload the label classes of a mesh, and the label of each class in the FaceSynthetics dataset."""
     face_synthetics = [one.face_synthetics for one in label_classes()]
     arrays = {
         "label_base": labels.base.astype(np.uint32),

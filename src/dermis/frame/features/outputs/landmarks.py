@@ -1,4 +1,4 @@
-"""Landmark outputs: positions and visibility of landmarks in the scene."""
+"""Landmark outputs: positions of facial landmarks in the scene, and whether they are visible."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class LandmarkBuffers:
     sets : dictionary from the name of a set to the surface points of its landmarks
     table : buffer of the surface points, read by landmarks.wgsl
     results : buffer of positions and visibility, written by landmarks.wgsl
-    count : number of landmarks of all sets
+    count : number of landmarks in all sets together
     """
 
     sets: dict[str, LandmarkPoints]
@@ -39,10 +39,11 @@ class LandmarkBuffers:
     results: Buffer
     count: int
 
-    def positions(self, result_bytes: NDArray[np.uint8]) -> LandmarkPositions:
+    def decode_positions(self, result_bytes: NDArray[np.uint8]) -> LandmarkPositions:
         """Return the positions and the visibility of the landmarks of each set.
 
-        result_bytes : content of the buffer `results`"""
+        result_bytes : content of the buffer `results`, read back from the device
+        """
         rows, first, positions = result_bytes.view(np.float32).reshape(-1, _FLOATS_PER_LANDMARK), 0, {}
         for name, points in self.sets.items():
             positions[name] = points.names, rows[first : first + len(points.names)]
@@ -50,7 +51,7 @@ class LandmarkBuffers:
         return positions
 
 
-def checked_landmarks(set_names: Iterable[str]) -> tuple[str, ...]:
+def checked_landmark_sets(set_names: Iterable[str]) -> tuple[str, ...]:
     """Check names of landmark sets and paths of landmark files, and return them without duplicates.
 
     Raises DermisError for a name that is neither a set nor a file.

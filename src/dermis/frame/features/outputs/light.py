@@ -41,9 +41,9 @@ _MAX_VISIBILITY_LIGHTS = 64  # as in visibility.wgsl
 class LightOutputs:
     """Resources for outputs of light and skin, apart from the buffers into which the outputs are written.
 
-    light_part_counts : number of parts into which the shader divides each light
-    transmitted : textures of the light through thin parts: one for each layout and, if there are several
-        layouts, one for their blend
+    light_part_counts : number of parts into which each light is divided for shading
+    transmitted : textures of the light transmitted through thin parts of the head, such as ears: one for each
+        layout and, if there are several layouts, one for their blend
     thickness : texture of the tissue thickness, None if the thickness is not requested
     pigments : melanin and blood fractions of uniform skin [-], None for painted maps or if pigments are not
         requested
@@ -60,7 +60,8 @@ def make_light_outputs(
 ) -> LightOutputs:
     """Return the resources of the requested outputs of light and skin.
 
-    translucency : for each layout, the resources of light through thin parts, None if no light crosses them
+    translucency : for each layout, the resources of light through thin parts of the head; None if the scene
+        has no such light
 
     Raises DermisError for outputs that the technique, the lights or the skin cannot provide.
     """
@@ -83,7 +84,7 @@ def make_light_outputs(
 
 
 def draw_light(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
-    """Declare the passes that shade the surface at pixel centres for outputs such as albedo.
+    """Declare the passes that shade the surface at pixel centres, for outputs such as albedo.
 
     Screen-space techniques also diffuse the subsurface light over the picture.
     """
@@ -103,7 +104,7 @@ def draw_light(graph: Recorder, planes: Planes, resources: LightOutputs, inputs:
 
 
 def draw_visibility(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
-    """Declare the pass that computes which fraction of each light the surface in a pixel sees."""
+    """Declare the pass that computes how much of each light is visible from the surface at each pixel."""
     shader, counts = stage_program(graph.device, planes, inputs.constants), resources.light_part_counts
     ends = np.zeros(_MAX_VISIBILITY_LIGHTS, np.uint32)
     ends[: len(counts)] = np.cumsum(counts)
@@ -112,7 +113,7 @@ def draw_visibility(graph: Recorder, planes: Planes, resources: LightOutputs, in
 
 
 def draw_pigments(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
-    """Declare the pass that writes the melanin and blood fractions of the skin in each pixel."""
+    """Declare the pass that writes the melanin and blood fractions of the skin at each pixel."""
     shader, uniform = stage_program(graph.device, planes), resources.pigments
     record = shader.record("Pigments", uniform_pigments=uniform or (0.0, 0.0), painted=uniform is None)
     draw_planes(graph, planes, shader, inputs.bindings(shader) | {"pigments": record})
@@ -127,18 +128,21 @@ def draw_thickness(graph: Recorder, planes: Planes, resources: LightOutputs, inp
     draw_planes(graph, planes, shader, bindings)
 
 
-def make_thickness_map(device: Device, pairs: PairBuffers) -> Texture:
-    """Return a texture over the coarse atlas, filled with the largest measurable thickness [mm]."""
-    surface = pairs.cells.receiver_mask
+def make_thickness_map(device: Device, pair_buffers: PairBuffers) -> Texture:
+    """Return a thickness texture over the coarse atlas, filled with the largest measurable thickness [mm]."""
+    surface = pair_buffers.cells.receiver_mask
     texels = np.zeros((*surface.shape, 4), np.float32)
-    texels[..., 0], texels[..., 3] = pairs.cells.radius_mm * surface, surface
+    texels[..., 0], texels[..., 3] = pair_buffers.cells.radius_mm * surface, surface
     texture = make_texture(device, surface.shape, "rgba32float", texture_name="thickness")
     upload(device, texture, texels)
     return texture
 
 
 def measure_thickness(graph: Recorder, translucency: Translucency, thickness_map: Texture) -> None:
-    """Declare the pass that writes the thickness of the posed head to the texture of `make_thickness_map`."""
+    """Declare the pass that writes the tissue thickness of the posed head to a texture.
+
+    thickness_map : result of `make_thickness_map`
+    """
     pairs, shader = translucency.pairs, program(graph.device, "outputs/thickness_map.wgsl")
     count, cells = pairs.receivers[1], pairs.cells
     reach = {"count": count, "radius_mm": cells.radius_mm, "cell_mm2": cells.cell_mm**2}
@@ -154,7 +158,7 @@ def measure_thickness(graph: Recorder, translucency: Translucency, thickness_map
 
 
 def _shading_bindings(shader: ComputeProgram, inputs: StageInputs) -> MutableBindings:
-    """Return the resources of the shading, with factors of 1 for subsurface light and reflected light."""
+    """Return the resources of the shading, set such that subsurface and reflected light are both included."""
     shade: UniformRecord = np.ndarray((), inputs.view.dtype, bytearray(inputs.view.tobytes()))
     shade["light_factors"] = 1.0
     return inputs.bindings(shader) | {"shade": shade, "scattered": inputs.scattered}
@@ -163,9 +167,9 @@ def _shading_bindings(shader: ComputeProgram, inputs: StageInputs) -> MutableBin
 def _translucent_pairs(
     request: FrameRequest, translucency: Sequence[Translucency | None]
 ) -> PairBuffers | None:
-    """Return the pairs of cells between which light crosses thin parts, None if no output needs them.
+    """Return the pairs of surface cells between which light crosses the head; None if no output needs them.
 
-    Raises DermisError if an output needs pairs, but no light crosses thin parts.
+    Raises DermisError if an output needs them, but the frame is rendered without light through thin parts.
     """
     culprit = next((name for name in request.outputs if name in _TRANSLUCENCY_OUTPUTS), None)
     if culprit is None:

@@ -1,4 +1,4 @@
-"""Buffer for the outputs of a stage, one image after another, and the pass that fills the buffer."""
+"""Buffer for the outputs of a shader stage, one image after another, and the pass that fills the buffer."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PlaneArray = NDArray[Any]  # callers know the dtype by the output's name
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """Buffer for the outputs of a stage: one image after another, with interleaved channels.
+    """Buffer for the outputs of a shader stage: one image after another, with interleaved channels.
 
     stage : name of the shader that fills the buffer
     channels : number of channels of each output, in the order of the buffer
@@ -35,7 +35,7 @@ class Planes:
     buffer: Buffer
 
     @property
-    def constants(self) -> Constants:
+    def first_channel_constants(self) -> Constants:
         """Return the pipeline constants that tell the shader where each output starts in the buffer."""
         return tuple((f"{name.upper()}_FIRST", first) for name, first in self._first_channels().items())
 
@@ -48,18 +48,18 @@ class Planes:
         plane = _WORD_BYTES * self.size[0] * self.size[1]
         return plane * self._first_channels()[output_name], plane * self.channels[output_name]
 
-    def arrays(self, buffer_bytes: NDArray[np.uint8]) -> dict[str, PlaneArray]:
+    def decode_outputs(self, buffer_bytes: NDArray[np.uint8]) -> dict[str, PlaneArray]:
         """Return each output as an (h, w) or (h, w, channels) array.
 
         buffer_bytes : bytes of the whole buffer
         """
         ranges = {name: self.byte_range(name) for name in self.channels}
         return {
-            name: self.array(name, buffer_bytes[start : start + size])
+            name: self.decode_output(name, buffer_bytes[start : start + size])
             for name, (start, size) in ranges.items()
         }
 
-    def array(self, output_name: str, output_bytes: NDArray[np.uint8]) -> PlaneArray:
+    def decode_output(self, output_name: str, output_bytes: NDArray[np.uint8]) -> PlaneArray:
         """Return one output as an (h, w) or (h, w, channels) array.
 
         output_bytes : bytes of the buffer in the range that `byte_range` returns
@@ -112,12 +112,12 @@ def stage_program(device: Device, planes: Planes, constants: Constants = ()) -> 
 
     constants : pipeline constants of the surface and the lights, for stages that need them
     """
-    return program(device, f"outputs/{planes.stage}.wgsl", (*planes.constants, *constants))
+    return program(device, f"outputs/{planes.stage}.wgsl", (*planes.first_channel_constants, *constants))
 
 
 def draw_planes(graph: Recorder, planes: Planes, shader: ComputeProgram, bindings: Bindings) -> None:
     """Declare the pass that computes the outputs of a stage for each pixel.
 
-    bindings : resources of the shader, apart from the buffer of outputs
+    bindings : resources of the shader, apart from the buffer for the outputs
     """
     graph.compute("outputs", shader, {**bindings, "planes": planes.buffer}, planes.size)

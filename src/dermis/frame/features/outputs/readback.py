@@ -27,13 +27,13 @@ _PIXELS_PER_INVOCATION, _WORDS_PER_INVOCATION = 4, 3  # read and written by pack
 
 @dataclass(frozen=True)
 class Readback:
-    """Readback in progress, of a picture and its outputs.
+    """Readback in progress of a picture and its outputs.
 
     fetched : readback of the buffers
     size : (width, height) [pixel]
     kind : dtype of the picture
     channels : number of channels of the picture: 3, or 4 with alpha
-    words : size of the packed picture in words of four bytes; in the downloaded bytes, the outputs follow the
+    words : number of 4-byte words of the packed picture; in the downloaded bytes, the outputs follow the
         picture
     outputs : resources of the outputs that are read back with the picture, None for the picture alone
     """
@@ -52,20 +52,20 @@ class Readback:
         return self._decode_picture(self.fetched.array())
 
     def image_and_outputs(self) -> tuple[PictureArray, dict[str, PlaneArray], LandmarkPositions]:
-        """Wait for the readback; return the picture, and dictionaries of outputs and of landmark sets.
+        """Wait for the readback; return the picture, and dictionaries of the outputs and of the landmarks.
 
-        The keys are the names of the outputs and of the sets. Call either this method or `image`, and only
-        once.
+        The keys are the names of the outputs and of the landmark sets. Call either this method or `image`,
+        and only once.
         """
         raw, start, arrays = self.fetched.array(), _WORD_BYTES * self.words, dict[str, PlaneArray]()
         if self.outputs is None:
             return self._decode_picture(raw), {}, {}
         for planes in self.outputs.planes:
             end = start + planes.buffer.size
-            arrays |= planes.arrays(raw[start:end])
+            arrays |= planes.decode_outputs(raw[start:end])
             start = end
         buffers = self.outputs.landmarks
-        landmarks = buffers.positions(raw[start : start + buffers.results.size]) if buffers else {}
+        landmarks = buffers.decode_positions(raw[start : start + buffers.results.size]) if buffers else {}
         return self._decode_picture(raw), {name: arrays[name] for name in self.outputs.names}, landmarks
 
     def _decode_picture(self, picture_bytes: NDArray[np.uint8]) -> PictureArray:
@@ -105,10 +105,10 @@ def start_readback(
         count = -(-pixels // _PIXELS_PER_INVOCATION)
         shader, words = program(device, "outputs/pack.wgsl"), _WORDS_PER_INVOCATION * count
         bindings["bytes"] = picture.bytes
-    _check_size(device, _WORD_BYTES * words, device.max_storage_bytes, pixels)
+    _check_readback_size(device, _WORD_BYTES * words, device.max_storage_bytes, pixels)
     packed = _packed_buffer(device, picture, words)
     buffers = [packed, *(outputs.buffers if outputs else ())]
-    _check_size(
+    _check_readback_size(
         device, sum(buffer.size for buffer in buffers), device.max_buffer_bytes, pixels, "outputs of "
     )
     grid = _PACKING_INVOCATIONS_PER_ROW, -(-count // _PACKING_INVOCATIONS_PER_ROW)
@@ -117,7 +117,7 @@ def start_readback(
     return Readback(graph.read_back(*buffers), picture.size, kind, channels, words, outputs)
 
 
-def _check_size(
+def _check_readback_size(
     device: Device, needed_bytes: int, max_bytes: int, pixel_count: int, contents_name: str = ""
 ) -> None:
     if needed_bytes > max_bytes:
@@ -130,7 +130,7 @@ def _check_size(
 def _packed_buffer(device: Device, picture: Picture, word_count: int) -> Buffer:
     """Return the buffer for the packed picture, which is kept in `Picture.packed` for later readbacks.
 
-    word_count : size of the packed picture [4 bytes]
+    word_count : number of 4-byte words of the packed picture
     """
     if word_count not in picture.packed:
         picture.packed[word_count] = device.buffer(np.zeros(word_count, np.uint32), "STORAGE")

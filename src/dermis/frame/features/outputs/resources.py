@@ -22,9 +22,8 @@ class Resources:
     """Resources of the outputs of a frame.
 
     names : names of the outputs in the order of the request
-    planes : buffers of the outputs, one for each stage
-    centres : texture of the triangle at each pixel centre, None if the only sample of a pixel is at its
-        centre
+    planes : buffers of the outputs, one for each shader stage
+    centres : texture with the index of the triangle that covers each pixel centre; None without multisampling
     previous : shape of the head in the previous scene, None if no motion vectors are requested
     light : resources for outputs of light and skin
     labels : buffers of the labels, None if no labels are requested
@@ -50,16 +49,17 @@ class Resources:
         return next(planes for planes in self.planes if output_name in planes.channels)
 
 
-def make(
+def make_resources(
     memo: Memo,
     device: Device,
     request: FrameRequest,
-    tables: ShapeTables,
+    shape_tables: ShapeTables,
     translucency: Sequence[Translucency | None],
 ) -> Resources | None:
     """Return the resources of the requested outputs, None if none are requested.
 
-    translucency : for each layout, the resources of light through thin parts, None if no light crosses them
+    translucency : for each layout, the resources of light through thin parts of the head; None if the scene
+        has no such light
 
     Raises DermisError if the outputs do not fit in one buffer of the device, or if the scene cannot provide
     them.
@@ -78,7 +78,9 @@ def make(
             for stage, outputs in stages.items()
         ),
         centres=None if settings.samples == 1 else cached(_make_centre_layers, device, settings.size),
-        previous=cached(make_shape, device, tables, caller_name="before") if "motion" in stages else None,
+        previous=cached(make_shape, device, shape_tables, caller_name="before")
+        if "motion" in stages
+        else None,
         light=make_light_outputs(memo, device, request, translucency),
         labels=make_label_buffers(memo, device, request),
         landmarks=cached(make_landmark_buffers, device, bare, sets) if sets else None,

@@ -1,4 +1,4 @@
-"""Inputs of the stages that compute outputs."""
+"""Inputs of the shader stages that compute outputs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from dermis.gpu import (
 class PreviousScene:
     """Pose and camera of the previous scene, from which motion vectors are computed.
 
-    motion : pose of the head in the previous scene, None if its shape has not changed
+    motion : pose of the head in the previous scene, None if the pose has not changed since
     view : uniform record of the shading pass with the rays of the previous camera
     """
 
@@ -40,8 +40,8 @@ class PictureDiffusion:
     """Diffusion of subsurface light over the picture, by a screen-space technique.
 
     layers : texture in which the shading stores the subsurface light
-    diffuse : function that declares the passes; it returns textures of the diffused light, and of the
-        fraction of this light that leaves towards the camera
+    diffuse : function that declares the passes of the diffusion. It returns textures of the diffused light,
+        and of the fraction of this light that leaves the skin towards the camera
     """
 
     layers: Texture
@@ -50,7 +50,7 @@ class PictureDiffusion:
 
 @dataclass(frozen=True, eq=False)
 class StageInputs:
-    """Inputs of the stages that compute outputs.
+    """Inputs of the shader stages that compute outputs.
 
     lighting : resources of the lighting for the first layout
     view : uniform record of the struct Shade
@@ -59,13 +59,15 @@ class StageInputs:
     scattered : texture of scattered light over the atlas, or tables of pre-integrated skin
     camera : projection of the camera, with the positions of samples in a pixel
     head : triangles of the head
-    visibility : texture of the triangle at each sample of the picture
-    centres : texture of the triangle at each pixel centre; equals `visibility` if this is the only sample
+    visibility : texture with the index of the triangle that covers each sample of the picture
+    centres : texture with the index of the triangle that covers each pixel centre; equals `visibility` if the
+        centre is the only sample
     shape : current shape of the head
     picture : textures of the picture
     has_hair : whether hair is drawn
     previous : pose and camera of the previous scene, None if no motion vectors are requested
-    translucency : resources of light through thin parts for the first layout, None if no light crosses them
+    translucency : resources of light through thin parts of the head for the first layout; None if the scene
+        has no such light
     picture_diffusion : diffusion over the picture, None unless the technique works in screen space
     sum_transmitted : function that fills the given textures of the atlas with the light through thin parts,
         and returns the texture that combines all layouts

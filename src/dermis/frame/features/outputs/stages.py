@@ -1,4 +1,4 @@
-"""Stages that compute outputs, and the passes that they declare; each stage has the name of its shader."""
+"""Shader stages that compute outputs, and the passes that they declare; each is named like its shader."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.scene.outputs import OUTPUTS, Output
 
 DrawStage = Callable[[Graph, Planes, Resources, StageInputs], None]
-_SURFACE_CONSTANTS = ("DETAIL",)  # pipeline constants of surface.wgsl
+_SURFACE_CONSTANT_NAMES = ("DETAIL",)  # pipeline constants of surface.wgsl
 
 
-def hair_labels(graph: Graph, resources: Resources | None, inputs: StageInputs) -> Bindings | None:
+def hair_label_bindings(graph: Graph, resources: Resources | None, inputs: StageInputs) -> Bindings | None:
     """Return the resources with which the hair pass labels pixels, None if no labels are requested."""
     if not _needs_hair_labels(resources, inputs):
         return None
     assert resources is not None and resources.labels is not None
-    _draw_centres(graph, inputs)
+    _draw_centre_triangles(graph, inputs)
     return resources.labels.hair_bindings(inputs.centres.texture)
 
 
@@ -37,8 +37,8 @@ def draw(graph: Graph, resources: Resources | None, inputs: StageInputs) -> None
     """Declare the passes of all requested outputs."""
     if resources is None:
         return
-    if not _needs_hair_labels(resources, inputs):  # else `hair_labels` has drawn the centres
-        _draw_centres(graph, inputs)
+    if not _needs_hair_labels(resources, inputs):  # else `hair_label_bindings` has drawn the centres
+        _draw_centre_triangles(graph, inputs)
     for planes in resources.planes:
         DRAW_STAGES[planes.stage](graph, planes, resources, inputs)
     if resources.landmarks:
@@ -50,8 +50,8 @@ def _needs_hair_labels(resources: Resources | None, inputs: StageInputs) -> bool
     return inputs.has_hair and labels is not None and labels.hair_classes is not None
 
 
-def _draw_centres(graph: Graph, inputs: StageInputs) -> None:
-    """Declare the passes that find the triangle at each pixel centre, unless the only sample is there."""
+def _draw_centre_triangles(graph: Graph, inputs: StageInputs) -> None:
+    """Declare the passes that find the triangle at each pixel centre, unless that is the only sample."""
     if inputs.centres is not inputs.visibility:
         draw_layers(graph, "outputs", inputs.centres, Views(inputs.camera.clips, PIXEL_CENTRE), inputs.head)
 
@@ -62,7 +62,7 @@ def _draw_geometry(graph: Graph, planes: Planes, resources: Resources, inputs: S
 
 
 def _draw_surface(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
-    constants = tuple(one for one in inputs.constants if one[0] in _SURFACE_CONSTANTS)
+    constants = tuple(one for one in inputs.constants if one[0] in _SURFACE_CONSTANT_NAMES)
     shader = stage_program(graph.device, planes, constants)
     draw_planes(graph, planes, shader, inputs.bindings(shader))
 

@@ -29,18 +29,18 @@ class Backdrop:
 def draw(
     graph: Recorder,
     backdrop: Backdrop,
-    shading: tuple[Bindings, UniformRecord],
+    shading_inputs: tuple[Bindings, UniformRecord],
     foreground: Texture,
     meter: Meter | None,
     settings: Settings,
 ) -> Texture:
     """Declare the pass that adds the background to a picture; return `backdrop.result`.
 
-    shading : resources of the lighting, and the uniform record of the shading pass
+    shading_inputs : resources of the lighting, and the uniform record of the shading pass
     foreground : texture of the picture without background
     meter : exposure meter, None for a fixed exposure
     """
-    (lighting, view), background = shading, settings.background
+    (lighting, view), background = shading_inputs, settings.background
     exposure, metered = exposure_inputs(graph.device, settings, meter)
     shader = program(graph.device, "post/background.wgsl")
     record = shader.record(

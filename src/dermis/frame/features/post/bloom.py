@@ -16,7 +16,8 @@ class BloomTextures:
     """Textures of the bloom.
 
     halved : picture at a half, a quarter, ... of its resolution
-    sums : for each of these resolutions but the coarsest, the sum of this and all coarser pictures
+    sums : for each of these resolutions but the coarsest, the sum of the picture at this resolution and at
+        all coarser resolutions
     result : picture with bloom
     """
 
@@ -34,7 +35,7 @@ def make_bloom(device: Device, picture_size: tuple[int, int]) -> BloomTextures:
 
 
 def draw(graph: Recorder, textures: BloomTextures, picture: Texture, scattered_fraction: float) -> Texture:
-    """Declare the passes that scatter a fraction of the picture's light; return `textures.result`.
+    """Declare the passes that spread a fraction of the light over the picture; return `textures.result`.
 
     The total light is unchanged.
 

@@ -46,21 +46,21 @@ def make_meter(device: Device) -> Meter:
 def draw(
     graph: Recorder,
     meter: Meter,
-    shading: tuple[Bindings, UniformRecord, Constants],
-    visibility: Texture,
+    shading_inputs: tuple[Bindings, UniformRecord, Constants],
+    visibility_buffer: Texture,
     radiance_image: Texture,
 ) -> None:
     """Declare the passes that measure the irradiance of the visible skin, and derive the exposure from it.
 
-    shading : resources of the lighting, uniform record of the shading pass, and pipeline constants of the
-        lights
-    visibility : texture of the triangle at each sample
+    shading_inputs : resources of the lighting, uniform record of the shading pass, and pipeline constants of
+        the lights
+    visibility_buffer : texture with the index of the triangle that covers each sample
     radiance_image : texture of the radiance of the picture
     """
-    lighting, view, constants = shading
+    lighting, view, constants = shading_inputs
     shader = program(graph.device, "post/meter.wgsl", constants)
     camera = shader.record("MeterCamera", rays=ray_record(shader, view), sample=view["jitter"][0, :2])
-    images = {"visibility_buffer": visibility, "image": radiance_image}
+    images = {"visibility_buffer": visibility_buffer, "image": radiance_image}
     bindings = {**lighting, **images, "camera": camera, "points": meter.points}
     graph.compute("meter", shader, bindings, (METER_GRID_SIDE, METER_GRID_SIDE))
     key = program(graph.device, "post/meter_key.wgsl")

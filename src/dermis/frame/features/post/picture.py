@@ -20,7 +20,7 @@ class Picture:
     exposed : linear light after exposure
     bytes : sRGB bytes
     size : (width, height) [pixel]
-    packed : buffers for the picture as packed for readback, keyed by their size in words of four bytes
+    packed : buffers into which the picture is packed for readback; the key is the number of 4-byte words
     """
 
     radiance: Texture
@@ -59,5 +59,5 @@ def draw(
 
 
 def encoding_members(settings: Settings) -> dict[str, int]:
-    """Return the members of uniform records that choose the tone curve and the sRGB encoding."""
+    """Return the members of a uniform record that select the tone curve and the sRGB encoding."""
     return {"tone": _TONE_CURVES.index(settings.tone), "encoded": int(settings.gamma == "right")}

@@ -1,4 +1,4 @@
-"""Resources of post-processing, and its passes from radiance to the picture."""
+"""Resources of post-processing, and the passes that turn radiance into the displayed picture."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Resources:
     bloom: BloomTextures | None
 
 
-def make(memo: Memo, device: Device, request: FrameRequest) -> Resources:
+def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resources:
     """Return the resources of the requested post-processing.
 
     Raises DermisError if the background shows the environment, but the scene has no environment.
@@ -50,24 +50,26 @@ def draw(
     resources: Resources,
     settings: Settings,
     radiance: Texture,
-    lighting: Bindings,
-    view: UniformRecord,
+    lighting_bindings: Bindings,
+    shade_record: UniformRecord,
     light_constants: Constants,
-    visibility: Texture,
+    visibility_buffer: Texture,
 ) -> None:
     """Declare the passes from radiance to the picture: meter, background, bloom, tone curve and encoding.
 
-    lighting : resources of the lighting
-    view : uniform record of the shading pass
+    lighting_bindings : resources of the lighting
+    shade_record : uniform record of the shading pass
     light_constants : pipeline constants of the lights
-    visibility : texture of the triangle at each sample
+    visibility_buffer : texture with the index of the triangle that covers each sample
     """
     if resources.meter:
-        shading = lighting, view, light_constants
-        meter.draw(graph, resources.meter, shading, visibility, radiance)
+        shading = lighting_bindings, shade_record, light_constants
+        meter.draw(graph, resources.meter, shading, visibility_buffer, radiance)
     if resources.backdrop:
         backdrop, exposure = resources.backdrop, resources.meter
-        radiance = background.draw(graph, backdrop, (lighting, view), radiance, exposure, settings)
+        radiance = background.draw(
+            graph, backdrop, (lighting_bindings, shade_record), radiance, exposure, settings
+        )
     if resources.bloom:
         radiance = bloom.draw(graph, resources.bloom, radiance, settings.bloom)
     picture.draw(graph, radiance, resources.picture, settings, resources.meter)

@@ -1,4 +1,4 @@
-"""Shading of the samples of the picture, and of points of baked maps."""
+"""Shading of the samples of the picture, and of the surface points of baked maps."""
 
 from dermis.frame.features.shading.bake import shader_constants
 from dermis.frame.features.shading.shade import draw

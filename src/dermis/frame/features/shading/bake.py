@@ -36,7 +36,9 @@ def shader_constants() -> dict[str, int]:
     return {"baked_numbers": BAKED_CHANNEL_COUNT}
 
 
-def point_words(triangle_index: NDArray[np.integer], weights: NDArray[np.floating]) -> NDArray[np.uint32]:
+def bake_point_words(
+    triangle_index: NDArray[np.integer], weights: NDArray[np.floating]
+) -> NDArray[np.uint32]:
     """Pack surface points into (n, 4) words for bake.wgsl.
 
     triangle_index : (n,) indices of the triangles on which the points lie
@@ -56,11 +58,13 @@ def bake(
     texel_side_uv: float,
     pigments: tuple[float, float] | None,
 ) -> NDArray[np.float32]:
-    """Return (n, BAKED_CHANNEL_COUNT) values at surface points, in the channels of `BAKED_CHANNELS`.
+    """Return (n, BAKED_CHANNEL_COUNT) properties and light of the skin at n surface points.
+
+    `BAKED_CHANNELS` names the columns of the result.
 
     constants : pipeline constants of the shading
     bindings : resources of the frame that shading.wgsl and bake.wgsl read
-    packed_points : (n, 4) packed surface points, from `point_words`
+    packed_points : (n, 4) packed surface points, from `bake_point_words`
     texel_side_uv : side of a texel in uv, which is 1 divided by the side of the map in texels [-]
     pigments : melanin and blood fractions of uniform skin [-]; None to read them from painted maps
     """

@@ -17,7 +17,7 @@ from dermis.gpu import (
 
 
 def shade_program(device: Device, constants: Constants = ()) -> ComputeProgram:
-    """Return the program of the shading pass; its structs also define the records of lights and skin.
+    """Return the program of the shading pass, which also defines the structs of the light and skin records.
 
     constants : pipeline constants of the lights, the surface and the technique
     """
@@ -26,32 +26,37 @@ def shade_program(device: Device, constants: Constants = ()) -> ComputeProgram:
 
 def draw(
     graph: Recorder,
-    lighting: Bindings,
-    view: UniformRecord,
+    lighting_bindings: Bindings,
+    shade_record: UniformRecord,
     constants: Constants,
-    visibility: ViewLayers,
-    scattered: Texture,
+    visibility_layers: ViewLayers,
+    scattered_light: Texture,
     radiance_image: Texture,
     picture_size: tuple[int, int],
     subsurface_layers: Texture | None = None,
 ) -> Texture:
     """Declare the pass that shades all samples of all pixels; return the image of radiance and coverage.
 
-    lighting : resources of the lighting
-    view : uniform record of the struct Shade
+    lighting_bindings : resources of the lighting
+    shade_record : uniform record of the struct Shade
     constants : pipeline constants of the lights, the surface and the technique
-    scattered : texture of scattered light over the atlas, or tables of pre-integrated skin
+    scattered_light : texture of scattered light over the atlas, or tables of pre-integrated skin
     radiance_image : texture for the radiance and, as alpha, the coverage by the head
     subsurface_layers : texture for the subsurface light (layer 0), and for the fraction of this light that
-        leaves towards the camera (layer 1); None to add the subsurface light to the image instead
+        leaves the skin towards the camera (layer 1); None to add the subsurface light to the image instead
     """
     device, (width, height) = graph.device, picture_size
-    bindings = {**lighting, "shade": view, "visibility_buffer": visibility.texture, "scattered": scattered}
+    bindings = {
+        **lighting_bindings,
+        "shade": shade_record,
+        "visibility_buffer": visibility_layers.texture,
+        "scattered": scattered_light,
+    }
     bindings |= {
         "image": radiance_image,
         "subsurface": subsurface_layers or placeholder_subsurface_layers(device),
     }
-    shader = shade_program(device, (*constants, *pixel_column_constants(device, visibility.count)))
+    shader = shade_program(device, (*constants, *pixel_column_constants(device, visibility_layers.count)))
     graph.compute("shade", shader, bindings, (width, -(-height // int(shader.constants.get("STRIP", 1)))))
     return radiance_image
 

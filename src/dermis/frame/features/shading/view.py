@@ -1,4 +1,4 @@
-"""Uniform record of the shading pass: camera rays, samples, poses of the eyes and light factors."""
+"""Uniform record of the shading pass, which holds camera rays, samples, materials and poses of the eyes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Pinhole(NamedTuple):
 
     eye : position of the pinhole [mm]
     axes : unit vectors to the right, up and forward
-    window : rectangle of the picture on the image plane at distance 1
+    window : half extents and centre of the picture on the image plane at distance 1
     """
 
     eye: Triple
@@ -53,9 +53,9 @@ class Pinhole(NamedTuple):
 class EyePoses(NamedTuple):
     """Poses of the modelled eyes of a head.
 
-    frames : (2, 4, 4) matrices from the space of the head to the space of each eye
-    edges_mm : (2, r, 3) points along the edges of the eyelids [mm]; None if they are unknown, as for heads
-        from files
+    frames : (2, 4, 4) matrices from the space of the head to the space of each of the two eyes
+    edges_mm : (2, r, 3) points along the eyelid edges of each eye [mm]; None if they are unknown, as for
+        heads from files
     """
 
     frames: NDArray[np.float64]
@@ -80,8 +80,10 @@ def camera_views(pinhole: Pinhole, outline: Outline, sample_count: int) -> Views
     return Views(np.array([clip]), pixel_samples(sample_count))
 
 
-def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: ProfileSplit) -> UniformRecord:
-    """Return the uniform record of the struct Shade: samples, weights and materials, but no camera.
+def view_record(
+    shading_program: ComputeProgram, head: Head, settings: Settings, profile_split: ProfileSplit
+) -> UniformRecord:
+    """Return the uniform record of the struct Shade; `with_camera` adds the camera and the eye poses.
 
     Raises DermisError for a head with too many materials.
     """
@@ -95,12 +97,14 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
     for index, material in enumerate(materials):
         colours[index, :3] = material.colour
         colours[index, 3] = 1 + MOUTH_PARTS.index(material.part) if material.part else 0
-    record = shade.record(
+    record = shading_program.record(
         "Shade",
         samples=settings.samples,
-        relit=split.relit,
-        relit_changes=np.pad(split.relit_changes, ((0, MAX_OTHER_PROFILES - len(split.others)), (0, 1))),
-        total=split.total,
+        relit=profile_split.relit,
+        relit_changes=np.pad(
+            profile_split.relit_changes, ((0, MAX_OTHER_PROFILES - len(profile_split.others)), (0, 1))
+        ),
+        total=profile_split.total,
         light_factors=_LIGHT_FACTORS[settings.parts],
         material_colour=colours,
         jitter=jitter,
@@ -110,7 +114,7 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
         part["emission"], part["metalness"] = material.emission, material.metalness
         part["roughness"] = _WET_MATERIAL_ROUGHNESS if material.roughness is None else material.roughness
         part["has_maps"] = material.has_maps
-    for name, value in split.fine.items():
+    for name, value in profile_split.fine.items():
         record["fine"][name] = value
     if head.eyes is not None:
         fill_eye(record["eyes"], head.eyes.look)
@@ -119,14 +123,15 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
     return record
 
 
-def with_camera(view: UniformRecord, pinhole: Pinhole, eyes: EyePoses | None) -> UniformRecord:
-    """Return a copy of a record of the struct Shade, with camera rays and poses of the eyes.
+def with_camera(shade_record: UniformRecord, pinhole: Pinhole, eyes: EyePoses | None) -> UniformRecord:
+    """Return a copy of a Shade record with camera rays and the poses of the eyes.
 
+    shade_record : result of `view_record`
     eyes : poses of modelled eyes, None for a head without such eyes
     """
     eye, (right, up, forward), (half, shift) = pinhole
     # A copy of the bytes: NumPy copies structs member by member and leaves the padding undefined.
-    record: UniformRecord = np.ndarray((), view.dtype, bytearray(view.tobytes()))
+    record: UniformRecord = np.ndarray((), shade_record.dtype, bytearray(shade_record.tobytes()))
     record["eye"], record["forward"] = eye, forward
     record["right"], record["up"] = tuple(half[0] * c for c in right), tuple(half[1] * c for c in up)
     record["shift"] = shift
@@ -142,6 +147,6 @@ def with_camera(view: UniformRecord, pinhole: Pinhole, eyes: EyePoses | None) ->
     return record
 
 
-def ray_record(shader: ComputeProgram, view: UniformRecord) -> UniformRecord:
+def ray_record(shader: ComputeProgram, shade_record: UniformRecord) -> UniformRecord:
     """Return a record of the struct Rays, for shaders that need only the camera rays of a Shade record."""
-    return shader.record("Rays", **{name: view[name] for name in _CAMERA_RAY_MEMBERS})
+    return shader.record("Rays", **{name: shade_record[name] for name in _CAMERA_RAY_MEMBERS})

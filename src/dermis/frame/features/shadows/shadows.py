@@ -20,8 +20,8 @@ class ShadowMaps:
     """Shadow maps of all lights.
 
     layers : depth map of each light
-    bounds : texture of the nearest depth in each square of a map, for several sizes of squares; area lights
-        use this texture to skip squares without occluders
+    bounds : texture of the nearest depth in each square block of a map, for several block sizes; area lights
+        use it to skip blocks without occluders
     """
 
     layers: ViewLayers
@@ -46,16 +46,16 @@ def make_shadow_maps(device: Device, layer_count: int, map_side: int) -> ShadowM
 
 
 def draw(
-    graph: Recorder, shadow_maps: ShadowMaps, views: Views, head: HeadGeometry, with_bounds: bool = True
+    graph: Recorder, shadow_maps: ShadowMaps, views: Views, head: HeadGeometry, with_depth_bounds: bool = True
 ) -> None:
-    """Declare the passes that draw the depths seen from each light.
+    """Declare the passes that draw the depth of the head as seen from each light.
 
-    with_bounds : whether the scene has area lights, which read the bounds
+    with_depth_bounds : whether the scene has area lights, which read `ShadowMaps.bounds`
     """
     if not len(views.clips):
         return
     draw_layers(graph, "shadows", shadow_maps.layers, views, head)
-    if with_bounds:
+    if with_depth_bounds:
         bound: Bindings = {
             "maps": shadow_maps.texture,
             "maps_sampler": graph.device.sampler(),

@@ -29,7 +29,7 @@ class Curvature:
     On a sphere of radius r, this curvature is 1/r.
 
     smoothed : buffer of the smoothed curvature, one float per vertex
-    scratch : buffer for intermediate steps of the smoothing
+    scratch : buffer for intermediate results of the smoothing
     tables : dictionary from names in the shaders to buffers of the triangles and neighbours of each vertex
     steps : number of smoothing steps; all steps together have the standard deviation `SMOOTHING_SIGMA_MM` on
         the head at rest

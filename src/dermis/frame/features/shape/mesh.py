@@ -35,16 +35,16 @@ class HeadGeometry:
     has_cutouts: bool = False
 
     @property
-    def constants(self) -> Constants:
-        """Return the pipeline constants of passes that find the nearest surface."""
+    def cutout_constants(self) -> Constants:
+        """Return the pipeline constants that passes need to find the nearest surface of this head."""
         return (("CUTOUTS", 1),) if self.has_cutouts else ()
 
     def with_shape(self, shape: Shape) -> HeadGeometry:
-        """Return these triangles with the posed vertices of a shape."""
+        """Return a copy of this geometry with the posed vertices of a shape."""
         return replace(self, resources=self.resources | shape.vertices)
 
     def with_vertices_of(self, other_geometry: HeadGeometry) -> HeadGeometry:
-        """Return these triangles with the vertex buffers of another geometry of the same head."""
+        """Return a copy of this geometry with the vertex buffers of another geometry of the same head."""
         return replace(
             self,
             resources={
@@ -57,12 +57,12 @@ class HeadGeometry:
 def upload_geometry(
     device: Device, mesh: Mesh, atlas: Atlas, shape: Shape, part_maps: PartMaps | None = None
 ) -> HeadGeometry:
-    """Upload the triangles of a head with their atlas coordinates, and add the vertices of its shape.
+    """Upload the triangles of a head with their atlas coordinates, to be drawn with the vertices of a shape.
 
-    part_maps : maps of the parts that are not skin. The opacity map may cut holes into a part. If None, parts
-        with holes are left out
+    part_maps : maps of the parts that are not skin, among them an opacity map that cuts holes into parts;
+        None to leave out the triangles with such holes
     """
-    table, cut_out = _triangle_table(mesh, atlas), mesh.cut_out
+    table, cut_out = _triangle_table(mesh, atlas), mesh.cut_out_mask
     if part_maps is None or not cut_out.any():
         table[0, cut_out, :3] = 0
         return _upload_triangle_table(device, table, shape.vertices)
@@ -74,14 +74,14 @@ def upload_geometry(
 
 
 def upload_triangles(device: Device, triangle_vertices: NDArray[np.integer]) -> HeadGeometry:
-    """Upload only the (t, 3) vertex indices of triangles, to draw the depths of a simplified mesh."""
+    """Upload only the (t, 3) vertex indices of triangles, for drawing the depths of a simplified mesh."""
     table = np.zeros((3, len(triangle_vertices), 4), dtype=np.uint32)
     table[0, :, :3] = triangle_vertices
     return _upload_triangle_table(device, table, {})
 
 
 def _upload_triangle_table(
-    device: Device, triangle_table: NDArray[np.uint32], vertices: dict[str, Texture | Buffer]
+    device: Device, triangle_table: NDArray[np.uint32], vertex_resources: dict[str, Texture | Buffer]
 ) -> HeadGeometry:
     rows = np.concatenate([_arrange_in_rows(part, _TRIANGLES_PER_ROW) for part in triangle_table])
     read = device.adapter.kind != "CPU"  # see geometry.wgsl; an unread buffer must still be bound
@@ -90,7 +90,9 @@ def _upload_triangle_table(
         "triangle_buffer": device.buffer(rows if read else rows[:1, :3], "STORAGE"),
     }
     return HeadGeometry(
-        resources | vertices, device.buffer(triangle_table[0, :, :3], "INDEX"), triangle_table.shape[1]
+        resources | vertex_resources,
+        device.buffer(triangle_table[0, :, :3], "INDEX"),
+        triangle_table.shape[1],
     )
 
 
@@ -116,7 +118,7 @@ def rest_geometry(
     memo: Memo,
     device: Device,
     geometry: HeadGeometry,
-    tables: ShapeTables,
+    shape_tables: ShapeTables,
     head: Head,
     rest_positions_mm: NDArray[np.float32] | None,
     layout_index: int,
@@ -131,5 +133,5 @@ def rest_geometry(
     positions, owner = rest_positions_mm, "person"
     if positions is None:
         positions, owner = head.control.positions_mm, "head"
-    shape = memo.get(evaluate_rest_shape, device, tables, positions, caller_name=owner)
+    shape = memo.get(evaluate_rest_shape, device, shape_tables, positions, caller_name=owner)
     return memo.get(HeadGeometry.with_shape, geometry, shape, caller_name=f"{owner} {layout_index}")

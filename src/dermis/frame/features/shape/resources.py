@@ -16,8 +16,8 @@ class Resources:
 
     shape : buffers of the posed shape
     tables : buffers that are constant for a mesh
-    rest_shape : buffers of the person at rest, None if the person's control points at rest are those of the
-        mesh, which several people may share
+    rest_shape : buffers of the person's shape at rest; None if the control points of the mesh are already
+        those of the person
     curvature : buffers of the surface's curvature, None unless the technique reads it
     """
 
@@ -27,7 +27,7 @@ class Resources:
     curvature: Curvature | None
 
 
-def make(memo: Memo, device: Device, request: FrameRequest) -> Resources:
+def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resources:
     """Return the buffers from which the shape of the requested head is computed."""
     cached, mesh = memo.get, request.topology.mesh
     tables = cached(shape_tables, device, request.topology, caller_name="shared" if request.is_shared else "")

@@ -30,7 +30,7 @@ MIN_RELATIVE_TANGENT = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class ShapeTables:
-    """Buffers of a head's mesh and rig that are constant over frames, and the sizes of their contents.
+    """Buffers of a head's mesh and rig that are constant over frames, and the numbers of their elements.
 
     morphs : dictionary from names in shape_pose.wgsl to morph targets and bone weights, empty for heads that
         do not move
@@ -84,7 +84,7 @@ class Shape:
 
 
 def shape_tables(device: Device, head: Head) -> ShapeTables:
-    """Upload the mesh and the rig of a head as buffers for the passes of its shapes."""
+    """Upload the mesh and the rig of a head to the buffers from which its shape is computed."""
     rig, mesh = head.control, head.mesh
     moves, bones = bool(rig.targets.names or rig.skeleton), len(rig.skeleton.names) if rig.skeleton else 0
     return ShapeTables(
@@ -100,27 +100,31 @@ def shape_tables(device: Device, head: Head) -> ShapeTables:
     )
 
 
-def make_shape(device: Device, tables: ShapeTables, *, is_animated: bool = True) -> Shape:
+def make_shape(device: Device, shape_tables: ShapeTables, *, is_animated: bool = True) -> Shape:
     """Create the buffers of a shape.
 
-    tables : constant buffers of the head, from `shape_tables`
+    shape_tables : constant buffers of the head, from `shape_tables`
     is_animated : whether morph targets and bones move the shape; False for a shape at rest
     """
-    rest, morphs, stencils = _point_buffer(device, tables.control), dict[str, Buffer](), dict[str, Buffer]()
+    rest, morphs, stencils = (
+        _point_buffer(device, shape_tables.control),
+        dict[str, Buffer](),
+        dict[str, Buffer](),
+    )
     weights, matrices = (
-        _float_buffer(device, max(1, tables.targets)),
-        _float_buffer(device, 12 * max(1, tables.bones)),
+        _float_buffer(device, max(1, shape_tables.targets)),
+        _float_buffer(device, 12 * max(1, shape_tables.bones)),
     )
     points = rest
-    if is_animated and tables.morphs:
-        points = _point_buffer(device, tables.control)
+    if is_animated and shape_tables.morphs:
+        points = _point_buffer(device, shape_tables.control)
         moving = {"rest": rest, "weights": weights, "matrices": matrices, "posed": points}
-        morphs = tables.morphs | moving
-    if tables.stencils:
-        finer = _point_buffer(device, tables.points)
-        stencils, points = tables.stencils | {"control": points, "points": finer}, finer
-    surface = tables.surface | {"points": points} | _vertex_resources(device, tables.vertices)
-    return Shape(rest, weights, matrices, morphs, stencils, surface, tables)
+        morphs = shape_tables.morphs | moving
+    if shape_tables.stencils:
+        finer = _point_buffer(device, shape_tables.points)
+        stencils, points = shape_tables.stencils | {"control": points, "points": finer}, finer
+    surface = shape_tables.surface | {"points": points} | _vertex_resources(device, shape_tables.vertices)
+    return Shape(rest, weights, matrices, morphs, stencils, surface, shape_tables)
 
 
 def _point_buffer(device: Device, point_count: int) -> Buffer:
@@ -131,8 +135,8 @@ def _float_buffer(device: Device, float_count: int) -> Buffer:
     return device.buffer(np.zeros(float_count, np.float32), "STORAGE")
 
 
-def _upload_tables(device: Device, tables: dict[str, NDArray[np.generic]]) -> dict[str, Buffer]:
-    return {name: device.buffer(table, "STORAGE") for name, table in tables.items()}
+def _upload_tables(device: Device, named_tables: dict[str, NDArray[np.generic]]) -> dict[str, Buffer]:
+    return {name: device.buffer(table, "STORAGE") for name, table in named_tables.items()}
 
 
 def _vertex_resources(device: Device, vertex_count: int) -> dict[str, Texture | Buffer]:
@@ -163,7 +167,7 @@ def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
 
 
 def displacements(targets: MorphTargets, template_targets: MorphTargets) -> NDArray[np.float32]:
-    """Return (n, 4) displacements [mm] with morph target indices, ordered by point, for shape_pose.wgsl.
+    """Return (n, 4) rows of displacement [mm] and morph target index, ordered by point, for shape_pose.wgsl.
 
     targets : morph targets of a person
     template_targets : morph targets of the person's template, which displace the same points in the same
@@ -188,18 +192,18 @@ def _bone_influences(skeleton: Skeleton | None, point_count: int) -> Words:
     return np.ascontiguousarray(np.concatenate([skeleton.bone.astype(np.uint32), weight], axis=1))
 
 
-def _contact_words(contact: LidContact | None, point_count: int) -> Words:
-    """Return (p, 3) words with which the shader keeps points outside the eyeballs, zeros for other points.
+def _contact_words(lid_contact: LidContact | None, point_count: int) -> Words:
+    """Return (p, 3) words with which the shader keeps points outside the eyeballs.
 
     The words are the indices of the front and back point of the eyeball, and the bits of a float: the least
-    distance from the eyeball [mm].
+    distance from the eyeball [mm]. They are 0 for points that may be anywhere.
     """
-    if contact is None:
+    if lid_contact is None:
         return np.zeros((1, 3), np.uint32)
     words = np.zeros((point_count, 3), np.uint32)
-    clearance = np.ascontiguousarray(contact.min_clearance_mm, np.float32).view(np.uint32)
-    ends = contact.apex[contact.ball], contact.back[contact.ball]
-    words[contact.point] = np.stack([*ends, clearance], axis=1)
+    clearance = np.ascontiguousarray(lid_contact.min_clearance_mm, np.float32).view(np.uint32)
+    ends = lid_contact.apex[lid_contact.ball], lid_contact.back[lid_contact.ball]
+    words[lid_contact.point] = np.stack([*ends, clearance], axis=1)
     return words
 
 
@@ -210,9 +214,10 @@ def _stencil_tables(stencils: Stencils) -> dict[str, NDArray[np.generic]]:
 
 
 def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
-    """Return the named tables of shape_vertices.wgsl: vertices, triangle corners and ranges of corners.
+    """Return the tables that shape_vertices.wgsl reads, by name: vertices, triangle corners and spans.
 
-    Corners are ordered by point and then by vertex, so that the corners of a vertex are contiguous.
+    Vertices with different uv can share a point. Corners are ordered by point and then by vertex. The spans
+    give, for each vertex, the range of the corners at its point and the range of its own corners.
     """
     count, corner = len(mesh.positions), mesh.triangles.ravel().astype(np.int64)
     table = np.zeros(count, _VERTEX_DTYPE)
@@ -231,17 +236,17 @@ def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     }
 
 
-def run_bounds(sorted_values: NDArray[np.integer], run_values: NDArray[np.integer]) -> Words:
-    """Return, for each of n values, the start and end of the run of this value in a sorted array, (n, 2)."""
-    ends = [np.searchsorted(sorted_values, run_values, side) for side in ("left", "right")]
+def run_bounds(sorted_values: NDArray[np.integer], searched_values: NDArray[np.integer]) -> Words:
+    """Return (n, 2) bounds: where the run of each of n values starts and ends in a sorted array."""
+    ends = [np.searchsorted(sorted_values, searched_values, side) for side in ("left", "right")]
     return np.stack(ends, axis=1).astype(np.uint32)
 
 
 def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
-    """Return the (v, 3) normals of a mesh, in coordinates that are constant while the surface deforms.
+    """Return the (v, 3) normals of a mesh, each in a frame that moves with its vertex.
 
-    The axes at a vertex are the smooth normal, the u direction made orthogonal to the normal, and the cross
-    product of these two axes.
+    The axes of the frame are the smooth normal, the u direction made orthogonal to the normal, and the cross
+    product of these two axes. In this frame, the normal of a vertex is constant while the surface deforms.
     """
     smooth = vertex_normals(mesh.positions, mesh.point, mesh.triangles).astype(np.float64)
     axis = np.eye(3)[np.abs(smooth).argmin(axis=1)]
@@ -255,9 +260,7 @@ def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
 
 
 def _run_offsets(sorted_index: NDArray[np.integer], run_count: int) -> Words:
-    """Return where the values 0, 1, ... start in a sorted array, then the length of the array.
-
-    The shape of the result is (run_count + 1,).
+    """Return the (run_count + 1,) offsets at which the runs of 0, 1, ... start and end in a sorted array.
 
     sorted_index : sorted integers from 0 to run_count - 1
     """
@@ -270,8 +273,8 @@ class MotionBytes(NamedTuple):
     positions : position of each control point at rest, three floats [mm]
     weights : weight of each morph target, one float
     matrices : matrix of each bone, from rest to pose, twelve floats row by row [mm]
-    displacements : result of the function `displacements` for a person who uses the buffers of a template,
-        else empty
+    displacements : result of the function `displacements` if the person's morph targets replace those of the
+        template, else empty
     """
 
     positions: bytes
@@ -281,7 +284,7 @@ class MotionBytes(NamedTuple):
 
     @property
     def at_rest(self) -> MotionBytes:
-        """Return the rest pose of the head: control points, but no morph weights and bone matrices."""
+        """Return the rest pose of the head: the control points without morph weights and bone matrices."""
         return MotionBytes(self.positions)
 
 
@@ -297,17 +300,19 @@ def draw(graph: Recorder, shape: Shape, motion: MotionBytes) -> None:
     graph.repeat(_evaluate_surface, shape)
 
 
-def make_rest_shape(device: Device, tables: ShapeTables) -> Shape:
+def make_rest_shape(device: Device, shape_tables: ShapeTables) -> Shape:
     """Create the buffers of a person's shape at rest, without morph targets and bones."""
-    return make_shape(device, tables, is_animated=False)
+    return make_shape(device, shape_tables, is_animated=False)
 
 
-def evaluate_rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArray[np.float32]) -> Shape:
+def evaluate_rest_shape(
+    device: Device, shape_tables: ShapeTables, positions_mm: NDArray[np.float32]
+) -> Shape:
     """Create the shape of a person at rest, and compute its vertices immediately.
 
     positions_mm : (p, 3) control points [mm]
     """
-    shape, frame = make_rest_shape(device, tables), CommandList(device, timed=False)
+    shape, frame = make_rest_shape(device, shape_tables), CommandList(device, timed=False)
     draw(frame, shape, MotionBytes(positions_mm.tobytes()))
     frame.submit()
     return shape
@@ -326,27 +331,27 @@ def _evaluate_surface(graph: Recorder, shape: Shape) -> None:
     tables = shape.tables
     if shape.morphs:
         constants = ("HAS_BONES", tables.bones > 0), ("HAS_CONTACTS", tables.has_contacts)
-        _dispatch(graph, "shape/shape_pose.wgsl", shape.morphs, tables.control, constants)
+        _dispatch_shape(graph, "shape/shape_pose.wgsl", shape.morphs, tables.control, constants)
     if shape.stencils:
-        _dispatch(graph, "shape/shape_refine.wgsl", shape.stencils, tables.points)
+        _dispatch_shape(graph, "shape/shape_refine.wgsl", shape.stencils, tables.points)
     limits = (("MIN_UV_CROSS", MIN_UV_CROSS), ("MIN_TANGENT", MIN_RELATIVE_TANGENT))
-    _dispatch(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, limits)
+    _dispatch_shape(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, limits)
 
 
-def _dispatch(
+def _dispatch_shape(
     graph: Recorder,
     shader_name: str,
-    bound_resources: Bindings,
+    bindings: Bindings,
     invocation_count: int,
     constants: Constants = (),
 ) -> None:
     """Declare a pass of the shape with one shader invocation for each of `invocation_count` elements.
 
-    bound_resources : resources of the shader
+    bindings : resources of the shader
     """
     graph.dispatch(
         "shape",
         program(graph.device, shader_name, constants),
-        bound_resources,
+        bindings,
         workgroup_grid(invocation_count),
     )

@@ -8,10 +8,10 @@ from dermis.gpu.wgsl_source import ShaderListMember
 
 
 def shader_constants() -> Mapping[str, float]:
-    """Return the values that `//#fill` lines insert in shaders of lobes, eyes, mouths and painted skin."""
+    """Return the values that `//#fill` lines insert into shaders of lobes, eyes, mouths and painted skin."""
     return {**lobe_constants(), **eye_constants(), **painting_constants()}
 
 
 def shader_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
-    """Return the lists over which `//#each` lines in shaders loop: lobes, and lists of painted skin."""
+    """Return the lists over which `//#each` lines in shaders loop, such as the list of specular lobes."""
     return {"lobes": lobe_shaders, **painting_lists()}

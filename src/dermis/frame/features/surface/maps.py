@@ -51,10 +51,10 @@ def upload_maps(
 ) -> UploadedMaps:
     """Upload or paint the maps of a head, with their sampler and the table of Beckmann's distribution.
 
-    use_colour : whether to use the colour map; False replaces it by white, for profiles that contain the
-        colour
-    decode_srgb : False treats the sRGB values of the colour map as linear, a mistake shown in the talk
-        [dEonLuebke2007]
+    use_colour : whether to use the colour map; False replaces it by white, for profiles that already include
+        the colour of the skin
+    decode_srgb : False treats the sRGB values of the colour map as linear, to reproduce a mistake that the
+        talk [dEonLuebke2007] shows
     painted_side : side of painted maps [texels]
     has_expressions : whether expressions change painted maps
     """
@@ -70,20 +70,20 @@ def upload_maps(
 
 
 def detail_bindings(device: Device, has_fine_relief: bool) -> MutableBindings:
-    """Return the tiled texture of relief that is finer than the maps, and its sampler, named as in skin.wgsl.
+    """Return the tiled texture of the skin's finest relief, and its sampler, named as in skin.wgsl.
 
-    has_fine_relief : whether the skin has such relief; if False, the texture is flat
+    has_fine_relief : whether the skin has relief that is finer than its maps; if False, the texture is flat
     """
     slopes = detail_slopes() if has_fine_relief else np.zeros((1, 1, 4), np.float32)
     repeat = {f"address_mode_{axis}": "repeat" for axis in "uv"}
     sampler = device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear", **repeat)
-    return {"detail_map": map_mips.upload_detail(device, slopes), "detail_sampler": sampler}
+    return {"detail_map": map_mips.upload_detail_slopes(device, slopes), "detail_sampler": sampler}
 
 
 def _paint_maps(
     device: Device, head: Head, maps: PaintedMaps, use_colour: bool, paint_options: tuple[int, bool]
 ) -> tuple[MutableBindings, ExpressionMaps | None]:
-    """Paint the maps for which the head has no file; return them, and the maps that expressions change.
+    """Paint the maps that the head does not have as files; also return the maps that expressions change.
 
     paint_options : side [texels], and whether expressions change the maps
     """
@@ -100,7 +100,7 @@ def _paint_maps(
 
 
 def _painted_surface(head: Head) -> PaintedSurface:
-    """Return the mesh over which skin is painted; all people of a template share the mesh of the template."""
+    """Return the mesh over which skin is painted: the mesh that a person shares with the template."""
     return painted_surface(head.topology.mesh, head.topology.control.stencils)
 
 
@@ -118,7 +118,7 @@ def _upload_file_maps(device: Device, head: Head, use_colour: bool, decode_srgb:
         "relief_map": map_mips.make_relief(device, maps.height),
         "slope_map": map_mips.upload_slopes(device, maps.normal),
         "colour_map": map_mips.upload_colours(device, colour),
-        "specular_map": _upload_grey(device, _relative_to_mean(maps.specular, head.mesh)),
+        "specular_map": _upload_grey(device, _divided_by_surface_mean(maps.specular, head.mesh)),
         **_part_bindings(device, maps.parts),
         "roughness_map": _upload_grey(device, _factor_channel(maps.roughness)),
         "beckmann_table": device.cached(
@@ -127,19 +127,19 @@ def _upload_file_maps(device: Device, head: Head, use_colour: bool, decode_srgb:
     }
 
 
-def has_parts(head: Head) -> bool:
+def has_part_materials(head: Head) -> bool:
     """Return whether a head has parts with maps or a metallic-roughness surface, see parts.wgsl."""
     return head.maps.parts is not None or any(one.roughness is not None for one in head.mesh.materials)
 
 
-def _part_bindings(device: Device, maps: PartMaps | None) -> MutableBindings:
+def _part_bindings(device: Device, part_maps: PartMaps | None) -> MutableBindings:
     """Upload the maps of parts that are not skin as layers of one texture, named as in parts.wgsl."""
-    if maps is None:
+    if part_maps is None:
         flat = np.zeros((1, 1, 4), np.float32)
         return {"part_maps": map_mips.upload_layers(device, [flat, flat], "part maps")}
-    layers = [maps.colour, maps.surface]
-    if maps.emission is not None:
-        layers.append(np.pad(maps.emission, ((0, 0), (0, 0), (0, 1))))
+    layers = [part_maps.colour, part_maps.surface]
+    if part_maps.emission is not None:
+        layers.append(np.pad(part_maps.emission, ((0, 0), (0, 0), (0, 1))))
     return {"part_maps": map_mips.upload_layers(device, layers, "part maps")}
 
 
@@ -147,7 +147,7 @@ def _factor_channel(factor_map: NDArray[np.float32] | None) -> NDArray[np.float3
     return np.ones((1, 1, 1), np.float32) if factor_map is None else factor_map[..., None]
 
 
-def _relative_to_mean(factor_map: NDArray[np.float32] | None, mesh: Mesh) -> NDArray[np.float32]:
+def _divided_by_surface_mean(factor_map: NDArray[np.float32] | None, mesh: Mesh) -> NDArray[np.float32]:
     """Return a map divided by its mean over the surface, as a factor of the skin's specular strength [-]."""
     if factor_map is None:
         return _factor_channel(None)

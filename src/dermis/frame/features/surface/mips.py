@@ -61,14 +61,14 @@ def upload_slopes(device: Device, slopes: Floats | None) -> Texture:
         return _flat_relief(device)
     mipped, frame = empty_map(device, slopes.shape), CommandList(device, timed=False)
     bound: Bindings = {"slopes": texture_from_array(device, slopes, "rg32float"), "stored": mipped.levels[0]}
-    shader = program(device, "surface/map_moments.wgsl", store=HALF_TEXEL_FORMAT)
+    shader = program(device, "surface/map_moments.wgsl", store_format=HALF_TEXEL_FORMAT)
     frame.compute("maps", shader, bound, slopes.shape[1::-1])
     fill_mips(frame, mipped)
     frame.submit()
     return mipped.texture
 
 
-def upload_detail(device: Device, slopes: Floats) -> Texture:
+def upload_detail_slopes(device: Device, slopes: Floats) -> Texture:
     """Upload the slopes of two tiling reliefs as one layer, and their squared lengths as a second layer.
 
     slopes : (h, w, 4) slopes along u and v of the first relief, then of the second relief
@@ -139,18 +139,18 @@ def relief_from_buffers(
     return mipped.texture
 
 
-def fill_relief(recorder: Recorder, relief: MippedTexture, heights: Buffer) -> None:
+def fill_relief(recorder: Recorder, relief_texture: MippedTexture, height_buffer: Buffer) -> None:
     """Declare the passes that fill a relief texture of even size from the heights in one buffer.
 
-    relief : texture for slopes and squared slopes
-    heights : buffer of heights with a border of one texel on all sides [mm]
+    relief_texture : texture for slopes and squared slopes
+    height_buffer : buffer of heights with a border of one texel on all sides [mm]
     """
-    _draw_slopes(recorder, relief, heights, 0, relief.size[1])
-    fill_mips(recorder, relief, 2)
+    _draw_slopes(recorder, relief_texture, height_buffer, 0, relief_texture.size[1])
+    fill_mips(recorder, relief_texture, 2)
 
 
 def _draw_slopes(
-    recorder: Recorder, relief: MippedTexture, heights: Buffer, first_row: int, row_count: int
+    recorder: Recorder, relief_texture: MippedTexture, height_buffer: Buffer, first_row: int, row_count: int
 ) -> None:
     device = recorder.device
     first = device.cached(
@@ -158,12 +158,14 @@ def _draw_slopes(
     )
     bound: Bindings = {
         "top": first,
-        "heights": heights,
-        "stored": relief.levels[0],
-        "halved": relief.levels[1],
+        "heights": height_buffer,
+        "stored": relief_texture.levels[0],
+        "halved": relief_texture.levels[1],
     }
-    size = -(-relief.size[0] // 2), -(-row_count // _RELIEF_ROWS_PER_INVOCATION)
-    recorder.compute("maps", program(device, "surface/relief.wgsl", store=HALF_TEXEL_FORMAT), bound, size)
+    size = -(-relief_texture.size[0] // 2), -(-row_count // _RELIEF_ROWS_PER_INVOCATION)
+    recorder.compute(
+        "maps", program(device, "surface/relief.wgsl", store_format=HALF_TEXEL_FORMAT), bound, size
+    )
 
 
 def _flat_relief(device: Device) -> Texture:
@@ -188,16 +190,16 @@ def with_mip_views(texture: Texture) -> MippedTexture:
     )
 
 
-def fill_mips(recorder: Recorder, mipped: MippedTexture, first_level: int = 1) -> None:
+def fill_mips(recorder: Recorder, mipped_texture: MippedTexture, first_level: int = 1) -> None:
     """Declare the passes that compute each mip level from the next finer mip level.
 
     first_level : index of the first level to compute
     """
     shader, levels = (
-        program(recorder.device, "surface/map_halve.wgsl", store=HALF_TEXEL_FORMAT),
-        mipped.levels,
+        program(recorder.device, "surface/map_halve.wgsl", store_format=HALF_TEXEL_FORMAT),
+        mipped_texture.levels,
     )
-    width, height = mipped.size
+    width, height = mipped_texture.size
     for mip in range(first_level, len(levels)):
         bound: Bindings = {"finer": levels[mip - 1], "stored": levels[mip]}
         recorder.compute("maps", shader, bound, (max(width >> mip, 1), max(height >> mip, 1)))

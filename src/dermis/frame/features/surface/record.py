@@ -56,11 +56,11 @@ def eye_constants() -> dict[str, float]:
     }
 
 
-def fill_eye(record: UniformRecord, look: EyeLook) -> None:
+def fill_eye(eye_records: UniformRecord, look: EyeLook) -> None:
     """Write the appearance of eyes to the members of one or more records of the shader struct `Eye`."""
     for name in ("eumelanin", "pupil_mm", "redness"):
-        record[name] = getattr(look, name)
-    record["seed"] = look.seed % _EYE_SEED_COUNT
+        eye_records[name] = getattr(look, name)
+    eye_records["seed"] = look.seed % _EYE_SEED_COUNT
 
 
 def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
@@ -70,17 +70,19 @@ def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
 
 
 def skin_record(
-    program: ComputeProgram, skin: Skin, maps: Maps, profile: GaussianSum, light_count: int
+    shading_program: ComputeProgram, skin: Skin, maps: Maps, profile: GaussianSum, light_count: int
 ) -> UniformRecord:
     """Return the uniform record of the shader struct `Skin`.
 
-    Members named like a field or property of `Skin` are copied from it; all other members are derived.
+    Members with the name of a field or property of `skin` are copied from it; all other members are derived.
 
     light_count : number of lights; each part of a divided light counts as one
     """
-    members = struct_dtype(program.source.text, "Skin").names or ()
+    members = struct_dtype(shading_program.source.text, "Skin").names or ()
     values = {name: getattr(skin, name) for name in members if hasattr(skin, name)}
-    return program.record("Skin", **values, **_derived_members(skin, maps, profile), light_count=light_count)
+    return shading_program.record(
+        "Skin", **values, **_derived_members(skin, maps, profile), light_count=light_count
+    )
 
 
 def _derived_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
@@ -99,7 +101,7 @@ def _derived_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, 
 
 
 def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats, float]:
-    """Return the (3,) reflectance and the refractive index of a half-space of mean skin colour [-]."""
+    """Return the (3,) reflectance and the refractive index of a half-space with the mean skin colour [-]."""
     if skin.albedo == "profile":
         colour = np.asarray(profile.albedo, np.float64)
     elif maps.mean_colour is None:
@@ -110,9 +112,10 @@ def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Float
 
 
 def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
-    """Return the members of the struct `Skin` for direction.wgsl: how skin responds to each light direction.
+    """Return the members of the struct `Skin` that direction.wgsl reads.
 
-    Reflectance and transmittance are computed for a half-space with the mean colour of the skin.
+    They describe how reflectance and transmittance depend on the direction of light, and are computed for a
+    half-space with the mean colour of the skin.
     """
     half_space = mean_half_space(skin, maps, profile)
     response = anisotropic_response(*half_space, skin.anisotropy)
@@ -132,9 +135,10 @@ def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str
 
 
 def _normal_map_level(maps: Maps) -> float:
-    """Return the mip level at which the height map is as large as the normal map, -1 if there is none.
+    """Return the mip level at which the height map is as large as the normal map, -1 if either is missing.
 
-    From the height map, only relief finer than this level is added to the normal map; for -1, all of it.
+    Shaders add to the normal map only the relief of the height map that is finer than this level; for -1,
+    they add all relief.
     """
     if maps.normal is None or maps.height is None:
         return _NO_RELIEF_LEVEL

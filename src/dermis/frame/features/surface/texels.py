@@ -1,4 +1,4 @@
-"""Surface properties at atlas texels, stored so that lighting need not read the mesh and its maps."""
+"""Surface properties at atlas texels, stored so that lighting does not read the mesh and its maps."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Translucency: light through thin parts such as ears, nostrils, lips and eyelids."""
+"""Translucency: light through thin parts of the head, such as ears, nostrils, lips and eyelids."""

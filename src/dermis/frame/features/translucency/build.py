@@ -1,4 +1,4 @@
-"""Creation of the resources of translucency, the light that crosses thin parts between cells of the skin."""
+"""Creation of the resources of translucency, the light that passes through thin parts of the head."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _MAX_THICKNESS_SIGMAS, _MAX_THICKNESS_MM = (
     40.0,
 )  # thickest part in the tables: in standard deviations, and in mm
 _WIDTH_STEPS_PER_DOUBLING, _MIN_WIDTH_MM = 2, 0.5  # spacing and minimum of rounded widths
-_CACHED_PAIR_SEARCHES = 4
+_CACHED_PAIR_SEARCH_COUNT = 4
 _PACKED_UNIT_LIGHT = np.array(
     [0xFE000, 0x3F8FE000], np.uint32
 )  # white light of 1, encoded as in packed_light.wgsl
@@ -49,7 +49,7 @@ _CELL_COARSENING_FACTOR = 1.5  # factor of the cell side when memory does not ho
 
 
 def thin_part_tables(memo: Memo, request: FrameRequest) -> ThinParts | None:
-    """Return the transmittance of thin parts as a function of thickness, None for Lambertian skin."""
+    """Return tables of the light that thin tissue transmits and loses, None for Lambertian skin."""
     if request.skin.direction != "half-space":
         return None
     split, maps = request.split, request.head.maps
@@ -68,9 +68,10 @@ def _thin_part_weights(
     variance_mm2: Floats,
     level_weight: Floats,
 ) -> ThinParts:
-    """Return the transmittance of thin parts for each thickness: one weight for each blurred level.
+    """Return tables of the light that thin tissue transmits and loses, as functions of its thickness.
 
-    The weights are scaled so that no level loses more light than it has.
+    For each thickness, the tables hold one weight for each blurred level of the diffusion. The weights are
+    scaled so that no level loses more light than it has.
 
     colour : (3,) diffuse reflectance of thick skin [-]
     eta : index of refraction of skin [-]
@@ -90,8 +91,8 @@ def _thin_part_weights(
 def make_translucency(
     memo: Memo,
     device: Device,
-    surface: Bindings,
-    rest_surface: Bindings,
+    surface_bindings: Bindings,
+    rest_surface_bindings: Bindings,
     atlas: Atlas,
     variance_mm2: Floats,
     weight: Floats,
@@ -101,14 +102,14 @@ def make_translucency(
 ) -> Translucency:
     """Return the resources for light that is transmitted through thin parts of a head.
 
-    A pair is a cell of the atlas where light enters a thin part, and a cell where this light leaves.
+    A pair consists of a cell of the atlas where light enters a thin part, and a cell where this light leaves.
 
-    surface : resources of geometry.wgsl and of the atlas, for the current shape
-    rest_surface : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
+    surface_bindings : resources of geometry.wgsl and of the atlas, for the current shape
+    rest_surface_bindings : the same resources for the shape in which pairs are searched
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     weight : (k, 3) weights of the blurred levels [-]
-    thickness_tables : transmittance as a function of thickness; if None, the weight of a pair is computed
-        from the Gaussians and the straight distance between its cells
+    thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
+        weight a pair by the Gaussians at the straight distance between its cells
     shares_pairs : whether skins with similar profiles use the same pairs; true for skins that may change
         between frames
     layout_key : name of the atlas layout in the cache
@@ -116,10 +117,12 @@ def make_translucency(
     widest_mm = float(np.sqrt(variance_mm2[-1]))
     widest_mm = rounded_sigma_mm(widest_mm) if shares_pairs else widest_mm
     cells = memo.get(_cached_cell_division, atlas, caller_name=layout_key)(widest_mm)
-    pairs = memo.get(PairCache, device, rest_surface, atlas, caller_name=layout_key).find(cells)
-    buffers = memo.get(make_translucency_buffers, device, surface, pairs, caller_name=layout_key)
+    pairs = memo.get(PairCache, device, rest_surface_bindings, atlas, caller_name=layout_key).pairs_for_cells(
+        cells
+    )
+    buffers = memo.get(make_translucency_buffers, device, surface_bindings, pairs, caller_name=layout_key)
     return memo.get(
-        with_profile, device, buffers, variance_mm2, weight, thickness_tables, caller_name=layout_key
+        with_profile_weights, device, buffers, variance_mm2, weight, thickness_tables, caller_name=layout_key
     )
 
 
@@ -128,26 +131,26 @@ def _cached_cell_division(atlas: Atlas) -> Callable[[float], Cells]:
 
     The parameter of the returned function is the standard deviation of the widest Gaussian [mm].
     """
-    return lru_cache(_CACHED_PAIR_SEARCHES)(partial(divide_into_cells, atlas))
+    return lru_cache(_CACHED_PAIR_SEARCH_COUNT)(partial(divide_into_cells, atlas))
 
 
 class PairCache:
-    """Cache of the translucent pairs of a surface, for the last few divisions of its atlas into cells.
+    """Cache of the translucent pairs of a surface, for the most recent divisions of its atlas into cells.
 
-    A pair is a cell of the atlas where light enters a thin part, and a cell where this light leaves.
+    A pair consists of a cell of the atlas where light enters a thin part, and a cell where this light leaves.
 
-    surface : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
+    surface_bindings : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
     """
 
-    def __init__(self, device: Device, surface: Bindings, atlas: Atlas) -> None:
-        self._device, self._surface, self._atlas = device, surface, atlas
+    def __init__(self, device: Device, surface_bindings: Bindings, atlas: Atlas) -> None:
+        self._device, self._surface, self._atlas = device, surface_bindings, atlas
         self._cache: dict[Cells, PairBuffers] = {}
 
-    def find(self, cells: Cells) -> PairBuffers:
-        """Return the pairs for a division into cells, from the cache or by a new search."""
+    def pairs_for_cells(self, cells: Cells) -> PairBuffers:
+        """Return the pairs for a division of the atlas into cells, from the cache or by a new search."""
         pairs = self._cache.pop(cells, None)
         if pairs is None:
-            while len(self._cache) >= _CACHED_PAIR_SEARCHES:
+            while len(self._cache) >= _CACHED_PAIR_SEARCH_COUNT:
                 self._cache.pop(next(iter(self._cache)))
             pairs = find_pairs(self._device, self._surface, self._atlas, cells)
         self._cache[cells] = pairs
@@ -155,28 +158,34 @@ class PairCache:
 
 
 def rounded_sigma_mm(widest_sigma_mm: float) -> float:
-    """Round a standard deviation to the nearest power of sqrt(2) [mm].
+    """Round the standard deviation of the widest Gaussian to the nearest power of sqrt(2) [mm].
 
-    Cells of the atlas depend only on the rounded width, so that skins with similar profiles share them.
+    The cells of the atlas depend only on the rounded value, so that skins with similar profiles share them.
 
-    widest_sigma_mm : standard deviation of the widest Gaussian [mm]
+    widest_sigma_mm : standard deviation before rounding [mm]
     """
     step = round(_WIDTH_STEPS_PER_DOUBLING * float(np.log2(max(widest_sigma_mm, _MIN_WIDTH_MM))))
     return float(2.0 ** (step / _WIDTH_STEPS_PER_DOUBLING))
 
 
 @logged_step("finding the thin parts")
-def find_pairs(device: Device, surface: Bindings, atlas: Atlas, cells: Cells) -> PairBuffers:
-    """Find the translucent pairs of a surface; coarser cells are used if a buffer cannot hold all pairs."""
-    table, times = search_pairs(device, surface, cells), count(1)
+def find_pairs(device: Device, surface_bindings: Bindings, atlas: Atlas, cells: Cells) -> PairBuffers:
+    """Find the pairs of cells between which light passes through thin tissue.
+
+    If a buffer cannot hold all pairs, coarser cells are used.
+    """
+    table, times = search_pairs(device, surface_bindings, cells), count(1)
     while table is None:
         cells = divide_into_cells(atlas, cells.max_sigma_mm, _CELL_COARSENING_FACTOR ** next(times))
-        table = search_pairs(device, surface, cells)
+        table = search_pairs(device, surface_bindings, cells)
     return make_pair_buffers(device, cells, table)
 
 
 def make_pair_buffers(device: Device, cells: Cells, pair_table: PairTable) -> PairBuffers:
-    """Return the pairs of a search as the buffers that the passes of a frame read."""
+    """Create the buffers of cell pairs that the passes of a frame read.
+
+    pair_table : result of the search for pairs
+    """
     return PairBuffers(
         cells=cells,
         receivers=upload_receivers(device, cells, pair_table.receiver),
@@ -184,16 +193,17 @@ def make_pair_buffers(device: Device, cells: Cells, pair_table: PairTable) -> Pa
         pairs=pair_table.pairs,
         count=int(pair_table.first[-1]),
         receiver_ranges=device.buffer(_receiver_ranges(cells, pair_table), "STORAGE"),
-        transmitted=mark_scratch(device, _zero_light(device, cells.receiver_mask)),
-        lost=_zero_light(device, cells.receiver_mask),
+        transmitted=mark_scratch(device, _black_light_texture(device, cells.receiver_mask)),
+        lost=_black_light_texture(device, cells.receiver_mask),
     )
 
 
 def _receiver_ranges(cells: Cells, pair_table: PairTable) -> NDArray[np.uint32]:
-    """Return (m, 3) words: the packed cell of each receiver, and the first and end index of its pairs.
+    """Return (m, 3) words, one row for each cell where light leaves (receiver).
 
-    If there are no receivers, the result is one row of zeros. Receivers with many pairs come first, so that
-    invocations of the same workgroup take about equally long, and the last workgroups finish fastest.
+    A row holds the packed position of the cell, and the first and end index of its pairs. If there are no
+    receivers, the result is one row of zeros. Receivers with many pairs come first, so that invocations of
+    the same workgroup take similar time.
     """
     first, end = pair_table.first[:-1], pair_table.first[1:]
     order = np.argsort(first - end, kind="stable")
@@ -201,8 +211,8 @@ def _receiver_ranges(cells: Cells, pair_table: PairTable) -> NDArray[np.uint32]:
     return rows if len(rows) else np.zeros((1, 3), np.uint32)
 
 
-def _zero_light(device: Device, surface_mask: NDArray[np.bool_]) -> Texture:
-    """Return a black texture over the coarse atlas, whose alpha is 1 where the mask shows surface."""
+def _black_light_texture(device: Device, surface_mask: NDArray[np.bool_]) -> Texture:
+    """Return a black texture over the coarse atlas; its alpha is 1 where `surface_mask` is set."""
     light = np.zeros((*surface_mask.shape, 4), np.float32)
     light[..., 3] = surface_mask
     texture = make_texture(device, surface_mask.shape, "rgba32float")
@@ -210,7 +220,7 @@ def _zero_light(device: Device, surface_mask: NDArray[np.bool_]) -> Texture:
     return texture
 
 
-def with_profile(
+def with_profile_weights(
     device: Device,
     translucency: Translucency,
     variance_mm2: Floats,
@@ -221,8 +231,8 @@ def with_profile(
 
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     weight : (k, 3) weights of the blurred levels [-]
-    thickness_tables : transmittance as a function of thickness; if None, the weight of a pair is computed
-        from the Gaussians and the straight distance between its cells
+    thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
+        weight a pair by the Gaussians at the straight distance between its cells
     """
     fraction = weight / np.maximum(weight.sum(axis=0), MIN_WEIGHT_SUM)
     transmitted = weight if thickness_tables is None else thickness_tables.transmitted
@@ -241,18 +251,20 @@ def with_profile(
     )
 
 
-def make_translucency_buffers(device: Device, surface: Bindings, pairs: PairBuffers) -> Translucency:
-    """Allocate the buffers of translucency; `with_profile` adds the weights of a profile.
+def make_translucency_buffers(
+    device: Device, surface_bindings: Bindings, pair_buffers: PairBuffers
+) -> Translucency:
+    """Allocate the buffers of translucency; `with_profile_weights` adds the weights of a profile.
 
-    surface : resources of geometry.wgsl and of the atlas, for the current shape
+    surface_bindings : resources of geometry.wgsl and of the atlas, for the current shape
     """
-    receivers, sources = pairs.receivers[1], pairs.sources[1]
+    receivers, sources = pair_buffers.receivers[1], pair_buffers.sources[1]
     return Translucency(
-        pairs=pairs,
-        surface=surface,
+        pairs=pair_buffers,
+        surface=surface_bindings,
         receiver_points=mark_scratch(device, make_element_buffer(device, receivers, RECEIVER_BYTES)),
         source_points=make_element_buffer(device, sources, SOURCE_BYTES),
-        weights=make_element_buffer(device, pairs.count, 8),
+        weights=make_element_buffer(device, pair_buffers.count, 8),
         source_light=mark_scratch(device, make_element_buffer(device, sources, 16)),
         direction_factors=mark_scratch(device, make_element_buffer(device, sources, 8)),
         unit_light=device.buffer(np.tile(_PACKED_UNIT_LIGHT, (max(sources, 1), 2)), "STORAGE"),

@@ -1,4 +1,4 @@
-"""Choice of the shape in which translucent pairs are searched: the head at rest or a deformed head."""
+"""Choice of the shape, at rest or deformed, in which the cell pairs of translucency are searched."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _STRAIN_QUANTILE = 0.9  # quantile of the changes of length; it ignores the few 
 
 
 class StrainGauge:
-    """Short distances on a head at rest, from which the strain of the deformed head is measured."""
+    """Measure of the strain of a deformed head, from distances between neighbouring control points."""
 
     def __init__(self, head: Head) -> None:
         from scipy.spatial import cKDTree
@@ -30,7 +30,9 @@ class StrainGauge:
         self._rest_lengths = self._pair_lengths(self._rest_mm, self._pairs)
 
     def strain(self, positions_mm: Floats) -> float:
-        """Return the strain of a shape: the relative change that nine in ten distances do not exceed [-].
+        """Return the strain of a shape, the 90th percentile of the relative changes of distances [-].
+
+        The distances are those between neighbouring control points.
 
         positions_mm : (p, 3) control points of the shape [mm]
         """
@@ -46,8 +48,9 @@ class StrainGauge:
 def pair_positions_mm(memo: Memo, request: FrameRequest) -> Floats | None:
     """Return the control points of the shape in which pairs are searched [mm], None for the head at rest.
 
-    A pair is two cells of the skin between which light crosses a thin part. The pairs of the head at rest are
-    used for all shapes with a strain up to `MAX_SHARED_PAIR_STRAIN`, and for all people of one template.
+    A pair is two cells of the skin between which light crosses a thin part. All people of one template use
+    the pairs of the template at rest. So does any other shape whose strain is at most
+    `MAX_SHARED_PAIR_STRAIN`.
     """
     positions = request.rest_positions_mm
     if positions is None or request.is_shared:

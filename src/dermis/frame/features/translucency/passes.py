@@ -1,4 +1,4 @@
-"""Passes of translucency: positions of the pairs, their weights, and the transmitted light."""
+"""Passes of translucency, the light that enters the head in one cell of the surface and leaves in another."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dermis.atlas.translucency.cells import Cells
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
-from dermis.frame.lights.records import oblique_constants
+from dermis.frame.lights.records import with_oblique_constant
 from dermis.frame.programs import program, workgroup_grid
 from dermis.gpu import Bindings, Buffer, ComputeProgram, Constants, Device, Recorder, Texture
 from dermis.optics.gaussians import MAX_GAUSSIANS
@@ -33,26 +33,26 @@ _MIN_SOURCE_SMOOTHNESS = (
 
 
 def make_element_buffer(device: Device, element_count: int, element_bytes: int = 4) -> Buffer:
-    """Allocate a buffer for a number of elements of `element_bytes` bytes each; the buffer is never empty."""
+    """Allocate a buffer for elements of `element_bytes` bytes each; the buffer has room for at least one."""
     return device.storage_buffer(element_bytes * max(1, element_count))
 
 
 def draw_cell_points(
     graph: Recorder,
     cell_role: str,
-    surface: Bindings,
+    surface_bindings: Bindings,
     cells: Cells,
     cell_table: tuple[Buffer, int],
     point_buffer: Buffer,
     metric_from_triangles: bool = False,
 ) -> None:
-    """Declare the pass that writes the current positions and normals of receivers or sources.
+    """Declare the pass that writes the current positions and normals of cells where light enters or leaves.
 
-    For sources, the pass also writes the area; for receivers, it writes the metric, which converts offsets in
-    the atlas to lengths.
+    For cells where light enters (sources), the pass also writes the area. For cells where light leaves
+    (receivers), it writes the metric, which converts offsets in the atlas to lengths.
 
     cell_role : "receiver" or "source"
-    surface : resources of geometry.wgsl and of the atlas
+    surface_bindings : resources of geometry.wgsl and of the atlas
     cell_table : buffer of cells, and its number of rows
     point_buffer : buffer to write to
     metric_from_triangles : whether to take the metric of receivers from the triangles instead of the stretch
@@ -62,13 +62,13 @@ def draw_cell_points(
     shader = program(graph.device, name, (("FACETS", 1),) if metric_from_triangles else ())
     record = shader.record("Cells", size=cells.size, side=cells.side, stride=cells.stride, count=count)
     own: Bindings = {"cells": record, f"{cell_role}s": buffer, f"{cell_role}_points": point_buffer}
-    graph.dispatch("pairs", shader, {**surface, **own}, workgroup_grid(count))
+    graph.dispatch("pairs", shader, {**surface_bindings, **own}, workgroup_grid(count))
 
 
 def draw(
-    graph: Recorder, levels: PyramidLevels, blur: Blur, thin_parts: Translucency, constants: Constants = ()
+    graph: Recorder, levels: PyramidLevels, blur: Blur, translucency: Translucency, constants: Constants = ()
 ) -> Texture:
-    """Declare the passes that sum the light from all sources at each receiver; return the sums.
+    """Declare the passes that sum, in each receiver cell, the light from all source cells; return the sums.
 
     levels : blurred light over the atlas; light enters the sources from one of the levels
     blur : Gaussian blurs of the levels
@@ -76,7 +76,11 @@ def draw(
 
     Source: [JensenBuhler2002; dEonLuebke2007].
     """
-    device, pairs, level = graph.device, thin_parts.pairs, blur.profile_levels[1 + thin_parts.source_level]
+    device, pairs, level = (
+        graph.device,
+        translucency.pairs,
+        blur.profile_levels[1 + translucency.source_level],
+    )
     halvings = blur.halvings[level]
     gather = program(device, "translucency/translucency_gather.wgsl")
     record = gather.record(
@@ -89,58 +93,60 @@ def draw(
     bindings: Bindings = {
         "entering": record,
         "levels": levels.stacks[halvings],
-        "source_points": thin_parts.source_points,
-        "direction_factors": thin_parts.direction_factors
-        if thin_parts.uses_tables
-        else thin_parts.unit_light,
-        "source_light": thin_parts.source_light,
+        "source_points": translucency.source_points,
+        "direction_factors": translucency.direction_factors
+        if translucency.uses_tables
+        else translucency.unit_light,
+        "source_light": translucency.source_light,
     }
     graph.dispatch("translucency", gather, bindings, workgroup_grid(pairs.sources[1], _SOURCES_PER_WORKGROUP))
-    sum_pairs(graph, thin_parts, thin_parts.source_light, pairs.transmitted, constants)
+    sum_pair_light(graph, translucency, translucency.source_light, pairs.transmitted, constants)
     return pairs.transmitted
 
 
 def draw_direction_factors(
-    graph: Recorder, layout: LitAtlas, thin_parts: Translucency, constants: Constants
+    graph: Recorder, layout: LitAtlas, translucency: Translucency, constants: Constants
 ) -> None:
     """Declare the pass that computes how the directions of incident light change the transmission.
 
-    The result is one factor for each source, which applies in full where the thin part is thick enough for
-    light to scatter many times.
+    The result is one factor for each source cell. It applies in full only where the tissue is so thick that
+    light scatters many times.
 
     constants : pipeline constants of the lights
     """
-    shader = program(graph.device, "translucency/translucency_directions.wgsl", oblique_constants(constants))
-    count = thin_parts.pairs.sources[1]
+    shader = program(
+        graph.device, "translucency/translucency_directions.wgsl", with_oblique_constant(constants)
+    )
+    count = translucency.pairs.sources[1]
     bindings: Bindings = {
         **layout.bindings,
         "surfaces": layout.surfaces,
         "source_count": shader.record("SourceCount", sources=count),
-        "source_points": thin_parts.source_points,
-        "direction_factors": thin_parts.direction_factors,
+        "source_points": translucency.source_points,
+        "direction_factors": translucency.direction_factors,
     }
     graph.dispatch("translucency", shader, bindings, workgroup_grid(count, _SOURCES_PER_WORKGROUP))
 
 
-def sum_pairs(
+def sum_pair_light(
     graph: Recorder,
-    thin_parts: Translucency,
+    translucency: Translucency,
     source_light: Buffer,
     light_sums: Texture,
     constants: Constants = (),
     stage_name: str = "translucency",
 ) -> None:
-    """Declare the pass that sums, at each receiver, the light of the sources times the weights of the pairs.
+    """Declare the pass that sums, in each receiver cell, the light of its sources times the pair weights.
 
     source_light : buffer of the light of each source
     light_sums : texture over the coarse atlas for the sums
     constants : pipeline constants that replace the defaults of translucency.wgsl
     stage_name : name of the stage in timings
     """
-    device, pairs = graph.device, thin_parts.pairs
+    device, pairs = graph.device, translucency.pairs
     bindings: Bindings = {
         "receivers": pairs.receiver_ranges,
-        "weights": thin_parts.weights,
+        "weights": translucency.weights,
         "source_light": source_light,
         "transmitted": light_sums,
     }
@@ -153,27 +159,28 @@ def sum_pairs(
     graph.dispatch(stage_name, shader, bindings, workgroup_grid(pairs.receivers[1], receivers_per_group))
 
 
-def draw_weights(graph: Recorder, thin_parts: Translucency) -> None:
-    """Declare the passes that compute the weights of all pairs for the current shape.
+def draw_weights(graph: Recorder, translucency: Translucency) -> None:
+    """Declare the passes that compute, for the current shape, the weights of all pairs of cells.
 
-    The passes also sum the fraction of the blurred light that each receiver loses because its tissue is thin.
+    A weight is the fraction of the light of the source cell that leaves in the receiver cell. The passes also
+    sum the fraction of the blurred light that each receiver cell loses because its tissue is thin.
     """
-    pairs, cells = thin_parts.pairs, thin_parts.pairs.cells
+    pairs, cells = translucency.pairs, translucency.pairs.cells
     draw_cell_points(
-        graph, "receiver", thin_parts.surface, cells, pairs.receivers, thin_parts.receiver_points
+        graph, "receiver", translucency.surface, cells, pairs.receivers, translucency.receiver_points
     )
-    draw_cell_points(graph, "source", thin_parts.surface, cells, pairs.sources, thin_parts.source_points)
+    draw_cell_points(graph, "source", translucency.surface, cells, pairs.sources, translucency.source_points)
     bindings: Bindings = {
         "pairs": pairs.pairs,
-        "receiver_points": thin_parts.receiver_points,
-        "source_points": thin_parts.source_points,
-        "weights": thin_parts.weights,
+        "receiver_points": translucency.receiver_points,
+        "source_points": translucency.source_points,
+        "weights": translucency.weights,
     }
-    shader = _weights_program(graph.device, thin_parts.gaussian_count, thin_parts.uses_tables)
+    shader = _weights_program(graph.device, translucency.gaussian_count, translucency.uses_tables)
     groups = _PAIRS_PER_ROW // _PAIRS_PER_GROUP, max(1, -(-pairs.count // _PAIRS_PER_ROW)), 1
-    graph.dispatch("pairs", shader, {**bindings, **thin_parts.loss_bindings}, groups)
-    sum_pairs(graph, thin_parts, thin_parts.unit_light, pairs.lost, stage_name="pairs")
-    graph.dispatch("pairs", shader, {**bindings, **thin_parts.weight_bindings}, groups)
+    graph.dispatch("pairs", shader, {**bindings, **translucency.loss_bindings}, groups)
+    sum_pair_light(graph, translucency, translucency.unit_light, pairs.lost, stage_name="pairs")
+    graph.dispatch("pairs", shader, {**bindings, **translucency.weight_bindings}, groups)
 
 
 def choose_source_level(source_spacing_mm: float, variance_mm2: Floats) -> int:
@@ -188,7 +195,7 @@ def choose_source_level(source_spacing_mm: float, variance_mm2: Floats) -> int:
 
 def weight_bindings(
     device: Device,
-    pairs: PairBuffers,
+    pair_buffers: PairBuffers,
     variance_mm2: Floats,
     weight: Floats,
     thickness_tables: ThinParts | None = None,
@@ -198,7 +205,8 @@ def weight_bindings(
 
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     weight : (k, 3) weights of the blurred levels [-]
-    thickness_tables : transmittance as a function of thickness; if None, pairs are weighted by the Gaussians
+    thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
+        weight pairs by the Gaussians
     transmittance : (THICKNESS_ROWS, k, 3) table to use: `thickness_tables.transmitted` or
         `thickness_tables.lost`
     """
@@ -207,9 +215,9 @@ def weight_bindings(
     record = _weights_program(device, len(weight), thickness_tables is not None).record(
         "PairProfile",
         reach_mm=1.0 if thickness_tables is None else thickness_tables.max_thickness_mm,
-        radius_mm=pairs.cells.radius_mm,
-        source_mm2=variance_mm2[choose_source_level(pairs.cells.cell_mm, variance_mm2)],
-        cell_mm2=pairs.cells.cell_mm**2,
+        radius_mm=pair_buffers.cells.radius_mm,
+        source_mm2=variance_mm2[choose_source_level(pair_buffers.cells.cell_mm, variance_mm2)],
+        cell_mm2=pair_buffers.cells.cell_mm**2,
         min_variance_ratio=_MIN_VARIANCE_RATIO,
         gaussian=gaussian,
     )
@@ -220,7 +228,7 @@ def weight_bindings(
 def _transmittance_table(
     gaussian_count: int, thickness_tables: ThinParts | None, transmittance: Floats | None
 ) -> NDArray[np.float32]:
-    """Return the transmittance for each thickness and each of k Gaussians, (THICKNESS_ROWS k, 4).
+    """Return (THICKNESS_ROWS k, 4) rows: RGB transmittance for each thickness and each of k Gaussians.
 
     The fourth channel holds `ThinParts.directionality` in the first row of each thickness, else 0. Without
     `thickness_tables`, the result is one row of zeros.

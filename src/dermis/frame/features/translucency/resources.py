@@ -1,4 +1,4 @@
-"""Resources of translucency: pairs of cells on opposite faces of thin parts, and transmitted light."""
+"""Resources of translucency: pairs of cells on opposite faces of thin tissue, and transmitted light."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from dermis.gpu import Bindings, Buffer, Texture
 
 @dataclass(frozen=True, eq=False)
 class PairBuffers:
-    """Translucent pairs of a surface: source cells, where light enters, and receiver cells, where it leaves.
+    """Pairs of surface cells between which light passes through thin tissue.
+
+    Light enters the source cell and leaves the receiver cell.
 
     cells : cells of the coarse atlas
     receivers : buffer of the receiver cells, and its number of rows, see translucency_receivers.wgsl
@@ -19,8 +21,8 @@ class PairBuffers:
     count : number of pairs
     receiver_ranges : buffer of each receiver cell and the range of its pairs, see translucency.wgsl
     transmitted : texture over the coarse atlas of transmitted light; alpha is 1 where there is surface
-    lost : texture over the coarse atlas of the fraction of blurred light that thin tissue does not return;
-        alpha is 1 where there is surface
+    lost : texture over the coarse atlas of the fraction of blurred light that is lost because the tissue is
+        thin; alpha is 1 where there is surface
     """
 
     cells: Cells
@@ -35,19 +37,19 @@ class PairBuffers:
 
 @dataclass(frozen=True, eq=False)
 class Translucency:
-    """Resources of the light through thin parts, for one atlas layout.
+    """Resources of the light through thin parts of the head, for one atlas layout.
 
-    pairs : translucent pairs
+    pairs : translucent pairs of source and receiver cells
     surface : resources of geometry.wgsl and of the atlas, for the current shape
     receiver_points : buffer of the current positions and normals of the receivers
     source_points : buffer of the current positions and normals of the sources
     weights : buffer of the fraction of light that passes from source to receiver, for each pair
     source_light : buffer of the light that enters at each source
     unit_light : buffer that holds light of 1 at all sources
-    direction_factors : buffer of one factor per source: how the directions of its incident light change the
-        transmission, from `passes.draw_direction_factors`
+    direction_factors : buffer of one factor per source, by which the directions of its incident light change
+        the transmission; filled by `passes.draw_direction_factors`
     weight_bindings : resources of translucency_weights.wgsl for transmitted light
-    loss_bindings : resources of translucency_weights.wgsl for light that thin tissue does not return
+    loss_bindings : resources of translucency_weights.wgsl for light that is lost because the tissue is thin
     gaussian_count : number of Gaussians that blur light
     uses_tables : whether transmittance is read from tables as a function of thickness
     source_level : index of the blurred level whose light enters at sources; 0 is the narrowest blur

@@ -55,9 +55,9 @@ class ViewLayers:
     triangles : whether layers store triangle indices instead of depth
     depth : depth attachments of the rasteriser: one for each layer, or a single one if `triangles`
     targets : colour targets of the rasteriser, one for each layer; None for layers of depth
-    nearness : buffer of the compute pass: depth of each sample, in some modes packed with the triangle
-    triangle_ids : buffer of the compute pass with the triangle of each sample, allocated on first use
-    tiles : buffer of the compute pass with the state of each tile
+    nearness : buffer of the compute pass: depth at each sample, in some modes packed with the triangle index
+    triangle_ids : buffer of the compute pass: triangle index at each sample, allocated on first use
+    tiles : buffer of the compute pass: state of each tile of pixels
     """
 
     texture: Texture
@@ -89,29 +89,29 @@ def make_layers(
     """
     use_compute_pass = device.adapter.kind != "CPU" if use_compute_pass is None else use_compute_pass
     fits = 4 * layer_size[0] * layer_size[1] * layer_count <= device.max_storage_bytes
-    make = _compute_layers if use_compute_pass and fits else _raster_layers
+    make = _make_compute_layers if use_compute_pass and fits else _make_raster_layers
     return make(device, layer_size, max(1, layer_count), store_triangles)
 
 
 def draw_layers(
     graph: Recorder, stage_name: str, layers: ViewLayers, views: Views, head: HeadGeometry
 ) -> None:
-    """Declare the passes that fill one layer for each sample position of each view.
+    """Declare the passes that fill the layers: one for each view and each of its sample positions.
 
     stage_name : name of the stage in timings
     """
     if layers.nearness is not None:
-        _draw_compute(graph, stage_name, layers, views, head)
+        _draw_with_compute_pass(graph, stage_name, layers, views, head)
     else:
-        _draw_raster(graph, stage_name, layers, views.matrices(layers.size), head)
+        _draw_with_rasteriser(graph, stage_name, layers, views.sample_matrices(layers.size), head)
 
 
-def draw(graph: Recorder, visibility: ViewLayers, views: Views, head: HeadGeometry) -> None:
-    """Declare the passes that find the triangle at each sample of the picture [Burns2013]."""
-    draw_layers(graph, "visibility", visibility, views, head)
+def draw(graph: Recorder, visibility_layers: ViewLayers, views: Views, head: HeadGeometry) -> None:
+    """Declare the passes that find the triangle that covers each sample of the picture [Burns2013]."""
+    draw_layers(graph, "visibility", visibility_layers, views, head)
 
 
-def _compute_layers(
+def _make_compute_layers(
     device: Device, layer_size: tuple[int, int], layer_count: int, store_triangles: bool
 ) -> ViewLayers:
     texel, name = ("r32uint", "visibility buffer") if store_triangles else ("r32float", "shadow maps")
@@ -133,12 +133,12 @@ def _word_buffer(device: Device, word_count: int) -> Buffer:
     return device.buffer(np.zeros(word_count, np.uint32), "STORAGE")
 
 
-def _raster_layers(
+def _make_raster_layers(
     device: Device, layer_size: tuple[int, int], view_count: int, store_triangles: bool
 ) -> ViewLayers:
     name = "visibility buffer" if store_triangles else "shadow maps"
 
-    def layered(texel: str, layer_count: int) -> tuple[Texture, list[TextureView]]:
+    def make_layered_texture(texel: str, layer_count: int) -> tuple[Texture, list[TextureView]]:
         texture = make_texture(
             device,
             layer_size,
@@ -150,14 +150,14 @@ def _raster_layers(
         return texture, [make_view(texture, layer=k) for k in range(layer_count)]
 
     if not store_triangles:
-        texture, depth = layered("depth32float", view_count)
+        texture, depth = make_layered_texture("depth32float", view_count)
         return ViewLayers(texture, layer_size, view_count, store_triangles, depth, [None] * view_count)
-    _, depth = layered("depth32float", 1)
-    texture, targets = layered("r32uint", view_count)
+    _, depth = make_layered_texture("depth32float", 1)
+    texture, targets = make_layered_texture("r32uint", view_count)
     return ViewLayers(texture, layer_size, view_count, store_triangles, depth * view_count, targets)
 
 
-def _draw_compute(
+def _draw_with_compute_pass(
     graph: Recorder, stage_name: str, layers: ViewLayers, views: Views, head: HeadGeometry
 ) -> None:
     device, triangles, (clips, positions) = graph.device, head.triangles, views
@@ -179,10 +179,10 @@ def _draw_compute(
         "tiles": layers.tiles,
         "layers": layers.texture,
     }
-    work, count = _split_work(triangles, len(clips), len(positions))
+    work, count = _divide_triangles_into_workgroups(triangles, len(clips), len(positions))
     groups = (min(count, _WORKGROUPS_PER_ROW), -(-count // _WORKGROUPS_PER_ROW), len(clips))
     for recorded in passes:
-        constants = (("RECORDED", recorded), ("SAMPLES", len(positions)), *work, *head.constants)
+        constants = (("RECORDED", recorded), ("SAMPLES", len(positions)), *work, *head.cutout_constants)
         shader = program(device, "visibility/visibility_buffer.wgsl", constants)
         graph.dispatch(stage_name, shader, resources, groups)
     graph.dispatch(stage_name, resolve, resources, (*_tile_counts(layers.size), layers.count))
@@ -200,11 +200,11 @@ def _pass_modes(layers: ViewLayers, triangle_count: int, clip_matrices: Matrix) 
     if not layers.triangles:
         return (_RECORD_DEPTH,)
     steps = 2.0 ** (32 - triangle_count.bit_length())
-    precise = max(map(_depth_range_mm, clip_matrices)) <= _MAX_DEPTH_STEP_MM * steps
+    precise = max(map(_max_distance_per_depth_mm, clip_matrices)) <= _MAX_DEPTH_STEP_MM * steps
     return (_RECORD_BOTH,) if precise else (_RECORD_DEPTH, _RECORD_TRIANGLE)
 
 
-def _draw_raster(
+def _draw_with_rasteriser(
     graph: Recorder, stage_name: str, layers: ViewLayers, clip_matrices: Matrix, head: HeadGeometry
 ) -> None:
     shader = _raster_program(graph.device, layers.triangles, head.has_cutouts)
@@ -224,12 +224,12 @@ def _draw_raster(
 
 
 def _raster_program(device: Device, store_triangles: bool, has_cutouts: bool) -> RenderProgram:
-    """Return the program that rasterises triangles or depth.
+    """Return the program that rasterises triangle indices or depth.
 
-    has_cutouts : whether a fragment shader cuts holes, even if only depth is drawn
+    has_cutouts : whether opacity maps cut holes, which needs a fragment shader even if only depth is drawn
     """
 
-    def make() -> RenderProgram:
+    def compile_program() -> RenderProgram:
         by_triangle = store_triangles or has_cutouts
         name = "visibility/visibility_buffer_raster.wgsl" if by_triangle else "visibility/depth_raster.wgsl"
         path, folders = FEATURES_FOLDER / name, shader_folders(*(("CUTOUTS",) if has_cutouts else ()))
@@ -244,7 +244,7 @@ def _raster_program(device: Device, store_triangles: bool, has_cutouts: bool) ->
             has_fragment=by_triangle,
         )
 
-    return cached_program(device, ("visibility buffer", store_triangles, has_cutouts), (), make)
+    return cached_program(device, ("visibility buffer", store_triangles, has_cutouts), (), compile_program)
 
 
 def _views_record(
@@ -256,11 +256,11 @@ def _views_record(
     return record
 
 
-def _depth_range_mm(clip_matrix: Matrix) -> float:
-    """Return an upper bound of the change of distance per unit of depth [mm].
+def _max_distance_per_depth_mm(clip_matrix: Matrix) -> float:
+    """Return the largest change of distance per unit of z-buffer depth, as an upper bound [mm].
 
-    Where depth is stored as an integer, the error of the distance is at most this bound divided by the number
-    of integer steps.
+    If depth is stored as an integer, the error of the distance is at most this bound divided by the number of
+    integer steps.
 
     clip_matrix : (4, 4) matrix from world to clip space
     """
@@ -277,8 +277,12 @@ def _depth_range_mm(clip_matrix: Matrix) -> float:
 
 
 @cache
-def _split_work(triangle_count: int, view_count: int, sample_count: int) -> tuple[Constants, int]:
-    """Return the pipeline constants and the number of workgroups of the compute pass, tuned on an H200.
+def _divide_triangles_into_workgroups(
+    triangle_count: int, view_count: int, sample_count: int
+) -> tuple[Constants, int]:
+    """Divide the triangles among the workgroups of the compute pass; the numbers were tuned on an H200.
+
+    Return pipeline constants, and the number of workgroups.
 
     triangle_count : number of triangles
     view_count : number of views
@@ -296,5 +300,8 @@ def _split_work(triangle_count: int, view_count: int, sample_count: int) -> tupl
 
 
 def _tile_counts(picture_size: tuple[int, int]) -> tuple[int, int]:
-    """Return the number of tiles of the compute pass across and down a picture of size (width, height)."""
+    """Return the number of tiles, across and down, of a picture of size (width, height).
+
+    The compute pass draws the picture in these tiles.
+    """
     return -(-picture_size[0] // _TILE_PIXELS[0]), -(-picture_size[1] // _TILE_PIXELS[1])

@@ -1,8 +1,8 @@
 """Export to a web page with Babylon.js, which diffuses light in screen space.
 
 The formulas follow the shader subSurfaceScattering of babylonjs 9.28.0 and 9.34.0. A diffusion profile is set
-as a colour c. The shader takes samples on a spiral, whose radii are distributed by a Burley profile of width
-max(c), and weights them by a Burley profile that has the width 1/c in each channel. A bug in the shader
+as a colour c. The shader takes samples on a spiral, with radii distributed like a Burley profile of width
+max(c). In each channel, a Burley profile of width 1/c gives the weights of the samples. A bug in the shader
 doubles all widths.
 """
 
@@ -65,22 +65,22 @@ class Babylon(EnginePage):
         return _profile_parameters(subject, k / d, RENDERED_WIDTH_RATIO / k)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the Burley widths [mm] as the colour, and 1 as metersPerUnit, as the scene is in metres."""
+        """Return parameters with the Burley widths [mm] as the colour c, and metersPerUnit 1."""
         return _profile_parameters(subject, fit_burley_width(subject.curve), 1.0)
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile of the discrete samples that the shader takes."""
         profile, (metres,) = (
             get_numbers(parameters, _DIFFUSION_PROFILE_NAME),
             get_numbers(parameters, _METERS_PER_UNIT_NAME),
         )
-        return spiral_curve(profile, metres, subject.curve.energy)
+        return spiral_profile(profile, metres, subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the library's script elements, and the sources for the page's Content-Security-Policy."""
+        """Return the script elements of Babylon.js, and the URLs or hashes that script-src allows."""
         files = self.library_files[version]
         if self.library_folder is None:
-            return "\n".join(file.element for file in files), [file.url for file in files]
+            return "\n".join(file.html_element for file in files), [file.url for file in files]
         texts = [escape_script(file.read(self.library_folder)) for file in files]
         return "\n".join(f"<script>{text}</script>" for text in texts), [csp_hash(text) for text in texts]
 
@@ -108,8 +108,8 @@ def spiral_samples(
 ) -> tuple[Floats, Floats, Floats]:
     """Return radii (n,), angles (n,) [rad] and normalised weights (n, 3) of the shader's samples.
 
-    The radii are for metersPerUnit 1 and without the shader's width error: multiply the radii by
-    `RENDERED_WIDTH_RATIO` / metersPerUnit to get mm.
+    The radii are for metersPerUnit 1 and for a shader without the bug that doubles the widths. Multiplied by
+    `RENDERED_WIDTH_RATIO` / metersPerUnit, they are in mm.
 
     profile_colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
     """
@@ -134,7 +134,7 @@ def burley_radii(enclosed_fraction: ArrayLike) -> tuple[Floats, Floats]:
     return 3.0 * np.log(c / (4.0 * u)), c**3 / (4.0 * u * (c * c + 16.0 * u * u))
 
 
-def spiral_curve(profile_colour: ArrayLike, meters_per_unit: float, energy: ArrayLike) -> CumulativeProfile:
+def spiral_profile(profile_colour: ArrayLike, meters_per_unit: float, energy: ArrayLike) -> CumulativeProfile:
     """Return the cumulative profile of the shader's samples, averaged over all rotations of the spiral.
 
     profile_colour : (3,) diffusion profile as Babylon.js defines it: inverse widths

@@ -1,4 +1,4 @@
-"""Skin in Blender, written by dermis: a head or a ball with its material, lights and camera, in metres.
+"""Blender scene written by dermis: a head or a ball with a skin material, lights and a camera, in metres.
 
     blender --python THIS_FILE                   # or open it in the text editor and run it
     blender -b --python THIS_FILE -- --render picture.png --samples 64 --save scene.blend
@@ -34,9 +34,9 @@ def main(arguments: list[str]) -> None:
     for light in EXPORT["lights"]:
         add_light(light)
     panorama = EXPORT["world"].get("panorama")
-    set_world(EXPORT["world"], panorama and np.load(data_folder() / panorama, allow_pickle=False))
+    set_world(EXPORT["world"], panorama and np.load(find_data_folder() / panorama, allow_pickle=False))
     set_camera(EXPORT["camera"])
-    set_render(bpy.context.scene)
+    set_render_settings(bpy.context.scene)
     save_and_render(options)
 
 
@@ -62,8 +62,8 @@ def check_version() -> None:
         )
 
 
-def data_folder() -> Path:
-    """Return the folder of the head and panorama files; this also works in Blender's text editor."""
+def find_data_folder() -> Path:
+    """Return the folder that contains the files of the head and the panorama."""
     texts = [Path(bpy.path.abspath(text.filepath)) for text in bpy.data.texts if text.filepath]
     folders = [Path(__file__).resolve().parent, *(file.parent for file in texts)]
     name = EXPORT["head"] or EXPORT["world"].get("panorama")
@@ -84,63 +84,63 @@ def place_head() -> None:
         return
     bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
     before = set(bpy.data.objects)
-    bpy.ops.import_scene.gltf(filepath=str(data_folder() / EXPORT["head"]))
+    bpy.ops.import_scene.gltf(filepath=str(find_data_folder() / EXPORT["head"]))
     meshes = [added for added in bpy.data.objects if added not in before and added.type == "MESH"]
     head = max((mesh for mesh in meshes if mesh.users_scene), key=lambda mesh: len(mesh.data.vertices))
     for slot in EXPORT["skin_slots"]:
         material = head.material_slots[slot].material
-        set_skin(next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED"))
+        set_skin_inputs(next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED"))
 
 
-def add_ball(diameter: float) -> None:
+def add_ball(diameter_m: float) -> None:
     """Add a ball with the skin material.
 
-    diameter : diameter of the ball [m]
+    diameter_m : diameter of the ball [m]
     """
     import bmesh  # type: ignore[import-not-found,unused-ignore]  # exists after bpy is imported
 
     mesh, shape = bpy.data.meshes.new("ball"), bmesh.new()
-    bmesh.ops.create_uvsphere(shape, u_segments=192, v_segments=96, radius=0.5 * diameter)
+    bmesh.ops.create_uvsphere(shape, u_segments=192, v_segments=96, radius=0.5 * diameter_m)
     shape.to_mesh(mesh)
     shape.free()
     mesh.shade_smooth()
-    mesh.materials.append(make_skin())
+    mesh.materials.append(make_skin_material())
     add_object("ball", mesh)
 
 
-def make_skin() -> Any:
+def make_skin_material() -> Any:
     """Return a new skin material of uniform colour, for the ball."""
     material = bpy.data.materials.new("skin")
     material.use_nodes = True
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Base Color"].default_value = (*EXPORT["colour"], 1.0)
     shader.inputs["Roughness"].default_value = EXPORT["roughness"]
-    set_skin(shader)
+    set_skin_inputs(shader)
     return material
 
 
-def set_skin(shader: Any) -> None:
+def set_skin_inputs(bsdf_node: Any) -> None:
     """Set the exported inputs of a Principled BSDF node, and convert the roughness from Beckmann to GGX.
 
     If a roughness map is connected, the map is multiplied by the conversion factor.
 
-    shader : Principled BSDF node
+    bsdf_node : Principled BSDF node
     """
     if EXPORT["method"] != "EEVEE":
-        shader.subsurface_method = EXPORT["method"]
+        bsdf_node.subsurface_method = EXPORT["method"]
     for name, value in EXPORT["inputs"].items():
-        shader.inputs[name].default_value = value
-    roughness = shader.inputs["Roughness"]
+        bsdf_node.inputs[name].default_value = value
+    roughness = bsdf_node.inputs["Roughness"]
     roughness.default_value *= EXPORT["smoother"]
     if roughness.links:
-        tree = shader.id_data
+        tree = bsdf_node.id_data
         factor = tree.nodes.new("ShaderNodeMath")
         factor.operation, factor.inputs[1].default_value = "MULTIPLY", EXPORT["smoother"]
         tree.links.new(roughness.links[0].from_socket, factor.inputs[0])
         tree.links.new(factor.outputs[0], roughness)
 
 
-def set_render(scene: Any) -> None:
+def set_render_settings(scene: Any) -> None:
     """Set the render engine, the resolution and the colour management of the scene."""
     known = {item.identifier for item in scene.render.bl_rna.properties["engine"].enum_items}
     eevee = "BLENDER_EEVEE_NEXT" if "BLENDER_EEVEE_NEXT" in known else "BLENDER_EEVEE"

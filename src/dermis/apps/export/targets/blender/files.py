@@ -53,7 +53,7 @@ _GGX_PER_BECKMANN_ROUGHNESS = 0.5
 _MAX_FILE_NAME_LENGTH = 60  # characters; Blender truncates names to 63
 _EXPORT_DATA_LINE = "EXPORT: dict[str, Any] = {}\n"
 _HELPER_IMPORT_PATTERN = re.compile(r"from dermis\.apps\.truths\.cycles_script import (.*)\n")
-_TYPE_COMMENT = "  # type: ignore[import-not-found,unused-ignore]"
+_BPY_TYPE_COMMENT = "  # type: ignore[import-not-found,unused-ignore]"
 _MAIN_GUARD = 'if __name__ == "__main__":'
 
 
@@ -122,7 +122,7 @@ def _write_script_files(
     if panorama is not None:
         files.append(script_path.with_name(PANORAMA_FILE))
         np.save(files[-1], panorama)
-    script_path.write_text(script_text(skin_description | scene_dict), encoding="utf-8")
+    script_path.write_text(blender_script_text(skin_description | scene_dict), encoding="utf-8")
     return files
 
 
@@ -143,7 +143,7 @@ def skin_material_indices(head: Head) -> list[int]:
     return [slot for slot, kind in enumerate(used) if head.mesh.materials[kind].kind == "skin"]
 
 
-def script_text(export_data: Mapping[str, object]) -> str:
+def blender_script_text(export_data: Mapping[str, object]) -> str:
     """Return the text of the Blender script with the exported parameters and scene as Python literals.
 
     Text is written as a Python literal, so that a name cannot inject code.
@@ -161,7 +161,7 @@ def script_text(export_data: Mapping[str, object]) -> str:
         names += sorted(called & functions.keys() - {*names})
     copied = "\n\n\n".join(str(ast.get_source_segment(source, functions[name])) for name in names)
     literal = pformat(dict(export_data), width=110, sort_dicts=False)
-    text = _HELPER_IMPORT_PATTERN.sub("from mathutils import Matrix\n", text).replace(_TYPE_COMMENT, "")
+    text = _HELPER_IMPORT_PATTERN.sub("from mathutils import Matrix\n", text).replace(_BPY_TYPE_COMMENT, "")
     text = text.replace(_MAIN_GUARD, f"{copied}\n\n\n{_MAIN_GUARD}")
     return text.replace(_EXPORT_DATA_LINE, f"EXPORT: dict[str, Any] = {literal}\n")
 

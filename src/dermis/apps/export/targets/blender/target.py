@@ -53,7 +53,7 @@ def burley_cdf(radius: ArrayLike) -> Floats:
 
 
 def burley_shape_factor(base_colour: ArrayLike) -> Floats:
-    """Return Burley's factor s(A) (3,); in EEVEE, the profile's width is the radius divided by s(A) [-].
+    """Return Burley's factor s(A) (3,), by which EEVEE divides the subsurface radius to get the width [-].
 
     base_colour : (3,) base colour; A is the colour divided by its brightest channel
 
@@ -80,7 +80,7 @@ def hulst_albedo(base_colour: ArrayLike) -> Floats:
     return np.asarray(np.clip(1.0 - s**2, 0.0, MAX_ALBEDO))
 
 
-def skin_path_ratio(base_colour: ArrayLike, eta: float) -> Floats:
+def skin_mfp_per_radius(base_colour: ArrayLike, eta: float) -> Floats:
     """Return the ratio of mean free path to subsurface radius in Cycles' method RANDOM_WALK_SKIN [-].
 
     Cycles interprets the radius as a diffuse mean free path. From the base colour, Cycles derives the
@@ -106,12 +106,14 @@ def skin_path_ratio(base_colour: ArrayLike, eta: float) -> Floats:
     return np.asarray(np.sqrt(3.0 * (1.0 - albedo)))
 
 
-def _dipole_reflectance(albedo: Floats, A: float) -> Floats:
+def _dipole_reflectance(albedo: Floats, internal_reflection_factor: float) -> Floats:
     root = np.sqrt(3.0 * (1.0 - albedo))
-    return np.asarray(0.5 * albedo * (1.0 + np.exp(-4.0 / 3.0 * A * root)) * np.exp(-root))
+    return np.asarray(
+        0.5 * albedo * (1.0 + np.exp(-4.0 / 3.0 * internal_reflection_factor * root)) * np.exp(-root)
+    )
 
 
-def walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> Floats:
+def random_walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> Floats:
     """Return the fraction of the incident light that Cycles' random walk returns within given radii [-].
 
     radius : radii [mean free paths]
@@ -120,7 +122,7 @@ def walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> Floats:
         RANDOM_WALK_SKIN
     """
     walk_albedo = max(albedo, MIN_ALBEDO)
-    radii, fraction_within = _interpolate_walk_table(round(walk_albedo, 7), walk_entry)
+    radii, fraction_within = _interpolate_random_walk_table(round(walk_albedo, 7), walk_entry)
     r = np.asarray(radius, np.float64)
     fraction = np.interp(np.log(np.maximum(r, 1e-12)), np.log(radii), fraction_within)
     near = np.minimum(r / radii[0], 1.0)  # linear in the radius below the first tabulated one
@@ -128,14 +130,14 @@ def walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> Floats:
 
 
 @cache
-def _interpolate_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Floats, Floats]:
+def _interpolate_random_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Floats, Floats]:
     """Return radii [mean free paths] and the fraction of light within each radius [-], for one albedo.
 
-    The tabulated fractions are interpolated to this albedo, and to eight times as many radii.
+    The fractions are interpolated from a table, at eight times as many radii as in the table.
     """
     from scipy.interpolate import PchipInterpolator
 
-    roots, radii, fraction_within = _load_walk_table()[walk_entry]
+    roots, radii, fraction_within = _load_random_walk_tables()[walk_entry]
     fraction = PchipInterpolator(roots, fraction_within, axis=0)(
         np.clip(np.sqrt(1.0 - albedo), roots[0], roots[-1])
     )
@@ -144,11 +146,11 @@ def _interpolate_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Float
 
 
 @cache
-def _load_walk_table() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
-    """Return the tables of Cycles' random walks, one for each way in which a walk enters the medium.
+def _load_random_walk_tables() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
+    """Return a table of Cycles' random walks for each way in which a walk enters the medium.
 
-    A table consists of sqrt(1 - albedo) (n,) [-], radii (m,) [mean free paths], and the fraction of light
-    that leaves within each radius (n, m) [-].
+    A table consists of three arrays: values of sqrt(1 - albedo) (n,) [-], radii (m,) [mean free paths], and
+    the fraction of light (n, m) that leaves the medium within each radius [-].
     """
     by_entry: dict[str, list[list[float]]] = {}
     for row in read_rows(__package__, "cycles_walk"):
@@ -177,12 +179,12 @@ class RandomWalk(NamedTuple):
 
         radius : radii [mean free paths]
         """
-        return walk_cdf(radius, self.albedo, self.entry) / self.emerging_fraction
+        return random_walk_cdf(radius, self.albedo, self.entry) / self.emerging_fraction
 
     @property
     def emerging_fraction(self) -> float:
-        """Return the light that leaves the skin along the normal, per incident light [-]."""
-        return float(walk_cdf(np.array([_EFFECTIVELY_INFINITE_RADIUS]), self.albedo, self.entry)[0])
+        """Return the light that leaves the skin along its normal, as a fraction of the incident light [-]."""
+        return float(random_walk_cdf(np.array([_EFFECTIVELY_INFINITE_RADIUS]), self.albedo, self.entry)[0])
 
 
 class Blender(Target):
@@ -202,28 +204,28 @@ class Blender(Target):
     part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the subsurface radius for which the method's profile is closest to the reference."""
-        units = self._unit_cdfs(subject, version)
+        """Return parameters with the subsurface radius whose profile is closest to the reference profile."""
+        units = self._unit_cdf_by_channel(subject, version)
         fitted = np.array([fit_length_scale(subject.curve, k, unit) for k, unit in enumerate(units)])
-        radius = fitted / self._unit_lengths(subject, version)
-        return self._parameters(tuple(round(float(x), 5) for x in radius), version)
+        radius = fitted / self._lengths_per_unit_radius(subject, version)
+        return self._material_parameters(tuple(round(float(x), 5) for x in radius), version)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return published diffuse mean free paths of skin as the subsurface radius."""
-        return self._parameters(JENSEN_DMFP_MM, version)
+        """Return parameters with published diffuse mean free paths of skin as the subsurface radius."""
+        return self._material_parameters(JENSEN_DMFP_MM, version)
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile by the formulas of Cycles' kernel and EEVEE's shader."""
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+        """Return the cumulative profile, predicted by the formulas of Cycles' kernel and EEVEE's shader."""
         metres = np.array(get_numbers(parameters, _RADIUS_NAME)) * get_numbers(parameters, _SCALE_NAME)[0]
-        lengths = np.maximum(metres / _METRES_PER_MM * self._unit_lengths(subject, version), 1e-9)
-        units = self._unit_cdfs(subject, version)
+        lengths = np.maximum(metres / _METRES_PER_MM * self._lengths_per_unit_radius(subject, version), 1e-9)
+        units = self._unit_cdf_by_channel(subject, version)
 
         def fraction_within(radius_mm: Floats) -> Floats:
             return np.stack(
                 [unit(radius_mm / length) for unit, length in zip(units, lengths, strict=True)], axis=-1
             )
 
-        energy = subject.curve.energy * self._energy_ratio(subject, version)
+        energy = subject.curve.energy * self._energy_per_base_colour(subject, version)
         return CumulativeProfile.from_function(fraction_within, energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
@@ -245,7 +247,7 @@ class Blender(Target):
             else (list(_FIRST_SUPPORTED_VERSION), list(_FIRST_MFP_VERSION))
         )
 
-    def _parameters(self, subsurface_radius: tuple[float, ...], version: str) -> Parameters:
+    def _material_parameters(self, subsurface_radius: tuple[float, ...], version: str) -> Parameters:
         method = self.variant.replace("-", "_").upper()
         parameters = [
             Parameter("Subsurface Method", method, "-", "of the Principled BSDF"),
@@ -271,12 +273,12 @@ class Blender(Target):
             "eevee": "4 pi d s(A), where A is the colour divided by its brightest channel",
         }[self.variant]
 
-    def _unit_lengths(self, subject: Subject, version: str) -> Floats:
+    def _lengths_per_unit_radius(self, subject: Subject, version: str) -> Floats:
         """Return the Burley width or mean free path (3,) that results from a subsurface radius of 1."""
         if self.variant == "random-walk":
             return np.full(3, 1.0 if _radius_is_mfp(version) else 1.0 / _4_PI)
         if self.variant == "random-walk-skin":
-            return skin_path_ratio(subject.clipped_albedo(), SKIN_ETA)
+            return skin_mfp_per_radius(subject.clipped_albedo(), SKIN_ETA)
         factor = burley_shape_factor(subject.clipped_albedo()) if self.variant == "eevee" else 1.0
         return np.full(3, 1.0 / _4_PI) / factor
 
@@ -286,13 +288,13 @@ class Blender(Target):
         albedos = albedo(subject.clipped_albedo())
         return [RandomWalk(float(one), "straight" if plain else "skin") for one in albedos]
 
-    def _unit_cdfs(self, subject: Subject, version: str) -> list[Cdf]:
-        """Return each channel's cumulative profile as a function of radius in units of `_unit_lengths`."""
+    def _unit_cdf_by_channel(self, subject: Subject, version: str) -> list[Cdf]:
+        """Return each channel's cumulative profile; radii are in Burley widths or mean free paths."""
         if self.variant in ("burley", "eevee"):
             return [burley_cdf] * 3
         return [walk.cdf for walk in self._random_walks(subject, version)]
 
-    def _energy_ratio(self, subject: Subject, version: str) -> Floats:
+    def _energy_per_base_colour(self, subject: Subject, version: str) -> Floats:
         """Return the light (3,) that leaves the skin along the normal, divided by the base colour [-]."""
         if self.variant in ("burley", "eevee"):
             return np.ones(3)

@@ -17,13 +17,13 @@ from dermis.scene.heads import is_person_name, load_person
 
 Extensions = Mapping[str, Mapping[str, object]]
 _MULTISCATTER_ROLE = "multiscatter"
-_MULTISCATTER_TABLE_STEPS = 1024
+_MULTISCATTER_TABLE_SIZE = 1024
 
 
-def encode_glb(subject: Subject, extensions: Extensions, draft_notice: str) -> bytes:
+def encode_glb(subject: Subject, material_extensions: Extensions, draft_notice: str) -> bytes:
     """Return a .glb file of the head with eyes, hairs and rig, or of a ball for a skin without a head.
 
-    extensions : dictionary from the name of each extension of the skin's material to its JSON
+    material_extensions : dictionary from the name of each extension of the skin's material to its JSON
     draft_notice : notice that an extension is a draft, stored in the file; "" if all extensions are ratified
     """
     head = subject.head_or_ball
@@ -36,27 +36,31 @@ def encode_glb(subject: Subject, extensions: Extensions, draft_notice: str) -> b
         head,
         roughness=subject.skin.roughness,
         slopes=relief_slopes(head),
-        notes=notes,
+        asset_extras=notes,
         eyes=subject.eye_pictures(),
-        skin_additions=_skin_additions(subject, head, extensions, draft_notice),
+        skin_additions=_skin_additions(subject, head, material_extensions, draft_notice),
     )
 
 
-def _skin_additions(subject: Subject, head: Head, extensions: Extensions, draft_notice: str) -> SkinAdditions:
-    """Return the skin material's extensions, uniform colour and, if needed, map of multiscatter colours.
+def _skin_additions(
+    subject: Subject, head: Head, material_extensions: Extensions, draft_notice: str
+) -> SkinAdditions:
+    """Return the extensions and the base colour of the skin material, and the map that an extension needs.
 
-    A map of multiscatter colours replaces the uniform multiscatter colour of the draft extension if the head
-    has a colour map.
+    If the head has a colour map, the draft extension gets a map of multiscatter colours instead of a uniform
+    multiscatter colour.
     """
     if not draft_notice:
         colour = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}
-        return SkinAdditions({} if head.maps.colour is not None else colour, extensions)
+        return SkinAdditions({} if head.maps.colour is not None else colour, material_extensions)
     white, extras = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]}, {"draft": draft_notice}
     if head.maps.colour is None:
-        return SkinAdditions(white, extensions, extras)
-    steps = np.linspace(0.0, 1.0, _MULTISCATTER_TABLE_STEPS)
+        return SkinAdditions(white, material_extensions, extras)
+    steps = np.linspace(0.0, 1.0, _MULTISCATTER_TABLE_SIZE)
     scattered = np.interp(head.maps.colour, steps, multiscatter_for_reflectance(steps)).astype(np.float32)
-    scatter = {**extensions["KHR_materials_scatter"], "multiscatterColorFactor": [1.0, 1.0, 1.0]}
+    scatter = {**material_extensions["KHR_materials_scatter"], "multiscatterColorFactor": [1.0, 1.0, 1.0]}
     scatter["multiscatterColorTexture"] = {"index": _MULTISCATTER_ROLE}
-    extensions = {**extensions, "KHR_materials_scatter": scatter}
-    return SkinAdditions(white, extensions, extras, {_MULTISCATTER_ROLE: encode_colours_png(scattered)})
+    material_extensions = {**material_extensions, "KHR_materials_scatter": scatter}
+    return SkinAdditions(
+        white, material_extensions, extras, {_MULTISCATTER_ROLE: encode_colours_png(scattered)}
+    )

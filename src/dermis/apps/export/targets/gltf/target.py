@@ -1,4 +1,4 @@
-"""Export to glTF: a .glb whose skin scatters light (draft extension) or transmits it (ratified extension)."""
+"""Export to glTF: a .glb file whose skin scatters light (draft extension) or transmits light (ratified)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dermis.apps.export.fitting import fit_burley_width
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, ParameterValue, Target, flat_tuple, get_numbers
 from dermis.apps.export.targets.gltf.file import encode_glb
-from dermis.apps.export.targets.gltf.volume import Volume, fit_volume, volume_curve
+from dermis.apps.export.targets.gltf.volume import Volume, fit_volume, volume_profile
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.media import SKIN_ETA, Floats
 
@@ -48,28 +48,32 @@ class Gltf(Target):
     part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the parameters of the variant: of a fitted scattering volume, or of light through an ear."""
+        """Return the parameters of the variant.
+
+        In the variant "scatter", a scattering volume is fitted to the skin's profile. In the variant
+        "diffuse-transmission", the skin transmits as much light as an ear.
+        """
         if self.variant == TRANSMISSION_VARIANT:
-            return _diffuse_parameters(subject, *_ear_transmission(subject))
+            return _diffuse_transmission_parameters(subject, *_ear_transmission(subject))
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour for all colours, and the profile's mean radius as attenuation distance."""
+        """Return the skin's colour as the value of each colour, and guesses of the other parameters."""
         if self.variant == TRANSMISSION_VARIANT:
-            return _diffuse_parameters(subject, _NAIVE_TRANSMISSION_FACTOR, subject.albedo)
+            return _diffuse_transmission_parameters(subject, _NAIVE_TRANSMISSION_FACTOR, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())
         colour = np.clip(subject.albedo, 1e-3, 1.0 - 1e-3)
         return _scatter_parameters(Volume(radius_m, colour, colour))
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile of the volume; in the transmission variant, all light leaves where it enters."""
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+        """Return the profile of the volume or, in the variant "diffuse-transmission", a step at radius 0."""
         if self.variant == TRANSMISSION_VARIANT:
             reflected = (1.0 - get_numbers(parameters, _TRANSMISSION_FACTOR_NAME)[0]) * subject.curve.energy
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), reflected)
-        return subject.rescale_energy(volume_curve(_parameter_volume(parameters)))
+        return subject.rescale_energy(volume_profile(_volume_from_parameters(parameters)))
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write a .glb file whose skin material has the extensions, which programs may ignore."""
+        """Write a .glb file whose skin material has glTF extensions with the parameters."""
         extensions: dict[str, dict[str, ParameterValue | list[float]]] = {
             "KHR_materials_ior": {"ior": SKIN_ETA}
         }
@@ -105,12 +109,12 @@ def _scatter_parameters(volume: Volume) -> Parameters:
     )
 
 
-def _diffuse_parameters(
+def _diffuse_transmission_parameters(
     subject: Subject, transmitted_fraction: float, transmitted_colour: Floats
 ) -> Parameters:
-    """Return the parameters of the variant "diffuse-transmission", in which light is not scattered.
+    """Return the parameters of the variant "diffuse-transmission", which has no subsurface scattering.
 
-    transmitted_fraction : fraction of the diffuse light that is transmitted [-]
+    transmitted_fraction : fraction of the diffuse light that leaves through the unlit side [-]
     transmitted_colour : (3,) colour of the transmitted light
     """
     return (
@@ -151,7 +155,7 @@ def _ear_transmission(subject: Subject) -> tuple[float, Floats]:
     return largest / max(largest + reflected, 1e-9), transmitted / max(largest, 1e-9)
 
 
-def _parameter_volume(parameters: Parameters) -> Volume:
+def _volume_from_parameters(parameters: Parameters) -> Volume:
     colour, multiscatter = (
         np.array(get_numbers(parameters, name)) for name in (_ATTENUATION_COLOUR_NAME, _MULTISCATTER_NAME)
     )

@@ -1,4 +1,4 @@
-"""Conversion between scattering media and volumes of glTF, which lie under a refracting surface."""
+"""Conversion between scattering media and glTF's volumes, whose surfaces refract light."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Volume(NamedTuple):
         return np.asarray(1e3 * self.distance_m / -np.log(np.clip(self.colour, _MIN_COLOUR, _MAX_COLOUR)))
 
 
-def volume_from_paths(mean_free_path_mm: ArrayLike, multiscatter: ArrayLike) -> Volume:
+def volume_from_mean_free_paths(mean_free_path_mm: ArrayLike, multiscatter: ArrayLike) -> Volume:
     """Return the volume with given mean free paths, the longest of which is the attenuation distance.
 
     mean_free_path_mm : (3,) mean free paths [mm]
@@ -66,21 +66,24 @@ def multiscatter_colour(albedo: ArrayLike) -> Floats:
     return np.asarray((1.0 - s) * (1.0 - 0.139 * s) / (1.0 + 1.17 * s))
 
 
-def multiscatter_for_reflectance(energy: ArrayLike) -> Floats:
-    """Return the multiscatter colour with which skin returns a given fraction of the entering light [-]."""
-    return multiscatter_colour(tabulated_albedo("skin", energy))
+def multiscatter_for_reflectance(reflectance: ArrayLike) -> Floats:
+    """Return the multiscatter colour with which skin reflects a given fraction of the incident light [-].
+
+    reflectance : diffusely reflected light per incident light [-]
+    """
+    return multiscatter_colour(tabulated_albedo("skin", reflectance))
 
 
-def volume_curve(volume: Volume) -> CumulativeProfile:
+def volume_profile(volume: Volume) -> CumulativeProfile:
     """Return the cumulative profile of the light that a volume returns through its surface."""
     return half_space("skin", single_scattering_albedo(volume.multiscatter), volume.mean_free_path_mm)
 
 
-def fit_volume(curve: CumulativeProfile, energy: Floats | None = None) -> Volume:
+def fit_volume(reference_profile: CumulativeProfile, energy: Floats | None = None) -> Volume:
     """Return the volume whose cumulative profile is closest to a reference profile.
 
-    curve : reference profile
-    energy : (3,) light that the volume returns per incident light, by default the energy of `curve` [-]
+    energy : (3,) light that leaves the volume per incident light [-]; by default the energy of the reference
+        profile
     """
-    medium = fit_homogeneous_medium(curve, energy)
-    return volume_from_paths(medium.mfp_mm, multiscatter_colour(medium.albedo))
+    medium = fit_homogeneous_medium(reference_profile, energy)
+    return volume_from_mean_free_paths(medium.mfp_mm, multiscatter_colour(medium.albedo))

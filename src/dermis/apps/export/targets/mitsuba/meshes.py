@@ -21,13 +21,12 @@ from dermis.scene.model import Scene
 _SEGMENTS_PER_EDGE = 4  # segments per edge
 
 
-def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
-    """Return a dictionary from shape name to the PLY file of a surface of the skin.
+def skin_meshes(xml_backend: XmlBackend, head: Head) -> dict[str, bytes]:
+    """Return the meshes of the skin's surface as PLY files, in a dictionary by shape name.
 
-    Positions are in mm, relative to the head's centre.
-
-    "skin" has normals and uv, and "caps" closes the openings of "skin". "upper" and "upper_caps" lie slightly
-    outside "skin" and "caps", and are the outer layer of the index-matched surface.
+    Positions are in mm, relative to the head's centre. The shape "skin" has normals and uv, and "caps" closes
+    its openings. The shapes "upper" and "upper_caps" lie slightly outside "skin" and "caps". They are the
+    outer layer of an index-matched surface.
 
     Raises DermisError if the skin does not enclose a volume.
     """
@@ -35,7 +34,7 @@ def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
     closed = closed_skin(mesh, head.name)
     closed = replace(closed, positions=(closed.positions - centre).astype(np.float32))
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
-    outer, _ = offset_inwards(closed, -interface_gap_mm(backend, closed), head.name)
+    outer, _ = offset_inwards(closed, -interface_gap_mm(xml_backend, closed), head.name)
     used, corners = np.unique(mesh.triangles[skin], return_inverse=True)
     solid_vertex = np.unique(mesh.point[used], return_inverse=True)[1]
     attributes = mesh.normals[used], mesh.uv[used]
@@ -92,29 +91,31 @@ def subdivide_triangles(
     return SubdividedTriangles(np.repeat(triangles, len(grid)), weights, corners)
 
 
-def coloured_meshes(renderer: Renderer, scene: Scene, materials: Iterable[int]) -> dict[int, bytes]:
+def coloured_meshes(renderer: Renderer, scene: Scene, material_indices: Iterable[int]) -> dict[int, bytes]:
     """Return a dictionary from material index to a PLY file of the triangles with this material.
 
     The triangles are subdivided, with a colour at each vertex instead of maps. Positions are in mm, relative
     to the head's centre.
 
-    materials : indices of the materials
+    material_indices : indices of the materials
     """
     mesh = scene.head.mesh
-    parts = {k: subdivide_triangles(np.flatnonzero(mesh.material == k)) for k in materials}
+    parts = {k: subdivide_triangles(np.flatnonzero(mesh.material == k)) for k in material_indices}
     triangle, weights = (np.concatenate([part[i] for part in parts.values()]) for i in (0, 1))
     colours = bake_albedo(renderer, scene, triangle, weights[:, 1:])
     ends = np.cumsum([len(part.triangle) for part in parts.values()])[:-1]
     coloured = zip(parts.items(), np.split(colours, ends), strict=True)
-    return {k: _encode_part(scene.head, part, colour) for (k, part), colour in coloured}
+    return {k: _encode_coloured_mesh(scene.head, part, colour) for (k, part), colour in coloured}
 
 
-def _encode_part(
-    head: Head, subdivided_triangles: SubdividedTriangles, colours: NDArray[np.float32]
+def _encode_coloured_mesh(
+    head: Head, subdivided_triangles: SubdividedTriangles, vertex_colours: NDArray[np.float32]
 ) -> bytes:
     mesh, corners = head.mesh, head.mesh.triangles[subdivided_triangles.triangle]
     weights = subdivided_triangles.weights[:, :, None]
     positions = (weights * mesh.positions[corners]).sum(axis=1) - np.array(head.centre_mm)
     normals = (weights * mesh.normals[corners]).sum(axis=1)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    return encode_ply(subdivided_triangles.corners, positions, normals, None, np.clip(colours, 0.0, 1.0))
+    return encode_ply(
+        subdivided_triangles.corners, positions, normals, None, np.clip(vertex_colours, 0.0, 1.0)
+    )

@@ -1,4 +1,4 @@
-"""Files of a Mitsuba scene; `mitsuba scene.xml -D boundary=rough` selects the surface of the skin."""
+"""Files of a Mitsuba scene; `mitsuba scene.xml -D boundary=rough` selects a surface model of the skin."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ class SkinAppearance(NamedTuple):
         for uniform skin
     dimming : (n, n) fraction of the emerging light that an index-matched surface absorbs; None for uniform
         skin
-    opaque : dictionary from material index to PLY file, for all materials except skin
-    pictured : dictionary from material index to the roles of the material's pictures; materials without
-        pictures are absent
-    pictures : dictionary from role to PNG file of the pictures, which all materials share
+    opaque : dictionary from material index to the PLY file of a mesh, for all materials except skin
+    pictured : dictionary from material index to the roles of the texture images that the material uses, such
+        as "colour"; materials without texture images are absent
+    pictures : dictionary from role to the PNG file of a texture image, which all materials share
     """
 
     media: Mapping[Boundary, IsotropicMedium]
@@ -76,14 +76,14 @@ class SkinAppearance(NamedTuple):
 
 def scene_files(
     scene: Scene,
-    appearance: SkinAppearance,
-    boundary: Boundary,
+    skin_appearance: SkinAppearance,
+    surface_model: Boundary,
     picture_size: tuple[int, int],
     samples_per_pixel: int,
 ) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each file of the scene, with scene.xml first.
 
-    boundary : surface model of the skin that scene.xml selects by default
+    surface_model : surface model of the skin that scene.xml selects by default
     picture_size : width and height of the picture [pixel]
     samples_per_pixel : number of paths that Mitsuba traces for each pixel
 
@@ -95,20 +95,25 @@ def scene_files(
     yield (
         "scene.xml",
         xml.scene_document(
-            _scene_elements(backend, scene, appearance, boundary, (*picture_size, samples_per_pixel))
+            _scene_elements(
+                backend, scene, skin_appearance, surface_model, (*picture_size, samples_per_pixel)
+            )
         ),
     )
     for each in BOUNDARIES:
-        yield f"boundary_{each}.xml", xml.scene_document(_skin_elements(backend, each, appearance, meshes))
+        yield (
+            f"boundary_{each}.xml",
+            xml.scene_document(_skin_elements(backend, each, skin_appearance, meshes)),
+        )
     yield from ((f"meshes/{name}.ply", content) for name, content in meshes.items())
-    for index, content in appearance.opaque.items():
+    for index, content in skin_appearance.opaque.items():
         yield _opaque_mesh_file(index), content
-    yield from ((_part_picture_file(role), content) for role, content in appearance.pictures.items())
-    if appearance.transmittance is not None and appearance.dimming is not None:
-        yield "textures/passing.exr", encode_map_exr("passing", appearance.transmittance)
-        yield "textures/held_back.exr", encode_map_exr("held_back", appearance.dimming)
-    if not isinstance(appearance.roughness, float):
-        yield "textures/roughness.exr", encode_map_exr("roughness", appearance.roughness)
+    yield from ((_part_picture_file(role), content) for role, content in skin_appearance.pictures.items())
+    if skin_appearance.transmittance is not None and skin_appearance.dimming is not None:
+        yield "textures/passing.exr", encode_map_exr("passing", skin_appearance.transmittance)
+        yield "textures/held_back.exr", encode_map_exr("held_back", skin_appearance.dimming)
+    if not isinstance(skin_appearance.roughness, float):
+        yield "textures/roughness.exr", encode_map_exr("roughness", skin_appearance.roughness)
     for index, values in enumerate(backend.bitmaps):
         yield xml.bitmap_path(index), encode_map_exr("light", np.asarray(values, np.float32))
 
@@ -130,62 +135,65 @@ def medium_description(medium: IsotropicMedium) -> SceneDict:
 
 
 def surface_bsdf(
-    boundary: Boundary, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
+    surface_model: Boundary, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
 ) -> SceneDict:
     """Return Mitsuba's description of the skin's surface, or of the outer layer of an index-matched surface.
 
-    boundary : surface model of the skin
+    surface_model : surface model of the skin
     transmittance : texture that scales light on entry and again on exit; None for a factor of 1
     roughness : Beckmann m, a number or a texture
     """
     facets = {"distribution": "beckmann", "alpha": roughness}
-    if boundary == "matched":
+    if surface_model == "matched":
         mirror = {"type": "roughconductor", "material": "none", **facets}
         return {"type": "mask", "opacity": MATCHED_REFLECTANCE, "bsdf": mirror, "id": "skin_surface"}
     refraction: SceneDict = {"int_ior": SKIN_ETA, "ext_ior": 1.0}
     if transmittance is not None:
         refraction["specular_transmittance"] = transmittance
-    if boundary == "smooth":
+    if surface_model == "smooth":
         return {"type": "dielectric", "id": "skin_surface", **refraction}
     return {"type": "roughdielectric", "id": "skin_surface", **facets, **refraction}
 
 
-def _lower_surface_bsdf(has_dimming: bool) -> SceneDict:
+def _lower_surface_bsdf(has_dimming_texture: bool) -> SceneDict:
     """Return Mitsuba's description of the inner layer of an index-matched surface.
 
     Where the skin is darker than its medium, this layer absorbs part of the light that leaves the skin.
 
-    has_dimming : whether the skin has a texture of the absorbed fraction
+    has_dimming_texture : whether the skin has a texture of the absorbed fraction
     """
-    if not has_dimming:
+    if not has_dimming_texture:
         return {"type": "null", "id": "skin_below"}
     black = {"type": "diffuse", "reflectance": mitsuba_rgb((0.0, 0.0, 0.0))}
     return {"type": "mask", "opacity": _exr_texture("held_back"), "bsdf": black, "id": "skin_below"}
 
 
 def _scene_elements(
-    backend: XmlBackend,
+    xml_backend: XmlBackend,
     scene: Scene,
-    appearance: SkinAppearance,
-    boundary: Boundary,
-    size_and_samples: tuple[int, int, int],
+    skin_appearance: SkinAppearance,
+    surface_model: Boundary,
+    picture_size_and_samples: tuple[int, int, int],
 ) -> list[ET.Element]:
     """Return the XML elements of the scene except the skin, which is included from its own XML file.
 
-    boundary : surface model of the skin that is included by default
-    size_and_samples : width and height of the picture [pixel], and samples per pixel
+    surface_model : surface model of the skin that is included by default
+    picture_size_and_samples : width and height of the picture [pixel], and samples per pixel
     """
-    sizes = zip(("width", "height", "samples"), map(str, size_and_samples), strict=True)
-    sensor = mitsuba_sensor(backend, scene.camera, size_and_samples[:2])
-    sensor["film"] |= {"width": xml.Override("integer", "width"), "height": xml.Override("integer", "height")}
-    sensor["sampler"]["sample_count"] = xml.Override("integer", "samples")
+    sizes = zip(("width", "height", "samples"), map(str, picture_size_and_samples), strict=True)
+    sensor = mitsuba_sensor(xml_backend, scene.camera, picture_size_and_samples[:2])
+    sensor["film"] |= {
+        "width": xml.CommandLineProperty("integer", "width"),
+        "height": xml.CommandLineProperty("integer", "height"),
+    }
+    sensor["sampler"]["sample_count"] = xml.CommandLineProperty("integer", "samples")
     # Spectral multiple importance sampling, as extinction differs between channels.
     integrator = {"type": "volpathmis", "rr_depth": RUSSIAN_ROULETTE_DEPTH, "hide_emitters": True}
     parts: list[SceneDict] = [integrator, sensor]
     lights = supported_lights(scene.lights, MITSUBA, "Mitsuba")
-    parts += [mitsuba_emitter(backend, light, k) for k, light in enumerate(lights, start=1)]
+    parts += [mitsuba_emitter(xml_backend, light, k) for k, light in enumerate(lights, start=1)]
     if scene.environment is not None:
-        parts.append(mitsuba_environment(backend, scene.environment))
+        parts.append(mitsuba_environment(xml_backend, scene.environment))
     colour = {"type": "mesh_attribute", "name": "vertex_color"}
     opaque = {
         "type": "principled",
@@ -193,62 +201,73 @@ def _scene_elements(
         "eta": SKIN_ETA,
         "base_color": colour,
     }
-    for role in appearance.pictures:
+    for role in skin_appearance.pictures:
         texture = {"type": "bitmap", "id": _part_texture(role).name, "filename": _part_picture_file(role)}
         parts.append({**texture, "raw": role != "colour", "wrap_mode": "clamp"})
-    for index in appearance.opaque:
-        roles = appearance.pictured.get(index)
+    for index in skin_appearance.opaque:
+        roles = skin_appearance.pictured.get(index)
         bsdf = opaque if roles is None else _part_bsdf(roles)
         parts.append({"type": "ply", "filename": _opaque_mesh_file(index), "bsdf": bsdf})
-    defaults = [xml.default_element(*one) for one in (("boundary", boundary), *sizes)]
-    elements = [xml.object_element(part, "", backend) for part in parts]
+    defaults = [xml.default_property_element(*one) for one in (("boundary", surface_model), *sizes)]
+    elements = [xml.object_element(part, "", xml_backend) for part in parts]
     return [*defaults, *elements, xml.include_element("boundary_$boundary.xml")]
 
 
 def _skin_elements(
-    backend: XmlBackend, boundary: Boundary, appearance: SkinAppearance, meshes: Mapping[str, bytes]
+    xml_backend: XmlBackend,
+    surface_model: Boundary,
+    skin_appearance: SkinAppearance,
+    meshes_by_shape_name: Mapping[str, bytes],
 ) -> list[ET.Element]:
     """Return the XML elements of the skin with one surface model: medium, surface and shapes.
 
-    meshes : dictionary from shape name to the PLY file of a surface of the skin
+    meshes_by_shape_name : dictionary from shape name to the PLY file of a surface of the skin
     """
-    roughness = appearance.roughness if isinstance(appearance.roughness, float) else _exr_texture("roughness")
-    transmittance = None if appearance.transmittance is None else _exr_texture("passing")
+    roughness = (
+        skin_appearance.roughness
+        if isinstance(skin_appearance.roughness, float)
+        else _exr_texture("roughness")
+    )
+    transmittance = None if skin_appearance.transmittance is None else _exr_texture("passing")
     parts = [
-        medium_description(appearance.media[boundary]),
-        surface_bsdf(boundary, transmittance, roughness),
+        medium_description(skin_appearance.media[surface_model]),
+        surface_bsdf(surface_model, transmittance, roughness),
     ]
     shapes = dict.fromkeys(("skin", "caps"), "skin_surface")
-    if boundary == "matched":
+    if surface_model == "matched":
         # Inward rays hit the upper surface and skip the lower one, outward rays the reverse.
         parts.append(_lower_surface_bsdf(transmittance is not None))
         shapes = dict.fromkeys(("upper", "upper_caps"), "skin_surface")
         shapes |= dict.fromkeys(("skin", "caps"), "skin_below")
-    for name in (name for name in shapes if name in meshes):
-        shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": xml.Ref(shapes[name])}
-        parts.append({**shape, "interior": xml.Ref("skin_medium")})
-    return [xml.object_element(part, "", backend) for part in parts]
+    for name in (name for name in shapes if name in meshes_by_shape_name):
+        shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": xml.ObjectReference(shapes[name])}
+        parts.append({**shape, "interior": xml.ObjectReference("skin_medium")})
+    return [xml.object_element(part, "", xml_backend) for part in parts]
 
 
-def _part_bsdf(roles: set[PartRole]) -> SceneDict:
-    """Return Mitsuba's description of a surface that is not skin and has pictures.
+def _part_bsdf(image_roles: set[PartRole]) -> SceneDict:
+    """Return Mitsuba's BSDF for a material that is not skin and has texture images.
 
-    roles : roles of these pictures
+    image_roles : roles of these images, such as "colour"
     """
     bsdf: SceneDict = {"type": "principled", "eta": _PART_IOR, "roughness": _OPAQUE_PART_ROUGHNESS}
-    bsdf |= {name: _part_texture(role) for role, name in _PART_INPUTS.items() if role in roles}
-    if "normal" in roles:
+    bsdf |= {name: _part_texture(role) for role, name in _PART_INPUTS.items() if role in image_roles}
+    if "normal" in image_roles:
         bsdf = {"type": "normalmap", "normalmap": _part_texture("normal"), "bsdf": bsdf}
     bsdf = {"type": "twosided", "bsdf": bsdf}
-    return {"type": "mask", "opacity": _part_texture("opacity"), "bsdf": bsdf} if "opacity" in roles else bsdf
+    return (
+        {"type": "mask", "opacity": _part_texture("opacity"), "bsdf": bsdf}
+        if "opacity" in image_roles
+        else bsdf
+    )
 
 
-def _part_texture(role: PartRole) -> xml.Ref:
-    return xml.Ref(f"parts_{role}")
+def _part_texture(image_role: PartRole) -> xml.ObjectReference:
+    return xml.ObjectReference(f"parts_{image_role}")
 
 
-def _part_picture_file(role: PartRole) -> str:
-    return f"textures/{_part_texture(role).name}.png"
+def _part_picture_file(image_role: PartRole) -> str:
+    return f"textures/{_part_texture(image_role).name}.png"
 
 
 def _opaque_mesh_file(material_index: int) -> str:

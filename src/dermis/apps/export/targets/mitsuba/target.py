@@ -76,7 +76,7 @@ class Mitsuba(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the parameters of the medium, fitted to the profile and the colour of the lightest skin."""
+        """Return the parameters of the medium, fitted to the skin's profile and lightest colour."""
         boundary, colours = self._boundary, skin_colours(subject)
         medium = fit_medium(subject.curve, colours, boundary)
         transmittance = colours.transmittance(boundary)
@@ -95,7 +95,7 @@ class Mitsuba(Target):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour as albedo, and 1/d of a fitted Burley profile as extinction."""
+        """Return parameters with the skin's colour as albedo, and the inverse Burley width as extinction."""
         extinction, albedo = (
             flat_tuple(1.0 / fit_burley_width(subject.curve)),
             flat_tuple(subject.clipped_albedo()),
@@ -103,7 +103,7 @@ class Mitsuba(Target):
         values = {_EXTINCTION_NAME: extinction, _ALBEDO_NAME: albedo, _TRANSMITTANCE_NAME: (1.0,) * 3}
         return replace_values(self.parameters(subject, version), values)
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the profile of random walks through the medium, for light incident along the normal."""
         boundary = self._boundary
         names = _EXTINCTION_NAME, _ALBEDO_NAME, _TRANSMITTANCE_NAME
@@ -119,8 +119,8 @@ class Mitsuba(Target):
         """Write the scene with one XML file for each surface model, and with meshes and textures."""
         colours, scene = skin_colours(subject), subject.scene or Scene(subject.head_or_ball)
         media = {each: fit_medium(subject.curve, colours, each) for each in BOUNDARIES}
-        pictured = _picture_roles_by_material(subject)
-        opaque = _opaque_meshes(scene, self.adapter, pictured)
+        pictured = _image_roles_by_material(subject)
+        opaque = _encode_opaque_meshes(scene, self.adapter, pictured)
         pictures = subject.part_pictures.encode(PART_ROLES) if subject.part_pictures else {}
         appearance = SkinAppearance(media, *skin_textures(subject, colours), opaque, pictured, pictures)
         return write_files(
@@ -132,91 +132,95 @@ class Mitsuba(Target):
         return next(one for one in BOUNDARIES if one == (self.variant or self.variants[0]))
 
 
-def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundary) -> IsotropicMedium:
-    """Return the medium that has the colour of the lightest skin and a profile closest to `curve`.
+def fit_medium(
+    reference_profile: CumulativeProfile, colours: SkinColours, surface_model: Boundary
+) -> IsotropicMedium:
+    """Return the medium that has the skin's lightest colour and the profile closest to the reference.
 
     The colour is matched for light from all directions, as heads are lit from all sides. The profile is
     matched for light incident along the normal.
 
-    curve : reference profile
-    boundary : model of the surface above the medium
+    colours : mean and lightest colour of the skin
+    surface_model : model of the surface above the medium
     """
-    energy = colours.medium_colour(boundary) / _boundary_transmittance(boundary)
-    if boundary == "matched":
+    energy = colours.medium_colour(surface_model) / _boundary_transmittance(surface_model)
+    if surface_model == "matched":
         energy = half_space("matched", tabulated_albedo("walk", energy), np.ones(3)).energy
-    medium = fit_homogeneous_medium(curve, energy, _half_space_kind(boundary))
+    medium = fit_homogeneous_medium(reference_profile, energy, _half_space_kind(surface_model))
     return IsotropicMedium(flat_tuple(1.0 / medium.mfp_mm), flat_tuple(medium.albedo))
 
 
-def _half_space_kind(boundary: Boundary) -> HalfSpaceKind:
-    return "matched" if boundary == "matched" else "skin"
+def _half_space_kind(surface_model: Boundary) -> HalfSpaceKind:
+    return "matched" if surface_model == "matched" else "skin"
 
 
-def _boundary_transmittance(boundary: Boundary) -> float:
+def _boundary_transmittance(surface_model: Boundary) -> float:
     """Return the transmittance of an index-matched surface, or 1 for a refracting surface [-]."""
-    return 1.0 - MATCHED_REFLECTANCE if boundary == "matched" else 1.0
+    return 1.0 - MATCHED_REFLECTANCE if surface_model == "matched" else 1.0
 
 
-def _picture_roles_by_material(subject: Subject) -> dict[int, set[PartRole]]:
-    """Return a dictionary from material index to picture roles, for parts with pictures except eyeballs."""
+def _image_roles_by_material(subject: Subject) -> dict[int, set[PartRole]]:
+    """Return the roles of the texture images of each material, by material index; eyeballs are left out."""
     head, pictures = subject.head_or_ball, subject.part_pictures
     if pictures is None:
         return {}
     used = {*np.unique(head.mesh.material).tolist()} - {*(head.eyes.material.tolist() if head.eyes else ())}
-    roles = {k: pictures.roles(head.mesh.materials[k]) for k in sorted(used)}
+    roles = {k: pictures.needed_roles(head.mesh.materials[k]) for k in sorted(used)}
     return {k: part_roles for k, part_roles in roles.items() if part_roles}
 
 
-def _opaque_meshes(scene: Scene, adapter: str, picture_materials: Container[int]) -> dict[int, bytes]:
+def _encode_opaque_meshes(scene: Scene, adapter: str, textured_materials: Container[int]) -> dict[int, bytes]:
     """Return a dictionary from material index to PLY file, for the head's materials except skin.
 
-    picture_materials : indices of the materials with pictures; files of other materials have vertex colours
+    textured_materials : indices of the materials with texture images; other meshes get vertex colours
     """
     mesh, centre = scene.head.mesh, scene.head.centre_mm
     opaque = [k for k in np.unique(mesh.material).tolist() if mesh.materials[k].kind != "skin"]
     meshes = {
         k: mesh_ply(mesh, mesh.material == k, centre, is_v_upwards=False)
         for k in opaque
-        if k in picture_materials
+        if k in textured_materials
     }
     if len(meshes) == len(opaque):
         return meshes
     from dermis.apps.export.targets.mitsuba.meshes import coloured_meshes
     from dermis.frame.renderer import Renderer
 
-    coloured = [k for k in opaque if k not in picture_materials]
+    coloured = [k for k in opaque if k not in textured_materials]
     return meshes | coloured_meshes(Renderer(adapter), scene, coloured)
 
 
 @dataclass(frozen=True, eq=False)
 class SkinColours:
-    """Mean and brightest colour of a skin.
+    """Mean and brightest colour of the colour map of a skin.
 
-    The medium has the brightest colour, and textures darken this colour to the colours of the skin's map.
+    The medium has the brightest colour. Where the map is darker, a texture dims the light of the medium.
 
     mean, brightest : (3,) mean and brightest colour, linear Rec. 709; equal for uniform skin
-    lightness_ratio : luminance of the lightest texels, relative to the mean luminance [-]
+    lightness_ratio : luminance of the lightest texels divided by the mean luminance [-]
     """
 
     mean: Floats
     brightest: Floats
     lightness_ratio: float
 
-    def medium_colour(self, boundary: Boundary) -> Floats:
+    def medium_colour(self, surface_model: Boundary) -> Floats:
         """Return the colour (3,) of the medium without textures.
 
         Under an index-matched surface, textures can only change lightness, so the colour is the mean colour
         scaled to the luminance of the lightest texels.
         """
-        return np.minimum(self.lightness_ratio * self.mean if boundary == "matched" else self.brightest, 0.97)
+        return np.minimum(
+            self.lightness_ratio * self.mean if surface_model == "matched" else self.brightest, 0.97
+        )
 
-    def transmittance(self, boundary: Boundary) -> tuple[float, ...]:
+    def transmittance(self, surface_model: Boundary) -> tuple[float, ...]:
         """Return the mean factor (3,) by which the textures dim light that enters and leaves the skin [-]."""
-        return flat_tuple(self.mean / self.medium_colour(boundary))
+        return flat_tuple(self.mean / self.medium_colour(surface_model))
 
 
 def skin_colours(subject: Subject) -> SkinColours:
-    """Return the colours in the subject's colour map or, without such a map, the colour of the profile."""
+    """Return the mean and brightest colour of a subject's colour map; without a map, both are its albedo."""
     texels = None if subject.head is None else subject.head.maps.colour
     if texels is None:
         colour = np.asarray(subject.albedo, np.float64)

@@ -33,15 +33,15 @@ _KIND_BY_PLUGIN = {plugin: kind for kind, plugins in _PLUGINS_BY_KIND.items() fo
 
 
 class Transform:
-    """Affine transformation, composed as in Mitsuba: each method prepends another transformation."""
+    """Affine transformation; each method returns a combination of another transformation with this one."""
 
     def __init__(self, matrix: ArrayLike | None = None) -> None:
         self.matrix = np.eye(4) if matrix is None else np.asarray(matrix, np.float64).reshape(4, 4)
 
     def look_at(self, origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> Transform:
-        """Return this transformation, preceded by a transformation that moves a camera to `origin`.
+        """Return a transformation that places a camera at `origin`, and then applies this transformation.
 
-        The +Z axis of the camera then points towards `target`.
+        The +Z axis of the camera points towards `target`.
         """
         forward = _normalise(np.subtract(target, origin))
         left = _normalise(np.cross(np.asarray(up, np.float64), forward))
@@ -49,17 +49,17 @@ class Transform:
         matrix[:3] = np.column_stack([left, np.cross(forward, left), forward, origin])
         return Transform(self.matrix @ matrix)
 
-    def scale(self, factors: ArrayLike) -> Transform:
-        """Return this transformation, preceded by a scaling along the axes.
+    def scale(self, scale_factors: ArrayLike) -> Transform:
+        """Return a transformation that scales along the axes, and then applies this transformation.
 
-        factors : one factor, or (3,) factors of x, y and z
+        scale_factors : one factor, or (3,) factors of x, y and z
         """
-        return Transform(self.matrix @ np.diag([*np.broadcast_to(factors, 3), 1.0]))
+        return Transform(self.matrix @ np.diag([*np.broadcast_to(scale_factors, 3), 1.0]))
 
 
 @dataclass(eq=False)
 class Bitmap:
-    """Image of a texture or light that is written to its own file."""
+    """Image of a texture or an environment light, to be written to its own file."""
 
     values: NDArray[np.float32]
 
@@ -68,7 +68,7 @@ class Bitmap:
 class XmlBackend:
     """Substitute for the module `mitsuba` in functions that describe scenes; needs no installed Mitsuba.
 
-    bitmaps : images of the elements converted so far, in the order in which the images are written
+    bitmaps : images of all elements created so far, in the order of their file names
     """
 
     bitmaps: list[NDArray[np.float32]] = field(default_factory=list)
@@ -78,14 +78,14 @@ class XmlBackend:
 
 
 @dataclass(frozen=True)
-class Ref:
+class ObjectReference:
     """Reference to an object of the scene by its id."""
 
     name: str
 
 
 @dataclass(frozen=True)
-class Override:
+class CommandLineProperty:
     """Property of a scene whose value is set on the command line by `mitsuba -D NAME=VALUE`.
 
     kind : type of the property, such as "integer"
@@ -96,18 +96,22 @@ class Override:
     name: str
 
 
-def object_element(description: Mapping[str, object], object_name: str, backend: XmlBackend) -> ET.Element:
+def object_element(
+    object_description: Mapping[str, object], object_name: str, xml_backend: XmlBackend
+) -> ET.Element:
     """Return the XML element of an object described by a dictionary.
 
-    description : properties of the object; "type" is the name of the plugin
+    object_description : properties of the object; "type" is the name of the plugin
     object_name : name of the object in the parent element; "" for an object without a name
-    backend : collector of the images that the description contains
+    xml_backend : object that collects the images in the description
     """
-    plugin = str(description["type"])
-    node = ET.Element(_KIND_BY_PLUGIN[plugin], {"type": plugin, **_name_attributes(object_name, description)})
-    for key, value in description.items():
+    plugin = str(object_description["type"])
+    node = ET.Element(
+        _KIND_BY_PLUGIN[plugin], {"type": plugin, **_name_attributes(object_name, object_description)}
+    )
+    for key, value in object_description.items():
         if key not in ("type", "id"):
-            node.append(_property_element(key, value, backend))
+            node.append(_property_element(key, value, xml_backend))
     return node
 
 
@@ -119,16 +123,16 @@ def bitmap_path(bitmap_index: int) -> str:
     return f"textures/light_{bitmap_index}.exr"
 
 
-def scene_document(elements: list[ET.Element]) -> bytes:
+def scene_document(xml_elements: list[ET.Element]) -> bytes:
     """Return an XML file with a scene of the given elements."""
     root = ET.Element("scene", {"version": SCENE_FORMAT_VERSION})
-    root.extend(elements)
+    root.extend(xml_elements)
     ET.indent(root)
     text: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
     return text + b"\n"
 
 
-def default_element(parameter_name: str, default_value: str) -> ET.Element:
+def default_property_element(parameter_name: str, default_value: str) -> ET.Element:
     """Return the element that sets the default of a parameter for `mitsuba -D`."""
     return ET.Element("default", {"name": parameter_name, "value": default_value})
 
@@ -138,32 +142,32 @@ def include_element(filename: str) -> ET.Element:
     return ET.Element("include", {"filename": filename})
 
 
-def _name_attributes(object_name: str, description: Mapping[str, object]) -> dict[str, str]:
+def _name_attributes(object_name: str, object_description: Mapping[str, object]) -> dict[str, str]:
     return (
-        {"id": str(description["id"])}
-        if "id" in description
+        {"id": str(object_description["id"])}
+        if "id" in object_description
         else ({"name": object_name} if object_name else {})
     )
 
 
-def _property_element(property_name: str, property_value: object, backend: XmlBackend) -> ET.Element:
-    if isinstance(property_value, Ref):
+def _property_element(property_name: str, property_value: object, xml_backend: XmlBackend) -> ET.Element:
+    if isinstance(property_value, ObjectReference):
         return ET.Element("ref", {"name": property_name, "id": property_value.name})
-    if isinstance(property_value, Override):
+    if isinstance(property_value, CommandLineProperty):
         return ET.Element(property_value.kind, {"name": property_name, "value": f"${property_value.name}"})
     if isinstance(property_value, Transform):
         node = ET.Element("transform", {"name": property_name})
         ET.SubElement(node, "matrix", {"value": _format_numbers(property_value.matrix)})
         return node
     if isinstance(property_value, Bitmap):
-        backend.bitmaps.append(property_value.values)
-        return _value_element("filename", bitmap_path(len(backend.bitmaps) - 1))
+        xml_backend.bitmaps.append(property_value.values)
+        return _value_element("filename", bitmap_path(len(xml_backend.bitmaps) - 1))
     if isinstance(property_value, Mapping):
         if property_value["type"] == "rgb":
             return ET.Element(
                 "rgb", {"name": property_name, "value": _format_numbers(property_value["value"])}
             )
-        return object_element(property_value, property_name, backend)
+        return object_element(property_value, property_name, xml_backend)
     return _value_element(property_name, property_value)
 
 

@@ -18,16 +18,18 @@ from dermis.apps.export.targets.openpbr.materials import (
 from dermis.base.errors import refuse
 
 
-def build_document(materials: Sequence[OpenPbrMaterial], shader: str, file_prefix: str) -> MaterialX.Document:
+def build_document(
+    materials: Sequence[OpenPbrMaterial], shader_category: str, file_prefix: str
+) -> MaterialX.Document:
     """Return a validated MaterialX document with the materials, in metres and linear Rec. 709.
 
-    shader : MaterialX node category of the surface shaders, `OPEN_PBR` or `STANDARD_SURFACE`
+    shader_category : MaterialX node category of the surface shaders, `OPEN_PBR` or `STANDARD_SURFACE`
     file_prefix : prefix of the file names of the maps beside the document
     """
     document = MaterialX.createDocument()
     document.setColorSpace("lin_rec709")
     for definition in materials:
-        _add_material(document, definition, shader, file_prefix)
+        _add_material(document, definition, shader_category, file_prefix)
     document.setDataLibrary(standard_library())
     valid, message = document.validate()
     if not valid:
@@ -45,49 +47,56 @@ def standard_library() -> MaterialX.Document:
 
 
 def _add_material(
-    document: MaterialX.Document, definition: OpenPbrMaterial, shader: str, file_prefix: str
+    materialx_document: MaterialX.Document,
+    open_pbr_material: OpenPbrMaterial,
+    shader_category: str,
+    file_prefix: str,
 ) -> None:
-    name = MaterialX.createValidName(definition.name) or "material"
-    node = document.addNode(shader, document.createValidChildName(f"{name}_surface"), "surfaceshader")
-    for key, value in definition.values.items():
-        constant = node.setInputValue(input_name(shader, key), _materialx_value(value))
+    name = MaterialX.createValidName(open_pbr_material.name) or "material"
+    node = materialx_document.addNode(
+        shader_category, materialx_document.createValidChildName(f"{name}_surface"), "surfaceshader"
+    )
+    for key, value in open_pbr_material.values.items():
+        constant = node.setInputValue(input_name(shader_category, key), _materialx_value(value))
         if key in LENGTH_INPUTS:
             constant.setUnitType("distance")
             constant.setUnit("meter")
-    if definition.maps:
-        graph = document.addNodeGraph(document.createValidChildName(f"{name}_maps"))
-        for key, role in definition.maps.items():
-            output = _add_map(graph, role, f"{file_prefix}{role}.png", shader)
-            mapped = node.addInput(input_name(shader, key), output.getType())
+    if open_pbr_material.maps:
+        graph = materialx_document.addNodeGraph(materialx_document.createValidChildName(f"{name}_maps"))
+        for key, role in open_pbr_material.maps.items():
+            output = _add_map(graph, role, f"{file_prefix}{role}.png", shader_category)
+            mapped = node.addInput(input_name(shader_category, key), output.getType())
             mapped.setNodeGraphString(graph.getName())
             mapped.setOutputString(output.getName())
-    material = document.addMaterialNode(document.createValidChildName(name), node)
-    if material.getName() != definition.name:
-        material.setAttribute("uiname", definition.name)
+    material = materialx_document.addMaterialNode(materialx_document.createValidChildName(name), node)
+    if material.getName() != open_pbr_material.name:
+        material.setAttribute("uiname", open_pbr_material.name)
 
 
-def _add_map(graph: MaterialX.NodeGraph, role: str, map_path: str, shader: str) -> MaterialX.Output:
+def _add_map(
+    node_graph: MaterialX.NodeGraph, map_role: str, map_path: str, shader_category: str
+) -> MaterialX.Output:
     """Add the nodes that read a map file to a graph, and return their output.
 
-    role : role of the map, such as "colour"; determines the type and colour space of the map's node
+    map_role : role of the map, such as "colour"; determines the type and colour space of the map's node
     map_path : path of the map
-    shader : MaterialX node category of the surface shaders
+    shader_category : MaterialX node category of the surface shaders
     """
-    map_type = MAP_TYPES[role]
+    map_type = MAP_TYPES[map_role]
     output_type = map_type.type
-    image = graph.addNode("image", f"{role}_image", map_type.type)
+    image = node_graph.addNode("image", f"{map_role}_image", map_type.type)
     filename = image.setInputValue("file", map_path, "filename")
     if map_type.space:
         filename.setColorSpace(map_type.space)
     last_node = image
     if map_type.type == "vector3":
-        last_node = graph.addNode("normalmap", "normal_in_space", map_type.type)
+        last_node = node_graph.addNode("normalmap", "normal_in_space", map_type.type)
         last_node.addInput("in", map_type.type).setNodeName(image.getName())
-    elif role == "parts_opacity" and shader == STANDARD_SURFACE:
+    elif map_role == "parts_opacity" and shader_category == STANDARD_SURFACE:
         output_type = "color3"
-        last_node = graph.addNode("convert", "opacity_of_channels", output_type)
+        last_node = node_graph.addNode("convert", "opacity_of_channels", output_type)
         last_node.addInput("in", map_type.type).setNodeName(image.getName())
-    output = graph.addOutput(role, output_type)
+    output = node_graph.addOutput(map_role, output_type)
     output.setNodeName(last_node.getName())
     return output
 

@@ -1,4 +1,4 @@
-"""OpenPBR materials of a head: values of inputs, maps that set inputs, and the files of these maps."""
+"""OpenPBR materials of a head, and the files of the maps that set inputs of these materials."""
 
 from __future__ import annotations
 
@@ -71,13 +71,13 @@ LENGTH_INPUTS = ("subsurface_radius",)
 """Inputs that are lengths [m]."""
 
 
-def input_name(shader: str, open_pbr_name: str) -> str:
+def input_name(shader_category: str, open_pbr_name: str) -> str:
     """Return the name that an input of OpenPBR has in a shader.
 
-    shader : `OPEN_PBR` or `STANDARD_SURFACE`
+    shader_category : `OPEN_PBR` or `STANDARD_SURFACE`
     open_pbr_name : name of the input in OpenPBR
     """
-    return open_pbr_name if shader == OPEN_PBR else _STANDARD_SURFACE_NAMES[open_pbr_name]
+    return open_pbr_name if shader_category == OPEN_PBR else _STANDARD_SURFACE_NAMES[open_pbr_name]
 
 
 class MapType(NamedTuple):
@@ -121,20 +121,20 @@ def skin_material(
     material_name: str,
     skin: Skin,
     radius_m: tuple[float, float, float],
-    colour: tuple[float, ...],
-    roles: Iterable[str],
+    uniform_colour: tuple[float, ...],
+    map_roles: Iterable[str],
 ) -> OpenPbrMaterial:
     """Return the OpenPBR material of skin.
 
     radius_m : (3,) mean free paths [m]
-    colour : (3,) uniform colour, used without a colour map; linear Rec. 709 [-]
-    roles : roles of the maps that replace uniform values
+    uniform_colour : (3,) uniform colour, used without a colour map; linear Rec. 709 [-]
+    map_roles : roles of the maps that replace uniform values
     """
     longest = max(radius_m)
     values: dict[str, InputValue] = {
-        "base_color": colour,
+        "base_color": uniform_colour,
         "subsurface_weight": 1.0,
-        "subsurface_color": colour,
+        "subsurface_color": uniform_colour,
         "subsurface_radius": longest,
         "subsurface_radius_scale": tuple(one / longest for one in radius_m),
         "subsurface_scatter_anisotropy": 0.0,
@@ -142,14 +142,14 @@ def skin_material(
         "specular_ior": SKIN_ETA,
         "specular_roughness": float(np.sqrt(skin.roughness * skin.smoothing)),
     }
-    mapped = {MAP_INPUTS[role]: role for role in roles}
+    mapped = {MAP_INPUTS[role]: role for role in map_roles}
     return OpenPbrMaterial(
         material_name, {key: value for key, value in values.items() if key not in mapped}, mapped
     )
 
 
-def opaque_material(material: Material) -> OpenPbrMaterial:
-    """Return the OpenPBR material of a part of the head that is not skin, such as teeth, tongue or lashes."""
+def untextured_part_material(material: Material) -> OpenPbrMaterial:
+    """Return the OpenPBR material, without textures, of a part of the head such as the teeth or lashes."""
     name = material.name.casefold()
     roughness = next(
         (value for part, value in _ROUGHNESS_BY_KIND.items() if part in name), _DEFAULT_PART_ROUGHNESS
@@ -162,13 +162,15 @@ def opaque_material(material: Material) -> OpenPbrMaterial:
     return OpenPbrMaterial(material.name, values, {})
 
 
-def part_material(material: Material, pictures: PartPictures) -> OpenPbrMaterial:
-    """Return the OpenPBR material of a part with pictures."""
-    roles = pictures.roles(material)
+def textured_part_material(material: Material, part_pictures: PartPictures) -> OpenPbrMaterial:
+    """Return the OpenPBR material of a part of the head that is not skin and has texture images."""
+    roles = part_pictures.needed_roles(material)
     maps = {name: f"{PART_PREFIX}{role}" for role, name in _PART_INPUTS.items() if role in roles}
-    values = {**opaque_material(material).values, "specular_ior": _PART_IOR}
+    values = {**untextured_part_material(material).values, "specular_ior": _PART_IOR}
     if max(material.emission) > 0.0:
-        values["emission_luminance"], values["emission_color"] = pictures.emission(material)
+        values["emission_luminance"], values["emission_color"] = part_pictures.emission_strength_and_colour(
+            material
+        )
     return OpenPbrMaterial(
         material.name, {key: value for key, value in values.items() if key not in maps}, maps
     )
@@ -183,99 +185,105 @@ def eye_material(material_name: str) -> OpenPbrMaterial:
     return OpenPbrMaterial(material_name, values, {"base_color": "eye"})
 
 
-def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
+def hair_material(absorption_per_mm: Floats, radius_mm: float) -> OpenPbrMaterial:
     """Return the OpenPBR material of hairs: an opaque surface with the mean colour of the hairs.
 
-    absorption : (n, 3) absorption coefficient inside the hairs [1/mm]
+    absorption_per_mm : (n, 3) absorption coefficient inside the hairs [1/mm]
     radius_mm : radius of the hairs [mm]
 
     Source: [Chiang2016] eq. 9 for the colour, at a roughness of 0.3.
     """
-    colour = flat_tuple(np.exp(-5.888 * np.sqrt(np.maximum(absorption.mean(axis=0), 0.0) * radius_mm)))
+    colour = flat_tuple(np.exp(-5.888 * np.sqrt(np.maximum(absorption_per_mm.mean(axis=0), 0.0) * radius_mm)))
     values: dict[str, InputValue] = {"base_color": colour, "specular_roughness": 0.4, "specular_ior": 1.55}
     return OpenPbrMaterial("hair", values, {})
 
 
-def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
-    """Return a dictionary from role to map of a skin, with the values that OpenPBR expects.
+def open_pbr_maps(head_maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
+    """Return the maps of the skin by role, converted to the values that OpenPBR expects.
 
-    slopes : (n, n, 2) slopes of the relief, used if `maps` has no normals
+    slopes : (n, n, 2) slopes of the relief, used if `head_maps` has no normals
     """
     arrays: dict[str, Floats] = {}
-    if maps.colour is not None and skin.albedo == "map":
-        arrays["colour"] = maps.colour
-    if maps.roughness is not None:
-        roughness = maps.roughness * np.float32(skin.roughness / DEFAULT_ROUGHNESS * skin.smoothing)
+    if head_maps.colour is not None and skin.albedo == "map":
+        arrays["colour"] = head_maps.colour
+    if head_maps.roughness is not None:
+        roughness = head_maps.roughness * np.float32(skin.roughness / DEFAULT_ROUGHNESS * skin.smoothing)
         arrays["roughness"] = np.sqrt(np.clip(roughness, 0.0, 1.0))
-    if maps.specular is not None and (mean := float(maps.specular.mean())) > 0:
-        arrays["specular"] = np.clip(maps.specular * np.float32(skin.strength / mean), 0.0, 1.0)
-    gradient = slopes if maps.normal is None else maps.normal
+    if head_maps.specular is not None and (mean := float(head_maps.specular.mean())) > 0:
+        arrays["specular"] = np.clip(head_maps.specular * np.float32(skin.strength / mean), 0.0, 1.0)
+    gradient = slopes if head_maps.normal is None else head_maps.normal
     if gradient is not None:
         normal = np.concatenate([-gradient, np.ones_like(gradient[..., :1])], axis=-1)
         arrays["normal"] = 0.5 + 0.5 * normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     return arrays
 
 
-def encode_map_files(arrays: Mapping[str, Floats]) -> dict[str, bytes]:
+def encode_map_files(maps_by_role: Mapping[str, Floats]) -> dict[str, bytes]:
     """Return a dictionary from the role of each map to the map as an 8-bit PNG file."""
     with ThreadPoolExecutor() as pool:  # compression releases the interpreter lock
-        return dict(zip(arrays, pool.map(_encode_map_png, arrays, arrays.values()), strict=True))
+        return dict(
+            zip(maps_by_role, pool.map(_encode_map_png, maps_by_role, maps_by_role.values()), strict=True)
+        )
 
 
-def _encode_map_png(role: str, texels: Floats) -> bytes:
-    if role in ("colour", "eye"):
+def _encode_map_png(map_role: str, texels: Floats) -> bytes:
+    if map_role in ("colour", "eye"):
         return encode_png(encode_srgb8(texels))
     levels = np.rint(np.clip(texels, 0.0, 1.0) * 255).astype(np.uint8)
     return encode_png(levels if levels.ndim == 3 else levels[..., None])
 
 
-def file_prefix(file: Path, subject: Subject) -> str:
+def file_prefix(main_file: Path, subject: Subject) -> str:
     """Return the prefix of the names of map and mesh files beside a target's main file."""
-    identifier = re.sub(r"[^A-Za-z0-9]+", "_", file.stem).strip("_")[:_MAX_MATERIAL_NAME_LENGTH]
+    identifier = re.sub(r"[^A-Za-z0-9]+", "_", main_file.stem).strip("_")[:_MAX_MATERIAL_NAME_LENGTH]
     return f"{identifier or subject.identifier}_"
 
 
-def write_maps(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
+def write_maps(subject: Subject, output_folder: Path, file_name_prefix: str) -> dict[str, Path]:
     """Write the maps of the head's skin as PNG files, and return a dictionary from role to path.
 
-    prefix : prefix of the file names
+    file_name_prefix : prefix of the file names
     """
     if subject.head is None:
         return {}
-    files = encode_map_files(map_arrays(subject.head.maps, subject.skin, relief_slopes(subject.head)))
-    written = write_files(folder, ((f"{prefix}{role}.png", data) for role, data in files.items()))
+    files = encode_map_files(open_pbr_maps(subject.head.maps, subject.skin, relief_slopes(subject.head)))
+    written = write_files(
+        output_folder, ((f"{file_name_prefix}{role}.png", data) for role, data in files.items())
+    )
     return dict(zip(files, written, strict=True))
 
 
 def write_part_pictures(
-    subject: Subject, folder: Path, prefix: str, roles: Iterable[PartRole] = ()
+    subject: Subject, output_folder: Path, file_name_prefix: str, additional_roles: Iterable[PartRole] = ()
 ) -> list[Path]:
-    """Write the pictures of parts that are not skin as PNG files, and return their paths.
+    """Write the texture images of parts that are not skin as PNG files, and return their paths.
 
-    prefix : prefix of the file names
-    roles : additional roles whose pictures are written although OpenPBR does not use them
+    file_name_prefix : prefix of the file names
+    additional_roles : roles of additional images to write, which OpenPBR does not use
     """
     if subject.part_pictures is None:
         return []
-    files = subject.part_pictures.encode([*_PART_INPUTS, *roles])
-    return write_files(folder, ((f"{prefix}{PART_PREFIX}{role}.png", data) for role, data in files.items()))
+    files = subject.part_pictures.encode([*_PART_INPUTS, *additional_roles])
+    return write_files(
+        output_folder, ((f"{file_name_prefix}{PART_PREFIX}{role}.png", data) for role, data in files.items())
+    )
 
 
-def mesh_materials(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> dict[int, OpenPbrMaterial]:
+def mesh_materials(subject: Subject, mfp_mm: Doubles, map_roles: Iterable[str]) -> dict[int, OpenPbrMaterial]:
     """Return a dictionary from material index in the subject's mesh to OpenPBR material.
 
     mfp_mm : (3,) mean free paths of the skin [mm]
-    roles : roles of the maps that replace uniform values of the skin
+    map_roles : roles of the maps that replace uniform values of the skin
     """
     red, green, blue = (_METRES_PER_MM * float(path) for path in mfp_mm)
-    colour, known_roles = flat_tuple(subject.clipped_albedo()), list(roles)
+    colour, known_roles = flat_tuple(subject.clipped_albedo()), list(map_roles)
     mesh, parts = subject.head_or_ball.mesh, subject.part_pictures
 
     def material_definition(material: Material) -> OpenPbrMaterial:
         if parts is not None and material.has_maps:
-            return part_material(material, parts)
+            return textured_part_material(material, parts)
         if material.kind != "skin":
-            return opaque_material(material)
+            return untextured_part_material(material)
         return skin_material(material.name, subject.skin, (red, green, blue), colour, known_roles)
 
     return {index: material_definition(mesh.materials[index]) for index in np.unique(mesh.material).tolist()}

@@ -11,7 +11,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from dermis.apps.export.fitting import burley_curve, curve_error, fit_burley_width, fit_homogeneous_medium
+from dermis.apps.export.fitting import (
+    cumulative_burley_profile,
+    fit_burley_width,
+    fit_homogeneous_medium,
+    profile_error,
+)
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, flat_tuple, get_numbers
 from dermis.apps.export.targets.openpbr.materials import (
@@ -69,13 +74,13 @@ class OpenPbr(Target):
         return _SHADER_BY_VARIANT[self.variant or "open-pbr"]
 
     @property
-    def is_profile(self) -> bool:
+    def uses_burley_profile(self) -> bool:
         """Return whether the radius is the width d of a Burley profile instead of a mean free path."""
         return self.variant.endswith("profile")
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the radii for which the random walk or Burley profile is closest to the reference."""
-        if self.is_profile:
+        if self.uses_burley_profile:
             d = fit_burley_width(subject.curve)
             return surface_parameters(subject, self.shader, d, "largest d of the profiles")
         path = fitted_mean_free_path_mm(subject)
@@ -83,20 +88,21 @@ class OpenPbr(Target):
         return surface_parameters(subject, self.shader, path, meaning)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return published diffuse mean free paths as the radius, where OpenPBR expects mean free paths."""
+        """Return parameters with published diffuse mean free paths, where OpenPBR expects mean free paths."""
         meaning = "diffuse mean free path, as published"
         return surface_parameters(subject, self.shader, published_mean_free_path_mm(subject), meaning)
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile that the renderer will show for the exported radii.
 
-        This is MaterialX's Burley profile if `is_profile` is true, otherwise the profile of a random walk.
+        For variants that end in "profile", this is MaterialX's Burley profile, otherwise the profile of a
+        random walk.
         """
         radius = get_radii_mm(parameters, self.shader)
-        if self.is_profile:
+        if self.uses_burley_profile:
             return materialx_profile(radius, subject)
         colour = np.array(get_numbers(parameters, input_name(self.shader, "subsurface_color")))
-        return walk_curve(colour, radius, subject)
+        return random_walk_profile(colour, radius, subject)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the document, and the maps beside it."""
@@ -112,26 +118,28 @@ class OpenPbr(Target):
         return [file, *maps.values(), *write_part_pictures(subject, file.parent, prefix)]
 
 
-def surface_parameters(subject: Subject, shader: str, radius_mm: Floats, meaning: str) -> Parameters:
+def surface_parameters(
+    subject: Subject, shader_category: str, radius_mm: Floats, radius_meaning: str
+) -> Parameters:
     """Return the parameters of a surface with given subsurface radii.
 
-    shader : node category of the surface, `OPEN_PBR` or `STANDARD_SURFACE`
+    shader_category : node category of the surface, `OPEN_PBR` or `STANDARD_SURFACE`
     radius_mm : (3,) subsurface radii [mm]
-    meaning : text for the report that explains the parameter with the largest radius
+    radius_meaning : explanation of subsurface_radius for the report
     """
     longest, skin, colour = float(radius_mm.max()), subject.skin, flat_tuple(subject.clipped_albedo())
     roughness = float(np.sqrt(skin.roughness * skin.smoothing))
     inputs = (
         ("subsurface_weight", 1.0, "-", "all light that is not reflected enters the skin"),
         ("subsurface_color", colour, "-", "diffuse reflectance; the mean of a colour map"),
-        ("subsurface_radius", _METRES_PER_MM * longest, "m", meaning),
+        ("subsurface_radius", _METRES_PER_MM * longest, "m", radius_meaning),
         ("subsurface_radius_scale", flat_tuple(radius_mm / longest), "-", "each channel's relative to that"),
         ("subsurface_scatter_anisotropy", 0.0, "-", "the lengths are reduced ones"),
         ("specular_ior", SKIN_ETA, "-", "of the surface; reflectance 0.028 at normal incidence"),
         ("specular_weight", skin.strength, "-", "factor of the specular reflection; the mean of a map"),
         ("specular_roughness", roughness, "-", "square root of Beckmann's m, or its map"),
     )
-    return tuple(Parameter(input_name(shader, name), *values) for name, *values in inputs)
+    return tuple(Parameter(input_name(shader_category, name), *values) for name, *values in inputs)
 
 
 def profile_error_text(mfp_mm: Floats, subject: Subject) -> str:
@@ -139,14 +147,14 @@ def profile_error_text(mfp_mm: Floats, subject: Subject) -> str:
 
     mfp_mm : (3,) exported mean free paths [mm]
     """
-    errors = curve_error(subject.curve, materialx_profile(mfp_mm, subject)).edge
+    errors = profile_error(subject.curve, materialx_profile(mfp_mm, subject)).edge
     return f"interpreted as d, errors at shadow edges are {', '.join(f'{error:.3f}' for error in errors)}"
 
 
-def get_radii_mm(parameters: Parameters, shader: str) -> Floats:
+def get_radii_mm(parameters: Parameters, shader_category: str) -> Floats:
     """Return the subsurface radii (3,) in a surface's parameters [mm]."""
-    longest = get_numbers(parameters, input_name(shader, "subsurface_radius"))[0] / _METRES_PER_MM
-    return longest * np.array(get_numbers(parameters, input_name(shader, "subsurface_radius_scale")))
+    longest = get_numbers(parameters, input_name(shader_category, "subsurface_radius"))[0] / _METRES_PER_MM
+    return longest * np.array(get_numbers(parameters, input_name(shader_category, "subsurface_radius_scale")))
 
 
 def fitted_mean_free_path_mm(subject: Subject) -> Floats:
@@ -155,7 +163,7 @@ def fitted_mean_free_path_mm(subject: Subject) -> Floats:
 
 
 def published_mean_free_path_mm(subject: Subject) -> Floats:
-    """Return the diffuse mean free paths (3,) of the tissue by the dipole model [mm].
+    """Return the diffuse mean free paths (3,) that the dipole model gives for the tissue [mm].
 
     A diffuse mean free path is 1 / sigma_tr of the lowest layer, [Jensen2001]. If the coefficients of this
     layer are not given for RGB, the widths of the closest Burley profiles are returned instead.
@@ -174,24 +182,26 @@ def lowest_layer(subject: Subject) -> Layer | None:
     return tissue.medium.layers[-1]
 
 
-def walk_curve(colour: Floats, mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
+def random_walk_profile(base_colour: Floats, mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
     """Return the cumulative profile of a random walk whose albedo is derived from the base colour.
 
     The albedo follows from van de Hulst's formula, so the energy of the profile includes the error of this
     formula.
 
-    colour : (3,) base colour
+    base_colour : (3,) base colour
     mfp_mm : (3,) mean free paths [mm]
     """
-    return subject.rescale_energy(half_space("walk", albedo_from_colour(colour), mfp_mm))
+    return subject.rescale_energy(half_space("walk", albedo_from_colour(base_colour), mfp_mm))
 
 
 def materialx_profile(mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
-    """Return the cumulative profile by MaterialX's specification, where the radius is Burley's width d.
+    """Return the cumulative profile of renderers that follow MaterialX's specification.
+
+    In this specification, the subsurface radius is the width d of Burley's profile.
 
     mfp_mm : (3,) exported radii [mm]
     """
-    return burley_curve(mfp_mm, subject.curve.energy)
+    return cumulative_burley_profile(mfp_mm, subject.curve.energy)
 
 
 TARGET = OpenPbr()

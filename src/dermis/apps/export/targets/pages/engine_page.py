@@ -30,9 +30,9 @@ _CDN_URL = "https://cdn.jsdelivr.net/npm"
 _MAX_SCRIPT_BYTES = 32 << 20
 _METRES_PER_MM = 1e-3
 _SHADOW_MAP_SIDE = 2048
-_WARM_UP_FRAMES = 4  # frames until all shaders are compiled
-_LOAD_ERROR = "{} could not be loaded from {}. Check the network, or export again with --library."
-_TEXTURE_POLICY = "img-src blob: data:; connect-src blob: data:"  # for textures in the head's file
+_WARM_UP_FRAME_COUNT = 4  # frames until all shaders are compiled
+_LOAD_ERROR_TEXT = "{} could not be loaded from {}. Check the network, or export again with --library."
+_TEXTURE_CSP_DIRECTIVES = "img-src blob: data:; connect-src blob: data:"  # for textures in the head's file
 _PAGE_FOLDER = Path(__file__).parent
 
 
@@ -63,17 +63,17 @@ class LibraryFile:
         return f"sha384-{self.sha384}"
 
     @property
-    def element(self) -> str:
+    def html_element(self) -> str:
         """Return the HTML element that loads and checks the file."""
         return f'<script src="{self.url}" integrity="{self.integrity}" crossorigin="anonymous"></script>'
 
-    def read(self, folder: Path) -> str:
+    def read(self, node_modules_folder: Path) -> str:
         """Return the text of the file from a node_modules folder of npm.
 
         Raises DermisError if the file is missing or differs from the expected version.
         """
         expected = f"{self.path} of {self.package} {self.version}, as npm installs it"
-        file = folder / self.package / self.path
+        file = node_modules_folder / self.package / self.path
         data = read_file(file, expected, _MAX_SCRIPT_BYTES)
         if base64.b64encode(hashlib.sha384(data).digest()).decode() != self.sha384:
             advice = f"Install it: npm install {self.package}@{self.version}"
@@ -101,9 +101,9 @@ class EnginePage(Target):
     library_files: ClassVar[Mapping[str, tuple[LibraryFile, ...]]]
     """Files of the library, by version."""
 
-    def with_library(self, folder: str | Path) -> EnginePage:
+    def with_library(self, node_modules_folder: str | Path) -> EnginePage:
         """Return a copy of the target that embeds the library from an npm folder in the page."""
-        return replace(self, library_folder=Path(folder))
+        return replace(self, library_folder=Path(node_modules_folder))
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the page with the head, its parameters, camera and lights."""
@@ -114,9 +114,9 @@ class EnginePage(Target):
             title=f"{subject.name} in {self.title}",
             note=f"{self.title} {version} ({self.licence}). {self.limitations}",
             script=escape_script(script),
-            policy=_TEXTURE_POLICY,
+            policy=_TEXTURE_CSP_DIRECTIVES,
             script_sources=sources,
-            settings=html_safe_json(self._page_settings(subject, parameters, version)),
+            settings=html_safe_json(self._page_settings_json(subject, parameters, version)),
             head=base64.b64encode(encode_glb(subject, {"KHR_materials_ior": {"ior": SKIN_ETA}}, "")).decode(),
             libraries=libraries,
         )
@@ -125,19 +125,22 @@ class EnginePage(Target):
 
     @abstractmethod
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the library's HTML elements, and the sources for the page's Content-Security-Policy."""
+        """Return the HTML elements of the library, and the sources for script-src.
 
-    def _page_settings(self, subject: Subject, parameters: Parameters, version: str) -> Json:
+        A source is a URL, a scheme or a hash that the page's Content-Security-Policy allows.
+        """
+
+    def _page_settings_json(self, subject: Subject, parameters: Parameters, version: str) -> Json:
         scene = subject.scene or Scene(subject.head_or_ball)
         centre_mm = scene.head.centre_mm if subject.scene else (0.0, 0.0, 0.0)  # of the ball
         return {
-            "camera": page_camera(scene, centre_mm),
-            "lights": [page_light(light) for light in scene.lights],
+            "camera": page_camera_json(scene, centre_mm),
+            "lights": [page_light_json(light) for light in scene.lights],
             "skin": {one.name.rpartition(".")[2]: one.value for one in parameters},
             "shadow_side": _SHADOW_MAP_SIDE,
-            "warm_frames": _WARM_UP_FRAMES,
+            "warm_frames": _WARM_UP_FRAME_COUNT,
             "smooth": True,
-            "no_library": _LOAD_ERROR.format(self.title, self.library_files[version][0].url),
+            "no_library": _LOAD_ERROR_TEXT.format(self.title, self.library_files[version][0].url),
         }
 
 
@@ -148,11 +151,10 @@ def html_safe_json(json_value: Json) -> str:
 
 
 def module_url(module_text: str, import_names: Mapping[str, str]) -> str:
-    """Return a JavaScript module as a data URL, with its imports renamed to names that the page defines.
+    """Return a JavaScript module as a data URL; its import statements use names of the page's import map.
 
     module_text : source of the module
-    import_names : mapping from a name in the import statements of the module to the name that the page
-        defines
+    import_names : dictionary from each name that the module's source imports to the name in the import map
     """
     for old, new in import_names.items():
         module_text = re.sub(rf"(\bfrom\s*)(['\"]){re.escape(old)}\2", rf"\1\2{new}\2", module_text)
@@ -167,7 +169,7 @@ def material_parameters(subject: Subject) -> Parameters:
     )
 
 
-def page_camera(scene: Scene, centre_mm: Sequence[float]) -> Json:
+def page_camera_json(scene: Scene, centre_mm: Sequence[float]) -> Json:
     """Return the scene's camera as JSON, with positions in the page's scene [m] and angle of view [rad].
 
     centre_mm : (3,) point of the scene that is the origin of the page's scene [mm]
@@ -183,8 +185,8 @@ def page_camera(scene: Scene, centre_mm: Sequence[float]) -> Json:
     }
 
 
-def page_light(light: Light) -> Json:
-    """Return a light as the JSON of a directional light that has the same irradiance at the head."""
+def page_light_json(light: Light) -> Json:
+    """Return the JSON of a directional light with the direction and irradiance of a light at the head."""
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction, np.float64)
     else:

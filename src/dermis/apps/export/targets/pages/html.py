@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
-_BASE_POLICY = "default-src 'none'; base-uri 'none'; form-action 'none'"
-_SCRIPT_END = re.compile("</(?=script)", re.IGNORECASE)
+_BASE_CSP_DIRECTIVES = "default-src 'none'; base-uri 'none'; form-action 'none'"
+_SCRIPT_END_PATTERN = re.compile("</(?=script)", re.IGNORECASE)
 
 
 def render_page(
@@ -35,7 +35,9 @@ def render_page(
     style = (folder / "page.css").read_text("utf-8")
     allowed = " ".join([csp_hash(script), *script_sources])
     return Template((folder / "page.html").read_text("utf-8")).substitute(
-        policy=html.escape(f"{_BASE_POLICY}; {policy}; style-src {csp_hash(style)}; script-src {allowed}"),
+        policy=html.escape(
+            f"{_BASE_CSP_DIRECTIVES}; {policy}; style-src {csp_hash(style)}; script-src {allowed}"
+        ),
         title=html.escape(title),
         note=html.escape(note),
         style=style,
@@ -44,9 +46,9 @@ def render_page(
     )
 
 
-def escape_script(script: str) -> str:
+def escape_script(script_text: str) -> str:
     """Return a script escaped for a <script> element; the values of its string literals do not change."""
-    return _SCRIPT_END.sub(r"<\\/", script).replace("<!--", r"<\!--")
+    return _SCRIPT_END_PATTERN.sub(r"<\\/", script_text).replace("<!--", r"<\!--")
 
 
 def csp_hash(inline_text: str) -> str:

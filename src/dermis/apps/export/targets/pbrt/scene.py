@@ -32,17 +32,17 @@ _MAX_BOUNCES = 100
 
 
 def format_directive(
-    directive_name: str, implementation: str, parameters: DirectiveParameters | None = None
+    directive_name: str, implementation_name: str, parameters: DirectiveParameters | None = None
 ) -> str:
     """Return a directive of a scene file, such as `Material "subsurface" "float eta" [ 1.4 ]`.
 
     directive_name : first word of the directive, such as "Material"
-    implementation : pbrt's name of the implementation, such as "subsurface"
+    implementation_name : pbrt's name of the implementation, such as "subsurface"
     parameters : dictionary from type and name, such as "float eta", to a value: a Boolean, or one or more
         texts or numbers
     """
     texts = [f'"{key}" [ {_format_value(value)} ]' for key, value in (parameters or {}).items()]
-    return " ".join([directive_name, f'"{implementation}"', *texts])
+    return " ".join([directive_name, f'"{implementation_name}"', *texts])
 
 
 def _format_value(parameter_value: ArrayLike | Sequence[str]) -> str:
@@ -55,7 +55,7 @@ def _format_value(parameter_value: ArrayLike | Sequence[str]) -> str:
     return " ".join(f"{number:.7g}" for number in np.ravel(np.asarray(parameter_value)).tolist())
 
 
-def camera_lines(camera: Camera, picture_name: str) -> Lines:
+def camera_directives(camera: Camera, picture_name: str) -> Lines:
     """Return the directives of camera, film and integrator, to be written before the directive WorldBegin.
 
     picture_name : name of the picture file that pbrt writes
@@ -78,7 +78,7 @@ def camera_lines(camera: Camera, picture_name: str) -> Lines:
     ]
 
 
-def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lines:
+def light_directives(lights: Iterable[Light], environment: Environment | None) -> Lines:
     """Return the directives of lights and environment, and warn if pbrt does not support one of them.
 
     Unsupported lights are replaced or omitted. A panorama is omitted.

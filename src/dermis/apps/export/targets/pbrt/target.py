@@ -1,4 +1,4 @@
-"""Export to pbrt, whose subsurface material is fitted with pbrt's own table of photon beam diffusion."""
+"""Export to pbrt, with parameters of the material `subsurface` that are fitted by pbrt's diffusion model."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from dermis.apps.export.targets.openpbr.materials import (
     PART_PREFIX,
     encode_map_files,
     file_prefix,
-    map_arrays,
+    open_pbr_maps,
 )
 from dermis.apps.export.targets.openpbr.target import published_mean_free_path_mm
-from dermis.apps.export.targets.pbrt.scene import Lines, camera_lines, format_directive, light_lines
+from dermis.apps.export.targets.pbrt.scene import Lines, camera_directives, format_directive, light_directives
 from dermis.formats.part_pictures import PartRole
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
@@ -64,7 +64,7 @@ class DiffusionTable(NamedTuple):
     albedo : (n,) single-scattering albedos
     radius : (m,) radii [mean free paths]
     reflectance : (n,) diffuse reflectance at each albedo
-    reflectance_within : (n, m) part of `reflectance` that is due to light leaving within each radius
+    reflectance_within : (n, m) diffuse reflectance if only the light that leaves within each radius counts
     """
 
     albedo: Floats
@@ -72,10 +72,11 @@ class DiffusionTable(NamedTuple):
     reflectance: Floats
     reflectance_within: Floats
 
-    def interpolate(self, radius: ArrayLike, reflectance: float) -> Floats:
-        """Return the part of `reflectance` that is due to light leaving within given radii [-].
+    def interpolate_reflectance_within(self, radius: ArrayLike, reflectance: float) -> Floats:
+        """Return the diffuse reflectance if only the light that leaves within given radii counts [-].
 
         radius : radii [mean free paths]
+        reflectance : diffuse reflectance if all light counts [-]
         """
         row = np.interp(reflectance, self.reflectance, np.arange(_TABLE_ALBEDO_COUNT))
         low = int(min(row, _TABLE_ALBEDO_COUNT - 2))
@@ -126,7 +127,7 @@ def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
 
 
 def _single_scattering(radius: Floats, eta: float) -> Floats:
-    """Return the radiant exitance (m,) of light scattered once; albedo and extinction coefficient are 1.
+    """Return the radiant exitance (m,) of light scattered once, for an albedo and an extinction of 1.
 
     radius : (m,) distances from a beam of unit power [mean free paths]
     """
@@ -182,7 +183,7 @@ class Pbrt(Target):
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the reflectance, and the mean free paths whose profile is closest to the reference."""
-        path = fit_radius_scale(subject.curve, _unit_curve(subject.albedo))
+        path = fit_radius_scale(subject.curve, _unit_profile(subject.albedo))
         return _material_parameters(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
@@ -191,10 +192,10 @@ class Pbrt(Target):
             subject, published_mean_free_path_mm(subject), "as published, 1 / sigma_tr"
         )
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile that pbrt tabulates for the reflectance and mean free paths."""
         reflectance = np.array(get_numbers(parameters, _REFLECTANCE_NAME))
-        curve = scale_radii(_unit_curve(reflectance), get_numbers(parameters, _MFP_NAME))
+        curve = scale_radii(_unit_profile(reflectance), get_numbers(parameters, _MFP_NAME))
         return subject.rescale_energy(curve)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
@@ -202,28 +203,31 @@ class Pbrt(Target):
         file = self.main_file(output, subject)
         prefix = file_prefix(file, subject)
         scene = subject.scene or _ball_scene(subject.head_or_ball)
-        lines, files = _scene_lines(subject, parameters, scene, prefix)
+        lines, files = _scene_directives(subject, parameters, scene, prefix)
         file.write_text("\n".join([*lines, ""]), encoding="ascii")
         return [file, *write_files(file.parent, files.items())]
 
 
-def _unit_curve(reflectance: Floats) -> CumulativeProfile:
+def _unit_profile(reflectance: Floats) -> CumulativeProfile:
     """Return pbrt's cumulative profile for reflectances (3,), with radii in mean free paths."""
     table = diffusion_table(SKIN_ETA)
-    total = np.array([table.interpolate(table.radius[-1], float(one)) for one in reflectance], np.float64)
+    total = np.array(
+        [table.interpolate_reflectance_within(table.radius[-1], float(one)) for one in reflectance],
+        np.float64,
+    )
 
     def fraction_within(radius: Floats) -> Floats:
-        columns = [table.interpolate(radius, float(one)) for one in reflectance]
+        columns = [table.interpolate_reflectance_within(radius, float(one)) for one in reflectance]
         return np.asarray(np.clip(np.stack(columns, axis=-1) / np.maximum(total, 1e-9), 0.0, 1.0))
 
     return CumulativeProfile.from_function(fraction_within, total)
 
 
-def _material_parameters(subject: Subject, mean_free_path_mm: Floats, meaning: str) -> Parameters:
+def _material_parameters(subject: Subject, mean_free_path_mm: Floats, mfp_meaning: str) -> Parameters:
     skin, colour = subject.skin, flat_tuple(subject.clipped_albedo())
     return (
         Parameter(_REFLECTANCE_NAME, colour, "-", "of the light that enters, or a texture"),
-        Parameter(_MFP_NAME, flat_tuple(mean_free_path_mm), "mm", meaning),
+        Parameter(_MFP_NAME, flat_tuple(mean_free_path_mm), "mm", mfp_meaning),
         Parameter("scale", 1.0, "-", "factor of mfp; must not be changed"),
         Parameter("g", 0.0, "-", "the mean free paths are reduced ones"),
         Parameter("eta", SKIN_ETA, "-", "index of refraction of the skin"),
@@ -244,7 +248,7 @@ def _ball_scene(ball: Head) -> Scene:
     return Scene(ball, camera=camera)
 
 
-def _scene_lines(
+def _scene_directives(
     subject: Subject, parameters: Parameters, scene: Scene, file_prefix: str
 ) -> tuple[Lines, dict[str, bytes]]:
     """Return the directives of the scene, and a dictionary from name to content of mesh and image files.
@@ -254,29 +258,29 @@ def _scene_lines(
     head = scene.head
     textures = skin_textures(subject, file_prefix)
     lines = ["# Written by dermis; lengths in mm relative to the head's centre"]
-    lines += [*camera_lines(scene.camera, f"{file_prefix}picture.exr"), "WorldBegin"]
+    lines += [*camera_directives(scene.camera, f"{file_prefix}picture.exr"), "WorldBegin"]
     part_lines, part_files = _part_textures(subject, file_prefix)
-    lines += [*light_lines(scene.lights, scene.environment), *textures.lines, *part_lines]
+    lines += [*light_directives(scene.lights, scene.environment), *textures.lines, *part_lines]
     files = textures.files | part_files
     for index in np.unique(head.mesh.material).tolist():
         material, name = head.mesh.materials[index], f"{file_prefix}part_{index}.ply"
         files[name] = mesh_ply(head.mesh, head.mesh.material == index, head.centre_mm, is_v_upwards=True)
-        roles = subject.part_pictures.roles(material) if subject.part_pictures else set()
+        roles = subject.part_pictures.needed_roles(material) if subject.part_pictures else set()
         if material.kind == "skin":
-            texts = [_skin_material(parameters, textures.material_textures)]
+            texts = [_skin_material_directive(parameters, textures.material_textures)]
         else:
-            texts = _opaque_materials(material, roles, f"part_{index}", file_prefix)
+            texts = _part_material_directives(material, roles, f"part_{index}", file_prefix)
         alpha = {"texture alpha": "parts_opacity"} if "opacity" in roles else {}
         shape = format_directive("Shape", "plymesh", {"string filename": name, **alpha})
         lines += ["AttributeBegin", *texts, shape, "AttributeEnd"]
     return lines, files
 
 
-def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[str, str]]) -> str:
-    """Return the directive of the skin's material; parameters with maps refer to textures or image files.
+def _skin_material_directive(parameters: Parameters, material_textures: dict[str, tuple[str, str]]) -> str:
+    """Return the directive of the skin's material, in which maps replace the values of some parameters.
 
-    material_textures : dictionary from a parameter with a map to two texts: its pbrt type, and the name of
-        the texture or image file
+    material_textures : for each parameter that a map sets, pbrt's type of the parameter, and the name of the
+        texture or image file
     """
     types = {_REFLECTANCE_NAME: "rgb", _MFP_NAME: "rgb", "remaproughness": "bool"}
     values: dict[str, ArrayLike] = {}
@@ -288,25 +292,26 @@ def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[st
     return format_directive("Material", "subsurface", values)
 
 
-def _opaque_materials(
-    material: Material, roles: set[PartRole], material_name: str, file_prefix: str
+def _part_material_directives(
+    material: Material, image_roles: set[PartRole], material_name: str, file_prefix: str
 ) -> Lines:
-    """Return the material directives for a part that is not skin, with references to the part's pictures.
+    """Return the material directives for a part of the head that is not skin.
 
-    material_name : prefix of the names of the two materials that are mixed for a metal part
+    image_roles : roles of the texture images that the part uses, such as "colour"
+    material_name : name of the part's material; partly metallic parts mix two materials with this prefix
     file_prefix : prefix of the names of the image files
     """
     values: dict[str, ArrayLike | Sequence[str]] = {"rgb reflectance": material.colour}
-    if "colour" in roles:
+    if "colour" in image_roles:
         values = {"texture reflectance": "parts_colour"}
-    if "alpha" in roles:
+    if "alpha" in image_roles:
         values["texture roughness"] = "parts_alpha"
     else:
         values["float roughness"] = _OPAQUE_PART_ROUGHNESS
     values["bool remaproughness"] = False
-    if "normal" in roles:
+    if "normal" in image_roles:
         values["string normalmap"] = f"{file_prefix}{PART_PREFIX}normal.png"
-    if "metalness" not in roles:
+    if "metalness" not in image_roles:
         return [format_directive("Material", "coateddiffuse", values)]
     names = {f"{material_name}_{kind}": kind for kind in ("coateddiffuse", "conductor")}
     mix: dict[str, ArrayLike | Sequence[str]] = {"string materials": [*names]}
@@ -342,8 +347,8 @@ class SkinTextures(NamedTuple):
 
     lines : directives that define the textures
     files : dictionary from the name of each image file to its content
-    material_textures : dictionary from a parameter of the skin's material with a map to two texts: its pbrt
-        type, and the name of the texture or image file
+    material_textures : for each parameter of the skin's material that a map sets, pbrt's type of the
+        parameter, and the name of the texture or image file
     """
 
     lines: Lines
@@ -359,7 +364,7 @@ def skin_textures(subject: Subject, file_prefix: str) -> SkinTextures:
     textures = SkinTextures([], {}, {})
     if subject.head is None:
         return textures
-    arrays = map_arrays(subject.head.maps, subject.skin, relief_slopes(subject.head))
+    arrays = open_pbr_maps(subject.head.maps, subject.skin, relief_slopes(subject.head))
     arrays.pop("specular", None)
     if "roughness" in arrays:
         arrays["roughness"] = arrays["roughness"] ** 2  # pbrt expects alpha, OpenPBR its square root

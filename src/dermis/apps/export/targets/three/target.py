@@ -1,4 +1,7 @@
-"""Export to a three.js web page on which users can move lights and head; its skin does not diffuse light."""
+"""Export to a web page with three.js, which draws the head without subsurface scattering.
+
+The user of the page can move the lights and the head.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ from dermis.apps.export.targets.pages.html import csp_hash
 from dermis.base.tables import read_rows
 from dermis.optics.cumulative_profile import CumulativeProfile
 
-_MODULE_NAMES = {
+_IMPORT_MAP_NAMES = {
     "./three.core.js": "three/core",
     "../utils/BufferGeometryUtils.js": "three/buffers",
     "../utils/SkeletonUtils.js": "three/skeletons",
@@ -57,24 +60,24 @@ class Three(EnginePage):
         """Return the exported parameters with the default index of refraction of MeshPhysicalMaterial."""
         return replace_values(self.parameters(subject, version), {"ior": _DEFAULT_IOR})
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile of light that leaves the skin where it enters: 1 at every radius."""
         return CumulativeProfile.from_function(lambda r: np.ones((len(r), 3)), subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the import map of three.js, and the sources for the page's Content-Security-Policy."""
+        """Return the import map of three.js, and the hash, URLs or scheme that script-src allows."""
         files = self.library_files[version]
         if self.library_folder is None:
             imports = {file.name: file.url for file in files}
             integrity = {file.url: file.integrity for file in files}
             return _import_map({"imports": imports, "integrity": integrity}, [*integrity])
-        modules = {file.name: module_url(file.read(self.library_folder), _MODULE_NAMES) for file in files}
+        modules = {file.name: module_url(file.read(self.library_folder), _IMPORT_MAP_NAMES) for file in files}
         return _import_map({"imports": modules}, ["data:"])
 
 
-def _import_map(entries: dict[str, dict[str, str]], sources: list[str]) -> tuple[str, list[str]]:
-    text = json.dumps(entries)
-    return f'<script type="importmap">{text}</script>', [csp_hash(text), *sources]
+def _import_map(import_map: dict[str, dict[str, str]], script_sources: list[str]) -> tuple[str, list[str]]:
+    text = json.dumps(import_map)
+    return f'<script type="importmap">{text}</script>', [csp_hash(text), *script_sources]
 
 
 TARGET = Three()

@@ -1,7 +1,7 @@
 """Export to Unity HDRP: a DiffusionProfileSettings asset, and the maps of a head.
 
-In DiffusionProfileSettings.cs, the width d of the Burley profile is the scattering colour times the
-multiplier [mm], if the world scale is the length of a scene unit in metres.
+In DiffusionProfileSettings.cs, the width d of the Burley profile [mm] is the scattering colour times the
+multiplier. The world scale must be the length of a scene unit in metres.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from string import Template
 
 import numpy as np
 
-from dermis.apps.export.fitting import burley_curve, fit_burley_width
+from dermis.apps.export.fitting import cumulative_burley_profile, fit_burley_width
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import (
     Parameter,
@@ -76,7 +76,7 @@ class Unity(Target):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour as the scattering colour, as the inspector suggests, with multiplier 1."""
+        """Return parameters with the skin's colour as the scattering colour, and multiplier 1."""
         colour = flat_tuple(subject.clipped_albedo())
         values: dict[str, ParameterValue] = {
             _SCATTERING_DISTANCE_NAME: colour,
@@ -84,14 +84,14 @@ class Unity(Target):
         }
         return replace_values(self.parameters(subject, version), values)
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative Burley profile that HDRP derives from scattering colour and multiplier."""
         colour, scale = (
             np.array(get_numbers(parameters, _SCATTERING_DISTANCE_NAME)),
             get_numbers(parameters, _WORLD_SCALE_NAME)[0],
         )
         multiplier = 1.0 if version == _VERSION_BEFORE_14 else get_numbers(parameters, _MULTIPLIER_NAME)[0]
-        return burley_curve(colour * multiplier / scale, subject.curve.energy)
+        return cumulative_burley_profile(colour * multiplier / scale, subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the asset, and the maps of a head beside it."""
@@ -101,14 +101,18 @@ class Unity(Target):
         return [asset, *write_files(asset.parent, maps)]
 
 
-def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
+def _scattering_distances(burley_width_mm: Floats, version: str) -> Parameters:
     """Return Burley widths as parameters: a colour before HDRP 14; a colour and a multiplier since HDRP 14.
 
-    d_mm : (3,) widths of the Burley profiles [mm]
+    burley_width_mm : (3,) widths of the Burley profiles [mm]
     """
     if version == _VERSION_BEFORE_14:
-        return (Parameter(_SCATTERING_DISTANCE_NAME, flat_tuple(d_mm), "mm", "d as a linear HDR colour"),)
-    profile = unity_parameters(BurleyProfile(np.ones(3), 1.0 / d_mm))
+        return (
+            Parameter(
+                _SCATTERING_DISTANCE_NAME, flat_tuple(burley_width_mm), "mm", "d as a linear HDR colour"
+            ),
+        )
+    profile = unity_parameters(BurleyProfile(np.ones(3), 1.0 / burley_width_mm))
     return (
         Parameter(
             _SCATTERING_DISTANCE_NAME,

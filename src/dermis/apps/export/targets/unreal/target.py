@@ -1,7 +1,7 @@
 """Export to Unreal Engine: an editor script that creates a SubsurfaceProfile, and the maps of a head.
 
 In SubsurfaceProfile.cpp and BurleyNormalizedSSS.cpp, the width d of the Burley profile is the mean free path
-divided by 0.6 s(A), where A is the albedo and s is Burley's factor for perpendicular light.
+divided by 0.6 s(A). Here A is the albedo, and s is Burley's factor for light at normal incidence.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.apps.export.fitting import burley_curve, fit_burley_width, fit_homogeneous_medium
+from dermis.apps.export.fitting import cumulative_burley_profile, fit_burley_width, fit_homogeneous_medium
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import (
     Parameter,
@@ -63,13 +63,13 @@ class Unreal(Target):
         return _profile_parameters(albedo, path_cm, version)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return parameters with the tissue's reduced mean free path, as the parameter's name suggests."""
+        """Return parameters with the reduced mean free path of the tissue as "mean free path"."""
         path = fit_homogeneous_medium(subject.curve, subject.curve.energy).mfp_mm
         if subject.tissue is not None and subject.tissue.rgb is None:
             path = subject.tissue.medium.layers[-1].mean_free_path_mm
         return _profile_parameters(subject.clipped_albedo(_MIN_ALBEDO), path / _MM_PER_CM, version)
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative Burley profile that the engine's screen-space pass renders."""
         colour = np.maximum(get_numbers(parameters, MEAN_FREE_PATH_COLOUR_NAME), _MIN_ENGINE_COLOUR)
         path = (
@@ -79,7 +79,9 @@ class Unreal(Target):
             * get_numbers(parameters, WORLD_UNIT_SCALE_NAME)[0]
         )
         albedo = np.array(get_numbers(parameters, ALBEDO_NAME))
-        return burley_curve(path / (UNREAL_SHAPE_RATIO * shape_factor(albedo)), subject.curve.energy)
+        return cumulative_burley_profile(
+            path / (UNREAL_SHAPE_RATIO * shape_factor(albedo)), subject.curve.energy
+        )
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the editor script, and the maps of a head beside it."""

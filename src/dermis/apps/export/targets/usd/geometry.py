@@ -48,26 +48,26 @@ def mesh_polygons(mesh: Mesh) -> Polygons:
 
 
 def first_vertex_by_point(mesh: Mesh) -> NDArray[np.intp]:
-    """Return the index of the first vertex at each point (p,); at uv seams, vertices share a point."""
+    """Return the index (p,) of the first vertex at each point; the vertices at a uv seam share a point."""
     return np.unique(mesh.point, return_index=True)[1]
 
 
 def add_mesh(
-    stage: Usd.Stage, path: Sdf.Path, head: Head, deformable: DeformableMesh
+    usd_stage: Usd.Stage, mesh_path: Sdf.Path, head: Head, deformable_mesh: DeformableMesh
 ) -> dict[int, UsdGeom.Subset]:
     """Add the head's mesh in its rest pose to the stage; return the geometry subsets by material index.
 
-    deformable : the head's mesh with morph targets and bone weights, all morph targets at weight 0
+    deformable_mesh : the head's mesh with morph targets and bone weights, all morph targets at weight 0
     """
     mesh, polygons = head.mesh, mesh_polygons(head.mesh)
     vertex = first_vertex_by_point(mesh)
-    prim = UsdGeom.Mesh.Define(stage, path)
-    points = Vt.Vec3fArray.FromNumpy(to_metres(deformable.positions_mm[vertex]))
+    prim = UsdGeom.Mesh.Define(usd_stage, mesh_path)
+    points = Vt.Vec3fArray.FromNumpy(to_metres(deformable_mesh.positions_mm[vertex]))
     prim.CreatePointsAttr(points)
     prim.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
     prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(polygons.vertex_counts))
     prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.point[polygons.vertices].astype(np.int32)))
-    prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(deformable.normals[vertex])))
+    prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(deformable_mesh.normals[vertex])))
     prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     if head.maps.parts is not None:
@@ -88,29 +88,31 @@ def texture_coordinates(head: Head) -> Floats:
     """
     mesh, uv = head.mesh, head.mesh.uv.copy()
     if head.eyes is not None:
-        frames = head.eyes.frames(head.control, head.control.rest)
+        frames = head.eyes.eye_matrices(head.control, head.control.rest)
         for material, frame in zip(head.eyes.material, frames, strict=True):
             eye = np.unique(mesh.triangles[mesh.material == material])
             uv[eye] = eye_uv(mesh.positions[eye] @ frame[:3, :3].T + frame[:3, 3])
     return uv
 
 
-def _add_uv(prim: UsdGeom.Mesh, uv: Floats, polygons: Polygons) -> None:
+def _add_uv(mesh_prim: UsdGeom.Mesh, uv: Floats, polygons: Polygons) -> None:
     """Add texture coordinates to a mesh as face-varying values, with v upwards as in USD.
 
     uv : (v, 2) texture coordinates of the vertices, with v downwards
     """
     upwards = np.ascontiguousarray(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), np.float32)
     types, tokens = Sdf.ValueTypeNames, UsdGeom.Tokens
-    primvar = UsdGeom.PrimvarsAPI(prim).CreatePrimvar("st", types.TexCoord2fArray, tokens.faceVarying)
+    primvar = UsdGeom.PrimvarsAPI(mesh_prim).CreatePrimvar("st", types.TexCoord2fArray, tokens.faceVarying)
     primvar.Set(Vt.Vec2fArray.FromNumpy(upwards))
     primvar.SetIndices(Vt.IntArray.FromNumpy(polygons.vertices))
 
 
-def add_hairs(stage: Usd.Stage, path: Sdf.Path, head: Head, strands: Strands) -> UsdGeom.BasisCurves:
+def add_hairs(
+    usd_stage: Usd.Stage, curves_path: Sdf.Path, head: Head, strands: Strands
+) -> UsdGeom.BasisCurves:
     """Add hairs in the rest pose to the stage, as linear curves with a width at each knot."""
     knots = strands.knot_positions_mm(head.mesh, head.mesh.points_mm)
-    prim = UsdGeom.BasisCurves.Define(stage, path)
+    prim = UsdGeom.BasisCurves.Define(usd_stage, curves_path)
     count = np.full(len(knots), knots.shape[1], np.int32)
     points = Vt.Vec3fArray.FromNumpy(to_metres(knots.reshape(-1, 3)))
     widths = Vt.FloatArray.FromNumpy((2.0 * METRES_PER_MM * strands.radius_mm.ravel()).astype(np.float32))
@@ -128,30 +130,32 @@ def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
     return np.ascontiguousarray(METRES_PER_MM * positions_mm.astype(np.float64), np.float32)
 
 
-def add_rig(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: DeformableMesh) -> None:
+def add_rig(
+    usd_stage: Usd.Stage, rig_root_path: Sdf.Path, mesh_prim: Usd.Prim, deformable_mesh: DeformableMesh
+) -> None:
     """Add blend shapes, a skeleton and a rest animation, so that programs can pose the head.
 
-    root : path of the UsdSkelRoot
-    mesh : mesh that the blend shapes and the skeleton deform
-    deformable : the head's mesh with morph targets and bone weights, all morph targets at weight 0
+    rig_root_path : path of the UsdSkelRoot
+    mesh_prim : mesh that the blend shapes and the skeleton deform
+    deformable_mesh : the head's mesh with morph targets and bone weights, all morph targets at weight 0
     """
-    path = root.AppendChild("skeleton")
-    skeleton = UsdSkel.Skeleton.Define(stage, path)
-    joints = _add_joints(skeleton, deformable.rig.skeleton)
-    rest = UsdSkel.Animation.Define(stage, path.AppendChild("rest"))
-    binding = UsdSkel.BindingAPI.Apply(mesh)
+    path = rig_root_path.AppendChild("skeleton")
+    skeleton = UsdSkel.Skeleton.Define(usd_stage, path)
+    joints = _add_joints(skeleton, deformable_mesh.rig.skeleton)
+    rest = UsdSkel.Animation.Define(usd_stage, path.AppendChild("rest"))
+    binding = UsdSkel.BindingAPI.Apply(mesh_prim)
     binding.CreateSkeletonRel().SetTargets([path])
     UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([rest.GetPath()])
-    _bind_joints(binding, deformable)
+    _bind_joints(binding, deformable_mesh)
     rest.CreateJointsAttr(joints)
     rest.SetTransforms(skeleton.GetRestTransformsAttr().Get())
-    names = unique_usd_names(deformable.rig.targets.names)
+    names = unique_usd_names(deformable_mesh.rig.targets.names)
     if names:
-        _add_blend_shapes(stage, mesh, deformable, names)
+        _add_blend_shapes(usd_stage, mesh_prim, deformable_mesh, names)
         binding.CreateBlendShapesAttr(names)
-        shapes = [mesh.GetPath().AppendChild(name) for name in names]
+        shapes = [mesh_prim.GetPath().AppendChild(name) for name in names]
         binding.CreateBlendShapeTargetsRel().SetTargets([Sdf.Path(str(shape)) for shape in shapes])
-        weights = deformable.rig.targets.rest
+        weights = deformable_mesh.rig.targets.rest
         rest.CreateBlendShapesAttr(names)
         rest.CreateBlendShapeWeightsAttr([0.0] * len(names) if weights is None else weights.tolist())
 
@@ -166,7 +170,7 @@ def unique_usd_names(original_names: Sequence[str]) -> list[str]:
     return valid
 
 
-def _add_joints(prim: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
+def _add_joints(usd_skeleton: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
     """Set the joints of a USD skeleton, and return their paths; a head without bones gets one joint."""
     joints, rest, bind = ["root"], np.eye(4)[None], np.eye(4)[None]
     if skeleton is not None:
@@ -174,8 +178,11 @@ def _add_joints(prim: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
         for name, parent in zip(unique_usd_names(skeleton.names), skeleton.parent.tolist(), strict=True):
             joints.append(f"{joints[parent]}/{name}" if parent >= 0 else name)
         rest, bind = _bone_transforms(skeleton)
-    prim.CreateJointsAttr(joints)
-    for create, matrices in ((prim.CreateRestTransformsAttr, rest), (prim.CreateBindTransformsAttr, bind)):
+    usd_skeleton.CreateJointsAttr(joints)
+    for create, matrices in (
+        (usd_skeleton.CreateRestTransformsAttr, rest),
+        (usd_skeleton.CreateBindTransformsAttr, bind),
+    ):
         create(Vt.Matrix4dArray([Gf.Matrix4d(matrix.T) for matrix in matrices]))
     return joints
 
@@ -193,26 +200,28 @@ def _bone_transforms(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
     return np.asarray(parent @ skeleton.local @ reduce), np.asarray(bind)
 
 
-def _bind_joints(binding: UsdSkel.BindingAPI, deformable: DeformableMesh) -> None:
-    rig, count = deformable.rig, int(deformable.head.mesh.point.max()) + 1
+def _bind_joints(mesh_binding: UsdSkel.BindingAPI, deformable_mesh: DeformableMesh) -> None:
+    rig, count = deformable_mesh.rig, int(deformable_mesh.head.mesh.point.max()) + 1
     rigid = np.zeros((count, 1), np.int64), np.ones((count, 1))
-    bone, weight = rigid if rig.skeleton is None else point_bone_influences(rig, deformable.refinement)
+    bone, weight = (
+        rigid if rig.skeleton is None else point_bone_influences(rig, deformable_mesh.subdivision_matrix)
+    )
     indices = Vt.IntArray.FromNumpy(np.ascontiguousarray(bone, np.int32).ravel())
     weights = Vt.FloatArray.FromNumpy(np.ascontiguousarray(weight, np.float32).ravel())
-    binding.CreateJointIndicesPrimvar(False, bone.shape[1]).Set(indices)
-    binding.CreateJointWeightsPrimvar(False, bone.shape[1]).Set(weights)
-    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
+    mesh_binding.CreateJointIndicesPrimvar(False, bone.shape[1]).Set(indices)
+    mesh_binding.CreateJointWeightsPrimvar(False, bone.shape[1]).Set(weights)
+    mesh_binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
 
 
 def _add_blend_shapes(
-    stage: Usd.Stage, mesh: Usd.Prim, deformable: DeformableMesh, shape_names: Sequence[str]
+    usd_stage: Usd.Stage, mesh_prim: Usd.Prim, deformable_mesh: DeformableMesh, shape_names: Sequence[str]
 ) -> None:
-    vertex = first_vertex_by_point(deformable.head.mesh)
-    point = np.full(len(deformable.head.mesh.positions), -1, np.int32)
+    vertex = first_vertex_by_point(deformable_mesh.head.mesh)
+    point = np.full(len(deformable_mesh.head.mesh.positions), -1, np.int32)
     point[vertex] = np.arange(len(vertex))
-    titles = deformable.rig.targets.names
-    for name, title, target in zip(shape_names, titles, deformable.targets(), strict=True):
-        shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild(name))
+    titles = deformable_mesh.rig.targets.names
+    for name, title, target in zip(shape_names, titles, deformable_mesh.targets(), strict=True):
+        shape = UsdSkel.BlendShape.Define(usd_stage, mesh_prim.GetPath().AppendChild(name))
         points = point[target.vertex]
         order = np.flatnonzero(points >= 0)
         order = order[np.argsort(points[order])]

@@ -16,7 +16,7 @@ from dermis.formats.deformable_mesh import DeformableMesh
 from dermis.mesh.grown_strands import hair_strands
 from dermis.mesh.head import Head
 
-_IMAGE_NODES = {"color3": "ND_image_color3", "float": "ND_image_float", "vector3": "ND_image_vector3"}
+_IMAGE_NODE_BY_TYPE = {"color3": "ND_image_color3", "float": "ND_image_float", "vector3": "ND_image_vector3"}
 _PREVIEW_INPUTS = {
     "base_color": "diffuseColor",
     "subsurface_color": "diffuseColor",
@@ -59,65 +59,67 @@ def build_stage(
     return stage
 
 
-def _has_rig(deformable: DeformableMesh) -> bool:
-    return bool(deformable.rig.targets.names) or deformable.rig.skeleton is not None
+def _has_rig(deformable_mesh: DeformableMesh) -> bool:
+    return bool(deformable_mesh.rig.targets.names) or deformable_mesh.rig.skeleton is not None
 
 
 def _add_materials(
-    stage: Usd.Stage,
-    scope: Sdf.Path,
-    subsets: Mapping[int, UsdGeom.Subset],
-    definitions: Mapping[int, OpenPbrMaterial],
-    prefix: str,
+    usd_stage: Usd.Stage,
+    materials_path: Sdf.Path,
+    geometry_subsets: Mapping[int, UsdGeom.Subset],
+    open_pbr_materials: Mapping[int, OpenPbrMaterial],
+    file_prefix: str,
 ) -> None:
-    UsdGeom.Scope.Define(stage, scope)
-    names = unique_usd_names([definitions[kind].name for kind in subsets])
-    for (kind, subset), name in zip(subsets.items(), names, strict=True):
-        material = _add_material(stage, scope.AppendChild(name), definitions[kind], prefix)
+    UsdGeom.Scope.Define(usd_stage, materials_path)
+    names = unique_usd_names([open_pbr_materials[kind].name for kind in geometry_subsets])
+    for (kind, subset), name in zip(geometry_subsets.items(), names, strict=True):
+        material = _add_material(
+            usd_stage, materials_path.AppendChild(name), open_pbr_materials[kind], file_prefix
+        )
         UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
 
 
-def _add_hairs(stage: Usd.Stage, root_path: Sdf.Path, head: Head) -> None:
+def _add_hairs(usd_stage: Usd.Stage, root_path: Sdf.Path, head: Head) -> None:
     for name, strands in (("lashes_and_brows", head.strands), ("hair", hair_strands(head))):
         if strands is None:
             continue
-        curves = add_hairs(stage, root_path.AppendChild(name), head, strands)
+        curves = add_hairs(usd_stage, root_path.AppendChild(name), head, strands)
         definition = hair_material(strands.absorption, float(np.median(strands.radius_mm)))
-        material = _add_material(stage, root_path.AppendPath(f"materials/{name}"), definition, "")
+        material = _add_material(usd_stage, root_path.AppendPath(f"materials/{name}"), definition, "")
         UsdShade.MaterialBindingAPI.Apply(curves.GetPrim()).Bind(material)
 
 
 def _add_material(
-    stage: Usd.Stage, prim_path: Sdf.Path, definition: OpenPbrMaterial, prefix: str
+    usd_stage: Usd.Stage, prim_path: Sdf.Path, open_pbr_material: OpenPbrMaterial, file_prefix: str
 ) -> UsdShade.Material:
     """Add an OpenPBR material with a preview surface to the stage, and return the material.
 
-    prefix : prefix of the file names of the maps
+    file_prefix : prefix of the file names of the maps
     """
-    material = UsdShade.Material.Define(stage, prim_path)
-    material.GetPrim().SetDisplayName(definition.name)
-    _add_open_pbr(material, definition, prefix)
-    _add_preview(material, definition, prefix)
+    material = UsdShade.Material.Define(usd_stage, prim_path)
+    material.GetPrim().SetDisplayName(open_pbr_material.name)
+    _add_open_pbr(material, open_pbr_material, file_prefix)
+    _add_preview(material, open_pbr_material, file_prefix)
     return material
 
 
-def _add_open_pbr(material: UsdShade.Material, definition: OpenPbrMaterial, prefix: str) -> None:
+def _add_open_pbr(material: UsdShade.Material, open_pbr_material: OpenPbrMaterial, file_prefix: str) -> None:
     prim = material.GetPrim()
     prim.AddAppliedSchema("MaterialXConfigAPI")  # its plug-in is not part of usd-core
     prim.CreateAttribute("config:mtlx:version", Sdf.ValueTypeNames.String, False).Set("1.39")
     surface = _add_shader(material, "open_pbr", "ND_open_pbr_surface_surfaceshader")
-    for key, value in definition.values.items():
+    for key, value in open_pbr_material.values.items():
         _set_input(surface, key, value)
-    if definition.maps:
+    if open_pbr_material.maps:
         uv_node = _add_shader(material, "place", "ND_geompropvalue_vector2")
         uv_node.CreateInput("geomprop", Sdf.ValueTypeNames.String).Set(_UV_PRIMVAR)
         uv = uv_node.CreateOutput("out", Sdf.ValueTypeNames.Float2)
-    for key, role in definition.maps.items():
+    for key, role in open_pbr_material.maps.items():
         map_type, types = MAP_TYPES[role], Sdf.ValueTypeNames
         usd_type = {"color3": types.Color3f, "float": types.Float, "vector3": types.Float3}[map_type.type]
-        image = _add_shader(material, f"{role}_image", _IMAGE_NODES[map_type.type])
+        image = _add_shader(material, f"{role}_image", _IMAGE_NODE_BY_TYPE[map_type.type])
         file = image.CreateInput("file", types.Asset)
-        file.Set(Sdf.AssetPath(f"./{prefix}{role}.png"))
+        file.Set(Sdf.AssetPath(f"./{file_prefix}{role}.png"))
         file.GetAttr().SetColorSpace(map_type.space or "raw")
         image.CreateInput("texcoord", types.Float2).ConnectToSource(uv)
         output = image.CreateOutput("out", usd_type)
@@ -130,30 +132,32 @@ def _add_open_pbr(material: UsdShade.Material, definition: OpenPbrMaterial, pref
     material.CreateSurfaceOutput("mtlx").ConnectToSource(out)
 
 
-def _add_preview(material: UsdShade.Material, definition: OpenPbrMaterial, prefix: str) -> None:
+def _add_preview(material: UsdShade.Material, open_pbr_material: OpenPbrMaterial, file_prefix: str) -> None:
     """Add a UsdPreviewSurface with the material's colour, without subsurface scattering.
 
-    prefix : prefix of the file names of the maps
+    file_prefix : prefix of the file names of the maps
     """
     types = Sdf.ValueTypeNames
     surface = _add_shader(material, "preview", "UsdPreviewSurface")
-    luminance = float(np.max(definition.values.get("emission_luminance", 0.0)))
-    for key, value in definition.values.items():
-        if key in _PREVIEW_INPUTS and not (key == "base_color" and "subsurface_color" in definition.maps):
+    luminance = float(np.max(open_pbr_material.values.get("emission_luminance", 0.0)))
+    for key, value in open_pbr_material.values.items():
+        if key in _PREVIEW_INPUTS and not (
+            key == "base_color" and "subsurface_color" in open_pbr_material.maps
+        ):
             radiance = tuple(luminance * np.array(value)) if key == "emission_color" else value
             _set_input(surface, _PREVIEW_INPUTS[key], radiance)
     uv = None
-    for key, role in definition.maps.items():
+    for key, role in open_pbr_material.maps.items():
         if key not in _PREVIEW_INPUTS:
             continue
-        is_cut = role == "parts_colour" and "geometry_opacity" in definition.maps
+        is_cut = role == "parts_colour" and "geometry_opacity" in open_pbr_material.maps
         file, map_type = "parts_cutout" if is_cut else role, MAP_TYPES[role]
         if uv is None:
             uv_node = _add_shader(material, "preview_place", "UsdPrimvarReader_float2")
             uv_node.CreateInput("varname", types.String).Set(_UV_PRIMVAR)
             uv = uv_node.CreateOutput("result", types.Float2)
         texture = _add_shader(material, f"preview_{role}", "UsdUVTexture")
-        texture.CreateInput("file", types.Asset).Set(Sdf.AssetPath(f"./{prefix}{file}.png"))
+        texture.CreateInput("file", types.Asset).Set(Sdf.AssetPath(f"./{file_prefix}{file}.png"))
         texture.CreateInput("sourceColorSpace", types.Token).Set(map_type.preview_space)
         texture.CreateInput("st", types.Float2).ConnectToSource(uv)
         for wrap in ("wrapS", "wrapT"):

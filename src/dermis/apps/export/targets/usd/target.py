@@ -21,7 +21,7 @@ from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
 
 _PACKAGE_SUFFIX, _BINARY_SUFFIX = ".usdz", ".usdc"
-_UNIT_PARAMETER = Parameter("metersPerUnit", 1.0, "m", "unit of all lengths, also in materials")
+_METERS_PER_UNIT_PARAMETER = Parameter("metersPerUnit", 1.0, "m", "unit of all lengths, also in materials")
 
 
 class Usd(OpenPbr):
@@ -40,11 +40,11 @@ class Usd(OpenPbr):
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the OpenPBR parameters for which the random walk is closest to the reference profile."""
-        return (*super().parameters(subject, version), _UNIT_PARAMETER)
+        return (*super().parameters(subject, version), _METERS_PER_UNIT_PARAMETER)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return published diffuse mean free paths in place of OpenPBR's mean free paths."""
-        return (*super().naive_parameters(subject, version), _UNIT_PARAMETER)
+        """Return parameters with published diffuse mean free paths, where OpenPBR expects mean free paths."""
+        return (*super().naive_parameters(subject, version), _METERS_PER_UNIT_PARAMETER)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the stage, with the maps beside the stage file or inside the .usdz package."""
@@ -63,25 +63,25 @@ class Usd(OpenPbr):
         return [file]
 
 
-def _write_stage(subject: Subject, parameters: Parameters, file: Path, prefix: str) -> list[Path]:
+def _write_stage(subject: Subject, parameters: Parameters, stage_path: Path, map_prefix: str) -> list[Path]:
     """Write the stage file, and the maps beside the stage file; return the paths of the maps.
 
-    prefix : prefix of the file names of the maps
+    map_prefix : prefix of the file names of the maps
     """
     from dermis.apps.export.targets.usd.stage import build_stage
 
-    maps, head = write_maps(subject, file.parent, prefix), subject.head_or_ball
+    maps, head = write_maps(subject, stage_path.parent, map_prefix), subject.head_or_ball
     definitions = mesh_materials(subject, get_radii_mm(parameters, OPEN_PBR), maps)
     eye_pictures = subject.eye_pictures()
     if head.eyes is not None and eye_pictures is not None:
-        maps["eye"] = file.parent / f"{prefix}eye.png"
+        maps["eye"] = stage_path.parent / f"{map_prefix}eye.png"
         maps["eye"].write_bytes(encode_map_files({"eye": eye_pictures.colour})["eye"])
         for material in definitions.keys() & set(head.eyes.material.tolist()):
             definitions[material] = eye_material(head.mesh.materials[material].name)
-    part_pictures = write_part_pictures(subject, file.parent, prefix, ["cutout"])
-    stage = build_stage(head, Path(subject.name).stem or subject.name, definitions, prefix)
-    if not stage.GetRootLayer().Export(str(file)):
-        refuse(file.name, "a stage that USD can write", "it failed", "Choose another name")
+    part_pictures = write_part_pictures(subject, stage_path.parent, map_prefix, ["cutout"])
+    stage = build_stage(head, Path(subject.name).stem or subject.name, definitions, map_prefix)
+    if not stage.GetRootLayer().Export(str(stage_path)):
+        refuse(stage_path.name, "a stage that USD can write", "it failed", "Choose another name")
     return [*maps.values(), *part_pictures]
 
 

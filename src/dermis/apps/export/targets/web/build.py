@@ -18,7 +18,7 @@ from dermis.apps.export.targets.web.maps import (
     read_texels,
 )
 from dermis.apps.export.targets.web.packing import ByteRunCollector
-from dermis.apps.export.targets.web.sliders import Slider, node_changes, node_inputs
+from dermis.apps.export.targets.web.sliders import Slider, slider_frame_changes, slider_frame_inputs
 from dermis.frame.capture import ADAPTER_KINDS, capture_frame, capture_renderer, reduce_hair
 from dermis.frame.features.shading.view import pinhole
 from dermis.frame.inputs import FrameInputs
@@ -28,7 +28,7 @@ from dermis.scene.lights import Light, SpotLight
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-OnRenderer = Callable[[Renderer, Scene, Settings], None]
+OnFramesCaptured = Callable[[Renderer, Scene, Settings], None]
 PAGE_TECHNIQUES = ("texture-space", "none")
 PICTURE_SIDES = {"gpu": (512, 1024, 1600), "software": (512,)}
 """Sides of the square pictures for each kind of adapter [pixel]."""
@@ -40,13 +40,13 @@ INTERACTIVE_QUALITY = {"software": (256, 1, 2)}
 class PageContent:
     """Data that the web page embeds: frames, buffers, maps and the poster.
 
-    frames_by_kind : dictionary from kind of adapter, "gpu" or "software", to the JSON of its captured frames
-    byte_runs : collector that stores and compresses the data of buffers and textures
-    maps : maps encoded as pictures
-    pictures : WebP files of the maps, to which `picture_entries` refers by index
-    picture_entries : dictionary from (role, mip level, layer) of a map to three integers: index in
-        `pictures`, index in `ByteRunCollector.runs` of the curves that decode the channels, and number of
-        colour channels
+    frames_by_kind : JSON of the captured frames for each kind of adapter, "gpu" or "software"
+    byte_runs : compressed data of buffers and textures
+    maps : layers of maps, encoded as WebP images
+    pictures : WebP files of these images, in the order in which the page stores them
+    picture_entries : entry for each image, by role, mip level and layer of the map; an entry consists of the
+        index in `pictures`, the index in `byte_runs` of the curves that decode the channels, and the number
+        of colour channels
     poster : (h, w, 3) sRGB picture that the page shows until it renders
     """
 
@@ -58,7 +58,7 @@ class PageContent:
     poster: NDArray[np.uint8] | None = None
 
     def add_picture(self, picture_key: PictureKey) -> tuple[int, int, int]:
-        """Add the picture of a layer of a map unless present; return its entry in `picture_entries`.
+        """Add the WebP file of one layer of a map, unless present; return its entry in `picture_entries`.
 
         picture_key : role, mip level and layer of the map
         """
@@ -93,7 +93,7 @@ class PageRequest:
     adapter: str = "auto"
     interactive: dict[str, tuple[int, int, int]] = field(default_factory=dict)
 
-    def frames(self, adapter_kind: str) -> Iterator[tuple[Settings, int]]:
+    def frame_settings(self, adapter_kind: str) -> Iterator[tuple[Settings, int]]:
         """Yield the settings of each frame, and the number of hairs drawn as one hair (0 at full quality).
 
         adapter_kind : kind of adapter, "gpu" or "software"
@@ -116,105 +116,116 @@ class PageRequest:
         return self.settings.model_copy(update={"size": (picture_side, picture_side), **diffusion})
 
 
-def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: None) -> PageContent:
+def build_page_content(
+    page_request: PageRequest, on_frames_captured: OnFramesCaptured = lambda *_: None
+) -> PageContent:
     """Capture the frames of all kinds of adapter, and return the data that the page embeds.
 
-    on_renderer : function called for each kind of adapter, once the renderer holds the maps of the page; it
-        receives the renderer, the scene and the settings; tests compare the renderer with the page
+    on_frames_captured : function called for each kind of adapter after its frames were captured, with the
+        renderer (which then uses the maps of the page), the scene and the settings
     """
     content = PageContent()
-    for adapter_kind in (one for one in ADAPTER_KINDS if request.sizes.get(one)):
-        renderer = capture_renderer(adapter_kind, request.adapter)
-        content.frames_by_kind[adapter_kind] = _capture_frames(content, renderer, request, adapter_kind)
-        settings = request.settings_for(request.sizes[adapter_kind][0])
-        on_renderer(renderer, request.scene, settings)
+    for adapter_kind in (one for one in ADAPTER_KINDS if page_request.sizes.get(one)):
+        renderer = capture_renderer(adapter_kind, page_request.adapter)
+        content.frames_by_kind[adapter_kind] = _capture_frames(content, renderer, page_request, adapter_kind)
+        settings = page_request.settings_for(page_request.sizes[adapter_kind][0])
+        on_frames_captured(renderer, page_request.scene, settings)
         if content.poster is None:
-            content.poster = renderer.draw(request.scene, settings).srgb8()
+            content.poster = renderer.draw(page_request.scene, settings).srgb8()
     return content
 
 
 def _capture_frames(
-    content: PageContent, renderer: Renderer, request: PageRequest, adapter_kind: str
+    page_content: PageContent, renderer: Renderer, page_request: PageRequest, adapter_kind: str
 ) -> Json:
-    """Capture the frames for one kind of adapter, add the data to `content`, and return the frames' JSON.
+    """Capture the frames for one kind of adapter, add their data to `page_content`, and return their JSON.
 
     adapter_kind : kind of adapter, "gpu" or "software"
     """
     capture, frames, slider_changes = FrameCapture(renderer.device), list[NamedFrame](), list[Json]()
     base: FrameInputs | None = None
-    for settings, merged_hairs in request.frames(adapter_kind):
-        inputs = renderer.prepare(request.scene, settings)
+    for settings, merged_hairs in page_request.frame_settings(adapter_kind):
+        inputs = renderer.prepare(page_request.scene, settings)
         base, picture = base or inputs, inputs.resources.post.picture
         captured = reduce_hair(capture_frame(capture, inputs), merged_hairs)
         frames.append(NamedFrame(settings.technique, captured, picture, settings.size, merged_hairs))
-        changes = _frame_changes(content.byte_runs, renderer, request, settings, inputs, frames[-1])
+        changes = _frame_changes(page_content.byte_runs, renderer, page_request, settings, inputs, frames[-1])
         slider_changes.append(changes)
     captured_frames = [frame.captured for frame in frames]
-    picture_maps = content.maps.replace_textures(renderer, capture, captured_frames)
+    picture_maps = page_content.maps.replace_textures(renderer, capture, captured_frames)
     steps = quantise_hairs(renderer, capture, captured_frames)
-    kind_json = frames_json(capture, frames, picture_maps, steps, content.byte_runs)
+    kind_json = frames_json(capture, frames, picture_maps, steps, page_content.byte_runs)
     for frame_json, changes in zip(kind_json["frames"], slider_changes, strict=True):
         frame_json["dials"] = changes
-    kind_json["maps"] = {str(index): _mip_entries(content, one) for index, one in picture_maps.items()}
+    kind_json["maps"] = {str(index): _mip_entries(page_content, one) for index, one in picture_maps.items()}
     assert base is not None
-    kind_json["hands"] = _interaction_json(request.scene, base)
-    kind_json["colours"] = _colour_maps(content, renderer, request, picture_maps)
+    kind_json["hands"] = _interaction_json(page_request.scene, base)
+    kind_json["colours"] = _colour_maps(page_content, renderer, page_request, picture_maps)
     return kind_json
 
 
 def _frame_changes(
     byte_runs: ByteRunCollector,
     renderer: Renderer,
-    request: PageRequest,
+    page_request: PageRequest,
     settings: Settings,
-    default_inputs: FrameInputs,
+    default_frame_inputs: FrameInputs,
     named_frame: NamedFrame,
 ) -> Json:
-    """Return as JSON how a frame's records and buffers change at each node of each slider.
+    """Return as JSON how a frame's uniform records and buffers change when a slider is moved.
 
-    A node is a value of a slider for which a frame is captured.
+    For each slider, the JSON contains the changes at each value for which a frame is captured.
 
-    default_inputs : inputs of the frame with all sliders at their default values
+    default_frame_inputs : inputs of the frame with all sliders at their default values
+    named_frame : captured frame with all sliders at their default values
     """
     capture = FrameCapture(renderer.device)
 
-    def node_json(inputs: FrameInputs | None) -> Json | None:
-        if inputs is None:
+    def slider_frame_json(frame_inputs: FrameInputs | None) -> Json | None:
+        if frame_inputs is None:
             return None
-        node = reduce_hair(capture_frame(capture, inputs), named_frame.merged_hairs)
-        return node_changes(named_frame.captured, node, byte_runs)
+        node = reduce_hair(capture_frame(capture, frame_inputs), named_frame.merged_hairs)
+        return slider_frame_changes(named_frame.captured, node, byte_runs)
 
     return {
         slider.name: [
-            *map(node_json, node_inputs(slider, lambda one: renderer.prepare(one, settings), default_inputs))
+            *map(
+                slider_frame_json,
+                slider_frame_inputs(
+                    slider, lambda one: renderer.prepare(one, settings), default_frame_inputs
+                ),
+            )
         ]
-        for slider in request.sliders
+        for slider in page_request.sliders
     }
 
 
-def _mip_entries(content: PageContent, picture_map: PictureMap) -> list[list[tuple[int, int, int]]]:
-    """Return the entries in `PageContent.picture_entries` for all layers of each mip level of a map."""
-    layers = 1 + max(layer for role, _, layer in content.maps.pictures if role == picture_map.role)
+def _mip_entries(page_content: PageContent, picture_map: PictureMap) -> list[list[tuple[int, int, int]]]:
+    """Return an entry of `PageContent.picture_entries` for each layer of each mip level of a map."""
+    layers = 1 + max(layer for role, _, layer in page_content.maps.pictures if role == picture_map.role)
     return [
-        [content.add_picture((picture_map.role, mip, k)) for k in range(layers)]
+        [page_content.add_picture((picture_map.role, mip, k)) for k in range(layers)]
         for mip in range(picture_map.mips)
     ]
 
 
-def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
+def _colour_maps(
+    page_content: PageContent, renderer: Renderer, page_request: PageRequest, picture_maps: PictureMaps
+) -> Json:
     """Return the JSON of the colour maps that replace the head's colour map when a slider is moved.
 
-    The JSON contains the resource index of the head's colour map and, for each slider, an entry of
-    `PageContent.picture_entries` for each captured value.
+    The JSON contains the resource index of the head's colour map. For each slider, it contains one entry of
+    `PageContent.picture_entries` per captured value.
     """
-    map_index = next((k for k, one in maps.items() if one.role == "colour_map"), None)
+    map_index = next((k for k, one in picture_maps.items() if one.role == "colour_map"), None)
     if map_index is None:
         return {}
-    settings, entries = request.settings_for(min(map(min, request.sizes.values()))), {}
-    for slider in (one for one in request.sliders if not one.changes_pose_only):
+    settings, entries = page_request.settings_for(min(map(min, page_request.sizes.values()))), {}
+    for slider in (one for one in page_request.sliders if not one.changes_pose_only):
         scenes = enumerate(slider.scenes)
         nodes = [
-            _colour_map_entry(content, renderer, one, settings, f"{slider.name} {k}") for k, one in scenes
+            _colour_map_entry(page_content, renderer, one, settings, f"{slider.name} {k}")
+            for k, one in scenes
         ]
         if any(nodes):
             entries[slider.name] = nodes
@@ -222,31 +233,31 @@ def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest,
 
 
 def _colour_map_entry(
-    content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, role: str
+    page_content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, map_role: str
 ) -> tuple[int, int, int] | None:
-    """Return the picture entry of the colour map of a scene; None if it is the head's default colour map.
+    """Return the entry in `PageContent.picture_entries` of a scene's colour map; None for the default map.
 
     scene : scene at a captured value of a slider; None at the default value
-    role : role under which the picture is stored
+    map_role : role under which the map is stored, such as "melanin 0"
     """
     if scene is None:
         return None
-    if (role, 0, 0) not in content.maps.pictures:
+    if (map_role, 0, 0) not in page_content.maps.pictures:
         capture = FrameCapture(renderer.device)
         texture = renderer.prepare(scene, settings).bindings["colour_map"]
-        texels = read_texels(capture, capture.resource(texture), 0)[0]
-        if content.maps.matches_picture("colour_map", texels):
+        texels = read_texels(capture, capture.index_of_resource(texture), 0)[0]
+        if page_content.maps.matches_picture("colour_map", texels):
             return None
-        content.maps.pictures[role, 0, 0] = encode_picture(texels, True)
-    return *content.add_picture((role, 0, 0))[:2], 3
+        page_content.maps.pictures[map_role, 0, 0] = encode_picture(texels, True)
+    return *page_content.add_picture((map_role, 0, 0))[:2], 3
 
 
-def _interaction_json(scene: Scene, inputs: FrameInputs) -> Json:
+def _interaction_json(scene: Scene, frame_inputs: FrameInputs) -> Json:
     """Return the JSON that the page needs to move the camera and the lights.
 
     The JSON also contains the points of the head's outline, around which the page fits shadow maps.
     """
-    camera, settings = scene.camera, inputs.settings
+    camera, settings = scene.camera, frame_inputs.settings
     projection, outline = pinhole(camera, scene.head, settings), scene.head.mesh.outline
     return {
         "centre": [*flat_tuple(scene.head.centre_mm)],
@@ -257,7 +268,7 @@ def _interaction_json(scene: Scene, inputs: FrameInputs) -> Json:
             "half": list(projection.window.half),
             "shift": list(projection.window.shift),
         },
-        "samples": inputs.camera_views.sample_positions.tolist(),
+        "samples": frame_inputs.camera_views.sample_positions.tolist(),
         "outline": np.asarray(outline.points_mm, np.float32).round(3).ravel().tolist(),
         "slack": outline.margin_mm,
         "middle": list(outline.centre_mm),

@@ -35,10 +35,10 @@ class NamedFrame:
 
 
 class PictureMap(NamedTuple):
-    """Map of the head whose first mip levels are stored as WebP pictures.
+    """Map of the head, of which the first mip levels are stored as WebP images.
 
     role : name of the map's binding in shaders, such as "colour_map"
-    mips : number of mip levels stored as pictures
+    mips : number of mip levels stored as WebP images
     mip_passes : passes that compute the remaining mip levels on the device; None if these levels are stored
         as texels
     """
@@ -53,62 +53,69 @@ PictureMaps = dict[int, PictureMap]
 
 
 def frames_json(
-    capture: FrameCapture,
-    frames: list[NamedFrame],
+    frame_capture: FrameCapture,
+    named_frames: list[NamedFrame],
     picture_maps: PictureMaps,
     quantisation_steps: dict[int, tuple[float, ...]],
     byte_runs: ByteRunCollector,
 ) -> Json:
-    """Return the JSON of frames with shaders, resources and passes, and collect the data of the resources.
+    """Return captured frames as JSON (shaders, resources and passes); add their data to `byte_runs`.
 
     Data that is all zero is not stored, as the page creates resources filled with zeros.
 
-    picture_maps : dictionary from resource index to map, for the maps that are stored as pictures
-    quantisation_steps : dictionary from the resource index of a buffer with rounded vectors to the rounding
-        step of each vector component
-    byte_runs : collector of the data; the JSON refers to the data by index of the byte run
+    picture_maps : dictionary from resource index to map, for the maps that are stored as WebP images
+    quantisation_steps : for each buffer of rounded vectors, by resource index, the rounding step of each
+        vector component
+    byte_runs : collector of buffer and texture data, to which the JSON refers by index
     """
-    pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
-    captured_frames = [frame.captured for frame in frames]
-    contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TRIANGLE_TABLE_BINDINGS))
-    for index in resources_read_before_write(capture, captured_frames):
+    pictures = [
+        [frame_capture.index_of_resource(f.picture.bytes), frame_capture.index_of_resource(f.picture.exposed)]
+        for f in named_frames
+    ]
+    captured_frames = [frame.captured for frame in named_frames]
+    contents, tables = {}, set(resources_bound_as(frame_capture, captured_frames, _TRIANGLE_TABLE_BINDINGS))
+    for index in resources_read_before_write(frame_capture, captured_frames):
         if index in quantisation_steps:
             floats = (
-                capture.read_content(index)[0].view(np.float32).reshape(-1, len(quantisation_steps[index]))
+                frame_capture.read_content(index)[0]
+                .view(np.float32)
+                .reshape(-1, len(quantisation_steps[index]))
             )
             contents[index] = [byte_runs.add_floats(floats, quantisation_steps[index])]
             continue
         _, picture_count, mip_passes = picture_maps.get(index, PictureMap("", 0, None))
-        mips = [] if mip_passes else _mip_bytes(capture, index)[picture_count:]
+        mips = [] if mip_passes else _mip_bytes(frame_capture, index)[picture_count:]
         if any(one.any() for one in mips):
-            add = byte_runs.add if index not in tables else _column_packer(byte_runs)
+            add = byte_runs.add if index not in tables else _triangle_column_packer(byte_runs)
             contents[index] = [-1] * picture_count + [add(one) for one in mips]
     return {
-        "shaders": capture.shaders,
-        "programs": [_program_json(one) for one in capture.programs],
-        "resources": [_camel_keys(one) for one in capture.resources],
-        "structs": {name: _struct_json(dtype) for name, dtype in capture.structs.items()},
+        "shaders": frame_capture.shaders,
+        "programs": [_program_json(one) for one in frame_capture.programs],
+        "resources": [_with_camel_case_keys(one) for one in frame_capture.resources],
+        "structs": {name: _struct_json(dtype) for name, dtype in frame_capture.structs.items()},
         "contents": contents,
-        "frames": [_frame_json(one, k, byte_runs) for one, k in zip(frames, pictures, strict=True)],
+        "frames": [_frame_json(one, k, byte_runs) for one, k in zip(named_frames, pictures, strict=True)],
         "halved": {k: _passes_json(m.mip_passes, byte_runs) for k, m in picture_maps.items() if m.mip_passes},
     }
 
 
-def _column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], int]:
-    """Return a function that adds a triangle table to `byte_runs` and returns the index of the byte run.
+def _triangle_column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], int]:
+    """Return a function that adds a buffer of triangle data to `byte_runs` and returns its index there.
 
-    A triangle table consists of three columns of equal length, stored one after another. Each column is
-    packed separately.
+    The buffer contains three columns of equal length, one after another. Each column is packed separately.
     """
     return lambda data: byte_runs.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
-def _mip_bytes(capture: FrameCapture, resource_index: int) -> list[Bytes]:
+def _mip_bytes(frame_capture: FrameCapture, resource_index: int) -> list[Bytes]:
     """Return the bytes of each mip level of a texture, with all layers of the level joined.
 
     resource_index : index of the texture or buffer in the capture
     """
-    parts, layers = capture.read_content(resource_index), capture.resources[resource_index].get("size")
+    parts, layers = (
+        frame_capture.read_content(resource_index),
+        frame_capture.resources[resource_index].get("size"),
+    )
     count = layers[2] if isinstance(layers, list) else 1
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
@@ -129,26 +136,28 @@ def _frame_json(named_frame: NamedFrame, picture_entry: list[int], byte_runs: By
     }
 
 
-def _view_record_index(captured: CapturedFrame, stage_name: str) -> int:
+def _view_record_index(captured_frame: CapturedFrame, stage_name: str) -> int:
     """Return the index of the uniform record with a stage's view matrices; -1 if there is no such record.
 
     stage_name : "visibility" or "shadows"
     """
-    views = [k for k, (struct, _) in enumerate(captured.records) if struct == "Views"]
-    records = (-1 - k for one in captured.passes if one.stage == stage_name for k in one.bound if k < 0)
+    views = [k for k, (struct, _) in enumerate(captured_frame.records) if struct == "Views"]
+    records = (-1 - k for one in captured_frame.passes if one.stage == stage_name for k in one.bound if k < 0)
     return next((k for k in records if k in views), -1)
 
 
-def _passes_json(captured: CapturedFrame, byte_runs: ByteRunCollector) -> list[Json]:
+def _passes_json(captured_frame: CapturedFrame, byte_runs: ByteRunCollector) -> list[Json]:
     """Return the JSON of a frame's passes, and store the data that the host writes to buffers."""
-    writes = ((one, one.written) for one in captured.passes)
+    writes = ((one, one.written) for one in captured_frame.passes)
     return [{**vars(one), "written": data and (data[0], byte_runs.add(data[1]))} for one, data in writes]
 
 
 def _program_json(program_entry: Json) -> Json:
     return {
         **program_entry,
-        "bindings": [(index, name, _camel_keys(entry)) for index, name, entry in program_entry["bindings"]],
+        "bindings": [
+            (index, name, _with_camel_case_keys(entry)) for index, name, entry in program_entry["bindings"]
+        ],
     }
 
 
@@ -158,17 +167,17 @@ def _struct_json(dtype: np.dtype[Any]) -> Json:
     return {"size": dtype.itemsize, "members": members}
 
 
-def _member_json(dtype: np.dtype[Any], offset: int) -> list[int] | Json:
+def _member_json(dtype: np.dtype[Any], byte_offset: int) -> list[int] | Json:
     base = dtype.base
     if base.fields is None:
-        return [offset // 4, dtype.itemsize // 4]
-    return {"offset": offset // 4, "each": base.itemsize // 4, "members": _struct_json(base)["members"]}
+        return [byte_offset // 4, dtype.itemsize // 4]
+    return {"offset": byte_offset // 4, "each": base.itemsize // 4, "members": _struct_json(base)["members"]}
 
 
-def _camel_keys(nested_value: object) -> object:
+def _with_camel_case_keys(nested_value: object) -> object:
     """Return nested dictionaries with their keys in camel case, as WebGPU's JavaScript interface requires."""
     if isinstance(nested_value, dict):
-        return {_camel_case(name): _camel_keys(one) for name, one in nested_value.items()}
+        return {_camel_case(name): _with_camel_case_keys(one) for name, one in nested_value.items()}
     return nested_value
 
 
@@ -177,28 +186,30 @@ def _camel_case(snake_case: str) -> str:
     return first + "".join(word.title() for word in others)
 
 
-def resources_read_before_write(capture: FrameCapture, frames: Frames) -> list[int]:
+def resources_read_before_write(frame_capture: FrameCapture, captured_frames: Frames) -> list[int]:
     """Return the sorted indices of the resources that a frame reads before writing to them.
 
     The page stores the data of these resources. A view of a texture counts as the whole texture, so a texture
     counts as written if any part of the texture is written.
     """
     found: set[int] = set()
-    for frame in frames:
+    for frame in captured_frames:
         written: set[int] = set()
         for one in frame.passes:
-            found |= {base_resource(capture, k) for k in resources_read_by(capture, one)} - written
-            written |= {base_resource(capture, k) for k in resources_written_by(capture, one)}
+            found |= {
+                viewed_resource(frame_capture, k) for k in resources_read_by(frame_capture, one)
+            } - written
+            written |= {viewed_resource(frame_capture, k) for k in resources_written_by(frame_capture, one)}
     return sorted(found)
 
 
 def resources_bound_as(
-    capture: FrameCapture, frames: Frames, binding_names: tuple[str, ...]
+    frame_capture: FrameCapture, captured_frames: Frames, binding_names: tuple[str, ...]
 ) -> dict[int, str]:
-    """Return a dictionary from resource index to the name in `binding_names` under which shaders bind it."""
+    """Return the resources that shaders bind by one of the given names, as a dictionary by resource index."""
     found: dict[int, str] = {}
-    for one in (one for frame in frames for one in frame.passes if one.program is not None):
-        bound_names = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]
+    for one in (one for frame in captured_frames for one in frame.passes if one.program is not None):
+        bound_names = [name for _, name, _ in frame_capture.programs[one.program or 0]["bindings"]]
         found |= {
             k: name
             for k, name in zip(one.bound, bound_names, strict=True)
@@ -207,41 +218,41 @@ def resources_bound_as(
     return found
 
 
-def base_resource(capture: FrameCapture, resource_index: int) -> int:
+def viewed_resource(frame_capture: FrameCapture, resource_index: int) -> int:
     """Return the resource index of a view's texture; any other resource index is returned unchanged.
 
     resource_index : index of the texture or buffer in the capture
     """
-    return int(capture.resources[resource_index].get("of", resource_index))
+    return int(frame_capture.resources[resource_index].get("of", resource_index))
 
 
-def resources_read_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
+def resources_read_by(frame_capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may read.
 
     captured_pass : pass of a captured frame
     """
-    yield from (k for k, entry in _bound_entries(capture, captured_pass) if _allows_reading(entry))
+    yield from (k for k, entry in _binding_entries(frame_capture, captured_pass) if _allows_reading(entry))
     if captured_pass.raster and captured_pass.raster["indices"] >= 0:
         yield int(captured_pass.raster["indices"])
 
 
-def resources_written_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
+def resources_written_by(frame_capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may write.
 
     captured_pass : pass of a captured frame
     """
     if captured_pass.written:
         yield captured_pass.written[0]
-    yield from (k for k, entry in _bound_entries(capture, captured_pass) if _allows_writing(entry))
+    yield from (k for k, entry in _binding_entries(frame_capture, captured_pass) if _allows_writing(entry))
     if captured_pass.raster:
         yield from (
             int(captured_pass.raster[name]) for name in ("depth", "target") if captured_pass.raster[name] >= 0
         )
 
 
-def _bound_entries(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[tuple[int, Json]]:
+def _binding_entries(frame_capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[tuple[int, Json]]:
     if captured_pass.program is not None:
-        bindings = capture.programs[captured_pass.program]["bindings"]
+        bindings = frame_capture.programs[captured_pass.program]["bindings"]
         yield from (
             (k, entry) for k, (_, _, entry) in zip(captured_pass.bound, bindings, strict=True) if k >= 0
         )

@@ -1,4 +1,4 @@
-"""Maps of captured frames as WebP pictures, with 8 bits per channel and a curve that decodes each channel."""
+"""Maps of captured frames as WebP images, with 8 bits per channel and a curve that decodes each channel."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ PictureKey = tuple[str, int, int]
 MIN_PICTURE_SIDE = 64
 """Minimum side of a map that is stored as a picture [texel]."""
 _WEBP_QUALITY = 88
-_LEVEL_COUNT = 256
+_QUANTISATION_LEVEL_COUNT = 256
 _COLOUR_CHANNEL_COUNT = 3
 
 
 @dataclass(frozen=True)
 class Picture:
-    """One layer of a map, encoded as a WebP picture.
+    """One layer of a map, encoded as a WebP image.
 
-    data : WebP file: a colour picture for a colour map, otherwise a grey picture of the channels, stacked
+    data : WebP file: a colour image for a colour map, otherwise a grey image of the channels, stacked
         vertically
-    curves : (c, 256) value to which each of the 256 levels of a channel is decoded
-    texels : (h, w, c) texels decoded from the picture
+    curves : (c, 256) values to which the 8-bit values of each channel are decoded
+    texels : (h, w, c) texels decoded from the image
     """
 
     data: bytes
@@ -44,12 +44,14 @@ class Picture:
 
 
 def encode_picture(texels: Halves, is_colour_map: bool) -> Picture:
-    """Return one layer of a map encoded as a WebP picture.
+    """Return one layer of a map encoded as a WebP image.
 
     texels : (h, w, c) texels
     is_colour_map : whether the first three channels are a colour; all further channels are then constant
     """
-    curves = np.stack([_value_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])])
+    curves = np.stack(
+        [_quantisation_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])]
+    )
     steps = np.stack([_nearest_levels(texels[..., k], curves[k]) for k in range(len(curves))], axis=-1)
     image = (
         steps[..., :_COLOUR_CHANNEL_COUNT]
@@ -67,23 +69,23 @@ def encode_picture(texels: Halves, is_colour_map: bool) -> Picture:
     return Picture(data, curves.astype(np.float16), decoded.astype(np.float16))
 
 
-def _value_curve(texels: NDArray[np.float64]) -> NDArray[np.float64]:
+def _quantisation_curve(texels: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the 256 increasing values to which a channel is quantised, with smaller steps near 0.
 
     texels : texels of the channel, whose minimum and maximum are the ends of the curve
     """
     limits = np.array([texels.min(), texels.max()])
     first, last = np.sign(limits) * np.sqrt(np.abs(limits))
-    root = np.linspace(first, last, _LEVEL_COUNT)
+    root = np.linspace(first, last, _QUANTISATION_LEVEL_COUNT)
     return np.asarray(np.sign(root) * root * root)
 
 
-def _nearest_levels(texels: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Return the index of the curve value nearest to each texel.
+def _nearest_levels(texels: Halves, quantisation_curve: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Return, for each texel, the index of the nearest value in `quantisation_curve`.
 
-    curve : increasing values
+    quantisation_curve : increasing values to which texels are quantised
     """
-    midpoints = 0.5 * (curve[1:] + curve[:-1])
+    midpoints = 0.5 * (quantisation_curve[1:] + quantisation_curve[:-1])
     return np.searchsorted(midpoints, texels.astype(np.float64)).astype(np.uint8)
 
 
@@ -110,52 +112,56 @@ _MAP_ROLES = (_COLOUR_ROLE, "relief_map", "slope_map", "specular_map", "roughnes
 
 @dataclass
 class MapPictures:
-    """WebP pictures of all maps that the page stores; the keys are role, mip level and layer.
+    """Maps encoded as WebP images.
 
-    If the device can compute the further mip levels of a map, only the first level is stored.
+    If the device can compute the mip levels of a map, only mip level 0 is encoded.
+
+    pictures : one image for each layer of a mip level of a map; the keys are role, mip level and layer
     """
 
     pictures: dict[PictureKey, Picture] = field(default_factory=dict)
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
-    def matches_picture(self, role: str, texels: NDArray[np.float16]) -> bool:
-        """Return whether texels equal those that were encoded as the first picture of a role."""
-        return bool(np.array_equal(self._encoded_texels[role], texels))
+    def matches_picture(self, map_role: str, texels: NDArray[np.float16]) -> bool:
+        """Return whether texels equal the original texels of the first image encoded for a role."""
+        return bool(np.array_equal(self._encoded_texels[map_role], texels))
 
-    def replace_textures(self, renderer: Renderer, capture: FrameCapture, frames: Frames) -> PictureMaps:
-        """Encode the frames' maps as pictures, and upload the decoded texels to the renderer's textures.
+    def replace_textures(
+        self, renderer: Renderer, frame_capture: FrameCapture, captured_frames: Frames
+    ) -> PictureMaps:
+        """Encode the frames' maps as WebP images, and upload the decoded texels to the renderer's textures.
 
         The renderer then draws with the same maps as the page. Returns a dictionary from resource index to
         replaced map.
         """
         maps = {}
-        for index, role in _picture_textures(capture, frames).items():
-            texture, description = capture.resource_at(index), capture.resources[index]
+        for index, role in _picture_textures(frame_capture, captured_frames).items():
+            texture, description = frame_capture.resource_at(index), frame_capture.resources[index]
             side, storable = min(description["size"][:2]), description["usage"] & _STORAGE_BINDING_USAGE
             mips = (
                 1 if storable else sum(side >> mip >= MIN_PICTURE_SIDE for mip in range(description["mips"]))
             )
-            levels = [self._add_pictures(capture, index, role, mip) for mip in range(mips)]
+            levels = [self._add_pictures(frame_capture, index, role, mip) for mip in range(mips)]
             small_mips = range(mips, description["mips"] if mips > 1 else 0)
-            levels += [read_texels(capture, index, mip) for mip in small_mips]
+            levels += [read_texels(frame_capture, index, mip) for mip in small_mips]
             update_map(renderer, texture, levels)
-            maps[index] = PictureMap(role, mips, capture_mips(capture, texture) if storable else None)
+            maps[index] = PictureMap(role, mips, capture_mips(frame_capture, texture) if storable else None)
         return maps
 
     def _add_pictures(
-        self, capture: FrameCapture, resource_index: int, role: str, mip_level: int
+        self, frame_capture: FrameCapture, resource_index: int, map_role: str, mip_level: int
     ) -> NDArray[np.float16]:
-        """Add the pictures of a mip level, and return the (l, h, w, c) texels decoded from the pictures.
+        """Encode a mip level as WebP images, and return the (l, h, w, c) texels decoded from these images.
 
         resource_index : index of the texture or buffer in the capture
         mip_level : mip level, 0 for the full resolution
         """
-        layers = read_texels(capture, resource_index, mip_level)
+        layers = read_texels(frame_capture, resource_index, mip_level)
         for layer, texels in enumerate(layers):
-            if (role, mip_level, layer) not in self.pictures:
-                self.pictures[role, mip_level, layer] = encode_picture(texels, role == _COLOUR_ROLE)
-                self._encoded_texels.setdefault(role, texels)
-        return np.stack([self.pictures[role, mip_level, layer].texels for layer in range(len(layers))])
+            if (map_role, mip_level, layer) not in self.pictures:
+                self.pictures[map_role, mip_level, layer] = encode_picture(texels, map_role == _COLOUR_ROLE)
+                self._encoded_texels.setdefault(map_role, texels)
+        return np.stack([self.pictures[map_role, mip_level, layer].texels for layer in range(len(layers))])
 
 
 def with_reduced_maps(head: Head, max_side: int) -> Head:
@@ -174,39 +180,41 @@ def _reduce_map(texels: NDArray[np.float32], max_side: int) -> NDArray[np.float3
     return np.asarray(mip_chain(texels)[mip], np.float32)
 
 
-def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) -> dict[int, tuple[float, ...]]:
-    """Round the hair knots in the device's buffers to multiples of steps, so that the buffers compress well.
+def quantise_hairs(
+    renderer: Renderer, frame_capture: FrameCapture, captured_frames: Frames
+) -> dict[int, tuple[float, ...]]:
+    """Round the knots of hairs in the device's buffers, so that the buffers compress well.
 
-    Returns a dictionary from resource index of a buffer to the steps of x, y, z and radius of a knot [mm].
+    Returns the rounding steps of a knot's x, y, z and radius [mm] for each buffer, by resource index.
     """
-    buffers = resources_bound_as(capture, frames, ("knots",))
+    buffers = resources_bound_as(frame_capture, captured_frames, ("knots",))
     for index in buffers:
-        knots = capture.read_content(index)[0].view(np.float32).reshape(-1, len(_KNOT_STEPS_MM))
+        knots = frame_capture.read_content(index)[0].view(np.float32).reshape(-1, len(_KNOT_STEPS_MM))
         data = quantise(knots, _KNOT_STEPS_MM)
-        renderer.device.write(capture.resource_at(index), data.tobytes(), data.nbytes)
+        renderer.device.write(frame_capture.resource_at(index), data.tobytes(), data.nbytes)
     return dict.fromkeys(buffers, _KNOT_STEPS_MM)
 
 
-def read_texels(capture: FrameCapture, resource_index: int, mip_level: int) -> NDArray[np.float16]:
+def read_texels(frame_capture: FrameCapture, resource_index: int, mip_level: int) -> NDArray[np.float16]:
     """Return the (l, h, w, c) texels of a mip level of a half-float texture.
 
     resource_index : index of the texture or buffer in the capture
     """
-    width, height, layers = capture.resources[resource_index]["size"]
+    width, height, layers = frame_capture.resources[resource_index]["size"]
     sides = max(1, height >> mip_level), max(1, width >> mip_level)
-    parts = capture.read_content(resource_index)[mip_level * layers : (mip_level + 1) * layers]
+    parts = frame_capture.read_content(resource_index)[mip_level * layers : (mip_level + 1) * layers]
     return np.stack([one.view(np.float16).reshape(*sides, -1) for one in parts])
 
 
-def _picture_textures(capture: FrameCapture, frames: Frames) -> dict[int, str]:
-    """Return a dictionary from resource index to role, for the map textures that are stored as pictures.
+def _picture_textures(frame_capture: FrameCapture, captured_frames: Frames) -> dict[int, str]:
+    """Return a dictionary from resource index to role, for the map textures that are stored as WebP images.
 
     These are the half-float textures whose sides have at least `MIN_PICTURE_SIDE` texels. The role of a
     texture is its name in the shaders.
     """
     return {
         index: role
-        for index, role in resources_bound_as(capture, frames, _MAP_ROLES).items()
-        if capture.resources[index].get("format", "").endswith("16float")
-        and min(capture.resources[index]["size"][:2]) >= MIN_PICTURE_SIDE
+        for index, role in resources_bound_as(frame_capture, captured_frames, _MAP_ROLES).items()
+        if frame_capture.resources[index].get("format", "").endswith("16float")
+        and min(frame_capture.resources[index]["size"][:2]) >= MIN_PICTURE_SIDE
     }

@@ -1,4 +1,4 @@
-"""Compression of buffers: rows are replaced by differences, reordered by byte and compressed by gzip.
+"""Compression of buffers by gzip, after taking differences between rows and regrouping the bytes.
 
 The script packed.js of the page reverses these steps.
 """
@@ -40,14 +40,16 @@ class ByteRunCollector:
         self._data: list[bytes] = []
         self._end = 0
 
-    def add(self, raw_bytes: Bytes | bytes, layouts: Iterable[tuple[int, int, int]] | None = None) -> int:
+    def add(
+        self, raw_bytes: Bytes | bytes, candidate_layouts: Iterable[tuple[int, int, int]] | None = None
+    ) -> int:
         """Add a run of bytes, and return the run's index in `runs`.
 
-        layouts : layouts to try: bytes per word, words per row, and order of the differences; the layout with
-            the best compression is used
+        candidate_layouts : layouts to try, of which the best is used: bytes per word, words per row, and
+            order of the differences
         """
         raw = np.frombuffer(raw_bytes, np.uint8)
-        return self._add_run(raw, list(layouts or _possible_layouts(len(raw))), ())
+        return self._add_run(raw, list(candidate_layouts or _possible_layouts(len(raw))), ())
 
     def add_parts(self, encoded_parts: Iterable[Bytes]) -> int:
         """Add a run that concatenates separately encoded parts, and return the run's index in `runs`."""
@@ -66,12 +68,12 @@ class ByteRunCollector:
         return self._add_run(words.view(np.uint8).reshape(-1), layouts, column_steps)
 
     def _add_run(
-        self, raw_bytes: Bytes, layouts: list[tuple[int, int, int]], column_steps: tuple[float, ...]
+        self, raw_bytes: Bytes, candidate_layouts: list[tuple[int, int, int]], column_steps: tuple[float, ...]
     ) -> int:
         key = hashlib.sha256(raw_bytes.tobytes()).digest() + repr(column_steps).encode()
         if key not in self._run_indices:
             self._run_indices[key] = len(self.runs)
-            layout = _best_layout(raw_bytes, layouts)
+            layout = _best_layout(raw_bytes, candidate_layouts)
             planes = byte_planes(raw_bytes, *layout)
             self.runs.append((self._end, len(planes), *layout, column_steps))
             self._data.append(planes)
@@ -126,10 +128,10 @@ def _possible_layouts(byte_count: int) -> Iterable[tuple[int, int, int]]:
         yield from ((word, row, order) for order in _DIFFERENCE_ORDERS)
 
 
-def _best_layout(raw_bytes: Bytes, layouts: list[tuple[int, int, int]]) -> tuple[int, int, int]:
+def _best_layout(raw_bytes: Bytes, candidate_layouts: list[tuple[int, int, int]]) -> tuple[int, int, int]:
     """Return the layout with which a sample of the bytes compresses best.
 
-    layouts : layouts to try: bytes per word, words per row, and order of the differences
+    candidate_layouts : layouts to try: bytes per word, words per row, and order of the differences
     """
     sample = raw_bytes
     if len(raw_bytes) > _LAYOUT_SAMPLE_COUNT * _LAYOUT_SAMPLE_BYTES:
@@ -140,5 +142,6 @@ def _best_layout(raw_bytes: Bytes, layouts: list[tuple[int, int, int]]) -> tuple
         aligned = [start // _LAYOUT_SAMPLE_ALIGNMENT * _LAYOUT_SAMPLE_ALIGNMENT for start in starts]
         sample = np.concatenate([raw_bytes[start : start + _LAYOUT_SAMPLE_BYTES] for start in aligned])
     return min(
-        layouts, key=lambda layout: len(zlib.compress(byte_planes(sample, *layout), _TRIAL_ZLIB_LEVEL))
+        candidate_layouts,
+        key=lambda layout: len(zlib.compress(byte_planes(sample, *layout), _TRIAL_ZLIB_LEVEL)),
     )

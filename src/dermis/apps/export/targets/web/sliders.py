@@ -25,16 +25,16 @@ _SLIDER_EXPRESSIONS = {"smile": "full-smile", "open mouth": "open-jaw", "frown":
 """Expression at the upper end of a slider, by the slider's name."""
 _ROUGHNESS_FACTORS = (0.5, 1.0, 1.7)
 PIGMENT_FACTORS = (0.4, 1.0, 3.0)
-"""Factors of a person's melanin and blood at the nodes of their sliders."""
+"""Factors of a person's melanin and blood at the captured values of their sliders."""
 
 
 @dataclass(frozen=True)
 class Slider:
-    """Slider of the web page, which interpolates between frames captured at certain values (nodes).
+    """Slider of the web page, which interpolates between the frames captured at a few values.
 
-    values : increasing values of the nodes; one of them is `default_value`
+    values : increasing values for which frames are captured; one of them is `default_value`
     default_value : value with which the page starts
-    scenes : scene at each node; None at the node of the default value
+    scenes : scene at each of these values; None at the default value
     changes_pose_only : whether all `scenes` differ from the default scene only in the head's pose
     """
 
@@ -45,56 +45,56 @@ class Slider:
     changes_pose_only: bool = False
 
 
-def node_inputs(
-    slider: Slider, prepare_inputs: Callable[[Scene], FrameInputs], default_inputs: FrameInputs
+def slider_frame_inputs(
+    slider: Slider, prepare_frame_inputs: Callable[[Scene], FrameInputs], default_frame_inputs: FrameInputs
 ) -> Iterator[FrameInputs | None]:
-    """Yield the frame inputs at each node of a slider; None at the node of the default value.
+    """Yield the frame inputs at each captured value of a slider; None at the default value.
 
-    prepare_inputs : function that returns the frame inputs of a scene
-    default_inputs : frame inputs of the default scene
+    prepare_frame_inputs : function that returns the frame inputs of a scene
+    default_frame_inputs : frame inputs of the default scene
     """
     for scene in slider.scenes:
         if scene is None:
             yield None
         elif slider.changes_pose_only:
-            posed = prepare_inputs(scene)
-            yield replace(default_inputs, motion=posed.motion, view=posed.view)
+            posed = prepare_frame_inputs(scene)
+            yield replace(default_frame_inputs, motion=posed.motion, view=posed.view)
         else:
-            yield prepare_inputs(scene)
+            yield prepare_frame_inputs(scene)
 
 
-def node_changes(
-    default_frame: CapturedFrame, node_frame: CapturedFrame, byte_runs: ByteRunCollector
+def slider_frame_changes(
+    default_frame: CapturedFrame, moved_frame: CapturedFrame, byte_runs: ByteRunCollector
 ) -> Json:
-    """Return as JSON how the frame at a node of a slider differs from the frame at the default value.
+    """Return as JSON how the frame at one value of a slider differs from the frame at the default value.
 
-    Uniform records, and data that the host writes to buffers, are compared. Each change has the index of the
-    record or pass, the index of the first word that differs, and the index of the byte run with the
-    differences. Integers in records are not compared.
+    The floats in uniform records, and the data that the host writes to buffers, are compared. Each change has
+    the index of the record or pass, the index of the first word that differs, and the index of the
+    differences in `byte_runs`.
 
-    default_frame, node_frame : captured frames at the default value and at the node
+    default_frame, moved_frame : captured frames at the default value and at the other value
 
-    Raises DermisError if the node's frame has different passes.
+    Raises DermisError if the two frames have different passes.
     """
-    stages = [[one.stage for one in captured.passes] for captured in (default_frame, node_frame)]
+    stages = [[one.stage for one in captured.passes] for captured in (default_frame, moved_frame)]
     if stages[0] != stages[1]:
         refuse("slider", "the same passes at each of its nodes", "they differ", "Remove the slider")
-    pairs = enumerate(zip(default_frame.records, node_frame.records, strict=True))
+    pairs = enumerate(zip(default_frame.records, moved_frame.records, strict=True))
     records = [(k, (_record_floats(one), _record_floats(other))) for k, ((_, one), (_, other)) in pairs]
-    passes = enumerate(zip(default_frame.passes, node_frame.passes, strict=True))
+    passes = enumerate(zip(default_frame.passes, moved_frame.passes, strict=True))
     written = [
         (k, (_written_floats(one), _written_floats(other))) for k, (one, other) in passes if one.written
     ]
     return {
-        "records": _node_differences(records, byte_runs),
-        "written": _node_differences(written, byte_runs),
+        "records": _word_differences(records, byte_runs),
+        "written": _word_differences(written, byte_runs),
     }
 
 
-def _record_floats(record: UniformRecord) -> Floats:
+def _record_floats(uniform_record: UniformRecord) -> Floats:
     """Return the 4-byte words of a uniform record as floats, with 0 in place of integers."""
-    floats = np.frombuffer(record.tobytes(), "<f4").copy()
-    floats[~_float_word_mask(record.dtype)] = 0.0
+    floats = np.frombuffer(uniform_record.tobytes(), "<f4").copy()
+    floats[~_float_word_mask(uniform_record.dtype)] = 0.0
     return floats
 
 
@@ -112,7 +112,7 @@ def _written_floats(captured_pass: CapturedPass) -> Floats:
     return np.frombuffer(captured_pass.written[1] if captured_pass.written else b"", "<f4")
 
 
-def _node_differences(
+def _word_differences(
     indexed_value_pairs: list[tuple[int, tuple[Floats, Floats]]], byte_runs: ByteRunCollector
 ) -> list[tuple[int, int, int]]:
     changes = []
@@ -167,10 +167,10 @@ def _pigment_sliders(scene: Scene) -> list[Slider]:
     return sliders
 
 
-def _with_pigment(scene: Scene, maps: PaintedMaps, pigment_name: str, pigment_value: float) -> Scene:
+def _with_pigment(scene: Scene, painted_maps: PaintedMaps, pigment_name: str, pigment_value: float) -> Scene:
     assert scene.skin.pigments is not None
     pigments = scene.skin.pigments.model_copy(update={pigment_name: pigment_value})
     changed: Any = {pigment_name: pigment_value}
-    painted = replace(maps, look=replace(maps.look, **changed))
+    painted = replace(painted_maps, look=replace(painted_maps.look, **changed))
     skin = scene.skin.model_copy(update={"pigments": pigments})
     return replace(scene, head=replace(scene.head, maps=painted), skin=skin)

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.export.fitting import gaussian_curve
+from dermis.apps.export.fitting import cumulative_gaussian_profile
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, flat_tuple, get_numbers
 from dermis.apps.export.targets.pages.html import escape_script, render_page
@@ -49,28 +49,28 @@ _ATLAS_SIDE = 512
 _MAX_MAP_SIDE = 1024
 
 
-def page_html(content: build.PageContent, sliders: tuple[Slider, ...], title: str, note: str) -> str:
+def page_html(page_content: build.PageContent, sliders: tuple[Slider, ...], title: str, note: str) -> str:
     """Return the HTML of the page with all its data and scripts.
 
     title, note : plain text, which is escaped
     """
     scene = {
-        "forms": content.frames_by_kind,
-        "blobs": content.byte_runs.runs,
-        "images": [len(one) for one in content.pictures],
+        "forms": page_content.frames_by_kind,
+        "blobs": page_content.byte_runs.runs,
+        "images": [len(one) for one in page_content.pictures],
         "dials": [{"name": one.name, "values": one.values, "rest": one.default_value} for one in sliders],
     }
-    assert content.poster is not None
+    assert page_content.poster is not None
     return render_page(
         _PAGE_FOLDER,
         title=title,
         note=note,
         script=escape_script(player_script()),
         policy="img-src data:",
-        poster=f"data:image/webp;base64,{base64.b64encode(_encode_webp(content.poster)).decode()}",
+        poster=f"data:image/webp;base64,{base64.b64encode(_encode_webp(page_content.poster)).decode()}",
         scene=encode_seven_bits(gzip.compress(json.dumps(scene).encode(), 9, mtime=0)),
-        data=encode_seven_bits(content.byte_runs.compress()),
-        pictures=encode_seven_bits(b"".join(content.pictures)),
+        data=encode_seven_bits(page_content.byte_runs.compress()),
+        pictures=encode_seven_bits(b"".join(page_content.pictures)),
     )
 
 
@@ -80,11 +80,11 @@ def player_script() -> str:
     return "".join(_EXPORT_KEYWORD.sub("", _IMPORT_STATEMENT.sub("", text)) for text in texts)
 
 
-def _encode_webp(picture: NDArray[np.uint8]) -> bytes:
+def _encode_webp(poster: NDArray[np.uint8]) -> bytes:
     from PIL import Image
 
     file = io.BytesIO()
-    Image.fromarray(picture).save(file, "WEBP", quality=80)
+    Image.fromarray(poster).save(file, "WEBP", quality=80)
     return file.getvalue()
 
 
@@ -118,10 +118,10 @@ class Web(Target):
         """Return the exported parameters, as the page has no parameters that a user could set."""
         return self.parameters(subject, version)
 
-    def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
+    def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile of the Gaussians with which the page diffuses light."""
         _, variance, *weight = (np.array(get_numbers(parameters, one.name)) for one in parameters)
-        return gaussian_curve(variance, np.stack(weight, axis=1), subject.curve.energy)
+        return cumulative_gaussian_profile(variance, np.stack(weight, axis=1), subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Capture the frames of the scene, and write the page with these frames."""
@@ -133,7 +133,7 @@ class Web(Target):
         sliders, settings = scene_sliders(scene), Settings(atlas=_ATLAS_SIDE)
         sides, quality = build.PICTURE_SIDES, build.INTERACTIVE_QUALITY
         request = build.PageRequest(scene, sliders, settings, sides, self.adapter, quality)
-        text = page_html(build.build_content(request), sliders, subject.name, self.limitations)
+        text = page_html(build.build_page_content(request), sliders, subject.name, self.limitations)
         output.write_text(text, encoding="utf-8")
         return [output]
 

@@ -37,10 +37,10 @@ def bioskin_model(weights_path: Path) -> SpectralModel:
     layers = _read_layers(weights_path)
     positions = (WAVELENGTHS_NM - _FIRST_WAVELENGTH_NM) / _WAVELENGTH_STEP_NM
 
-    def reflectance(values: ParameterValues) -> Floats:
-        count = len(next(iter(values.values())))
+    def decode_reflectance(parameter_values: ParameterValues) -> Floats:
+        count = len(next(iter(parameter_values.values())))
         columns = (
-            np.broadcast_to(values.get(name, np.float64(_MIDDLE_INPUT_VALUES[name])), count)
+            np.broadcast_to(parameter_values.get(name, np.float64(_MIDDLE_INPUT_VALUES[name])), count)
             for name in _DECODER_INPUTS
         )
         x = np.stack(list(columns), axis=-1)
@@ -49,14 +49,14 @@ def bioskin_model(weights_path: Path) -> SpectralModel:
         spectrum = 1.0 / (1.0 + np.exp(-(x @ layers["fc_dec_out.weight"].T + layers["fc_dec_out.bias"])))
         return np.asarray(spectrum[:, positions.astype(int)], np.float64)
 
-    return reflectance
+    return decode_reflectance
 
 
 class _TensorReader(pickle.Unpickler):
     """Unpickler that loads a dictionary of tensors and refuses to construct any other object."""
 
     def find_class(self, module_name: str, name: str) -> object:
-        """Return a class or function that files of weights need; raise UnpicklingError for any other name."""
+        """Return a class or function that weight files need; raise UnpicklingError for any other name."""
         if (module_name, name) == ("torch._utils", "_rebuild_tensor_v2"):
             return lambda storage, offset, size, *rest: (storage, offset, size)
         if (module_name, name) == ("collections", "OrderedDict"):

@@ -1,4 +1,4 @@
-"""Constants that all people share and additions to the skin model, fitted to measured spectra."""
+"""Fits of the skin model's constants to measured spectra, and a skin model with additional constants."""
 
 from __future__ import annotations
 
@@ -61,15 +61,15 @@ _NOTABLE_CORRELATION = 0.85
 
 
 def extended_model(constants: Mapping[str, float]) -> ExtendedModel:
-    """Return the model of skin with the given constants; all other constants have the package's values."""
+    """Return an extended model of skin with given values of some of `CONSTANTS`, keyed by name."""
     return ExtendedModel(dict(constants))
 
 
 @dataclass(frozen=True)
 class ExtendedModel:
-    """Spectral model of skin with additions that the package's model does not have.
+    """Spectral model of skin with more pigments and constants than the package's model.
 
-    constants : values of some of `CONSTANTS`, used for parameters that a call of the model does not state
+    constants : values of some of `CONSTANTS`; the others have default values
     """
 
     constants: dict[str, float]
@@ -117,7 +117,11 @@ class ExtendedModel:
 
 
 def _blood_in_bands(oxygen: float, half_width_nm: float) -> Floats:
-    """Return the absorption (31,) of blood, averaged over triangular bands of wavelengths [1/mm]."""
+    """Return the absorption (31,) of blood, averaged over triangular wavelength bands [1/mm].
+
+    oxygen : fraction of haemoglobin that carries oxygen [-]
+    half_width_nm : half of the width of each band
+    """
     if half_width_nm < 0.5:
         return blood_absorption(WAVELENGTHS_NM, oxygen)
     offsets = np.linspace(-half_width_nm, half_width_nm, 21)
@@ -128,11 +132,12 @@ def _blood_in_bands(oxygen: float, half_width_nm: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class SharedFit:
-    """Result of a fit of constants that all spectra share and of separate unknowns for each spectrum.
+    """Result of a fit of a skin model to spectra: constants shared by all spectra, and unknowns of each.
 
     constants : values of the constants by name
     fit : unknowns of each spectrum
-    confounded : pairs of constants that the spectra hardly tell apart, with the correlation of their errors
+    confounded : names of two constants with strongly correlated errors, and the correlation, for each such
+        pair
     """
 
     constants: dict[str, float]
@@ -147,24 +152,28 @@ def fit_constants(
     criterion: Criterion = "spectrum",
     fixed_constants: Mapping[str, float] | None = None,
 ) -> SharedFit:
-    """Fit shared constants and each spectrum's unknowns in alternation, by least squares.
+    """Fit constants shared by all spectra, and unknowns of each spectrum, by least squares.
 
-    unknowns : names of the parameters that each spectrum has separately
-    free_constants : names of the `CONSTANTS` to fit, which all spectra share
+    unknowns : names of the parameters that are fitted to each spectrum separately
+    free_constants : names of the `CONSTANTS` that are fitted to all spectra together
     fixed_constants : values of constants that are not fitted
     """
     separate = [UNKNOWNS[name] for name in unknowns]
     shared = [CONSTANTS[name] for name in free_constants]
     z = np.array([one.coordinate(dict(fixed_constants or {}).get(one.name, one.start)) for one in shared])
 
-    def constants_at(point: Floats) -> dict[str, float]:
-        values = {one.name: float(one.parameter_values(point[i : i + 1])[0]) for i, one in enumerate(shared)}
+    def constants_at(coordinates: Floats) -> dict[str, float]:
+        values = {
+            one.name: float(one.parameter_values(coordinates[i : i + 1])[0]) for i, one in enumerate(shared)
+        }
         return dict(fixed_constants or {}) | values
 
-    def fit_unknowns(point: Floats, start: SpectralFit | None, iterations: int) -> tuple[SpectralFit, Floats]:
-        model = extended_model(constants_at(point))
-        first = None if start is None else start.values
-        found = invert_spectra(spectra, model, separate, criterion, first, iterations)
+    def fit_unknowns(
+        coordinates: Floats, start_fit: SpectralFit | None, iteration_count: int
+    ) -> tuple[SpectralFit, Floats]:
+        model = extended_model(constants_at(coordinates))
+        first = None if start_fit is None else start_fit.values
+        found = invert_spectra(spectra, model, separate, criterion, first, iteration_count)
         return found, found.weighted_residual(criterion).ravel()
 
     fit, r = fit_unknowns(z, None, 25)

@@ -19,7 +19,7 @@ ILLUMINANTS = {"D65": "", "A": "a", "FL11": "fl11", "LED-B3": "led_b3"}
 def colour_weights(illuminant: str) -> Floats:
     """Return weights (3, 31) that convert reflectance spectra to linear Rec. 709 colours.
 
-    The L*a*b* of a resulting colour under D65 equals that of the spectrum under the illuminant.
+    The colour has the same L*a*b* coordinates under D65 as the spectrum under the illuminant.
 
     illuminant : key of `ILLUMINANTS`
 

@@ -40,7 +40,7 @@ from dermis.optics.pigments.spectra import (
     WAVELENGTHS_NM,
     baseline_absorption,
     blood_absorption,
-    jacques_1998,
+    jacques_scattering,
     melanosome_absorption,
     rgb_weights,
 )
@@ -59,7 +59,7 @@ _OXYGEN_LIMIT_TOLERANCE, _MAX_MATCHED_DELTA_E = (
     1e-6,
     0.25,
 )  # tolerance of oxygen at a bound [-], and of a matched colour [CIEDE2000]
-_REGRESSION_NEIGHBOURS = 80  # of other people, for the local regression of colours
+_REGRESSION_NEIGHBOUR_COUNT = 80  # of other people, for the local regression of colours
 _ERROR_PERCENTILES = 50.0, 95.0
 _DONNER_JENSEN_SKIN = SkinParameters(baseline=1.0, epidermis_mm=0.25, oxygen=0.75)
 _EDGE_LOSS_MELANIN = 0.01, 0.03, 0.1, 0.3
@@ -79,7 +79,9 @@ _CONSTANTS_BY_ADDITION: dict[str, tuple[str, ...]] = {
 
 
 def measured(bioskin: Path | None = None, only: str | None = None) -> None:
-    """Fit the spectral model of skin to all measured spectra, and write docs/measured.md; takes ten minutes.
+    """Fit the spectral model of skin to all measured spectra, and write docs/measured.md.
+
+    Takes ten minutes.
 
     Parameters
     ----------
@@ -95,12 +97,12 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
         "counts": lambda: {"spectra": len(archive.spectra), "folds": FOLD_COUNT},
         "models": lambda: _default_skin_errors(archive),
         "surface": lambda: _smooth_surface_errors(archive),
-        "limits": lambda: _limit_fractions(archive),
+        "limits": lambda: _implausible_fit_fractions(archive),
         "folds": lambda: _fold_errors(archive),
         "alternatives": lambda: _published_model_errors(
             archive.sample_rows(_SPECTRA_SAMPLE_COUNT, 2), bioskin
         ),
-        "additions": lambda: _addition_errors(archive.sample_rows(_CONSTANTS_SAMPLE_COUNT, 3)),
+        "additions": lambda: _additional_constant_errors(archive.sample_rows(_CONSTANTS_SAMPLE_COUNT, 3)),
         "sites": lambda: _site_fits(archive),
         "site_folds": lambda: _site_fold_errors(archive),
         "edge": lambda: _edge_loss_errors(archive.sample_rows(_CONSTANTS_SAMPLE_COUNT, 3)),
@@ -119,7 +121,11 @@ def measured_page() -> None:
 
 
 def _default_skin_errors(archive: Archive) -> JsonObject:
-    """Return errors of fits with the former default skin, the present one, and two skins between these."""
+    """Return errors of fits of two, three and five unknowns, for four skins that set the other parameters.
+
+    The skins are the former default skin, the present one, and two that are the former default with less
+    absorption by bloodless tissue.
+    """
     skins = {
         "former": FORMER_SKIN,
         "half": replace(FORMER_SKIN, baseline=0.5),
@@ -167,11 +173,11 @@ def _default_skin_errors(archive: Archive) -> JsonObject:
 
 
 def _smooth_surface_errors(archive: Archive) -> JsonObject:
-    """Return percentiles of the distances of colours from a smooth surface through other people's colours.
+    """Return percentiles of the distances of measured colours from a smooth surface in colour space.
 
-    They are lower bounds of the colour errors of models with two unknowns per spectrum and the same constants
-    for all people, because the colours of such a model lie on a surface. The entry "each site" has a separate
-    surface for each site of the body.
+    The surface is fitted to the colours of other people. A skin model with two unknowns per spectrum also
+    produces colours on a surface, so that its errors are hardly smaller than these distances. For the key
+    "each site", a surface is fitted to each site of the body.
     """
     face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
     sites = [_surface_distances(archive.select_rows(archive.site == site)) for site in range(len(SITES))]
@@ -183,9 +189,9 @@ def _smooth_surface_errors(archive: Archive) -> JsonObject:
 
 
 def _surface_distances(archive_part: Archive) -> Floats:
-    """Return the difference (n,) of each colour from a smooth surface through the colours of other people.
+    """Return the CIEDE2000 differences (n,) of colours from a smooth surface through other people's colours.
 
-    The surface is a local linear regression of the third principal coordinate on the first two.
+    The surface is a local linear regression of the colours' third principal component on the first two.
     """
     from scipy.spatial import cKDTree
 
@@ -193,11 +199,11 @@ def _surface_distances(archive_part: Archive) -> Floats:
     mean, scale = colours.mean(axis=0), colour_metric(np.median(colours, axis=0)[None])[0]
     axes = np.linalg.svd((colours - mean) @ scale.T, full_matrices=False)[2]
     point = (colours - mean) @ scale.T @ axes.T
-    nearest = np.asarray(cKDTree(point[:, :2]).query(point[:, :2], k=_REGRESSION_NEIGHBOURS + 40)[1])
+    nearest = np.asarray(cKDTree(point[:, :2]).query(point[:, :2], k=_REGRESSION_NEIGHBOUR_COUNT + 40)[1])
     on_surface = point.copy()
     for k, neighbours in enumerate(nearest):
         others = neighbours[archive_part.person[neighbours] != archive_part.person[k]][
-            :_REGRESSION_NEIGHBOURS
+            :_REGRESSION_NEIGHBOUR_COUNT
         ]
         A = np.column_stack([np.ones(len(others)), point[others, :2] - point[k, :2]])
         on_surface[k, 2] = np.linalg.lstsq(A, point[others, 2], rcond=None)[0][0]
@@ -205,11 +211,11 @@ def _surface_distances(archive_part: Archive) -> Floats:
     return delta_e_2000(linear_of_lab(nearby), linear_of_lab(colours))
 
 
-def _limit_fractions(archive: Archive) -> JsonObject:
-    """Return the fractions of colour fits with three unknowns that fail, by kind of failure.
+def _implausible_fit_fractions(archive: Archive) -> JsonObject:
+    """Return the fractions of implausible or failed fits of three unknowns to measured colours.
 
-    The keys are "none" for an oxygenation of 0, "all" for an oxygenation of 1, and "unmatched" for fits that
-    do not reproduce the measured colour.
+    The keys are "none" for a fitted oxygenation of 0, "all" for an oxygenation of 1, and "unmatched" for fits
+    that do not reproduce the measured colour.
     """
     fit = fit_skin(archive.spectra, THREE_UNKNOWNS, "colour")
     oxygen = fit.values["oxygen"]
@@ -223,31 +229,32 @@ def _limit_fractions(archive: Archive) -> JsonObject:
 def _category_errors(
     archive: Archive,
     categories: Sequence[object],
-    labels: np.ndarray,
+    category_by_spectrum: np.ndarray,
     two_unknown_fit: SpectralFit,
     three_unknown_fit: SpectralFit,
     five_unknown_fit: SpectralFit,
 ) -> list[list[float]]:
-    """Return a row for each group of people or for each site: number of spectra and three median errors.
+    """Return the number of spectra and three median errors for each group of people or each site.
 
-    The errors are the colour errors with two and with three unknowns, and the RMS with five unknowns.
+    The first two are colour errors of fits of two and of three unknowns. The third is the RMS difference
+    between measured and fitted spectra for five unknowns.
 
     categories : all groups or all sites
-    labels : (n,) group or site of each spectrum
+    category_by_spectrum : (n,) group or site of each spectrum
     """
     rows = []
     for category in categories:
-        chosen = labels == category
+        chosen = category_by_spectrum == category
         medians = [float(np.median(one.delta_e()[chosen])) for one in (two_unknown_fit, three_unknown_fit)]
         rows.append([int(chosen.sum()), *medians, float(np.median(five_unknown_fit.rms[chosen]))])
     return rows
 
 
-def _illuminant_errors(fits: dict[str, SpectralFit]) -> JsonObject:
+def _illuminant_errors(fits_by_unknown_count: dict[str, SpectralFit]) -> JsonObject:
     """Return percentiles of the colour differences between spectra and fits under each illuminant."""
     return {
         name: {light: _percentiles(fit.delta_e(colour_weights(light))) for light in ILLUMINANTS}
-        for name, fit in fits.items()
+        for name, fit in fits_by_unknown_count.items()
     }
 
 
@@ -310,10 +317,10 @@ def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObjec
 
 def _jacques_model(parameter_values: ParameterValues) -> Floats:
     """Return the reflectance (n, 31) of skins with the baseline and scattering of [Jacques1998]."""
-    bloodless, sigma_s_prime = baseline_absorption(WAVELENGTHS_NM), jacques_1998(WAVELENGTHS_NM)
+    bloodless, sigma_s_prime = baseline_absorption(WAVELENGTHS_NM), jacques_scattering(WAVELENGTHS_NM)
 
-    def parameter_column(name: str, default: float) -> Floats:
-        return np.asarray(parameter_values.get(name, np.float64(default)))[..., None]
+    def parameter_column(name: str, default_value: float) -> Floats:
+        return np.asarray(parameter_values.get(name, np.float64(default_value)))[..., None]
 
     m, b, oxygen = (
         parameter_column("melanin", 0.0),
@@ -332,8 +339,8 @@ def _jacques_model(parameter_values: ParameterValues) -> Floats:
     )
 
 
-def _addition_errors(sample: Archive) -> list[JsonObject]:
-    """Return fit errors for each addition to the model, with three and with five unknowns per spectrum."""
+def _additional_constant_errors(archive_sample: Archive) -> list[JsonObject]:
+    """Return fit errors of the skin model with each additional constant, for three and for five unknowns."""
     rows = []
     for name, free in _CONSTANTS_BY_ADDITION.items():
         row: JsonObject = {"name": name}
@@ -341,7 +348,7 @@ def _addition_errors(sample: Archive) -> list[JsonObject]:
             shared = ("baseline", "epidermis_mm") if label == "three" else ("baseline",)
             if label == "five" and free == ("scattering",):
                 continue
-            found = fit_constants(sample.spectra, unknowns, (*shared, *free))
+            found = fit_constants(archive_sample.spectra, unknowns, (*shared, *free))
             row[label] = {
                 "rms": float(np.sqrt((found.fit.residual**2).mean())),
                 "constants": found.constants,
@@ -352,9 +359,9 @@ def _addition_errors(sample: Archive) -> list[JsonObject]:
 
 
 def _site_fits(archive: Archive) -> list[JsonObject]:
-    """Return the thickness of the epidermis and the oxygenation that fit the spectra of each site best.
+    """Return the epidermis thickness and the oxygenation that fit the spectra of each site best.
 
-    Each row has results of fits to spectra, and under "colour" those of fits to colours.
+    The values under the key "colour" fit the colours of the spectra best.
     """
     rows = []
     for site in range(len(SITES)):
@@ -376,9 +383,10 @@ def _site_fits(archive: Archive) -> list[JsonObject]:
 
 
 def _site_fold_errors(archive: Archive) -> JsonObject:
-    """Return colour errors of fits with two unknowns, where each site has its own thickness and oxygenation.
+    """Return colour errors of fits with two unknowns per spectrum and two constants per site of the body.
 
-    The errors are cross-validated: thickness and oxygenation are fitted to people of other folds.
+    The constants are the epidermis thickness and the oxygenation. The errors are cross-validated: the
+    constants are fitted to people of other folds.
     """
     error = np.zeros(len(archive.spectra))
     fixed = {"baseline": DEFAULT_SKIN.baseline}
@@ -400,10 +408,10 @@ def _site_fold_errors(archive: Archive) -> JsonObject:
     }
 
 
-def _edge_loss_errors(sample: Archive) -> JsonObject:
-    """Return the fractions of light that apertures miss, and constants fitted to corrected spectra.
+def _edge_loss_errors(archive_sample: Archive) -> JsonObject:
+    """Return the edge loss of each aperture, and constants fitted to spectra corrected for it.
 
-    The spectra are corrected for the light that each aperture misses.
+    The edge loss is the fraction of the reflected light that an aperture of a spectrophotometer misses.
     """
     skins = [replace(DEFAULT_SKIN, melanin=m, blood=0.008) for m in _EDGE_LOSS_MELANIN]
     losses = [edge_loss(one, _EDGE_LOSS_WAVELENGTHS_NM) for one in skins]
@@ -417,15 +425,16 @@ def _edge_loss_errors(sample: Archive) -> JsonObject:
         loss = np.array([np.interp(WAVELENGTHS_NM, _EDGE_LOSS_WAVELENGTHS_NM, one[name]) for one in losses])
         seen = true * (1.0 - loss)
         factor = np.stack(
-            [1.0 - np.interp(sample.spectra[:, k], seen[::-1, k], loss[::-1, k]) for k in range(31)], axis=-1
+            [1.0 - np.interp(archive_sample.spectra[:, k], seen[::-1, k], loss[::-1, k]) for k in range(31)],
+            axis=-1,
         )
-        found = fit_constants(sample.spectra / factor, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
+        found = fit_constants(archive_sample.spectra / factor, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
         results[name] = {
             "loss": [one[name] for one in losses],
             "constants": found.constants,
             "rms": float(np.sqrt((found.fit.residual**2).mean())),
         }
-    uncorrected = fit_constants(sample.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
+    uncorrected = fit_constants(archive_sample.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
     results["uncorrected"] = {
         "constants": uncorrected.constants,
         "rms": float(np.sqrt((uncorrected.fit.residual**2).mean())),

@@ -56,11 +56,11 @@ _CONSTANT_NAMES = {
 
 def write_measured_page() -> None:
     """Write docs/measured.md from docs/templates/measured.md and the results of the last measurement."""
-    fill_page(PAGE, **measured_parts(read_results(RESULT_FILE)), **read_results(PEOPLE_FILE))
+    fill_page(PAGE, **measured_page_texts(read_results(RESULT_FILE)), **read_results(PEOPLE_FILE))
 
 
-def measured_parts(results: JsonObject) -> dict[str, str]:
-    """Return the tables and sentences of the page, keyed by placeholder."""
+def measured_page_texts(results: JsonObject) -> dict[str, str]:
+    """Return the tables, phrases and numbers of docs/measured.md, keyed by placeholder."""
     present = results["models"]["present"]
     return {
         "spectra": f"{results['counts']['spectra']:,}",
@@ -77,7 +77,7 @@ def measured_parts(results: JsonObject) -> dict[str, str]:
         "site_above": f"{100 * results['site_folds']['above_2']:.0f} %",
         "site_face": f"{results['site_folds']['cheek and forehead'][0]:.2f}",
         "folds": _folds_table(results["folds"]),
-        **_confounded_texts(results),
+        **_confounded_constant_texts(results),
         "additions": _additions_table(results["additions"]),
         "residual": _residual_table(results["models"]),
         "groups": "\n\n".join(
@@ -115,11 +115,11 @@ def _models_table(errors_by_model: JsonObject) -> str:
     return _markdown_table(heads, rows)
 
 
-def _folds_table(folds: Sequence[JsonObject]) -> str:
+def _folds_table(fold_results: Sequence[JsonObject]) -> str:
     heads = ["part", "spectra", "bloodless tissue", "epidermis [mm]", "oxygen", "constants"]
     heads += ["two", "two, cheek and forehead", "three", "five, RMS"]
     rows = []
-    for number, fold in enumerate(folds, 1):
+    for number, fold in enumerate(fold_results, 1):
         constants = fold["constants"]
         for label in ("fitted", "default"):
             errors = fold[label]
@@ -139,11 +139,12 @@ def _folds_table(folds: Sequence[JsonObject]) -> str:
     return _markdown_table(heads, rows)
 
 
-def _confounded_texts(results: JsonObject) -> dict[str, str]:
-    """Return paragraphs and numbers of the page, keyed by the placeholder that each replaces.
+def _confounded_constant_texts(results: JsonObject) -> dict[str, str]:
+    """Return texts on strongly correlated constants and on corrected spectra, keyed by placeholder.
 
-    "confounded" lists pairs of constants that the spectra hardly distinguish. "wide_factor" and
-    "small_factor" are baselines fitted to spectra that are corrected for the light that an aperture misses.
+    The text "confounded" lists pairs of constants with strongly correlated errors. The numbers "wide_factor"
+    and "small_factor" are baselines, fitted to spectra that are corrected for the edge loss of a wide and of
+    a small aperture.
     """
     pairs = {}
     for row in results["additions"]:
@@ -163,10 +164,10 @@ def _confounded_texts(results: JsonObject) -> dict[str, str]:
     }
 
 
-def _additions_table(additions: Sequence[JsonObject]) -> str:
+def _additions_table(addition_results: Sequence[JsonObject]) -> str:
     heads = ("addition", "three unknowns, RMS", "constants", "five unknowns, RMS", "constants")
     rows = []
-    for row in additions:
+    for row in addition_results:
         cells = [row["name"]]
         for label in ("three", "five"):
             one = row.get(label)
@@ -179,12 +180,15 @@ def _constants_text(constants: dict[str, float]) -> str:
     return ", ".join(f"{_CONSTANT_NAMES[name]} {value:.3g}" for name, value in constants.items())
 
 
-def _residual_table(models: JsonObject) -> str:
+def _residual_table(errors_by_model: JsonObject) -> str:
     """Return the table of mean residuals, measured minus model, by wavelength."""
     shown = range(0, 31, 2)
     heads = ("mean residual, 1e-4", *(f"{400 + 10 * k}" for k in shown))
     rows = [
-        [f"{_SKIN_NAMES[name]}, {count}", *(f"{1e4 * models[name]['residual'][count][k]:.0f}" for k in shown)]
+        [
+            f"{_SKIN_NAMES[name]}, {count}",
+            *(f"{1e4 * errors_by_model[name]['residual'][count][k]:.0f}" for k in shown),
+        ]
         for name in ("former", "present")
         for count in ("two", "three", "five")
     ]
@@ -201,10 +205,10 @@ def _category_table(
     return _markdown_table((category_title, "spectra", "two", "three", "five, RMS"), cells)
 
 
-def _sites_table(sites: Sequence[JsonObject]) -> str:
+def _sites_table(site_results: Sequence[JsonObject]) -> str:
     heads = ("site", "epidermis, by spectrum [mm]", "oxygen", "epidermis, by colour [mm]", "oxygen", "two")
     rows = []
-    for name, site in zip(SITES, sites, strict=True):
+    for name, site in zip(SITES, site_results, strict=True):
         low, middle, high = site["oxygen"]
         rows.append(
             [
@@ -250,7 +254,7 @@ def _edge_loss_table(edge_results: JsonObject) -> str:
 
 
 def _corrected_constants_text(edge_results: JsonObject) -> str:
-    """Return text on constants fitted to spectra as measured, and to spectra corrected for missed light."""
+    """Return text on constants fitted to the measured spectra, and to spectra corrected for edge loss."""
     parts = [
         f"{_constants_text(edge_results[name]['constants'])} (RMS {edge_results[name]['rms']:.4f}) {label}"
         for name, label in (

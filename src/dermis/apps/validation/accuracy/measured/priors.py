@@ -1,4 +1,4 @@
-"""Command that fits the distribution of people's pigments and writes it as a table of the package."""
+"""Command that fits the distribution of people's skin parameters and writes skin_priors.csv."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _CSV_HEADER = """# quantity: mixture of normal distributions of log melanin, log
 
 
 def priors() -> None:
-    """Fit the distribution of people's pigments to the archive, and write it as a table of the package."""
+    """Fit the distribution of people's skin parameters to measured spectra, and write skin_priors.csv."""
     archive = read_archive()
     living = archive.select_rows(~np.isin(archive.site, [SITES.index(name) for name in _CALLOUS_SITES]))
     fit = fit_skin(living.spectra, PRIOR_NAMES)
@@ -40,7 +40,7 @@ def priors() -> None:
 
 
 def prior_csv(prior: SkinPrior) -> str:
-    """Return the CSV text of a distribution: column names, and one row per component."""
+    """Return the CSV text of a mixture distribution: column names, and one row per normal distribution."""
     lower = np.tril_indices(len(PRIOR_NAMES))
     lines = [",".join(PRIOR_COLUMNS)]
     for weight, mean, covariance in zip(prior.weight, prior.mean, prior.covariance, strict=True):

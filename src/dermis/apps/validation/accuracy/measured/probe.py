@@ -1,4 +1,4 @@
-"""Light that a spectrophotometer's aperture misses, from photon counts of the package's skin."""
+"""Edge loss of spectrophotometers: reflected light that their apertures miss, by Monte Carlo."""
 
 from __future__ import annotations
 
@@ -17,11 +17,13 @@ _RADIUS_COUNT = 400  # number of points of the measured disc, by their radii
 def edge_loss(
     skin: SkinParameters, wavelength_nm: Floats, photon_count: int = 60_000, seed: int = 1
 ) -> dict[str, Floats]:
-    """Return the fraction (n,) of the reflected light that each aperture misses at each wavelength [-].
+    """Return the fractions (n,) of the reflected light that spectrophotometers miss, by aperture [-].
 
-    A spectrophotometer compares skin with an opaque white tile. In skin, some light that enters near the edge
-    of the lit disc leaves outside the disc, and no light returns from the dark surroundings in exchange.
+    A spectrophotometer lights a disc of the skin. Some of the light that enters near the edge leaves the skin
+    outside the disc, and no light from the dark surroundings replaces it.
 
+    skin : parameters of the skin
+    wavelength_nm : (n,) wavelengths
     photon_count : number of photons per wavelength
 
     Source: [Wang1995].
@@ -34,7 +36,11 @@ def edge_loss(
 
 
 def _missed_fraction(slab_result: SlabResult, measured_radius_mm: float, lit_radius_mm: float) -> float:
-    """Return the fraction of the reflected light that an aperture misses [-]."""
+    """Return the fraction of the reflected light that an aperture misses [-].
+
+    slab_result : reflectance of the skin by distance from the point of entry
+    measured_radius_mm, lit_radius_mm : radii of the measured and of the lit disc
+    """
     inner, outer = slab_result.edges_mm[:-1], slab_result.edges_mm[1:]
     energy = slab_result.reflectance * np.pi * (outer**2 - inner**2)
     middle = np.sqrt(0.5 * (outer**2 + inner**2))
@@ -43,11 +49,11 @@ def _missed_fraction(slab_result: SlabResult, measured_radius_mm: float, lit_rad
 
 
 def lit_fraction(distance_mm: Floats, measured_radius_mm: float, lit_radius_mm: float) -> Floats:
-    """Return the fraction (n,) of a circle's circumference that lies in the lit disc [-].
+    """Return the fraction (n,) of the points at a given distance that lie in the lit disc [-].
 
-    The fraction is averaged over circles around all points of the measured disc.
+    The distance is from a point of the measured disc. The fraction is averaged over all points of that disc.
 
-    distance_mm : (n,) radii of the circles
+    distance_mm : (n,) distances
     measured_radius_mm : radius of the measured disc
     lit_radius_mm : radius of the lit disc, which has the same centre
     """

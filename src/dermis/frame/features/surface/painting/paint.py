@@ -1,4 +1,4 @@
-"""Painted maps of human skin: colour, gloss and relief at rest, and the changes that expressions make."""
+"""Painted maps of human skin: colour, gloss and relief, at rest and with facial expressions."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from dermis.gpu.shader_types import make_record, struct_dtype
 from dermis.gpu.textures import download
 from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.human.skin import face, textures
-from dermis.human.skin.face import FOLD_MOVEMENT_COUNT, HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, table_sizes
+from dermis.human.skin.face import FOLD_MOVEMENT_COUNT, HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, paint_table_sizes
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.measured import SiteDifferences
 from dermis.human.skin.painted import oxygen_range, painted_colour_tables
@@ -67,27 +67,27 @@ _FOLDING_VALUE_COUNT = FOLD_MOVEMENT_COUNT + 1  # numbers in `folding` of the sh
 
 
 def painting_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
-    """Return the lists over which the painting shaders loop: noises, dot layers, zones, noise regions."""
-    return {name: _as_members(names) for name, names in _PAINTING_LISTS.items()}
+    """Return the lists over which `//#each` lines in painting shaders loop, such as the list of noises."""
+    return {name: _as_shader_list(names) for name, names in _PAINTING_LISTS.items()}
 
 
 def painting_constants() -> dict[str, float]:
     """Return the named values that `//#fill` lines insert into the painting shaders."""
-    counts = {name: len(names) for name, names in _PAINTING_LISTS.items()} | table_sizes()
+    counts = {name: len(names) for name, names in _PAINTING_LISTS.items()} | paint_table_sizes()
     rows = {"noise_rows": len(noise_table()), "amount_rows": len(ZONE_AMOUNTS) // 4}
     sizes = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM}
     return sizes | counts | rows | {"folding": FOLD_MOVEMENT_COUNT, "wander_rows": ZONE_BORDER_NOISE_COUNT}
 
 
-def _as_members(member_names: Sequence[str]) -> Callable[[], Sequence[ShaderListMember]]:
+def _as_shader_list(member_names: Sequence[str]) -> Callable[[], Sequence[ShaderListMember]]:
     return lambda: [ShaderListMember(name, Path()) for name in member_names]
 
 
 class PaintInputs(NamedTuple):
     """Inputs of the shader that paints skin.
 
-    paint : uniform record of the skin's appearance: pigments, gloss, age, ...
-    tables : tables of the face: noises, dots, zones, folds and hairline
+    paint : uniform record of the skin's appearance, such as pigments, gloss and age
+    tables : tables of procedural noises and dots, facial zones, folds of the skin, and the hairline
     colours : (3, n, n, 3) colour tables, linear Rec. 709 [-]: of skin with the lowest oxygen saturation, of
         skin with the highest oxygen saturation, and of lips
     surface : mesh that is painted
@@ -100,14 +100,14 @@ class PaintInputs(NamedTuple):
 
 
 def paint_inputs(surface: PaintedSurface, look: SkinLook, map_side: int) -> PaintInputs:
-    """Return the shader inputs with which the maps of a look are painted.
+    """Return the inputs of the shader that paints skin with a given look.
 
     map_side : side of the maps [texels]
 
-    Raises DermisError for too many triangles.
+    Raises DermisError for a mesh with too many triangles.
     """
-    if surface.count >= _MAX_PAINTED_TRIANGLES:
-        actual = f"got {surface.count:,}"
+    if surface.triangle_count >= _MAX_PAINTED_TRIANGLES:
+        actual = f"got {surface.triangle_count:,}"
         refuse("painted skin", f"fewer than {_MAX_PAINTED_TRIANGLES:,} triangles", actual, "Subdivide less")
     text = _shader_text(_SKIN_SHADER)
     names = set(struct_dtype(text, "Paint").names or ()) & set(vars(look))
@@ -118,7 +118,7 @@ def paint_inputs(surface: PaintedSurface, look: SkinLook, map_side: int) -> Pain
     return PaintInputs(paint, tables, painted_colour_tables(look), surface)
 
 
-def cache_key(inputs: PaintInputs, driver_name: str) -> str:
+def painted_maps_cache_key(inputs: PaintInputs, driver_name: str) -> str:
     """Return the disk cache key of painted maps: a hash of inputs, shaders and driver name."""
     source = "\n".join((driver_name, _shader_text(_SKIN_SHADER), _shader_text(_TEXEL_TRIANGLE_SHADER)))
     records = (np.frombuffer(record.tobytes(), np.uint8) for record in (inputs.paint, inputs.tables))
@@ -126,15 +126,15 @@ def cache_key(inputs: PaintInputs, driver_name: str) -> str:
 
 
 @cache
-def _shader_text(shader: str) -> str:
-    return shader_source(FEATURES_FOLDER / shader, shader_folders()).text
+def _shader_text(shader_path: str) -> str:
+    return shader_source(FEATURES_FOLDER / shader_path, shader_folders()).text
 
 
 def _face_tables(hairline_recession: float, site_differences: SiteDifferences) -> bytes:
-    """Return the tables of the face that spot.wgsl reads: noises, dots, zones, folds and the hairline.
+    """Return the tables that spot.wgsl reads: procedural noises and dots, facial zones, skin folds, hairline.
 
     hairline_recession : recession of the hairline [-]
-    site_differences : differences of pigments between the measured sites of the face
+    site_differences : differences of pigments between measured sites of the face, such as forehead and cheek
     """
     folds, edge = face.fold_curves(), face.hairline_heights(hairline_recession)
     ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)
@@ -151,7 +151,7 @@ def _face_tables(hairline_recession: float, site_differences: SiteDifferences) -
 
 
 class RestMaps(NamedTuple):
-    """Painted maps at rest; only the finest mip levels are filled.
+    """Painted maps of a face at rest; only the finest mip levels are filled.
 
     colour, specular, roughness : textures with views of their mip levels
     heights : buffer of heights with a border of one texel [mm]
@@ -168,7 +168,7 @@ class RestMaps(NamedTuple):
 def cached_rest_maps(
     device: Device, inputs: PaintInputs, map_side: int, with_expressions: bool = False
 ) -> RestMaps:
-    """Return the painted maps at rest, cached on disk for software adapters, which paint slowly.
+    """Return the painted maps of a face at rest, cached on disk for software adapters, which paint slowly.
 
     Only the first maps that a device paints are stored, because programs that render many people rarely need
     the same person again.
@@ -178,13 +178,13 @@ def cached_rest_maps(
     if device.adapter.kind != "CPU":
         return paint_rest_maps(device, inputs, map_side)
     key, names = (
-        cache_key(inputs, f"{device.adapter.name} {device.adapter.driver}"),
+        painted_maps_cache_key(inputs, f"{device.adapter.name} {device.adapter.driver}"),
         [*_PAINTED_MAP_NAMES, "heights"],
     )
     names += ["deltas"] if with_expressions else []
     arrays = load_arrays(_PAINTED_CACHE_FOLDER, key, names)
     if arrays is not None:
-        return _upload_arrays(device, arrays, map_side)
+        return _upload_cached_maps(device, arrays, map_side)
     maps = paint_rest_maps(device, inputs, map_side)
     if device.cached("first painted", lambda: key) == key:
         load_or_make(
@@ -195,7 +195,7 @@ def cached_rest_maps(
 
 @logged_step("painting the skin")
 def paint_rest_maps(device: Device, inputs: PaintInputs, map_side: int) -> RestMaps:
-    """Paint the maps of a face without expression.
+    """Paint the maps of a face at rest.
 
     map_side : side of the maps [texels]
     """
@@ -221,7 +221,7 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, map_side: int) -> RestM
 def _surface_buffers(device: Device, inputs: PaintInputs, map_side: int) -> dict[str, Buffer]:
     """Return buffers of the mesh that is painted, and of the triangle that covers each texel of the maps.
 
-    The buffers are cached on the device for all people who share the mesh.
+    The device caches the buffers for all people who share the mesh.
     """
     surface = inputs.surface
     cache = device.cached("painted surfaces", WeakKeyDictionary[PaintedSurface, dict[int, dict[str, Buffer]]])
@@ -235,7 +235,9 @@ def _surface_buffers(device: Device, inputs: PaintInputs, map_side: int) -> dict
         }
         frame = CommandList(device, timed=False)
         bound: Bindings = {"paint": inputs.paint, **buffers}
-        frame.dispatch("maps", program(device, _TEXEL_TRIANGLE_SHADER), bound, workgroup_grid(surface.count))
+        frame.dispatch(
+            "maps", program(device, _TEXEL_TRIANGLE_SHADER), bound, workgroup_grid(surface.triangle_count)
+        )
         frame.submit()
         sides[map_side] = buffers
     return sides[map_side]
@@ -259,16 +261,16 @@ def _download_maps(device: Device, maps: RestMaps, with_expressions: bool) -> Ar
     return arrays
 
 
-def _upload_arrays(device: Device, arrays: Arrays, map_side: int) -> RestMaps:
+def _upload_cached_maps(device: Device, map_arrays: Arrays, map_side: int) -> RestMaps:
     maps = {name: map_mips.empty_map(device, (map_side, map_side)) for name in _PAINTED_MAP_NAMES}
     for name, one in maps.items():
-        upload(device, one.texture, arrays[name])
+        upload(device, one.texture, map_arrays[name])
     deltas = None
-    if "deltas" in arrays:
+    if "deltas" in map_arrays:
         deltas = make_texture(device, (map_side, map_side), HALF_TEXEL_FORMAT, layer_count=2)
-        for layer, texels in enumerate(arrays["deltas"]):
+        for layer, texels in enumerate(map_arrays["deltas"]):
             upload(device, deltas, texels, layer=layer)
-    return RestMaps(**maps, heights=device.buffer(arrays["heights"], "STORAGE"), deltas=deltas)
+    return RestMaps(**maps, heights=device.buffer(map_arrays["heights"], "STORAGE"), deltas=deltas)
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,24 +288,26 @@ class ExpressionMaps:
     relief: map_mips.MippedTexture
 
 
-def draw_expression(graph: Graph, maps: ExpressionMaps, movement_strengths: NDArray[np.float32]) -> None:
+def draw_expression(
+    graph: Graph, expression_maps: ExpressionMaps, movement_strengths: NDArray[np.float32]
+) -> None:
     """Declare the passes that compute the colour and relief of an expression.
 
     movement_strengths : (9,) strength of each facial movement, from `human.skin.face.movement_weights` [-]
     """
-    shader, side = program(graph.device, "surface/painting/expression.wgsl"), maps.colour.size[0]
+    shader, side = program(graph.device, "surface/painting/expression.wgsl"), expression_maps.colour.size[0]
     folding = movement_strengths[:_FOLDING_VALUE_COUNT].reshape(2, 4)
     record = shader.record(
         "Expression", folding=folding, pressed=movement_strengths[_FOLDING_VALUE_COUNT], side=side
     )
-    graph.compute("maps", shader, maps.bindings | {"expression": record}, (side, side))
-    graph.repeat(_fill_expression_maps, maps)
+    graph.compute("maps", shader, expression_maps.bindings | {"expression": record}, (side, side))
+    graph.repeat(_fill_expression_maps, expression_maps)
 
 
-def _fill_expression_maps(graph: Recorder, maps: ExpressionMaps) -> None:
+def _fill_expression_maps(graph: Recorder, expression_maps: ExpressionMaps) -> None:
     """Declare the passes that compute the mip levels of the colour, and the relief from the heights."""
-    map_mips.fill_mips(graph, maps.colour)
-    map_mips.fill_relief(graph, maps.relief, maps.heights)
+    map_mips.fill_mips(graph, expression_maps.colour)
+    map_mips.fill_relief(graph, expression_maps.relief, expression_maps.heights)
 
 
 class PaintedTextures(NamedTuple):
@@ -319,8 +323,8 @@ class PaintedTextures(NamedTuple):
 class RawPaintedArrays(NamedTuple):
     """Painted texels in the channels that the painting shader skin.wgsl writes.
 
-    colour : (n, n, 4) linear Rec. 709 albedo [-], and 1
-    specular : (n, n, 4) specular factor, amount of pores, log2 of the mm per unit of uv, and 0
+    colour : (n, n, 4) linear Rec. 709 albedo [-], and a channel of ones
+    specular : (n, n, 4) specular factor, amount of pores, log2 of the mm per unit of uv, and zeros
     roughness : (n, n, 4) roughness factor, amount of furrows, and fractions of melanin and blood
     height_mm : (n, n) heights of the relief [mm]
     """
@@ -334,7 +338,7 @@ class RawPaintedArrays(NamedTuple):
 def paint_textures(
     device: Device, surface: PaintedSurface, look: SkinLook, map_side: int, with_expressions: bool = False
 ) -> PaintedTextures:
-    """Paint the maps of a look as textures.
+    """Paint the maps of skin with a given look as textures.
 
     map_side : side of the maps [texels]
     with_expressions : whether expressions change colour and relief; if so, `draw_expression` fills these maps
@@ -362,9 +366,10 @@ def paint_textures(
 
 
 def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, map_side: int) -> Maps:
-    """Paint the maps of a look as arrays, without pores and furrows, which are too fine for maps.
+    """Paint the maps of skin with a given look as arrays.
 
-    Heights fade to 0 outside the charts.
+    Pores and furrows are left out, because they are too fine for maps. Heights fade to 0 outside the charts
+    of the uv layout.
     """
     arrays = paint_raw_arrays(device, surface, look, map_side)
     rho_s = DEFAULT_RHO_S * arrays.specular[..., 0]
@@ -379,7 +384,7 @@ def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, map_si
 def paint_raw_arrays(
     device: Device, surface: PaintedSurface, look: SkinLook, map_side: int
 ) -> RawPaintedArrays:
-    """Paint the maps of a look as arrays, with all channels that the shader writes."""
+    """Paint the maps of skin with a given look as arrays, with all channels that the shader writes."""
     maps = paint_rest_maps(device, paint_inputs(surface, look, map_side), map_side)
     textures = maps.colour, maps.specular, maps.roughness
     colour, specular, roughness = (download(device, one.texture).astype(np.float32) for one in textures)

@@ -1,4 +1,4 @@
-"""Heads with painted maps and eyes as arrays, for files and for programs without the painting shaders."""
+"""Painted maps and eyes of a head as arrays, to be written to files for programs without painting shaders."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EYE_PICTURE_SIDE = 1024
 
 
 def paint_eye(device: Device, look: EyeLook, picture_side: int = EYE_PICTURE_SIDE) -> EyeTextures:
-    """Paint pictures of an eye, seen along its axis through the cornea, for programs without the eye shader.
+    """Paint pictures of an eye as seen from its front, for programs without the eye shader.
 
     picture_side : side of the pictures [pixels]
     """
@@ -41,7 +41,7 @@ def paint_eye(device: Device, look: EyeLook, picture_side: int = EYE_PICTURE_SID
 
 
 def paint_head(device: Device, head: Head, map_side: int) -> tuple[Head, EyeTextures | None]:
-    """Return a head with its painted maps as arrays, and pictures of the eyes if they are modelled.
+    """Return a copy of a head with its painted maps as arrays, and pictures of the eyes if they are modelled.
 
     map_side : side of the painted maps, a power of two from 256 to 4096 [texels]
     """
@@ -50,9 +50,9 @@ def paint_head(device: Device, head: Head, map_side: int) -> tuple[Head, EyeText
 
 
 def with_painted_maps(device: Device, head: Head, map_side: int) -> Head:
-    """Return a head whose painted maps are arrays.
+    """Return a copy of a head with its painted maps as arrays.
 
-    Maps from files are kept, and heads without painted maps are returned unchanged.
+    Maps from files are kept. A head without painted maps is returned unchanged.
 
     map_side : side of the painted maps, a power of two from 256 to 4096 [texels]
 

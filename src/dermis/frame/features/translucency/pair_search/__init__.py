@@ -1,1 +1,1 @@
-"""Search for translucent pairs by shaders on the device."""
+"""Search for pairs of surface cells between which light passes through thin tissue, by shaders."""

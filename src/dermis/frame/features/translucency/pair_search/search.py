@@ -1,4 +1,8 @@
-"""Search for translucent pairs of cells, restricted to tiles (groups of cells) with opposed normals."""
+"""Search for pairs of surface cells between which light passes through thin tissue.
+
+The cells are grouped into tiles, and tiles into blocks. Only pairs of tiles with opposed normals are
+searched.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +30,9 @@ _PAIR_BYTES = 12
 
 
 class SearchPasses:
-    """Passes of a search, submitted in batches because the sizes of later passes depend on earlier results.
+    """Passes of the search for cell pairs.
+
+    They are submitted in batches, because the sizes of later passes depend on earlier results.
 
     commands : command list of the passes that are not yet submitted
     blocks : number of blocks of tiles along a side of the atlas
@@ -46,7 +52,7 @@ class SearchPasses:
             "block": block,
         }
 
-    def add(
+    def add_pass(
         self, shader_name: str, invocation_count: int, bindings: Bindings, constants: Constants = ()
     ) -> None:
         """Add a pass with one shader invocation for each of `invocation_count` elements.
@@ -59,14 +65,14 @@ class SearchPasses:
             "pair search", shader, {**bindings, "search": record}, workgroup_grid(invocation_count)
         )
 
-    def read(self, buffer: Buffer, word_count: int) -> Index:
-        """Submit all passes so far, and return the first `word_count` words of a buffer."""
+    def submit_and_read(self, buffer: Buffer, word_count: int) -> Index:
+        """Submit all passes that were added, and return the first `word_count` words of a buffer."""
         self.commands.submit()
         self.commands = CommandList(self.device, timed=False)
         words = np.frombuffer(self.device.handle.queue.read_buffer(buffer), np.uint32)
         return words[:word_count].astype(np.int64)
 
-    def upload(self, *columns: NDArray[np.integer]) -> Buffer:
+    def upload_table(self, *columns: NDArray[np.integer]) -> Buffer:
         """Upload integer columns as a table of 32-bit words; an empty table becomes one row of zeros."""
         return upload_words(self.device, *columns)
 
@@ -89,7 +95,9 @@ def list_offsets(list_lengths: Index) -> Index:
 
 @dataclass(frozen=True, eq=False)
 class TilePairs:
-    """Pairs of tiles between which translucent pairs of cells are possible.
+    """Pairs of tiles between which light may pass through thin tissue.
+
+    A tile is a square of cells of the atlas.
 
     bounds : buffer of the bounding box and normal cone of each tile
     tile : (t,) indices of the tiles that are in at least one pair
@@ -103,27 +111,31 @@ class TilePairs:
     partners: Buffer
 
 
-def find_tile_pairs(passes: SearchPasses, surface: Bindings, cells: Cells) -> TilePairs:
-    """Find the pairs of tiles between which translucent pairs of cells are possible.
+def find_tile_pairs(passes: SearchPasses, surface_bindings: Bindings, cells: Cells) -> TilePairs:
+    """Find the pairs of tiles between which light may pass through thin tissue.
 
-    surface : resources of geometry.wgsl
+    surface_bindings : resources of geometry.wgsl
     """
     device, count = passes.device, cells.tiles_per_side**2
     tiles, counts = make_element_buffer(device, count, _TILE_BOUNDS_BYTES), make_element_buffer(device, count)
-    bindings = {"tiles": tiles, "block_pairs": _find_block_pairs(passes, surface, cells, tiles)}
-    every_tile = passes.upload(np.arange(count), np.zeros(count, np.int64))
-    passes.add("tile_pairs", count, {**bindings, "queries": every_tile, "partners": counts})
-    partner_count = passes.read(counts, count)
+    bindings = {"tiles": tiles, "block_pairs": _find_block_pairs(passes, surface_bindings, cells, tiles)}
+    every_tile = passes.upload_table(np.arange(count), np.zeros(count, np.int64))
+    passes.add_pass("tile_pairs", count, {**bindings, "queries": every_tile, "partners": counts})
+    partner_count = passes.submit_and_read(counts, count)
     tile = np.flatnonzero(partner_count)
     first = list_offsets(partner_count[tile])
     partners = make_element_buffer(device, int(first[-1]))
-    bindings |= {"queries": passes.upload(tile, first[:-1]), "partners": partners}
-    passes.add("tile_pairs", len(tile), bindings, (("LISTED", 1),))
+    bindings |= {"queries": passes.upload_table(tile, first[:-1]), "partners": partners}
+    passes.add_pass("tile_pairs", len(tile), bindings, (("LISTED", 1),))
     return TilePairs(tiles, tile, first, partners)
 
 
-def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, tile_bounds: Buffer) -> Buffer:
-    """Return a buffer with one bit for each pair of blocks of tiles, set if translucent pairs are possible.
+def _find_block_pairs(
+    passes: SearchPasses, surface_bindings: Bindings, cells: Cells, tile_bounds: Buffer
+) -> Buffer:
+    """Return a buffer with one bit for each pair of blocks, set if light may pass between them.
+
+    A block is a square of tiles.
 
     tile_bounds : buffer to fill with the bounding box and normal cone of each tile
     """
@@ -132,25 +144,25 @@ def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, til
     bounds = make_element_buffer(passes.device, blocks, _TILE_BOUNDS_BYTES)
     block_pairs = make_element_buffer(passes.device, words)
     triangles = {
-        "triangle_first": passes.upload(cells.triangle_first),
-        "triangles": passes.upload(cells.triangles),
+        "triangle_first": passes.upload_table(cells.triangle_first),
+        "triangles": passes.upload_table(cells.triangles),
     }
-    passes.add("tiles", cells.tiles_per_side**2, {**surface, **triangles, "tiles": tile_bounds})
-    passes.add("blocks", blocks, {"tiles": tile_bounds, "blocks": bounds})
-    passes.add("block_pairs", words, {"blocks": bounds, "block_pairs": block_pairs})
+    passes.add_pass("tiles", cells.tiles_per_side**2, {**surface_bindings, **triangles, "tiles": tile_bounds})
+    passes.add_pass("blocks", blocks, {"tiles": tile_bounds, "blocks": bounds})
+    passes.add_pass("block_pairs", words, {"blocks": bounds, "block_pairs": block_pairs})
     return block_pairs
 
 
 @dataclass(frozen=True, eq=False)
 class CandidateCells:
-    """Cells that may be in translucent pairs, ordered by their tiles.
+    """Cells between which light may pass through thin tissue, ordered by the tiles that contain them.
 
     receiver : (r,) cells that receive light, as indices into `Cells.receivers`
     source : (s,) cells that emit light, as indices into the coarse atlas
-    first : (r,) index in `TilePairs.partners` where the partners of each receiver's tile start
-    end : (r,) index where these partners end
-    sources_first : (t,) index in `source` where the sources of each of the t tiles of the atlas start
-    sources_end : (t,) index where these sources end
+    first : (r,) for each receiver, index in `TilePairs.partners` where the partners of its tile start
+    end : (r,) for each receiver, index where these partners end
+    sources_first : (t,) for each of the t tiles of the atlas, index in `source` where its sources start
+    sources_end : (t,) for each of these tiles, index where its sources end
     """
 
     receiver: Index
@@ -174,7 +186,7 @@ def candidate_cells(cells: Cells, tile_pairs: TilePairs) -> CandidateCells:
 
 
 def _expand_ranges(range_starts: Index, chosen_ranges: Index) -> tuple[Index, Index]:
-    """Return the integers in chosen ranges, and for each integer the index of its range in `chosen_ranges`.
+    """Return all integers in the chosen ranges, and the index of each integer's range in `chosen_ranges`.
 
     range_starts : start of each range; a range ends where the next range starts
     chosen_ranges : indices of the chosen ranges
@@ -188,43 +200,50 @@ def _expand_ranges(range_starts: Index, chosen_ranges: Index) -> tuple[Index, In
 
 
 def compute_positions(
-    passes: SearchPasses, surface: Bindings, cells: Cells, candidates: CandidateCells
+    passes: SearchPasses, surface_bindings: Bindings, cells: Cells, candidates: CandidateCells
 ) -> Bindings:
-    """Return a dictionary from names in shaders to buffers of the candidates' positions and normals.
+    """Compute the positions and normals of the candidate cells.
 
-    surface : resources of geometry.wgsl and of the atlas
+    Return a dictionary from names in shaders to the buffers of the results.
+
+    surface_bindings : resources of geometry.wgsl and of the atlas
     """
     device, commands = passes.device, passes.commands
     receiver_points = make_element_buffer(device, len(candidates.receiver), RECEIVER_BYTES)
     source_points = make_element_buffer(device, len(candidates.source), SOURCE_BYTES)
     receivers = upload_receivers(device, cells, candidates.receiver)
     draw_cell_points(
-        commands, "receiver", surface, cells, receivers, receiver_points, metric_from_triangles=True
+        commands, "receiver", surface_bindings, cells, receivers, receiver_points, metric_from_triangles=True
     )
     draw_cell_points(
-        commands, "source", surface, cells, upload_sources(device, cells, candidates.source), source_points
+        commands,
+        "source",
+        surface_bindings,
+        cells,
+        upload_sources(device, cells, candidates.source),
+        source_points,
     )
     return {"receiver_points": receiver_points, "source_points": source_points}
 
 
 def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple[Bindings, int]:
-    """Upload the ranges of sources that hits.wgsl tests for each receiver.
+    """Upload the ranges of source cells that hits.wgsl tests for each receiver cell.
 
-    Also returns the number of words that hits.wgsl writes: one for each receiver and each tile that is
-    tested. A word has one bit for each source in the tile.
+    Also return the number of words that hits.wgsl writes: one for each receiver and each tile that is tested
+    for it. A word has one bit for each source in the tile.
     """
     word = list_offsets(candidates.end - candidates.first)
     unused = np.zeros(len(candidates.receiver), np.int64)
     ranges = candidates.sources_first, candidates.sources_end
     bindings = {
-        "receiver_ranges": passes.upload(candidates.first, candidates.end, word[:-1], unused),
-        "source_ranges": passes.upload(*ranges),
+        "receiver_ranges": passes.upload_table(candidates.first, candidates.end, word[:-1], unused),
+        "source_ranges": passes.upload_table(*ranges),
     }
     return bindings, int(word[-1])
 
 
-def draw_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, bindings: Bindings) -> Buffer:
-    """Return a buffer of the gutter texels that hold copies of source cells, see gutter_copies.wgsl.
+def list_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, bindings: Bindings) -> Buffer:
+    """Add the pass that lists the gutter texels with copies of source cells; return its result buffer.
 
     source_cells : (n,) indices of cells that emit light
     bindings : further resources of gutter_copies.wgsl
@@ -238,8 +257,8 @@ def draw_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, 
         end = cells.gutter_copy_first[begin + np.minimum(x + 1, side - 1) + 1]
         ranges += [first, np.where(within, end, first)]
     copies = make_element_buffer(passes.device, _MAX_GUTTER_COPIES * len(source_cells))
-    resources = {**bindings, "rows": passes.upload(*ranges), "copies": copies}
-    passes.add("gutter_copies", len(source_cells), resources)
+    resources = {**bindings, "rows": passes.upload_table(*ranges), "copies": copies}
+    passes.add_pass("gutter_copies", len(source_cells), resources)
     return copies
 
 
@@ -268,10 +287,10 @@ def upload_sources(device: Device, cells: Cells, source_cells: Index) -> tuple[B
 
 @dataclass(frozen=True, eq=False)
 class PairTable:
-    """Translucent pairs as the search returns them, ordered by receiver.
+    """Pairs of cells between which light passes through thin tissue, ordered by receiver.
 
     receiver : (m,) cells that receive light from at least one source, as indices into `Cells.receivers`
-    first : (m + 1,) offsets into `pairs`; the pairs of receiver[i] end before those of receiver[i + 1] start
+    first : (m + 1,) offsets into `pairs`; the pairs of receiver[i] are from first[i] up to first[i + 1]
     source : (n,) cells that emit light in at least one pair
     pairs : buffer of three words for each pair: source, receiver, and the offset in the atlas between the two
     """
@@ -282,59 +301,61 @@ class PairTable:
     pairs: Buffer
 
 
-def search_pairs(device: Device, surface: Bindings, cells: Cells) -> PairTable | None:
-    """Return all pairs of cells between which enough light crosses thin parts, None if a buffer is too small.
+def search_pairs(device: Device, surface_bindings: Bindings, cells: Cells) -> PairTable | None:
+    """Return all pairs of cells between which enough light passes, None if a buffer is too small.
 
-    surface : resources of geometry.wgsl for the shape to search in, and of the atlas
+    surface_bindings : resources of geometry.wgsl for the shape to search in, and of the atlas
     """
     passes = SearchPasses(device, cells)
-    tile_pairs = find_tile_pairs(passes, surface, cells)
+    tile_pairs = find_tile_pairs(passes, surface_bindings, cells)
     candidates = candidate_cells(cells, tile_pairs)
     ranges, words = upload_hit_ranges(passes, candidates)
     count = len(candidates.receiver)
     if max(4 * words, RECEIVER_BYTES * count) > device.max_storage_bytes:
         return None
-    points = compute_positions(passes, surface, cells, candidates)
+    points = compute_positions(passes, surface_bindings, cells, candidates)
     hits, counts = make_element_buffer(device, words), make_element_buffer(device, count)
     hit_bindings = {**ranges, "partners": tile_pairs.partners, "hits": hits}
-    passes.add("hits", count, {**hit_bindings, **points, "tiles": tile_pairs.bounds, "counts": counts})
-    pair_count = passes.read(counts, count)
+    passes.add_pass("hits", count, {**hit_bindings, **points, "tiles": tile_pairs.bounds, "counts": counts})
+    pair_count = passes.submit_and_read(counts, count)
     if _PAIR_BYTES * pair_count.sum() > device.max_storage_bytes:
         return None
-    gutters = passes.upload(*cells.gutter_copies.T)
-    map_bindings = {**points, "reach_map": surface["reach_map"], "gutters": gutters}
-    return _list_pairs(passes, cells, candidates, pair_count, hit_bindings, map_bindings)
+    gutters = passes.upload_table(*cells.gutter_copies.T)
+    gutter_copy_bindings = {**points, "reach_map": surface_bindings["reach_map"], "gutters": gutters}
+    return _make_pair_table(passes, cells, candidates, pair_count, hit_bindings, gutter_copy_bindings)
 
 
-def _list_pairs(
+def _make_pair_table(
     passes: SearchPasses,
     cells: Cells,
     candidates: CandidateCells,
     pair_count: Index,
     hit_bindings: Bindings,
-    map_bindings: Bindings,
+    gutter_copy_bindings: Bindings,
 ) -> PairTable:
-    """Convert the bits that hits.wgsl wrote to a table of pairs, and drop the cells that are in no pair.
+    """Convert the bits that hits.wgsl wrote to a table of cell pairs, and drop the cells that are in no pair.
 
     pair_count : (r,) number of pairs of each receiver
     hit_bindings : resources that hits.wgsl and pairs.wgsl share
-    map_bindings : resources that gutter_copies.wgsl and offsets.wgsl share
+    gutter_copy_bindings : resources that gutter_copies.wgsl and offsets.wgsl share
     """
     device, sources, first = passes.device, len(candidates.source), list_offsets(pair_count)
-    count, first_pair = int(first[-1]), passes.upload(first)
+    count, first_pair = int(first[-1]), passes.upload_table(first)
     pairs, used = make_element_buffer(device, count, _PAIR_BYTES), make_element_buffer(device, sources)
-    passes.add("pairs", len(pair_count), {**hit_bindings, "first": first_pair, "pairs": pairs, "used": used})
-    is_receiver, is_source = pair_count > 0, passes.read(used, sources) > 0
+    passes.add_pass(
+        "pairs", len(pair_count), {**hit_bindings, "first": first_pair, "pairs": pairs, "used": used}
+    )
+    is_receiver, is_source = pair_count > 0, passes.submit_and_read(used, sources) > 0
     chosen = np.flatnonzero(is_source)
-    copy_bindings = {**map_bindings, "queries": passes.upload(chosen)}
+    copy_bindings = {**gutter_copy_bindings, "queries": passes.upload_table(chosen)}
     bindings = {
-        **map_bindings,
-        "receiver_index": passes.upload(np.cumsum(is_receiver) - is_receiver),
-        "source_index": passes.upload(np.cumsum(is_source) - is_source),
-        "copies": draw_gutter_copies(passes, cells, candidates.source[chosen], copy_bindings),
+        **gutter_copy_bindings,
+        "receiver_index": passes.upload_table(np.cumsum(is_receiver) - is_receiver),
+        "source_index": passes.upload_table(np.cumsum(is_source) - is_source),
+        "copies": list_gutter_copies(passes, cells, candidates.source[chosen], copy_bindings),
         "pairs": pairs,
     }
-    passes.add("offsets", count, bindings)
+    passes.add_pass("offsets", count, bindings)
     passes.commands.submit()
     receiver = candidates.receiver[is_receiver]
     return PairTable(receiver, list_offsets(pair_count[is_receiver]), candidates.source[chosen], pairs)
