@@ -71,12 +71,12 @@ def shader_constants() -> dict[str, int]:
     return {f"class_{name}": class_number(name) for name in names} | {"class_count": len(label_classes())}
 
 
-def draw_labels(graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: StageInputs) -> None:
+def draw_labels(graph: Recorder, output_planes: Planes, buffers: LabelBuffers, inputs: StageInputs) -> None:
     """Declare the pass that writes the label class of each pixel."""
     constants = ("FIELDS", buffers.field_count), ("HAIRS", buffers.hair_classes is not None)
-    shader = stage_program(graph.device, planes, constants)
+    shader = stage_program(graph.device, output_planes, constants)
     bindings = inputs.bindings(shader) | buffers.tables | {"hair_labels": buffers.hair_labels}
-    draw_planes(graph, planes, shader, bindings)
+    draw_planes(graph, output_planes, shader, bindings)
 
 
 def _upload_label_tables(device: Device, labels: MeshLabels) -> MutableBindings:
