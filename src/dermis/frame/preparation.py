@@ -12,7 +12,7 @@ from dermis.base.errors import refuse
 from dermis.frame.allocation import make_resources
 from dermis.frame.features.diffusion.profiles import ProfileMix, SkinProfiles
 from dermis.frame.features.diffusion.pyramid import Blur, half_precision_scale
-from dermis.frame.features.hair.resources import strand_constants
+from dermis.frame.features.hair.resources import strand_shadow_constants
 from dermis.frame.features.occlusion.moving import (
     RotationAnchors,
     SkyViews,
@@ -139,7 +139,7 @@ class Preparation:
             self.memo.clear()
             raise out_of_memory_error(error, device, request) from error
         camera = pinhole(scene.camera, head, settings)
-        constants = light_constants(scene) + strand_constants(head, settings)
+        constants = light_constants(scene) + strand_shadow_constants(head, settings)
         constants += interreflection_constants(resources)
         texel = resources.diffusion.levels.texel
         scale = half_precision_scale(texel, peak_irradiance(scene, environment_map))

@@ -177,7 +177,7 @@ def level_format(device: Device) -> str:
     return FLOAT_TEXEL_FORMAT if device.adapter.kind == "CPU" else HALF_TEXEL_FORMAT
 
 
-def warm_up(device: Device) -> None:
+def start_compiling_common_programs(device: Device) -> None:
     """Start compiling the programs that most frames need, while other threads load the scene."""
     for name in _COMMON_SHADERS:
         program(device, name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dermis.frame.features.hair.resources import (
-    KNOTS_PER_WINDOW,
+    KNOTS_PER_BOUNDS_WORKGROUP,
     TILE_SIDE_PIXELS,
     Resources,
     StrandCounts,
@@ -107,7 +107,7 @@ def _draw_deep_opacity(
     clear = program(graph.device, "hair/strands_clear.wgsl")
     graph.dispatch("strands", clear, bindings, (_CLEARING_WORKGROUP_COUNT, 1, 1))
     windows = program(graph.device, "hair/strands_window.wgsl")
-    graph.dispatch("strands", windows, bindings, (max(1, -(-knots // KNOTS_PER_WINDOW)), 1, 1))
+    graph.dispatch("strands", windows, bindings, (max(1, -(-knots // KNOTS_PER_BOUNDS_WORKGROUP)), 1, 1))
     for adds_cover in (0, 1):
         _dispatch_hair(graph, "hair/strands_shadow.wgsl", bindings, segments, (("ADDS_COVER", adds_cover),))
 

@@ -39,7 +39,7 @@ _WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = (
     1.0,
 )  # added width per unit of cover: where hair hides hair, fewer strands suffice
 _DETAIL_LEVELS_PER_OCTAVE = 4  # levels of detail for each doubling of the size of a pixel
-KNOTS_PER_WINDOW = 1 << 12
+KNOTS_PER_BOUNDS_WORKGROUP = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
 # Row of the table of strands in strands_pose.wgsl.
 _STRAND_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("absorption", "f4", 4)])
@@ -313,7 +313,10 @@ class Resources:
 def shader_constants() -> dict[str, float]:
     """Return the named values that `//#fill` lines insert into the hair shaders."""
     opacity = {"strand_window": DEEP_OPACITY_WIDTH, "strand_layers": DEEP_OPACITY_LAYERS}
-    words = {"strand_window_words": DEEP_OPACITY_HEADER_WORDS, "strand_window_knots": KNOTS_PER_WINDOW}
+    words = {
+        "strand_window_words": DEEP_OPACITY_HEADER_WORDS,
+        "strand_window_knots": KNOTS_PER_BOUNDS_WORKGROUP,
+    }
     guides = {"guide_anchors": GUIDE_ANCHORS, "guide_knots": GUIDE_KNOTS}
     return {"strand_tile": TILE_SIDE_PIXELS, **opacity, **words, **guides, **hair_constants()}
 
@@ -323,7 +326,7 @@ def has_strands(head: Head, settings: Settings) -> bool:
     return settings.strands and any(part is not None and len(part) > 0 for part in (head.strands, head.hair))
 
 
-def strand_constants(head: Head, settings: Settings) -> Constants:
+def strand_shadow_constants(head: Head, settings: Settings) -> Constants:
     """Return the pipeline constant that makes lighting read strand shadows; () if no strands are drawn."""
     return (("STRANDS", 1),) if has_strands(head, settings) else ()
 

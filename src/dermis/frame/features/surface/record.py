@@ -81,11 +81,11 @@ def skin_record(
     members = struct_dtype(shading_program.source.text, "Skin").names or ()
     values = {name: getattr(skin, name) for name in members if hasattr(skin, name)}
     return shading_program.record(
-        "Skin", **values, **_derived_members(skin, maps, profile), light_count=light_count
+        "Skin", **values, **_derived_skin_members(skin, maps, profile), light_count=light_count
     )
 
 
-def _derived_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
+def _derived_skin_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
     """Return the members of the struct `Skin` that are not fields or properties of the Python class."""
     energy, usual = ENERGY_SCHEMES[skin.energy], DEFAULT_ROUGHNESS if maps.has_roughness else 1.0
     return {
