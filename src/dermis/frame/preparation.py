@@ -201,7 +201,7 @@ class Preparation:
 
 
 def interreflection_constants(resources: Resources) -> Constants:
-    """Return the pipeline constant that enables interreflection, () if no layout has interreflection."""
+    """Return the pipeline constant that enables interreflection, () for heads without interreflection."""
     return (("INTERREFLECTION", 1),) if resources.layouts[0].interreflection else ()
 
 
@@ -254,7 +254,7 @@ def _sky_view(
 
 
 def with_lights(layout: AtlasLayout, lights_record: UniformRecord) -> AtlasLayout:
-    """Return a copy of a layout whose shader bindings include the uniform record of the lights."""
+    """Return a copy of an atlas layout whose shader bindings include the uniform record of the lights."""
     return replace(layout, bindings=layout.bindings | {"lights": lights_record})
 
 

@@ -208,8 +208,8 @@ def rows_per_invocation(device: Device, segment_count: int) -> int:
 
     segment_count : estimate of the largest number of segments in a tile
 
-    The result is 1 on GPUs. Software adapters skip pixels without hair faster in a loop over several pixels,
-    but they end a shader's loops after 65,535 iterations in total, which limits the number of pixels.
+    The result is 1 on GPUs. Software adapters skip pixels without hair faster in a loop over several pixels.
+    They end a shader's loops after 65,535 iterations in total, which limits the number of pixels.
     """
     if device.adapter.kind != "CPU":
         return 1

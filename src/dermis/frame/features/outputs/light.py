@@ -42,8 +42,8 @@ class LightOutputs:
     """Resources for outputs of light and skin, apart from the buffers into which the outputs are written.
 
     light_part_counts : number of parts into which each light is divided for shading
-    transmitted : textures of the light transmitted through thin parts of the head, such as ears: one for each
-        layout and, if there are several layouts, one for their blend
+    transmitted : textures of the light transmitted through thin parts of the head, such as ears. There is one
+        for each atlas layout and, if there are several layouts, one for their blend
     thickness : texture of the tissue thickness, None if the thickness is not requested
     pigments : melanin and blood fractions of uniform skin [-], None for painted maps or if pigments are not
         requested
@@ -60,8 +60,8 @@ def make_light_outputs(
 ) -> LightOutputs:
     """Return the resources of the requested outputs of light and skin.
 
-    translucency : for each layout, the resources of light through thin parts of the head; None if the scene
-        has no such light
+    translucency : for each atlas layout, the resources of light through thin parts of the head; None if the
+        scene has no such light
 
     Raises DermisError for outputs that the technique, the lights or the skin cannot provide.
     """
