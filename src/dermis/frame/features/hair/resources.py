@@ -258,9 +258,9 @@ class StrandTables:
     groom : buffers from which coarse strands are interpolated, None if there are no coarse strands
     possible : total number of coarse strands of the person
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
-    length_mm : length of the longest kind of coarse hair, such as scalp hair or moustache [mm]
-    width_mm : width of a strand of this kind [mm]
-    cover : projected area of hair of this kind per area of skin [-]
+    length_mm : length of the scalp hair or the beard, whichever is longer [mm]
+    width_mm : width of a strand of the longer of the two [mm]
+    cover : projected area of hair per area of skin, for the longer of the two [-]
     """
 
     strands: Buffer

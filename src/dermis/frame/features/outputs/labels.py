@@ -24,8 +24,8 @@ class LabelBuffers:
     """Buffers that label.wgsl and strand_labels.wgsl read and write.
 
     tables : dictionary from names in label.wgsl to tables of the label classes of the mesh
-    field_count : number of classes whose border crosses triangles; such a border is given by a signed
-        distance at each vertex
+    field_count : number of distance fields. A field holds the signed distance of each vertex to the border of
+        a class, for borders that cross triangles
     hair_classes : buffer of the class of each strand, None if the head has no hair
     hair_labels : buffer of the class of the hair in each pixel, written by the hair pass
     """
