@@ -45,7 +45,7 @@ from dermis.mesh.head import Head
 from dermis.scene.skin import lobe_name
 from dermis.specular.albedo import albedo_table
 
-LayoutAtlas = tuple[Atlas, AtlasTextures]
+UploadedAtlas = tuple[Atlas, AtlasTextures]
 
 
 def make_resources(memo: Memo, device: Device, request: FrameRequest, technique: Technique) -> Resources:
@@ -63,7 +63,8 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
     strands = hair.make_resources(memo, device, request)
     bindings = _shared_bindings(memo, device, request, shadow_maps, shapes, strands)
     atlases = [
-        _layout_atlas(memo, device, request, name, k) for k, name in enumerate(request.atlas_plan.layouts)
+        _cached_uploaded_atlas(memo, device, request, name, k)
+        for k, name in enumerate(request.atlas_plan.layouts)
     ]
     uploaded = memo.result(maps)
     bindings |= uploaded.bindings | cached(detail_bindings, device, request.has_fine_relief)
@@ -169,9 +170,9 @@ def _cached_sky_visibility(
     return memo.get(make_vertex_sky_visibility, device, request.topology, untracked=(at_rest,))
 
 
-def _layout_atlas(
+def _cached_uploaded_atlas(
     memo: Memo, device: Device, request: FrameRequest, layout_name: str, layout_index: int
-) -> LayoutAtlas:
+) -> UploadedAtlas:
     stretch = request.technique.stretch(request.settings)
     atlas = memo.get(
         cached_atlas,
@@ -190,18 +191,23 @@ def _make_layout(
     device: Device,
     request: FrameRequest,
     technique: Technique,
-    layout_atlas: LayoutAtlas,
+    uploaded_atlas: UploadedAtlas,
     shape_resources: shape.Resources,
     shared_bindings: Bindings,
     layout_index: int,
 ) -> AtlasLayout:
     """Return the resources of one atlas layout, except the record of the lights, which each frame adds.
 
-    layout_atlas : the atlas, and its textures on the device
+    uploaded_atlas : the atlas, and its textures on the device
     shared_bindings : result of `_shared_bindings`, to which the maps of the head have been added
     layout_index : index of the layout, part of the keys of its resources in the cache
     """
-    cached, layout_key, head, (atlas, textures) = memo.get, str(layout_index), request.topology, layout_atlas
+    cached, layout_key, head, (atlas, textures) = (
+        memo.get,
+        str(layout_index),
+        request.topology,
+        uploaded_atlas,
+    )
     geometry = cached(
         upload_geometry,
         device,

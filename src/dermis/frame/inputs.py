@@ -58,5 +58,5 @@ class FrameInputs:
 
     @property
     def bindings(self) -> Bindings:
-        """Return the shader resources of the first layout, from which the picture is shaded."""
+        """Return the shader resources of the first atlas layout, from which the picture is shaded."""
         return self.layouts[0].bindings

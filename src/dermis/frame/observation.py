@@ -115,9 +115,9 @@ def pair_with_previous(
 ) -> Iterator[tuple[Scene, Scene | None]]:
     """Yield each scene with its previous scene, from which motion vectors are computed, or with None.
 
-    previous : the previous scenes. An iterable gives one for each scene (or None). A single scene (or None)
-        is the previous scene of the first scene only. Each later scene is then paired with the scene before
-        it, or with None if that shows another head
+    previous : previous scene (or None) of each scene as an iterable, or a single scene (or None) that
+        precedes the first scene. In the latter case, each later scene is paired with the scene before it, or
+        with None if the scenes show different heads
     """
     if isinstance(previous, Iterable):
         for one, before in zip_longest(scenes, previous, fillvalue=_NO_PREVIOUS_SCENE):

@@ -17,12 +17,12 @@ from dermis.images.codecs import encode_png
 from dermis.images.io import encode_exr_parts
 from dermis.scene.outputs import OUTPUTS, Output
 
-Format = Literal["exr", "png", "npy"]
+FileFormat = Literal["exr", "png", "npy"]
 _MAX_PNG_LEVEL = 65535
 _PICTURE_PART_NAME = "rgba"  # name of the first part, a convention of compositing programs
 
 
-def check_formats(output_names: Iterable[str], file_format: Format) -> None:
+def check_formats(output_names: Iterable[str], file_format: FileFormat) -> None:
     """Raise DermisError for an output that a file format cannot store.
 
     output_names : names of outputs
@@ -33,12 +33,12 @@ def check_formats(output_names: Iterable[str], file_format: Format) -> None:
             refuse(f"output {name}", "exr or npy", "got png, which cannot hold it", "Choose one of these")
 
 
-def output_path(picture_path: Path, output_name: str, file_format: Format) -> Path:
+def output_path(picture_path: Path, output_name: str, file_format: FileFormat) -> Path:
     """Return the path of the file of an output, beside the picture: face.depth.exr beside face.png."""
     return picture_path.with_name(f"{picture_path.stem}.{output_name}.{file_format}")
 
 
-def encode_output(output_name: str, output_array: PlaneArray, file_format: Format) -> bytes:
+def encode_output(output_name: str, output_array: PlaneArray, file_format: FileFormat) -> bytes:
     """Return the bytes of a file that stores one output; equal arrays give equal bytes.
 
     output_name : name of the output
@@ -54,7 +54,7 @@ def write_output(path: Path, output_name: str, output_array: PlaneArray) -> None
     output_name : name of the output
     output_array : (h, w) or (h, w, c) array of the output
     """
-    kinds: dict[str, Format] = {".exr": "exr", ".png": "png", ".npy": "npy"}
+    kinds: dict[str, FileFormat] = {".exr": "exr", ".png": "png", ".npy": "npy"}
     _write_atomically(path, encode_output(output_name, output_array, kinds[path.suffix.lower()]))
 
 
@@ -109,7 +109,7 @@ def _encode_npy(output_name: str, output_array: PlaneArray) -> bytes:
     return stream.getvalue()
 
 
-_ENCODERS: Mapping[Format, Callable[[str, PlaneArray], bytes]] = {
+_ENCODERS: Mapping[FileFormat, Callable[[str, PlaneArray], bytes]] = {
     "exr": _encode_exr,
     "png": _encode_png,
     "npy": _encode_npy,

@@ -12,7 +12,7 @@ from dermis.base.errors import refuse
 from dermis.frame.allocation import make_resources
 from dermis.frame.features.diffusion.profiles import ProfileMix, SkinProfiles
 from dermis.frame.features.diffusion.pyramid import Blur, half_precision_scale
-from dermis.frame.features.hair.resources import strand_constants
+from dermis.frame.features.hair.resources import strand_shadow_constants
 from dermis.frame.features.occlusion.moving import (
     RotationAnchors,
     SkyViews,
@@ -139,7 +139,7 @@ class Preparation:
             self.memo.clear()
             raise out_of_memory_error(error, device, request) from error
         camera = pinhole(scene.camera, head, settings)
-        constants = light_constants(scene) + strand_constants(head, settings)
+        constants = light_constants(scene) + strand_shadow_constants(head, settings)
         constants += interreflection_constants(resources)
         texel = resources.diffusion.levels.texel
         scale = half_precision_scale(texel, peak_irradiance(scene, environment_map))
@@ -201,7 +201,7 @@ class Preparation:
 
 
 def interreflection_constants(resources: Resources) -> Constants:
-    """Return the pipeline constant that enables interreflection, () if no layout has interreflection."""
+    """Return the pipeline constant that enables interreflection, () for heads without interreflection."""
     return (("INTERREFLECTION", 1),) if resources.layouts[0].interreflection else ()
 
 
@@ -254,7 +254,7 @@ def _sky_view(
 
 
 def with_lights(layout: AtlasLayout, lights_record: UniformRecord) -> AtlasLayout:
-    """Return a copy of a layout whose shader bindings include the uniform record of the lights."""
+    """Return a copy of an atlas layout whose shader bindings include the uniform record of the lights."""
     return replace(layout, bindings=layout.bindings | {"lights": lights_record})
 
 

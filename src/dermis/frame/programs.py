@@ -58,7 +58,7 @@ def shader_folders(*option_names: str) -> tuple[Folder, ...]:
     A feature is a package in `features`. The functions `shader_constants` and `shader_lists` of each package
     are found automatically, so that features need not be registered.
 
-    option_names : names of the `//#if` conditions that hold
+    option_names : names of the `//#if` conditions that are true
     """
     lists, constants = _feature_definitions(registry_version())
     shared = ShaderFolder(FEATURES_FOLDER, lists, lambda: constants, frozenset(option_names))
@@ -115,7 +115,7 @@ def program(
 def shader_options(
     source_format: str, store_format: str, with_labels: bool, constants: Constants = ()
 ) -> tuple[str, ...]:
-    """Return the names of the `//#if` conditions that hold for the options of `program`."""
+    """Return the names of the `//#if` conditions that are true for the given options of `program`."""
     values = {
         "FILTERED_SOURCE": source_format == HALF_TEXEL_FORMAT,
         "STORED_HALVES": store_format == HALF_TEXEL_FORMAT,
@@ -177,7 +177,7 @@ def level_format(device: Device) -> str:
     return FLOAT_TEXEL_FORMAT if device.adapter.kind == "CPU" else HALF_TEXEL_FORMAT
 
 
-def warm_up(device: Device) -> None:
+def start_compiling_common_programs(device: Device) -> None:
     """Start compiling the programs that most frames need, while other threads load the scene."""
     for name in _COMMON_SHADERS:
         program(device, name)

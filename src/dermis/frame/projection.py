@@ -19,8 +19,8 @@ Vectors = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Triple = tuple[float, float, float]
 Axes = tuple[Triple, Triple, Triple]
-Row = tuple[float, float, float, float]
-Rows = tuple[Row, Row, Row]
+MatrixRow = tuple[float, float, float, float]
+MatrixRows = tuple[MatrixRow, MatrixRow, MatrixRow]
 _MAX_LIGHT_TANGENT = math.tan(math.radians(80.0))
 _MIN_LIGHT_DISTANCE_MM = 1.0
 _UP_DIRECTION = 0.0, 1.0, 0.0
@@ -130,14 +130,14 @@ def _cross(first_vector: Sequence[float], second_vector: Sequence[float]) -> Tri
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-def view_rows(eye: Triple, axes: Axes) -> Rows:
+def view_rows(eye: Triple, axes: Axes) -> MatrixRows:
     """Return the upper three rows of the view matrix, which give x to the right, y up and depth forward."""
     right, up, forward = axes
     return (*right, -_dot(right, eye)), (*up, -_dot(up, eye)), (*forward, -_dot(forward, eye))
 
 
 def perspective_rows(
-    view_matrix_rows: Rows, window: Window, near: float, far: float
+    view_matrix_rows: MatrixRows, window: Window, near: float, far: float
 ) -> list[Sequence[float]]:
     """Return the rows of the matrix from world to clip space for a window on the image plane.
 
@@ -157,7 +157,7 @@ def perspective_rows(
     return [*across, depth, view_matrix_rows[2]]
 
 
-def depth_range(outline: Outline, view_matrix_rows: Rows) -> tuple[float, float]:
+def depth_range(outline: Outline, view_matrix_rows: MatrixRows) -> tuple[float, float]:
     """Return the nearest and farthest depth of a shape in view space, with a small margin [mm].
 
     view_matrix_rows : upper three rows of the view matrix

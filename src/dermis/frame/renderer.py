@@ -22,7 +22,7 @@ from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.observation import Observation, observation_jobs
 from dermis.frame.preparation import Preparation
-from dermis.frame.programs import warm_up
+from dermis.frame.programs import start_compiling_common_programs
 from dermis.frame.rendered_frame import FrameTextures, RenderedFrame
 from dermis.gpu import CommandList, Device, Graph, open_device
 from dermis.gpu.command_list import Timing
@@ -38,8 +38,8 @@ T = TypeVar("T")
 FRAMES_IN_FLIGHT = 3
 """Limit of submitted, incomplete frames, so that Python and the device overlap with little latency."""
 
-Submit = Callable[[], Readback]
-Receive = Callable[[Readback], T]
+SubmitFrame = Callable[[], Readback]
+ReceiveResult = Callable[[Readback], T]
 _MAX_CACHE_SIZE = 1000
 _WARM_UP_FRAME_COUNT = 100
 
@@ -47,7 +47,7 @@ _WARM_UP_FRAME_COUNT = 100
 def pipeline_frames(
     reopening_device: ReopeningDevice,
     current_device: Callable[[], Device],
-    frames: Iterable[tuple[Submit, Receive[T]]],
+    frames: Iterable[tuple[SubmitFrame, ReceiveResult[T]]],
 ) -> Iterator[T]:
     """Yield the results of frames in order; while one is read back, later frames are already submitted.
 
@@ -58,7 +58,7 @@ def pipeline_frames(
     frames : for each frame, a function that submits the frame, and a function that returns the result of its
         readback
     """
-    pending: deque[tuple[Readback, Submit, Receive[T]]] = deque()
+    pending: deque[tuple[Readback, SubmitFrame, ReceiveResult[T]]] = deque()
 
     def oldest_result() -> T:
         readback, submit, receive = pending.popleft()
@@ -130,7 +130,7 @@ class Renderer:
 
     def _use_device(self, device: Device) -> None:
         """Create the graph and caches of a device that was just opened."""
-        warm_up(device)
+        start_compiling_common_programs(device)
         self.device, self.graph = device, Graph(device)
         preparation = Preparation(device, self._cache_size, self._cache_ttl)
         self.memo, self.prepare = preparation.memo, preparation.inputs

@@ -73,5 +73,5 @@ class Resources:
 
     @property
     def head(self) -> HeadGeometry:
-        """Return the triangles of the head with their coordinates in the first layout."""
+        """Return the triangles of the head with their coordinates in the first atlas layout."""
         return self.layouts[0].head

@@ -47,7 +47,7 @@ def seam_method(method_name: str, can_stitch: bool) -> SeamMethod:
 
 
 class AtlasPlan(NamedTuple):
-    """Atlases of a frame: the names of their layouts, and the side of each atlas [texels]."""
+    """Atlases of a frame: the names of their uv layouts, and the side of each atlas [texels]."""
 
     layouts: tuple[str, ...]
     side: int

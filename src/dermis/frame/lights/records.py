@@ -144,8 +144,7 @@ def light_records(
 def light_sample_points() -> Floats:
     """Return (64, 4) evenly spread sample points of area lights [Roberts2018].
 
-    A row holds the coordinates x and y of a point on the unit disc, then x and y of a point on the square
-    from -1 to 1.
+    A row holds two points: x and y on the unit disc, then x and y on the square from -1 to 1.
     """
     even = (0.5 + np.arange(_SHADOW_RAY_COUNT)[:, None] * [0.7548776662, 0.5698402910]) % 1.0
     phi = 2.0 * np.pi * even[:, 1]

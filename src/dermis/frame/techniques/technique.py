@@ -52,7 +52,7 @@ class Technique(TechniqueTraits):
         """Create the textures of the blur pyramid, minimal for techniques that blur no light over the atlas.
 
         atlas_side : side of the atlas [texels]
-        halvings : for each layout, the number of times that the resolution of each level is halved
+        halvings : for each atlas layout, the number of times that the resolution of each level is halved
         """
         return make_levels(device, atlas_side, halvings, FLOAT_TEXEL_FORMAT)
 
@@ -131,8 +131,8 @@ class Technique(TechniqueTraits):
     ) -> Texture:
         """Declare the passes that fill textures with only the light through thin parts of the head.
 
-        Return the texture that combines all layouts. The textures are for outputs that separate this light
-        from the rest of the picture.
+        Return the texture that combines all atlas layouts. The textures are for outputs that separate this
+        light from the rest of the picture.
 
         atlas_textures : textures of the atlas, one for each layout and, if there are several layouts, one for
             their blend
@@ -186,7 +186,7 @@ class AtlasTechnique(Technique):
         return choose_halvings(split.blurred_mm2, atlas.median_texels_per_mm, max_halvings)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
-        """Declare the passes that light, blur and sum the atlas in each layout, and blend two layouts."""
+        """Declare the passes that light, blur and sum each atlas layout, and blend two layouts."""
         resources = inputs.resources
         levels, layouts, mixture = resources.diffusion.levels, inputs.layouts, resources.diffusion.mixture
         if not inputs.blurs:
@@ -272,7 +272,7 @@ class AtlasTechnique(Technique):
     ) -> Texture:
         """Declare the passes that fill textures with the light through thin parts of the head only.
 
-        The blurred levels are summed with weights of 0. Return the texture that combines all layouts.
+        The blurred levels are summed with weights of 0. Return the texture that combines all atlas layouts.
         """
         layouts, levels = inputs.layouts, inputs.resources.diffusion.levels
         for layout, blur, texture in zip(layouts, inputs.blurs, atlas_textures, strict=False):

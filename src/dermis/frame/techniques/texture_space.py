@@ -51,12 +51,14 @@ class TextureSpace(AtlasTechnique):
         )
         own = [k for k in range(len(variances)) if k + 1 not in steps]
 
-        def with_all_levels(one: ProfileSplit) -> ProfileSplit:
+        def with_intermediate_levels(one: ProfileSplit) -> ProfileSplit:
             weight = np.zeros((len(variances), 3))
             weight[own] = one.weight
             return replace(one, blurred_mm2=variances, weight=weight)
 
-        return replace(with_all_levels(split), others=tuple(map(with_all_levels, split.others))), steps
+        return replace(
+            with_intermediate_levels(split), others=tuple(map(with_intermediate_levels, split.others))
+        ), steps
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
         """Declare the passes that fill each level k with level 0, blurred by the k-th Gaussian."""

@@ -1,4 +1,4 @@
-"""Passes of the atlas: stretch maps, stitched gutters, and the blend of two layouts."""
+"""Passes of the atlas: stretch maps, stitched gutters, and the blend of two atlas layouts."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def draw_gutters(
 def draw_blend(
     graph: Recorder, first_layout: LitAtlas, second_layout: LitAtlas, blended_light: Texture
 ) -> None:
-    """Declare the pass that replaces the light near the seams of one layout by the light of another layout.
+    """Declare the pass that replaces the light near the seams of an atlas layout by that of another layout.
 
     The seams of the two layouts are in different places. The transition between the two lights is smooth.
 

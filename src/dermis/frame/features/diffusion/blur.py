@@ -34,7 +34,7 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
     source: TextureOrView = levels.layer(0)
     first_deviation = np.sqrt(variance_mm2[0]) * atlas.median_texels_per_mm  # [texel]
     full_first = len(variance_mm2) == 1 or first_deviation > MAX_CHAINED_SIGMA_TEXELS
-    for k, members in enumerate(_spread_members(variance_mm2, blur.halvings), start=1):
+    for k, members in enumerate(_level_variance_members(variance_mm2, blur.halvings), start=1):
         source_halvings, halvings = blur.halvings[k - 1 : k + 1]
         draw_gutters(graph, "diffuse", sheets[source_halvings], source, levels.texel)
         if halvings > source_halvings:
@@ -99,7 +99,7 @@ def _kernel_texture(device: Device) -> Texture:
     return device.cached("kernels", upload_table)
 
 
-def _spread_members(
+def _level_variance_members(
     variance_mm2: NDArray[np.float64], halvings: tuple[int, ...]
 ) -> Iterator[dict[str, float]]:
     """Yield the members of the shader struct `Spread` for each blurred level.

@@ -30,10 +30,10 @@ class Mixture:
     uv_weights : texture over uv of the blend weights of all profiles but the first
     entering : for each profile but the first, the blur pyramid of the light that enters the skin, multiplied
         by the blend weight of the profile
-    atlas_weights : for each layout, a texture over the atlas of the same blend weights
+    atlas_weights : for each atlas layout, a texture over the atlas of the same blend weights
     sums : texture array. Layer 0 is the exitance if all skin has the first profile. Each other profile has
-        two more layers: the changes of the exitance if this profile replaces the first, for all entering
-        light and for the weighted light in `entering`
+        two more layers with changes of the exitance, if this profile replaces the first. One is for all
+        entering light, the other for the weighted light in `entering`
     """
 
     uv_weights: Texture

@@ -91,7 +91,7 @@ def make_levels(device: Device, atlas_side: int, halvings: Halvings, texel_forma
     """Allocate the textures of a blur pyramid.
 
     atlas_side : side of the atlas at full resolution [texels]
-    halvings : for each layout, the number of times that the resolution of each level is halved
+    halvings : for each atlas layout, the number of times that the resolution of each level is halved
     texel_format : texture format
     """
     ranges = levels_by_resolution(halvings)
@@ -121,10 +121,10 @@ def make_levels(device: Device, atlas_side: int, halvings: Halvings, texel_forma
 def levels_by_resolution(halvings: Halvings) -> tuple[range, ...]:
     """Return the range of level indices that each resolution stores, finest resolution first.
 
-    A range covers the levels of all layouts. At all resolutions but the finest, the first index is that of a
-    copy: the last level of the next finer resolution, stored at half its resolution.
+    A range covers the levels of all atlas layouts. At all resolutions but the finest, the first index is that
+    of a copy: the last level of the next finer resolution, stored at half its resolution.
 
-    halvings : for each layout, the number of times that the resolution of each level is halved
+    halvings : for each atlas layout, the number of times that the resolution of each level is halved
     """
     coarsest = max(map(max, halvings))
     return tuple(

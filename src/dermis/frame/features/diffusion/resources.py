@@ -44,7 +44,7 @@ class BlurScheme(Protocol):
 class Resources:
     """Resources of the diffusion.
 
-    levels : textures of the blur pyramid, which the layouts use one after another
+    levels : textures of the blur pyramid, which the atlas layouts use one after another
     blurs : Gaussian blurs of each atlas layout, empty when no light is blurred
     mixture : textures of profiles that are blended by a map, None for a single profile
     """

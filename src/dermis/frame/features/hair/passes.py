@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dermis.frame.features.hair.resources import (
-    KNOTS_PER_WINDOW,
+    KNOTS_PER_BOUNDS_WORKGROUP,
     TILE_SIDE_PIXELS,
     Resources,
     StrandCounts,
@@ -107,7 +107,7 @@ def _draw_deep_opacity(
     clear = program(graph.device, "hair/strands_clear.wgsl")
     graph.dispatch("strands", clear, bindings, (_CLEARING_WORKGROUP_COUNT, 1, 1))
     windows = program(graph.device, "hair/strands_window.wgsl")
-    graph.dispatch("strands", windows, bindings, (max(1, -(-knots // KNOTS_PER_WINDOW)), 1, 1))
+    graph.dispatch("strands", windows, bindings, (max(1, -(-knots // KNOTS_PER_BOUNDS_WORKGROUP)), 1, 1))
     for adds_cover in (0, 1):
         _dispatch_hair(graph, "hair/strands_shadow.wgsl", bindings, segments, (("ADDS_COVER", adds_cover),))
 
@@ -208,8 +208,8 @@ def rows_per_invocation(device: Device, segment_count: int) -> int:
 
     segment_count : estimate of the largest number of segments in a tile
 
-    The result is 1 on GPUs. Software adapters skip pixels without hair faster in a loop over several pixels,
-    but they end a shader's loops after 65,535 iterations in total, which limits the number of pixels.
+    The result is 1 on GPUs. Software adapters skip pixels without hair faster in a loop over several pixels.
+    They end a shader's loops after 65,535 iterations in total, which limits the number of pixels.
     """
     if device.adapter.kind != "CPU":
         return 1

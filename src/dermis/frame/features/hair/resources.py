@@ -40,7 +40,7 @@ _MIN_STRANDS_PER_PIXEL = 2.0  # where all strands are short; fewer would look li
 _ROOT_AREA_MM2 = 6e4  # approximate area of the skin on which scalp hair and beard grow
 _MAX_SHORT_KNOTS_FRACTION = 0.4  # largest fraction of `Detail.drawn_knots` that is spent against dots
 _DETAIL_LEVELS_PER_OCTAVE = 4  # levels of detail for each doubling of the size of a pixel
-KNOTS_PER_WINDOW = 1 << 12
+KNOTS_PER_BOUNDS_WORKGROUP = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
 # Row of the table of strands in strands_pose.wgsl.
 _STRAND_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("absorption", "f4", 4)])
@@ -259,10 +259,10 @@ class StrandTables:
     groom : buffers from which coarse strands are interpolated, None if there are no coarse strands
     possible : total number of coarse strands of the person
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
-    length_mm : length of the longest kind of coarse hair, such as scalp hair or moustache [mm]
-    shortest_mm : length of the shortest kind [mm]
-    width_mm : width of a strand of the longest kind [mm]
-    cover : projected area of hair of the longest kind per area of skin [-]
+    length_mm : length of the scalp hair or the beard, whichever is longer [mm]
+    shortest_mm : length of the shorter of the two [mm]
+    width_mm : width of a strand of the longer of the two [mm]
+    cover : projected area of hair per area of skin, for the longer of the two [-]
     """
 
     strands: Buffer
@@ -316,7 +316,10 @@ class Resources:
 def shader_constants() -> dict[str, float]:
     """Return the named values that `//#fill` lines insert into the hair shaders."""
     opacity = {"strand_window": DEEP_OPACITY_WIDTH, "strand_layers": DEEP_OPACITY_LAYERS}
-    words = {"strand_window_words": DEEP_OPACITY_HEADER_WORDS, "strand_window_knots": KNOTS_PER_WINDOW}
+    words = {
+        "strand_window_words": DEEP_OPACITY_HEADER_WORDS,
+        "strand_window_knots": KNOTS_PER_BOUNDS_WORKGROUP,
+    }
     guides = {"guide_anchors": GUIDE_ANCHORS, "guide_knots": GUIDE_KNOTS}
     return {"strand_tile": TILE_SIDE_PIXELS, **opacity, **words, **guides, **hair_constants()}
 
@@ -326,7 +329,7 @@ def has_strands(head: Head, settings: Settings) -> bool:
     return settings.strands and any(part is not None and len(part) > 0 for part in (head.strands, head.hair))
 
 
-def strand_constants(head: Head, settings: Settings) -> Constants:
+def strand_shadow_constants(head: Head, settings: Settings) -> Constants:
     """Return the pipeline constant that makes lighting read strand shadows; () if no strands are drawn."""
     return (("STRANDS", 1),) if has_strands(head, settings) else ()
 

@@ -211,7 +211,7 @@ def draw(
 def _draw_occlusion_map(
     graph: Recorder, vertex_visibility: VertexSkyVisibility, layout: LitAtlas, occlusion: MovingOcclusion
 ) -> None:
-    """Declare the passes that update the occlusion map of a layout from the fractions at the vertices.
+    """Declare the passes that update the occlusion map of an atlas layout from the fractions at the vertices.
 
     The pass that finds the vertices around each texel runs only once, because its inputs are constant.
     """

@@ -24,8 +24,8 @@ class LabelBuffers:
     """Buffers that label.wgsl and strand_labels.wgsl read and write.
 
     tables : dictionary from names in label.wgsl to tables of the label classes of the mesh
-    field_count : number of classes whose border crosses triangles; such a border is given by a signed
-        distance at each vertex
+    field_count : number of distance fields. A field holds the signed distance of each vertex to the border of
+        a class, for borders that cross triangles
     hair_classes : buffer of the class of each strand, None if the head has no hair
     hair_labels : buffer of the class of the hair in each pixel, written by the hair pass
     """
@@ -71,12 +71,12 @@ def shader_constants() -> dict[str, int]:
     return {f"class_{name}": class_number(name) for name in names} | {"class_count": len(label_classes())}
 
 
-def draw_labels(graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: StageInputs) -> None:
+def draw_labels(graph: Recorder, output_planes: Planes, buffers: LabelBuffers, inputs: StageInputs) -> None:
     """Declare the pass that writes the label class of each pixel."""
     constants = ("FIELDS", buffers.field_count), ("HAIRS", buffers.hair_classes is not None)
-    shader = stage_program(graph.device, planes, constants)
+    shader = stage_program(graph.device, output_planes, constants)
     bindings = inputs.bindings(shader) | buffers.tables | {"hair_labels": buffers.hair_labels}
-    draw_planes(graph, planes, shader, bindings)
+    draw_planes(graph, output_planes, shader, bindings)
 
 
 def _upload_label_tables(device: Device, labels: MeshLabels) -> MutableBindings:

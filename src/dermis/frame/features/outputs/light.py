@@ -42,8 +42,8 @@ class LightOutputs:
     """Resources for outputs of light and skin, apart from the buffers into which the outputs are written.
 
     light_part_counts : number of parts into which each light is divided for shading
-    transmitted : textures of the light transmitted through thin parts of the head, such as ears: one for each
-        layout and, if there are several layouts, one for their blend
+    transmitted : textures of the light transmitted through thin parts of the head, such as ears. There is one
+        for each atlas layout and, if there are several layouts, one for their blend
     thickness : texture of the tissue thickness, None if the thickness is not requested
     pigments : melanin and blood fractions of uniform skin [-], None for painted maps or if pigments are not
         requested
@@ -60,8 +60,8 @@ def make_light_outputs(
 ) -> LightOutputs:
     """Return the resources of the requested outputs of light and skin.
 
-    translucency : for each layout, the resources of light through thin parts of the head; None if the scene
-        has no such light
+    translucency : for each atlas layout, the resources of light through thin parts of the head; None if the
+        scene has no such light
 
     Raises DermisError for outputs that the technique, the lights or the skin cannot provide.
     """
@@ -83,49 +83,57 @@ def make_light_outputs(
     )
 
 
-def draw_light(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
+def draw_light(graph: Recorder, output_planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
     """Declare the passes that shade the surface at pixel centres, for outputs such as albedo.
 
     Screen-space techniques also diffuse the subsurface light over the picture.
     """
     device, diffusion = graph.device, inputs.picture_diffusion
-    shader = stage_program(device, planes, inputs.constants)
+    shader = stage_program(device, output_planes, inputs.constants)
     layers = diffusion.layers if diffusion else placeholder_subsurface_layers(device)
-    draw_planes(graph, planes, shader, _shading_bindings(shader, inputs) | {"subsurface": layers})
-    if diffusion is not None and "diffuse" in planes.channels:
+    draw_planes(graph, output_planes, shader, _shading_bindings(shader, inputs) | {"subsurface": layers})
+    if diffusion is not None and "diffuse" in output_planes.channels:
         below, leaving = diffusion.diffuse()
-        add = program(device, "outputs/spread.wgsl", planes.first_channel_constant("diffuse"))
-        draw_planes(graph, planes, add, {"below": below, "leaving": leaving})
-    if "translucent" in planes.channels:
+        add = program(device, "outputs/spread.wgsl", output_planes.first_channel_constant("diffuse"))
+        draw_planes(graph, output_planes, add, {"below": below, "leaving": leaving})
+    if "translucent" in output_planes.channels:
         transmitted = inputs.sum_transmitted(resources.transmitted)
-        multiply = program(device, "outputs/transmitted.wgsl", planes.first_channel_constant("translucent"))
+        multiply = program(
+            device, "outputs/transmitted.wgsl", output_planes.first_channel_constant("translucent")
+        )
         bindings = inputs.bindings(multiply) | {"transmitted": transmitted}
-        draw_planes(graph, planes, multiply, bindings)
+        draw_planes(graph, output_planes, multiply, bindings)
 
 
-def draw_visibility(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
+def draw_visibility(
+    graph: Recorder, output_planes: Planes, resources: LightOutputs, inputs: StageInputs
+) -> None:
     """Declare the pass that computes how much of each light is visible from the surface at each pixel."""
-    shader, counts = stage_program(graph.device, planes, inputs.constants), resources.light_part_counts
+    shader, counts = stage_program(graph.device, output_planes, inputs.constants), resources.light_part_counts
     ends = np.zeros(_MAX_VISIBILITY_LIGHTS, np.uint32)
     ends[: len(counts)] = np.cumsum(counts)
     parts = shader.record("LightParts", count=len(counts), end=ends.reshape(-1, 4))
-    draw_planes(graph, planes, shader, _shading_bindings(shader, inputs) | {"light_parts": parts})
+    draw_planes(graph, output_planes, shader, _shading_bindings(shader, inputs) | {"light_parts": parts})
 
 
-def draw_pigments(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
+def draw_pigments(
+    graph: Recorder, output_planes: Planes, resources: LightOutputs, inputs: StageInputs
+) -> None:
     """Declare the pass that writes the melanin and blood fractions of the skin at each pixel."""
-    shader, uniform = stage_program(graph.device, planes), resources.pigments
+    shader, uniform = stage_program(graph.device, output_planes), resources.pigments
     record = shader.record("Pigments", uniform_pigments=uniform or (0.0, 0.0), painted=uniform is None)
-    draw_planes(graph, planes, shader, inputs.bindings(shader) | {"pigments": record})
+    draw_planes(graph, output_planes, shader, inputs.bindings(shader) | {"pigments": record})
 
 
-def draw_thickness(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
+def draw_thickness(
+    graph: Recorder, output_planes: Planes, resources: LightOutputs, inputs: StageInputs
+) -> None:
     """Declare the passes that measure the tissue thickness of thin parts, and write it for each pixel."""
     assert inputs.translucency is not None and resources.thickness is not None
     measure_thickness(graph, inputs.translucency, resources.thickness)
-    shader = stage_program(graph.device, planes)
+    shader = stage_program(graph.device, output_planes)
     bindings = inputs.bindings(shader) | {"thickness_map": resources.thickness}
-    draw_planes(graph, planes, shader, bindings)
+    draw_planes(graph, output_planes, shader, bindings)
 
 
 def make_thickness_map(device: Device, pair_buffers: PairBuffers) -> Texture:

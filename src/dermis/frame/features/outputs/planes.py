@@ -107,17 +107,19 @@ def make_planes(
     )
 
 
-def stage_program(device: Device, planes: Planes, constants: Constants = ()) -> ComputeProgram:
+def stage_program(device: Device, output_planes: Planes, constants: Constants = ()) -> ComputeProgram:
     """Return the program that computes the requested outputs of a stage.
 
     constants : pipeline constants of the surface and the lights, for stages that need them
     """
-    return program(device, f"outputs/{planes.stage}.wgsl", (*planes.first_channel_constants, *constants))
+    return program(
+        device, f"outputs/{output_planes.stage}.wgsl", (*output_planes.first_channel_constants, *constants)
+    )
 
 
-def draw_planes(graph: Recorder, planes: Planes, shader: ComputeProgram, bindings: Bindings) -> None:
+def draw_planes(graph: Recorder, output_planes: Planes, shader: ComputeProgram, bindings: Bindings) -> None:
     """Declare the pass that computes the outputs of a stage for each pixel.
 
     bindings : resources of the shader, apart from the buffer for the outputs
     """
-    graph.compute("outputs", shader, {**bindings, "planes": planes.buffer}, planes.size)
+    graph.compute("outputs", shader, {**bindings, "planes": output_planes.buffer}, output_planes.size)

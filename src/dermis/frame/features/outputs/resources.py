@@ -58,8 +58,8 @@ def make_resources(
 ) -> Resources | None:
     """Return the resources of the requested outputs, None if none are requested.
 
-    translucency : for each layout, the resources of light through thin parts of the head; None if the scene
-        has no such light
+    translucency : for each atlas layout, the resources of light through thin parts of the head; None if the
+        scene has no such light
 
     Raises DermisError if the outputs do not fit in one buffer of the device, or if the scene cannot provide
     them.

@@ -56,40 +56,42 @@ def _draw_centre_triangles(graph: Graph, inputs: StageInputs) -> None:
         draw_layers(graph, "outputs", inputs.centres, Views(inputs.camera.clips, PIXEL_CENTRE), inputs.head)
 
 
-def _draw_geometry(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
-    shader = stage_program(graph.device, planes)
-    draw_planes(graph, planes, shader, inputs.bindings(shader))
+def _draw_geometry(graph: Graph, output_planes: Planes, resources: Resources, inputs: StageInputs) -> None:
+    shader = stage_program(graph.device, output_planes)
+    draw_planes(graph, output_planes, shader, inputs.bindings(shader))
 
 
-def _draw_surface(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
+def _draw_surface(graph: Graph, output_planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     constants = tuple(one for one in inputs.constants if one[0] in _SURFACE_CONSTANT_NAMES)
-    shader = stage_program(graph.device, planes, constants)
-    draw_planes(graph, planes, shader, inputs.bindings(shader))
+    shader = stage_program(graph.device, output_planes, constants)
+    draw_planes(graph, output_planes, shader, inputs.bindings(shader))
 
 
-def _draw_motion(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
+def _draw_motion(graph: Graph, output_planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     previous, vertices = inputs.previous, inputs.shape.vertices
     assert previous is not None
     if previous.motion is not None:
         assert resources.previous is not None
         shape.draw(graph, resources.previous, previous.motion)
         vertices = resources.previous.vertices
-    shader = stage_program(graph.device, planes)
+    shader = stage_program(graph.device, output_planes)
     bindings = inputs.bindings(shader) | {
         "previous": shader.record("Previous", rays=ray_record(shader, previous.view)),
         "previous_table": vertices["vertex_table"],
         "previous_buffer": vertices["vertex_buffer"],
     }
-    draw_planes(graph, planes, shader, bindings)
+    draw_planes(graph, output_planes, shader, bindings)
 
 
-def _draw_alpha(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
-    draw_planes(graph, planes, stage_program(graph.device, planes), {"exposed": inputs.picture.exposed})
+def _draw_alpha(graph: Graph, output_planes: Planes, resources: Resources, inputs: StageInputs) -> None:
+    draw_planes(
+        graph, output_planes, stage_program(graph.device, output_planes), {"exposed": inputs.picture.exposed}
+    )
 
 
-def _draw_label(graph: Graph, planes: Planes, resources: Resources, inputs: StageInputs) -> None:
+def _draw_label(graph: Graph, output_planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     assert resources.labels is not None
-    draw_labels(graph, planes, resources.labels, inputs)
+    draw_labels(graph, output_planes, resources.labels, inputs)
 
 
 def _light_stage(

@@ -160,13 +160,13 @@ def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
     count = len(rig.positions_mm)
     return {
         "first": _run_offsets(rig.targets.point, count),
-        "displacements": displacements(rig.targets, rig.targets),
+        "displacements": displacement_rows(rig.targets, rig.targets),
         "influences": _bone_influences(rig.skeleton, count),
         "contacts": _contact_words(rig.contact, count),
     }
 
 
-def displacements(targets: MorphTargets, template_targets: MorphTargets) -> NDArray[np.float32]:
+def displacement_rows(targets: MorphTargets, template_targets: MorphTargets) -> NDArray[np.float32]:
     """Return (n, 4) rows of displacement [mm] and morph target index, ordered by point, for shape_pose.wgsl.
 
     targets : morph targets of a person
@@ -273,8 +273,8 @@ class MotionBytes(NamedTuple):
     positions : position of each control point at rest, three floats [mm]
     weights : weight of each morph target, one float
     matrices : matrix of each bone, from rest to pose, twelve floats row by row [mm]
-    displacements : result of the function `displacements` if the person's morph targets replace those of the
-        template, else empty
+    displacements : result of `displacement_rows` if the person's morph targets replace those of the template,
+        else empty
     """
 
     positions: bytes
@@ -323,7 +323,7 @@ def rest_motion(rig: Rig) -> MotionBytes:
     weights, matrices, positions = (array.tobytes() for array in rig.rest)
     if rig.template is None or not rig.targets.names:
         return MotionBytes(positions, weights, matrices)
-    own = displacements(rig.targets, rig.template.targets)
+    own = displacement_rows(rig.targets, rig.template.targets)
     return MotionBytes(positions, weights, matrices, own.tobytes())
 
 

@@ -26,7 +26,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.specular.beckmann import beckmann_table
 
 _MAX_SOFTWARE_MAP_SIDE = 1024  # limit of painted maps on software adapters, which are slow [texels]
-_MEAN_GRID_SIDE = 512  # side of the grid over which the mean of a map is computed [texels]
+_SURFACE_MEAN_GRID_SIDE = 512  # side of the grid over which the mean of a map is computed [texels]
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,12 +151,12 @@ def _divided_by_surface_mean(factor_map: NDArray[np.float32] | None, mesh: Mesh)
     """Return a map divided by its mean over the surface, as a factor of the skin's specular strength [-]."""
     if factor_map is None:
         return _factor_channel(None)
-    texel, triangle = rasterise(mesh, _MEAN_GRID_SIDE, np.arange(len(mesh.triangles)))
+    texel, triangle = rasterise(mesh, _SURFACE_MEAN_GRID_SIDE, np.arange(len(mesh.triangles)))
     corners = mesh.positions[mesh.triangles].astype(np.float64)
     weight = (triangle_areas(corners) / np.maximum(triangle_uv_area(mesh), 1e-12))[triangle]
     height, width = factor_map.shape
-    row, column = texel // _MEAN_GRID_SIDE, texel % _MEAN_GRID_SIDE
-    found = factor_map[row * height // _MEAN_GRID_SIDE, column * width // _MEAN_GRID_SIDE]
+    row, column = texel // _SURFACE_MEAN_GRID_SIDE, texel % _SURFACE_MEAN_GRID_SIDE
+    found = factor_map[row * height // _SURFACE_MEAN_GRID_SIDE, column * width // _SURFACE_MEAN_GRID_SIDE]
     mean = float((weight * found).sum() / weight.sum()) if len(texel) else 0.0
     return _factor_channel(factor_map / mean if mean > 0 else np.ones_like(factor_map))
 

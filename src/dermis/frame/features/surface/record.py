@@ -81,11 +81,11 @@ def skin_record(
     members = struct_dtype(shading_program.source.text, "Skin").names or ()
     values = {name: getattr(skin, name) for name in members if hasattr(skin, name)}
     return shading_program.record(
-        "Skin", **values, **_derived_members(skin, maps, profile), light_count=light_count
+        "Skin", **values, **_derived_skin_members(skin, maps, profile), light_count=light_count
     )
 
 
-def _derived_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
+def _derived_skin_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
     """Return the members of the struct `Skin` that are not fields or properties of the Python class."""
     energy, usual = ENERGY_SCHEMES[skin.energy], DEFAULT_ROUGHNESS if maps.has_roughness else 1.0
     return {
@@ -96,7 +96,7 @@ def _derived_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, 
         "returned": energy.returns_internal_light,
         "tint": skin.specular_colour == "wrong",
         "relief_band": _normal_map_level(maps),
-        **(_direction_members(skin, maps, profile) if skin.direction == "half-space" else {}),
+        **(_light_direction_members(skin, maps, profile) if skin.direction == "half-space" else {}),
     }
 
 
@@ -111,7 +111,7 @@ def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Float
     return colour, 1.0 if skin.specular == "none" else SKIN_ETA
 
 
-def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
+def _light_direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
     """Return the members of the struct `Skin` that direction.wgsl reads.
 
     They describe how reflectance and transmittance depend on the direction of light, and are computed for a

@@ -21,7 +21,7 @@ def make_surface_texture(device: Device, atlas_side: int) -> Texture:
 
 
 def draw(graph: Recorder, layout: LitAtlas) -> None:
-    """Declare the pass that fills the surface texture of a layout."""
+    """Declare the pass that fills the surface texture of an atlas layout."""
     bound = {**layout.bindings, **layout.atlas.resources, "surfaces": layout.surfaces}
     graph.compute(
         "surface", program(graph.device, "surface/surface_texels.wgsl"), bound, layout.surfaces.size[:2]

@@ -26,7 +26,7 @@ from dermis.frame.features.translucency.passes import (
     SOURCE_BYTES,
     choose_source_level,
     make_element_buffer,
-    weight_bindings,
+    pair_weight_bindings,
 )
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
 from dermis.frame.request import FrameRequest
@@ -239,10 +239,10 @@ def with_profile_weights(
     lost = fraction if thickness_tables is None else thickness_tables.lost
     return replace(
         translucency,
-        weight_bindings=weight_bindings(
+        weight_bindings=pair_weight_bindings(
             device, translucency.pairs, variance_mm2, weight, thickness_tables, transmitted
         ),
-        loss_bindings=weight_bindings(
+        loss_bindings=pair_weight_bindings(
             device, translucency.pairs, variance_mm2, fraction, thickness_tables, lost
         ),
         gaussian_count=len(weight),

@@ -49,8 +49,8 @@ def pair_positions_mm(memo: Memo, request: FrameRequest) -> Floats | None:
     """Return the control points of the shape in which pairs are searched [mm], None for the head at rest.
 
     A pair is two cells of the skin between which light crosses a thin part. All people of one template use
-    the pairs of the template at rest. So does any other shape whose strain is at most
-    `MAX_SHARED_PAIR_STRAIN`.
+    the pairs of the template at rest. Other heads use their pairs at rest for all shapes with a strain of at
+    most `MAX_SHARED_PAIR_STRAIN`.
     """
     positions = request.rest_positions_mm
     if positions is None or request.is_shared:

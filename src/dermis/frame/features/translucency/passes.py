@@ -193,7 +193,7 @@ def choose_source_level(source_spacing_mm: float, variance_mm2: Floats) -> int:
     return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
 
 
-def weight_bindings(
+def pair_weight_bindings(
     device: Device,
     pair_buffers: PairBuffers,
     variance_mm2: Floats,
