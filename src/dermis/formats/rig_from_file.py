@@ -86,7 +86,7 @@ def build_rig(
     to_head: Doubles,
     culprit: object,
 ) -> Rig | None:
-    """Return the rig that moves a mesh's points; None for a file without morph targets and bones.
+    """Return the rig that moves a mesh's points; None for a file with neither morph targets nor bones.
 
     positions_mm : (v, 3) vertices in the head's space
     point_of_vertex : (v,) index of the point of each vertex

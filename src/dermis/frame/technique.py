@@ -39,7 +39,7 @@ class ProfileSplit:
 
     @property
     def relit_changes(self) -> Floats:
-        """Return, for each of n other profiles, its `relit` minus the `relit` of this profile, (n, 3) [-]."""
+        """Return by how much the weights `relit` of each of n other profiles exceed those of this profile (n, 3)."""
         return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
 
     @property

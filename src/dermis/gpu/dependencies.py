@@ -136,7 +136,7 @@ class Dependencies:
     def compute_versions(self, epoch: int, pass_keys: Iterable[Hashable]) -> list[int]:
         """Return the version of the output of each pass.
 
-        epoch : number that changes when all content becomes unknown
+        epoch : number that changes when the contents of all resources are invalidated
         pass_keys : for each pass, everything that its output depends on besides the resources that it reads
         """
         versions: list[int] = []

@@ -302,7 +302,10 @@ class Target(ABC):
 
 
 class JsonTarget(Target):
-    """Base class of targets that only write a JSON file of parameters and were not tested in the program."""
+    """Base class of targets that only write a JSON file of parameters.
+
+    The files have not been tested in the programs for which they are written.
+    """
 
     suffixes = (".json", "")
     untested = True

@@ -86,11 +86,12 @@ def solve_reflectance(
 ) -> Floats:
     """Return the Hankel transform (n, c) of R(r) of a layered medium [-].
 
-    R(r) is per power that enters. This function is faster than `solve_layers`, which also computes T(r).
+    R(r) is relative to the power that enters the medium. This function is faster than `solve_layers`, which also computes T(r).
 
     frequency : (n,) frequencies s > 0 [1/mm]
     mismatch : boundary mismatch with air [-]
-    source_kind : "beam" or "point", the place where light first scatters, see `solve_layers`
+    source_kind : where light first scatters: along the refracted beam ("beam") or at one depth ("point"),
+        see `solve_layers`
     """
     return _solve_upwards(frequency, _sublayers(medium, source_kind), medium.channels, mismatch)[0] / (
         2.0 * mismatch

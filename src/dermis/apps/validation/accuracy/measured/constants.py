@@ -92,9 +92,9 @@ class ExtendedModel:
             wavelength, 0.0
         )
         half_width = float(self.constants.get("bandwidth_nm", 0.0))
-        vessels = oxygen * _blood_in_bands(1.0, half_width) + (1.0 - oxygen) * _blood_in_bands(
-            0.0, half_width
-        )
+        vessels = oxygen * _blood_absorption_by_band(1.0, half_width) + (
+            1.0 - oxygen
+        ) * _blood_absorption_by_band(0.0, half_width)
         depth = np.maximum(vessels * parameter_column("vessel_mm"), 1e-9)
         vessels = vessels * -np.expm1(-depth) / depth
         m, b = parameter_column("melanin"), parameter_column("blood")
@@ -116,7 +116,7 @@ class ExtendedModel:
         )
 
 
-def _blood_in_bands(oxygen: float, half_width_nm: float) -> Floats:
+def _blood_absorption_by_band(oxygen: float, half_width_nm: float) -> Floats:
     """Return the absorption (31,) of blood, averaged over triangular wavelength bands [1/mm].
 
     oxygen : fraction of haemoglobin that carries oxygen [-]

@@ -121,9 +121,9 @@ def measured_page() -> None:
 
 
 def _default_skin_errors(archive: Archive) -> JsonObject:
-    """Return errors of fits of two, three and five unknowns, for four skins that set the other parameters.
+    """Return the errors of fits with two, three and five unknowns, for each of four skins.
 
-    The skins are the former default skin, the present one, and two that are the former default with less
+    Parameters that are not fitted are those of the skin. The skins are the former default skin, the present one, and two that are the former default with less
     absorption by bloodless tissue.
     """
     skins = {
