@@ -39,7 +39,7 @@ class ProfileSplit:
 
     @property
     def relit_changes(self) -> Floats:
-        """Return by how much the weights `relit` of each of n other profiles exceed those of this profile (n, 3)."""
+        """Return (n, 3) the weights `relit` of each of n other profiles minus those of this profile [-]."""
         return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
 
     @property

@@ -86,7 +86,8 @@ def solve_reflectance(
 ) -> Floats:
     """Return the Hankel transform (n, c) of R(r) of a layered medium [-].
 
-    R(r) is relative to the power that enters the medium. This function is faster than `solve_layers`, which also computes T(r).
+    R(r) is relative to the power that enters the medium. This function is faster than `solve_layers`, which
+    also computes T(r).
 
     frequency : (n,) frequencies s > 0 [1/mm]
     mismatch : boundary mismatch with air [-]

@@ -123,8 +123,8 @@ def measured_page() -> None:
 def _default_skin_errors(archive: Archive) -> JsonObject:
     """Return the errors of fits with two, three and five unknowns, for each of four skins.
 
-    Parameters that are not fitted are those of the skin. The skins are the former default skin, the present one, and two that are the former default with less
-    absorption by bloodless tissue.
+    Parameters that are not fitted are those of the skin. The skins are the former default skin, the present
+    one, and two that are the former default with less absorption by bloodless tissue.
     """
     skins = {
         "former": FORMER_SKIN,
