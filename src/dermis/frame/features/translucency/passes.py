@@ -206,7 +206,7 @@ def pair_weight_bindings(
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     weight : (k, 3) weights of the blurred levels [-]
     thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
-        weight pairs by the Gaussians
+        compute the weights of pairs from the Gaussians
     transmittance : (THICKNESS_ROWS, k, 3) table to use: `thickness_tables.transmitted` or
         `thickness_tables.lost`
     """
@@ -232,6 +232,8 @@ def _transmittance_table(
 
     The fourth channel holds `ThinParts.directionality` in the first row of each thickness, else 0. Without
     `thickness_tables`, the result is one row of zeros.
+
+    transmittance : (THICKNESS_ROWS, k, 3) transmittance, one of the arrays of `thickness_tables`
     """
     if thickness_tables is None or transmittance is None:
         return np.zeros((1, 4), np.float32)

@@ -186,10 +186,12 @@ def candidate_cells(cells: Cells, tile_pairs: TilePairs) -> CandidateCells:
 
 
 def _expand_ranges(range_starts: Index, chosen_ranges: Index) -> tuple[Index, Index]:
-    """Return all integers in the chosen ranges, and the index of each integer's range in `chosen_ranges`.
+    """Return all integers in the chosen ranges and, for each integer, an index into `chosen_ranges`.
+
+    The index tells which of the chosen ranges contains the integer.
 
     range_starts : start of each range; a range ends where the next range starts
-    chosen_ranges : indices of the chosen ranges
+    chosen_ranges : indices of the chosen ranges in `range_starts`
     """
     count = range_starts[chosen_ranges + 1] - range_starts[chosen_ranges]
     position = np.repeat(np.arange(len(chosen_ranges)), count)
@@ -243,7 +245,9 @@ def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple
 
 
 def list_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, bindings: Bindings) -> Buffer:
-    """Add the pass that lists the gutter texels with copies of source cells; return its result buffer.
+    """Add the pass that lists, for each source cell, the positions in gutters that copy light near this cell.
+
+    Return the buffer of these positions.
 
     source_cells : (n,) indices of cells that emit light
     bindings : further resources of gutter_copies.wgsl
