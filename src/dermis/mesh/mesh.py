@@ -29,8 +29,8 @@ class Material:
     colour : diffuse albedo where there is no colour map, linear Rec. 709 [-]
     part : name of a part of the mouth, which selects a colour in mouth.wgsl; None for other surfaces
     eye : whether the file declares the group to be an eyeball
-    has_maps : whether `Maps.parts` contains the colour and surface of an opaque group, already multiplied by
-        the factors of the file's material
+    has_maps : whether `Maps.parts` contains colour and surface maps of an opaque group; the factors of the
+        file's material are already included in these maps
     roughness : perceptual roughness of an opaque group, see glTF [-]; None for wet eyes and teeth
     metalness : 1 for metal [-]
     emission : radiance that the group emits, linear Rec. 709

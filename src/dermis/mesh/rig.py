@@ -203,8 +203,8 @@ class Rig(ShortRepr):
     def _posable_lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
         """Return arrays for `lid_edges_mm` that do not depend on the pose.
 
-        They are the indices (n,) of the control points around the lid edges, and the weights (e, n) of these
-        control points in the e points along the edges. The `RigOutline` poses the control points.
+        They are the indices (n,) of the control points around the lid edges, the weights (e, n) of these
+        control points in the e points along the edges, and a `RigOutline` that poses these control points.
         """
         assert self.contact is not None
         edge = self.contact.edge.ravel().astype(np.intp)

@@ -197,7 +197,7 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
 
     The triangles are indices of vertices of the subdivided mesh. Triangles with an opacity map are left out.
 
-    min_faces : coarser levels are used only if the mesh has at least this number of faces at these levels
+    min_faces : levels are dropped only as long as the coarser mesh has at least this number of faces
     tolerance_mm : largest distance between a dropped vertex and the middle of the coarse edge that replaces
         it [mm]
     """

@@ -1,4 +1,4 @@
-"""Loading of heads by name: the parametric human, samples and files."""
+"""Loading of heads by name: the parametric human, sample heads and mesh files."""
 
 from __future__ import annotations
 
@@ -228,6 +228,7 @@ def _load_human(
 
     head_name : "human", "human:SEED", or a person's .json file
     user_files : dictionary from map roles, such as "colour", to files that replace the painted maps
+    height_mm, normal_y : interpretation of the height map and the normal map, see `load_head`
     mesh_options : options that apply only to mesh files; DermisError is raised unless all have their defaults
     subdivision_levels : number of levels, or a function of the head that returns it
     """
