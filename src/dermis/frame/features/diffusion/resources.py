@@ -18,7 +18,7 @@ from dermis.gpu import Device, Memo
 
 
 class BlurScheme(Protocol):
-    """Interface of techniques, which choose the texture format and the resolutions of their blurs."""
+    """Interface through which a rendering technique chooses the format and the resolutions of its blurs."""
 
     def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
         """Allocate the blur pyramid for a square atlas with a side of `atlas_side` texels."""

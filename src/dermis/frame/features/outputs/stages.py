@@ -1,4 +1,4 @@
-"""Shader stages that compute outputs, and the passes that they declare; each is named like its shader."""
+"""Stages that compute outputs: each declares the passes of a shader, and has the name of this shader."""
 
 from __future__ import annotations
 

@@ -139,7 +139,7 @@ def sum_pair_light(
     """Declare the pass that sums, in each receiver cell, the light of its sources times the pair weights.
 
     source_light : buffer of the light of each source
-    light_sums : texture over the coarse atlas for the sums
+    light_sums : texture for the sums, with one texel per cell of the atlas
     constants : pipeline constants that replace the defaults of translucency.wgsl
     stage_name : name of the stage in timings
     """
