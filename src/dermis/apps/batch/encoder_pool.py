@@ -1,4 +1,4 @@
-"""Pool of processes that encode the images of a worker as files, in order."""
+"""Pool of processes that encode rendered images as files, and return the files in the order of the images."""
 
 from __future__ import annotations
 
