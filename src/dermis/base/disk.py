@@ -270,7 +270,7 @@ def _temporary_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def _prune_folder(cache_path: Path) -> None:
-    """Delete the least recently used files until the size limit is met, and delete old unfinished files."""
+    """Delete unfinished old files of a cache folder, and the least recently used files above a size limit."""
     newest_first = sorted(
         _folder_files(cache_path, _CACHE_FILE_SUFFIX), key=lambda entry: entry[1].st_mtime, reverse=True
     )

@@ -45,7 +45,7 @@ def make_private_folder(folder: Path) -> None:
 def describe_other_writers(folder: Path) -> str:
     """Return a clause that says how other users can write to a folder; empty if no other user can.
 
-    Folders above the user's home and folders that only root can write to count as safe.
+    Folders above the user's home count as safe, and so do folders that only root can write to.
     """
     if os.name != "posix":
         return ""  # Windows profiles are private

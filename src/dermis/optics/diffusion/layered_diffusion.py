@@ -1,7 +1,8 @@
 """Diffusion in layered media, with continuous fluence and flux at each interface.
 
-In the Hankel domain, the fluence phi(z) in each layer satisfies D phi'' - D q^2 phi = -S(z). Here, q^2 is
-sigma_tr^2 + s^2 at the frequency s, and S is the source of light that has just scattered for the first time.
+In the Hankel domain, the fluence phi(z) in each layer satisfies D phi'' - D q^2 phi = -S(z). Here, z is the
+depth, D is the diffusion coefficient, q^2 is sigma_tr^2 + s^2 at the frequency s, and S(z) is the power, per
+unit of depth, of the light that scatters for the first time at the depth z.
 At each face, the layers below impose the boundary condition D phi' = W - Z phi. A recursion computes Z and W
 of the faces from bottom to top.
 """
@@ -68,7 +69,7 @@ def solve_layers(
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms (n, c) of R(r) and of T(r) of a layered medium [-].
 
-    R(r) and T(r) are the profiles at the upper and the lower face, per power that enters.
+    R(r) and T(r) are the profiles at the upper and the lower face, relative to the power that enters.
 
     frequency : (n,) frequencies s > 0 [1/mm]
     mismatch : boundary mismatch with air; internal interfaces are index-matched [-]
@@ -102,7 +103,7 @@ def solve_reflectance(
 def solve_two_layers(
     upper_layer: Layer, thickness_mm: ArrayLike, lower_layer: Layer, mismatch: float
 ) -> Floats:
-    """Return the total reflectance (n, c) of n skins with two layers, per power that enters [-].
+    """Return the total reflectance (n, c) of n skins with two layers, relative to the entering power [-].
 
     upper_layer : upper layers, with coefficients (n, c), or (c,) if they are the same for all skins
     thickness_mm : (n, 1) thicknesses of the upper layers, or one number [mm]
@@ -148,7 +149,7 @@ def _solve_sublayers(
 def _solve_upwards(
     frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, mismatch: float
 ) -> tuple[Floats, list[_DownwardTransfer]]:
-    """Return the fluence at the surface, and the transfer through each sublayer, topmost sublayer first."""
+    """Return the fluence at the surface, and the `_DownwardTransfer` of each sublayer, topmost first."""
     s = np.asarray(frequency, dtype=np.float64)[..., None]
     zero = np.zeros((*s.shape[:-1], channel_count))
     face, transfers = _BoundaryCondition(zero + 1.0 / (2.0 * mismatch), zero), list[_DownwardTransfer]()

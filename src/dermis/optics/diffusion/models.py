@@ -56,8 +56,8 @@ def diffusion_profile(
     model : "dipole" and "better-dipole" require one half-space; the other models accept any stack
     clamp : whether the multipole's source is kept inside thin layers ("layer") or not ("none"), see `Slab`
     rgb_weights : (3, c) weights that convert wavelengths to linear Rec. 709; the result then has three
-        channels and is per incident power. By default, the result has the medium's channels and is per power
-        that enters
+        channels and is relative to the incident power. By default, the result has the medium's channels and
+        is relative to the power that enters
 
     Raises DermisError when the model is not valid for the medium.
 
@@ -86,7 +86,10 @@ def diffusion_rings(
     clamp: Clamp = "layer",
     rgb_weights: Floats | None = None,
 ) -> RingTarget:
-    """Return only the ring energies of `diffusion_profile`, which is faster than the whole profile."""
+    """Return the light that emerges through rings, as in the result of `diffusion_profile` but faster.
+
+    The parameters are those of `diffusion_profile`.
+    """
     grid, values, total = _sampled_profile(medium, model, clamp, rgb_weights)
     edges = ring_edges()
     return RingTarget(edges, np.diff(enclosed_energy(edges, grid, values), axis=0), total)
@@ -210,7 +213,9 @@ def gaussian_transmittance(profile: GaussianSum, thickness_mm: ArrayLike) -> Flo
 def slab_transmittance(
     medium: Medium, thickness_mm: ArrayLike, model: Literal["layered", "multipole"] = "layered"
 ) -> Floats:
-    """Return the transmittance (n, c) of a medium that is cut off at a thickness, per power that enters [-].
+    """Return the transmittance (n, c) of a medium that is cut off at each of n thicknesses [-].
+
+    The transmittance is relative to the power that enters the medium.
 
     thickness_mm : (n,) thicknesses at which the medium is cut off [mm]
     model : "layered" includes unscattered light, attenuated by the reduced extinction; "multipole" assumes
