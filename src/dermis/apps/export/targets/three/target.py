@@ -65,7 +65,10 @@ class Three(EnginePage):
         return CumulativeProfile.from_function(lambda r: np.ones((len(r), 3)), subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the import map of three.js, and the hash, URLs or scheme that script-src allows."""
+        """Return the import map of three.js, and the sources from which the page may load scripts.
+
+        The sources are a hash, and URLs or a scheme, for script-src in the page's Content-Security-Policy.
+        """
         files = self.library_files[version]
         if self.library_folder is None:
             imports = {file.name: file.url for file in files}

@@ -137,7 +137,7 @@ def _frame_json(named_frame: NamedFrame, picture_entry: list[int], byte_runs: By
 
 
 def _view_record_index(captured_frame: CapturedFrame, stage_name: str) -> int:
-    """Return the index of the uniform record with a stage's view matrices; -1 if there is no such record.
+    """Return the index in `captured_frame.records` of a stage's view matrices; -1 if there are none.
 
     stage_name : "visibility" or "shadows"
     """
@@ -206,7 +206,10 @@ def resources_read_before_write(frame_capture: FrameCapture, captured_frames: Fr
 def resources_bound_as(
     frame_capture: FrameCapture, captured_frames: Frames, binding_names: tuple[str, ...]
 ) -> dict[int, str]:
-    """Return the resources that shaders bind by one of the given names, as a dictionary by resource index."""
+    """Return a dictionary from resource index to name, for the resources that shaders bind by given names.
+
+    binding_names : names of the bindings in the shaders
+    """
     found: dict[int, str] = {}
     for one in (one for frame in captured_frames for one in frame.passes if one.program is not None):
         bound_names = [name for _, name, _ in frame_capture.programs[one.program or 0]["bindings"]]
@@ -219,9 +222,9 @@ def resources_bound_as(
 
 
 def viewed_resource(frame_capture: FrameCapture, resource_index: int) -> int:
-    """Return the resource index of a view's texture; any other resource index is returned unchanged.
+    """Return the index of the texture to which a texture view belongs.
 
-    resource_index : index of the texture or buffer in the capture
+    resource_index : index of a resource in the capture; returned unchanged if it is not a texture view
     """
     return int(frame_capture.resources[resource_index].get("of", resource_index))
 
