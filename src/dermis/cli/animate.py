@@ -255,7 +255,8 @@ class TimeSpan:
 
     begin, end : first and last time within the motion [s]
     rate : frame rate of the rendered animation, from --fps [1/s]
-    motion_rate : frame rate of motion files that have no time stamps, from --motion-fps [1/s]
+    motion_rate : frame rate of mesh sequences, and of motion files that have no times or only timecodes, from
+        --motion-fps [1/s]
     """
 
     begin: Fraction | None
