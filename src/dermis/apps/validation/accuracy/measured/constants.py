@@ -132,12 +132,11 @@ def _blood_absorption_by_band(oxygen: float, half_width_nm: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class SharedFit:
-    """Result of a fit of a skin model to spectra: constants shared by all spectra, and unknowns of each.
+    """Result of a fit of a skin model to spectra: shared constants, and unknowns of each spectrum.
 
-    constants : values of the constants by name
+    constants : values of the constants that all spectra share, by name
     fit : unknowns of each spectrum
-    confounded : names of two constants with strongly correlated errors, and the correlation, for each such
-        pair
+    confounded : for each pair of constants with strongly correlated errors, both names and the correlation
     """
 
     constants: dict[str, float]
@@ -154,9 +153,11 @@ def fit_constants(
 ) -> SharedFit:
     """Fit constants shared by all spectra, and unknowns of each spectrum, by least squares.
 
+    spectra : (n, 31) measured reflectance [-]
     unknowns : names of the parameters that are fitted to each spectrum separately
     free_constants : names of the `CONSTANTS` that are fitted to all spectra together
-    fixed_constants : values of constants that are not fitted
+    criterion : what the fit minimises: differences of the spectra ("spectrum") or of their colours ("colour")
+    fixed_constants : values of constants that are not fitted, by name
     """
     separate = [UNKNOWNS[name] for name in unknowns]
     shared = [CONSTANTS[name] for name in free_constants]
