@@ -108,9 +108,9 @@ PassAccess = tuple[int, tuple[ResourceState, ...], tuple[ResourceState, ...]]
 class Dependencies:
     """Dependencies between the passes of a frame, used to find stale passes: those with outdated output.
 
-    The version that a pass writes is a hash of its key and of the versions that it reads. A pass is skipped
-    if its outputs already have that version. It is also skipped if no pass that runs reads its outputs, and
-    each output is scratch or overwritten later.
+    The version of a pass's output is a hash of the versions that the pass reads and of its key, which stands
+    for all other inputs. A pass is skipped if its outputs already have that version. It is also skipped if no
+    pass that runs reads its outputs, and each output is scratch or overwritten later.
 
     passes : for each pass, in order, its access id and the states of the resources that it reads and writes
     """

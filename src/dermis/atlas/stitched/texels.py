@@ -104,7 +104,9 @@ def anchors_diverge(first_texels: AnchoredTexels, second_texels: AnchoredTexels)
 
 
 def gap_limit_mm(first_texels: AnchoredTexels, second_texels: AnchoredTexels, axis: int) -> Doubles:
-    """Return the distance (n,) between surface points above which two adjacent texels have a gap [mm].
+    """Return the largest distance (n,) between the surface points of adjacent texels without a gap [mm].
+
+    If the points are farther apart, the surface is not continuous between the two texels.
 
     axis : 0 for texels adjacent along x, 1 along y
     """

@@ -75,9 +75,11 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
 
 
 def with_oblique_constant(constants: Constants) -> Constants:
-    """Return `constants`, and add the constant for oblique incidence if they contain HALF_SPACE.
+    """Return `constants`, with OBLIQUE added if they contain HALF_SPACE.
 
-    Use the result only for passes that know the shape of the surface around a point.
+    HALF_SPACE makes the response of skin to light depend on direction. OBLIQUE also evaluates oblique light
+    at an offset along the surface; only passes that provide the shape of the surface around a point may use
+    it.
     """
     return (*constants, ("OBLIQUE", 1)) if ("HALF_SPACE", 1) in constants else constants
 

@@ -65,7 +65,7 @@ class GpuGems3(AtlasTechnique):
         return float(TEXEL_FORMAT_BYTES[HALF_TEXEL_FORMAT] * (blur_count + 4))
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
-        """Return 0 for each level, because all levels have full resolution."""
+        """Return the number of halvings of each level's resolution: 0, as all levels have full resolution."""
         return (0,) * (len(split.blurred_mm2) + 1)
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
