@@ -172,13 +172,13 @@ class IntermediateViews:
 def draw_thickness(device: Device, translucency: Translucency, target_texture: Texture) -> Texture:
     """Fill a texture with the tissue thickness at each texel of the coarse atlas [mm]; return the texture.
 
-    Light that leaves the skin at one texel may have entered the skin at other texels nearby. The thickness at
-    a texel is its smallest depth below the tangent planes at these other texels, and at most the distance up
-    to which texels are paired.
+    Light enters the skin at one texel, passes through the tissue and leaves the skin at another texel of the
+    same pair. The thickness at a texel where light leaves is its smallest depth below the tangent planes at
+    the texels where this light enters. It is at most the maximum distance of a pair.
 
-    translucency : data of the light that passes through the tissue, with these pairs of texels
-    target_texture : texture with the size of the coarse atlas; texels that no light reaches through the
-        tissue are left unchanged
+    translucency : pairs of texels, and the points of the skin at these texels
+    target_texture : texture with the size of the coarse atlas; texels at which no such light leaves are left
+        unchanged
     """
     pairs, shader = translucency.pairs, program(device, Path(__file__).parent / "thickness.wgsl")
     count = pairs.receivers[1]

@@ -78,9 +78,10 @@ class Babylon(EnginePage):
         return spiral_profile(profile, metres, subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the script elements of Babylon.js, and the sources from which the page may load scripts.
+        """Return the script elements of Babylon.js, and the values to add to script-src.
 
-        The sources are URLs or hashes for script-src in the page's Content-Security-Policy.
+        script-src is the part of the page's Content-Security-Policy that lists the permitted scripts. The
+        values are URLs or hashes of scripts.
         """
         files = self.library_files[version]
         if self.library_folder is None:

@@ -21,7 +21,7 @@ class NamedFrame:
     """Captured frame with its name and output picture.
 
     name : technique of the frame
-    captured : passes and uniform records of the frame
+    captured : passes of the frame, and the uniform data that shaders read
     picture : output of the frame on the device
     size : width and height of the picture [pixel]
     merged_hairs : number of hairs drawn as one thicker hair during interaction; 0 at full quality
@@ -100,7 +100,7 @@ def frames_json(
 
 
 def _triangle_column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], int]:
-    """Return a function that adds a buffer of triangle data to `byte_runs` and returns its index there.
+    """Return a function that adds a buffer of triangle data to `byte_runs`, and returns the run's index.
 
     The buffer contains three columns of equal length, one after another. Each column is packed separately.
     """
@@ -147,7 +147,7 @@ def _view_record_index(captured_frame: CapturedFrame, stage_name: str) -> int:
 
 
 def _passes_json(captured_frame: CapturedFrame, byte_runs: ByteRunCollector) -> list[Json]:
-    """Return the JSON of a frame's passes, and store the data that the host writes to buffers."""
+    """Return the JSON of a frame's passes; add the data that the host writes to buffers to `byte_runs`."""
     writes = ((one, one.written) for one in captured_frame.passes)
     return [{**vars(one), "written": data and (data[0], byte_runs.add(data[1]))} for one, data in writes]
 
