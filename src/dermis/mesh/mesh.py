@@ -62,6 +62,7 @@ class Mesh(ShortRepr):
     point : (v,) index of the unique position
     triangles : (f, 3) vertex indices
     material : (f,) index into `materials`
+    materials : materials of the triangles
     quads : (q, 2) pairs of triangles (a, b, c) and (c, d, a) that form a quad abcd; no rows if the mesh has
         no quads
     """
@@ -165,6 +166,7 @@ def build_mesh(
     uv : (v, 2) v down
     triangles : (f, 3) vertex indices, at least one triangle
     material : (f,) index into `materials`
+    materials : materials of the triangles
     normals : (v, 3) unit normals; computed instead where they are invalid, or everywhere if None
     point : (v,) index of the unique position; if None, equal positions are welded
     quads : (q, 2) pairs of triangles that are a quad, see `Mesh`

@@ -49,7 +49,8 @@ class Motion(NamedTuple):
 class Stencils(ShortRepr):
     """Points of a subdivided mesh as weighted means of control points, in compressed rows.
 
-    first : (q + 1,) index at which the control points of each mesh point start in `point` and `weight`
+    first : (q + 1,) index at which the control points of each mesh point start in `point` and `weight`; the
+        last element is n
     point : (n,) indices of control points
     weight : (n,) weights of these control points, which sum to 1 for each mesh point
     """

@@ -40,8 +40,8 @@ MapFile = str | os.PathLike[str] | None
 class MapOptions:
     """Maps that users choose for the skin.
 
-    files : dictionary from each map role, such as "colour", to the user's picture file, or to None to keep
-        the mesh file's picture
+    files : dictionary from the role of each map, such as "colour", to the user's picture file, or to None if
+        the mesh file's picture is kept
     height_mm : height of one grey level of the height map, see `load_maps` [mm]
     normal_y : direction of green in the normal map, see `load_maps`
     skin_site : name of a measured skin colour, used for skin without a colour map; see `measured_tone`

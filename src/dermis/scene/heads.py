@@ -66,7 +66,7 @@ def load_head(
     subdivide: Subdivide = AUTO,
     regions: Literal["auto", "none"] = "auto",
 ) -> Head:
-    r"""Load a head: the parametric human, a sample or a file.
+    r"""Load a head: the parametric human, a sample head of the package or a mesh file.
 
     Options take precedence over what a sample, a glTF file or the .mtl of an OBJ file specifies. Morph
     targets and bones of a glTF file can move the head (`Pose`). In rest pose, the morph targets have the

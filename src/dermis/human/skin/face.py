@@ -69,8 +69,8 @@ def _movement_matrix(target_names: tuple[str, ...]) -> Floats:
 def zone_table(recession: float = 0.0, site_differences: SiteDifferences | None = None) -> Floats:
     """Return the Gaussian zones of the face as rows (k, 24) for the paint shader.
 
-    The columns are the centre (3) [mm], a zero, the inverse radii (3) [1/mm], a zero, and the sixteen
-    `ZONE_AMOUNTS`.
+    The columns are the centre (3) [mm], a zero, the inverse radii (3) [1/mm], a zero, and sixteen amounts by
+    which the zone changes skin or hair, in the order of `ZONE_AMOUNTS`.
 
     recession : recession of the hair, 0 to 1, see `SkinLook`; it thins the hair at the crown
     site_differences : pigments at other sites of the face minus the pigments at the cheek; None if all sites
