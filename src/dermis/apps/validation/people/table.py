@@ -347,9 +347,13 @@ def _colour_matching_shift(
 
 
 def cells_csv(archive: Archive, skin_variables: Doubles, measured_table: MeasuredTable) -> str:
-    """Return a CSV table of medians and covariances, with one row for each group and site.
+    """Return a CSV table of measured skin, with one row for each group and site.
 
-    Further rows are for the people of one sex or one age group.
+    It has medians and covariances of CIELAB colours and of skin variables. Further rows are for the people of
+    one sex or one age group.
+
+    skin_variables : (n, 4) skin variables of the measurements, from `invert_spectra`
+    measured_table : statistics from which rows without measurements are filled
     """
     out = StringIO()
     out.write(_CELLS_CSV_HEADER)
