@@ -174,6 +174,7 @@ def quantise_map(
 def orient_normal_map(normals: Floats, normal_y: NormalY) -> Floats:
     """Return normals whose y, the green channel, points towards row 0 of the map or away from row 0.
 
+    normals : (h, w, 3) normals whose y points towards row 0
     normal_y : "up" if y is to point towards row 0, as in OpenGL; "down" if away from row 0, as in DirectX
     """
     if normal_y == "up":
