@@ -59,7 +59,7 @@ no_effect = partial(_file_property, "no effect")
 
 
 def keys_of(properties: Iterable[FileProperty], *treatments: Treatment) -> tuple[str, ...]:
-    """Return the keys of all properties, or only of those that have one of the given treatments."""
+    """Return the `FileProperty.keys` of all properties, or only of those with one of the given treatments."""
     chosen = (item for item in properties if not treatments or item.treatment in treatments)
     return tuple(dict.fromkeys(key for item in chosen for key in item.keys))
 

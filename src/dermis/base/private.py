@@ -18,7 +18,7 @@ _WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def cache_folder() -> Path:
-    """Return the folder of the disk cache: DERMIS_CACHE, or the user's cache folder.
+    """Return the folder of the disk cache: the environment variable DERMIS_CACHE, or a default for the user.
 
     For a user without a home folder, a path is returned at which nothing can be stored.
     """

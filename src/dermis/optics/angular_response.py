@@ -152,7 +152,8 @@ class _HalfSpace:
     def _reflected_radiance(self, incident_cosine: Floats, h_values: Floats) -> Floats:
         """Return pi times the radiance that the medium reflects into each of the discrete directions [-].
 
-        The result (d, n) has a row for each discrete direction and a column for each incident direction.
+        The light from each incident direction has the irradiance 1 on the medium. The result (d, n) has a row
+        for each discrete direction and a column for each incident direction.
 
         incident_cosine : (n,) cosines of the directions of incident light below the surface
         h_values : (n,) H function at these cosines

@@ -53,7 +53,7 @@ class ThinParts:
     lost : (THICKNESS_ROWS, k, 3) weights of the light that a half-space would reflect but the thin part does
         not; lost light spreads as widely as transmitted light [-]
     directionality : (THICKNESS_ROWS,) dependence of the transmittance on the incident direction, relative to
-        that of deep slabs (see `oblique_transmittance`); 0 for no dependence [-]
+        that of optically thick slabs (see `oblique_transmittance`); 0 for no dependence [-]
     """
 
     max_thickness_mm: float
@@ -93,9 +93,9 @@ def solve_thin_parts(
 def oblique_transmittance(
     total_reflectance: Floats, eta: float, from_photons: bool = False, g: float = 0.0
 ) -> Floats:
-    """Return the relative transmittance (DIRECTION_ROWS, c) of deep slabs for each incident direction [-].
+    """Return the relative transmittance (DIRECTION_ROWS, c) of optically thick slabs by direction [-].
 
-    The relative transmittance is t / r. Here, t is the transmittance of the slab for the direction, divided
+    The relative transmittance is t / r. Here, t is the transmittance for the incident direction, divided
     by the slab's transmittance for uniform light, and r is the same quotient for the reflectance of a
     half-space. The square roots of the cosines of incidence in air are evenly spaced from 0 to 1.
 
@@ -118,7 +118,7 @@ def _oblique_column(eta: float, from_photons: bool, g: float, total_reflectance:
 
 
 def _deep_transmittance(albedo: float, eta: float, direction_nodes: int, g: float) -> tuple[Slabs, Floats]:
-    """Return the reflection of a half-space, and the relative transmittance (m,) of deep slabs [-].
+    """Return the reflection of a half-space, and the relative transmittance (m,) of thick slabs [-].
 
     Both are for m incident directions. Relative transmittance is defined as in `oblique_transmittance`.
 

@@ -31,7 +31,10 @@ class _Sublayer(NamedTuple):
 
 
 class _BoundaryCondition(NamedTuple):
-    """Boundary condition D phi' = W - Z phi for the fluence phi at a face; Z and W depend on lower layers."""
+    """Boundary condition D phi' = W - Z phi of a face, with the fluence phi and the diffusion coefficient D.
+
+    The derivative phi' is with respect to depth; Z and W depend on the layers below the face.
+    """
 
     Z: Floats
     W: Floats
@@ -43,7 +46,7 @@ class _DownwardTransfer(NamedTuple):
     The fluence is a sum of three solutions of the diffusion equation: one decays downwards, one grows
     downwards, and a particular solution accounts for the source of light and is 0 at the upper face.
 
-    E : attenuation exp(-q d) across the thickness d of the sublayer [-]
+    E : attenuation exp(-q d) across the thickness d of the sublayer, where q is the rate of decay [-]
     rho : ratio of the growing to the decaying solution at the lower face, if there is no source [-]
     common : 1 / (1 + E^2 rho), which sums the reflections between both faces [-]
     beta : part of the growing solution that the sources cause at the lower face

@@ -166,9 +166,9 @@ def _medium_warnings(medium: Medium, model: DiffusionModel, clamp: Clamp) -> lis
 
 
 def _first_event_albedo(medium: Medium) -> Floats:
-    """Return the fraction (c,) of all events in the first mean free path that are scattering events [-].
+    """Return the probability (c,) that light scatters where it first interacts with a medium [-].
 
-    All other events are absorption.
+    Otherwise, the light is absorbed. The probability is a mean over the first mean free path.
     """
     depth, scattered = np.zeros(medium.channels), np.zeros(medium.channels)
     for layer in medium.layers:
