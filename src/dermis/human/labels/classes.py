@@ -14,7 +14,7 @@ class LabelClass(NamedTuple):
     number, name : number of the class, which is the pixel value in the output `label`, and name of the class
     face_synthetics : number of the class in the data set FaceSynthetics, which is the pixel value in the
         output `label_face_synthetics`
-    description : what belongs to the class, as text for the documentation
+    description : short description of what belongs to the class
     """
 
     number: int

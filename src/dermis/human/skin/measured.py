@@ -453,7 +453,7 @@ def symmetric_square_root(covariance: Doubles) -> Doubles:
 
 
 class MeasuredCell(NamedTuple):
-    """Median colour and pigments of measured people of one group, sex and age group at one site of the body.
+    """Median colour and pigments of one group of measured people at one site of the body.
 
     group : name of the group of people, one of the values of `GROUP_OF_CODE`
     site : name of the site of the body, one of `SITES`
@@ -477,7 +477,8 @@ class MeasuredCell(NamedTuple):
 def measured_cells() -> tuple[MeasuredCell, ...]:
     """Return the medians of measured skin for each group of people and each site of the body.
 
-    At each site, a group has one entry for all its people, and one for each combination of sex and age group.
+    At each site, a group has one entry for all its people, and further entries for people of one sex or of one
+    age group.
 
     Source: [Lu2025].
     """
