@@ -477,8 +477,8 @@ class MeasuredCell(NamedTuple):
 def measured_cells() -> tuple[MeasuredCell, ...]:
     """Return the medians of measured skin for each group of people and each site of the body.
 
-    At each site, a group has one entry for all its people, and further entries for people of one sex or of one
-    age group.
+    At each site, a group has one entry for all its people, and further entries for people of one sex or of
+    one age group.
 
     Source: [Lu2025].
     """
