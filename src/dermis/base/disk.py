@@ -84,7 +84,9 @@ def load_or_make(
     """Return arrays from the disk cache; if there is no valid entry, compute the arrays and cache them.
 
     folder : name of a folder inside the cache folder
+    cache_key : key of the entry, a hash of the inputs of the computation
     array_names : names of the arrays in the result
+    compute : function that returns the arrays as a dictionary from name to array
     """
     arrays = load_arrays(folder, cache_key, array_names)
     if arrays is None:

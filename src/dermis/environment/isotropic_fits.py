@@ -177,6 +177,7 @@ def _fit_parameters(
     the logarithm of its width, and the logarithm of its weight. The unit of lengths is the standard deviation
     of the specular lobe.
 
+    target_lobe : specular lobe
     view_index : index of the view in LOBE_TABLE_COSINES
     initial_parameters : initial parameters (4, 5)
     neighbour_mean : mean parameters (4, 5) of adjacent table entries; regularisation pulls the fit towards

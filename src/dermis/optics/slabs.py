@@ -214,6 +214,7 @@ def _slabs_in_air(
 ) -> Slabs:
     """Return the reflection and transmission of slabs in air, from those of slabs with index-matched faces.
 
+    transport : discrete directions, and reflectance of the faces
     reflection, transmission : (n, m, m) reflection and transmission with index-matched faces, as pi times the
         radiance for unit power from each direction
     unscattered_fraction : (n, m) fraction of light that crosses the slab without scattering [-]
@@ -273,7 +274,9 @@ def _doubling_steps(
     Reflection and transmission (n, m, m) are pi times the radiance for unit power from each direction. The
     unscattered light (n, m) is the fraction that crosses the slab without scattering.
 
+    transport : discrete directions, and phase function of the medium
     initial_depth : (n,) initial thicknesses in reduced mean free paths
+    doubling_count : number of doublings
     """
     mu, flux, albedo = transport.mu, transport.flux, transport.phase.albedo
     t = transport.phase.extinction * initial_depth[:, None, None]

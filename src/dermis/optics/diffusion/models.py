@@ -270,6 +270,7 @@ class ModelError:
 def measured_model_error(model_name: str, tissue_name: str = "") -> ModelError | None:
     """Return the measured error of a diffusion model, or None if the model was never measured.
 
+    model_name : name of the diffusion model, such as "dipole"
     tissue_name : name of a tissue; if the name is empty or the tissue was not measured, the result covers all
         measured tissues
     """

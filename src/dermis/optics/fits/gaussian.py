@@ -190,6 +190,7 @@ def _combine_fits(channel_fits: list[tuple[Floats, Floats]], profile_name: str) 
     """Combine fits of separate channels into one sum of Gaussians, in which equal variances occur once.
 
     channel_fits : variances (k,) and weights (k, c) of each fit
+    profile_name : name of the resulting profile
     """
     variance, index = np.unique(np.concatenate([v for v, _ in channel_fits]), return_inverse=True)
     channels = sum(w.shape[1] for _, w in channel_fits)
