@@ -99,7 +99,7 @@ class FrameRequest:
 
     @property
     def has_interreflection(self) -> bool:
-        """Return whether interreflection is computed; scenes with an environment also require occlusion."""
+        """Return whether interreflection is computed; with an environment, it requires occlusion."""
         return self.settings.interreflection and (self.has_occlusion or self.environment is None)
 
     @property

@@ -52,7 +52,10 @@ class ResourceState:
         return found
 
     def set_version(self, version: int) -> None:
-        """Set the version of this resource and its views; the version of a viewed texture becomes unknown."""
+        """Set the version of this resource and of its views.
+
+        If this resource is a view, the version of the viewed texture becomes unknown.
+        """
         self.version = version
         for view in self.views:
             view.version = version

@@ -70,6 +70,8 @@ class FrameListing:
     ) -> None:
         """Append a pass to the listing.
 
+        stage : name of the stage
+        workgroups : see `ListedPass.groups`
         declared_index : index of the declared pass, which may be a recording that contains several listed
             passes
         recorded : whether the pass belongs to a recording

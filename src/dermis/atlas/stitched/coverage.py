@@ -120,7 +120,8 @@ def _drawing_order(surface: FlatSurface, triangle_piece: Index, member_triangles
 
     Other triangles are drawn later and therefore own the texels that they share with mirrored triangles.
 
-    member_triangles : (t,) indices of the triangles
+    triangle_piece : (f,) piece of each triangle, -1 if there is none
+    member_triangles : (t,) indices of the triangles to sort
     """
     return member_triangles[
         np.argsort(
@@ -146,6 +147,7 @@ def _extend_surface_edge(
 
     A blur along the edge then reads the same light from a gutter as from the chart piece beside it.
 
+    triangle_piece : (f,) piece of each triangle, -1 if there is none
     beyond_end : (h, w) mask of texels beyond the end of the surface
     y, x : (n,) rows and columns of the gutter texels to fill, all of which are in this mask
     """

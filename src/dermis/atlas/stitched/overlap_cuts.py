@@ -52,7 +52,7 @@ _MAX_RELATIVE_AREA_GROWTH = 0.25  # largest growth of the area of all pieces by 
 class Conflicts(NamedTuple):
     """Conflicts in the gutters of a chart piece: pairs of border points whose gutters meet.
 
-    Where they meet, the two gutters show points that are apart on the surface.
+    Where they meet, the two gutters show points that are not adjacent on the surface.
 
     first, second : (n, 2) positions of the two border points of each pair, in uv scaled to texels [texel]
     inside : (m, 2) texels that the piece covers, in the same coordinates [texel]
@@ -271,6 +271,7 @@ def _conflict_clusters(conflicts: Conflicts, gutter_width_texels: float) -> list
 def _near_any_target(points: Doubles, target_points: Doubles, max_distance: float) -> Mask:
     """Return the mask (...) of points (..., 2) within about `max_distance` of any target point.
 
+    points : (..., 2) points to test
     target_points : (n, 2) points to which the distances are measured
     """
     cell = max_distance / _CELLS_PER_GUTTER
@@ -297,6 +298,7 @@ def _conflict_strip(
 
     The side is chosen so that the selected triangles have the smaller area.
 
+    member_triangles : (t,) indices of the piece's triangles
     one_side_mask : (t,) mask of the triangles on either of the two sides, not necessarily the chosen one
     gutter_width_texels : gutter width [texel]
     """

@@ -20,6 +20,7 @@ def rasterise_texel_triangles(corners: Doubles, drawn_triangles: Index, grid_sha
 
     corners : (f, 3, 2) corners of all triangles [texel]
     drawn_triangles : (t,) indices in drawing order
+    grid_shape : height and width of the grid of texels
     """
     owner = np.full(grid_shape, -1, np.int32)
     texel, which = covered_texels(corners[drawn_triangles], grid_shape)

@@ -158,6 +158,8 @@ def _light_members(light: Light, centre: Triple, shadow_view: ShadowView | None,
     """Return the members of the shader struct `Light` for a light; members that are left out are 0.
 
     light : light, or one part of a divided light
+    centre : centre of the head, the origin of light positions [mm]
+    shadow_view : view for the light's shadow map, None if the light has no shadows
     part_count : number of parts of the light, 1 if it is not divided
     """
     kind, parallel = KINDS[light.kind], isinstance(light, DirectionalLight)

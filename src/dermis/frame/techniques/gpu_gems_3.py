@@ -34,6 +34,8 @@ TexturePair = tuple[TextureOrView, TextureOrView]
 class StretchedLevels(PyramidLevels):
     """Pyramid levels with textures for a stretch map that is blurred together with the light.
 
+    The stretch map holds the texel density on the surface along u and along v.
+
     stretch : blurred stretch map, and the stretch map that is blurred only along u
     """
 
