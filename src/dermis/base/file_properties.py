@@ -21,7 +21,7 @@ class FileProperty:
     detail : how the property affects the picture, or why it does not, in Markdown
     keys : words by which the reader recognises the property, such as statements or extensions
     other_parts : treatment if the material is not that of skin but of another part of a model, such as
-        clothes; None if this treatment is the same
+        clothes; None if it is treated as in skin
     """
 
     treatment: Treatment

@@ -18,7 +18,7 @@ _MAX_LISTED_THICKNESS_MM = 1e4  # thicker layers of MCML files stand for semi-in
 
 
 def check_reduced(culprit: str, layer_entries: Mapping[str, object]) -> None:
-    """Raise DermisError for a layer with an anisotropy g, whose scattering is probably not reduced by 1 - g.
+    """Raise DermisError for a layer with an anisotropy g: its scattering probably lacks the factor 1 - g.
 
     culprit : name of the file or layer, for the message
     layer_entries : entries of the layer in the file, including "scattering_per_mm"

@@ -151,7 +151,9 @@ def _bloodless_absorption(parameters: SkinParameters, wavelength_nm: Floats) -> 
 
 
 def dj2006_layers(parameters: SkinParameters, pigment_fractions: Floats) -> tuple[Layer, Layer]:
-    """Return epidermis and dermis of the structure "dj2006" for n skins, with coefficients (n, 31).
+    """Return epidermis and dermis of the structure "dj2006" for each of n pigment fractions.
+
+    The coefficients of both layers have the shape (n, 31).
 
     parameters : parameters of the skins; its fields `melanin` and `blood` are ignored
     pigment_fractions : (n,) fractions, used both as melanin fractions of the epidermis and as blood fractions
