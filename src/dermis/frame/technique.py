@@ -65,7 +65,7 @@ class TechniqueTraits:
     supports_translucency : whether light can pass through thin parts of the head
     needs_curvature : whether the shading pass reads the curvature of the surface
     shade_constants : pipeline constants of the shading pass
-    pixel_bytes : memory per pixel besides the picture [bytes]
+    pixel_bytes : memory per pixel, without the memory for the picture itself [bytes]
     subsurface_layer_bytes : memory per pixel of the textures of `Technique.make_subsurface_layers` [bytes]
     """
 

@@ -282,7 +282,7 @@ class Graph(Recorder):
         return result
 
     def read_back(self, *buffers: Buffer) -> BufferReadback:
-        """Return a readback of the concatenated content that buffers have after the frame."""
+        """Return a readback of the content that buffers have after the frame, one buffer after another."""
         readback = BufferReadback(self.device, sum(buffer.size for buffer in buffers))
         self._readbacks.append((buffers, readback))
         return readback
