@@ -168,6 +168,7 @@ def _triangles_of_overlapped_charts(
 ) -> Mask:
     """Return the mask (f,) of triangles in charts that a larger chart mostly covers in uv.
 
+    triangle_chart : (f,) chart index of each triangle
     covered_texel : (k,) flat index of each covered texel, once for each triangle that covers its centre
     covering_triangle : (k,) index of this triangle
     """
@@ -193,6 +194,7 @@ def _assign_texels(
 
     Where a chart is folded onto itself in uv, its unmirrored triangles own the texels.
 
+    mapped_triangles : (f,) mask of triangles that may own texels
     texel, triangle : (k,) flat texel index and triangle index of each covered texel centre
     """
     is_mapped = mapped_triangles[triangle]

@@ -51,10 +51,10 @@ def table_file_arrays(mesh: Mesh, tables: dict[str, dict[str, NDArray[Any]]]) ->
 
 
 def position_fingerprint(mesh: Mesh) -> Doubles:
-    """Return an array of mean and root mean square of the vertex positions, then some of the positions [mm].
+    """Return numbers that identify the vertex positions of a mesh [mm].
 
-    If some vertices of two heads with the same topology differ by a millimetre, the heads have different
-    fingerprints.
+    These are the mean and the root mean square of all positions, followed by some of the positions. Heads of
+    the same topology have different numbers if some of their vertices differ by a millimetre.
     """
     positions = mesh.positions.astype(np.float64)
     sample = positions[:: max(len(positions) // _COMPARED_VERTEX_COUNT, 1)]

@@ -188,7 +188,11 @@ def _barycentric_coordinates(corners: Doubles, points: Doubles) -> Doubles:
 
 
 def _material_factor(material: FileMaterial, role: Role, has_vertex_colours: bool) -> Floats:
-    """Return the factor (k,) by which a material multiplies its picture for a map role, such as "colour"."""
+    """Return the factor (k,) by which a material multiplies its picture for a map role, such as "colour".
+
+    has_vertex_colours : whether the mesh has vertex colours, which the factor must leave unchanged if the
+        material has no colour of its own
+    """
     has_colour = has_vertex_colours or "colour" in material.textures
     colour = material.colour or ((1.0, 1.0, 1.0) if has_colour else DEFAULT_COLOUR)
     factors: dict[Role, Sequence[float]] = {

@@ -57,6 +57,8 @@ def progress_bar(task: str) -> Iterator[Callable[[int, int], None]]:
     """Show a progress bar on stderr if stderr is a terminal, and yield a function that updates the bar.
 
     The function takes the number of finished steps and the total number of steps.
+
+    task : text next to the bar
     """
     if not sys.stderr.isatty():
         yield lambda done, total: None

@@ -84,7 +84,9 @@ def load_or_make(
     """Return arrays from the disk cache; if there is no valid entry, compute the arrays and cache them.
 
     folder : name of a folder inside the cache folder
+    cache_key : key of the entry, a hash of the inputs of the computation
     array_names : names of the arrays in the result
+    compute : function that returns the arrays as a dictionary from name to array
     """
     arrays = load_arrays(folder, cache_key, array_names)
     if arrays is None:
@@ -270,7 +272,7 @@ def _temporary_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def _prune_folder(cache_path: Path) -> None:
-    """Delete the least recently used files until the size limit is met, and delete old unfinished files."""
+    """Delete unfinished old files of a cache folder, and the least recently used files above a size limit."""
     newest_first = sorted(
         _folder_files(cache_path, _CACHE_FILE_SUFFIX), key=lambda entry: entry[1].st_mtime, reverse=True
     )

@@ -1,4 +1,4 @@
-"""Declarations of how readers treat the properties of files, from which docs/formats.md is built."""
+"""Declarations of what file readers do with each property of a file; docs/formats.md is built from them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ class FileProperty:
     name : property as the documentation shows it, in Markdown
     detail : how the property affects the picture, or why it does not, in Markdown
     keys : words by which the reader recognises the property, such as statements or extensions
-    other_parts : treatment in materials of parts that are not skin; None if it is the same as in skin
+    other_parts : treatment if the material is not that of skin but of another part of a model, such as
+        clothes; None if it is treated as in skin
     """
 
     treatment: Treatment
@@ -32,7 +33,8 @@ class FileProperty:
     def documentation_cells(self, has_parts_column: bool) -> list[str]:
         """Return the cells of the row for this property in a table of the documentation.
 
-        has_parts_column : whether the table has separate columns for the treatment in skin and in other parts
+        has_parts_column : whether the table has a column for the treatment in materials of skin, and another
+            column for the treatment in all other materials
         """
         others = [self.other_parts or self.treatment] if has_parts_column else []
         return [self.name, self.treatment, *others, self.detail]
@@ -57,7 +59,7 @@ no_effect = partial(_file_property, "no effect")
 
 
 def keys_of(properties: Iterable[FileProperty], *treatments: Treatment) -> tuple[str, ...]:
-    """Return the keys of all properties, or only of those that have one of the given treatments."""
+    """Return the `FileProperty.keys` of all properties, or only of those with one of the given treatments."""
     chosen = (item for item in properties if not treatments or item.treatment in treatments)
     return tuple(dict.fromkeys(key for item in chosen for key in item.keys))
 

@@ -18,7 +18,7 @@ _WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def cache_folder() -> Path:
-    """Return the folder of the disk cache: DERMIS_CACHE, or the user's cache folder.
+    """Return the folder of the disk cache: the environment variable DERMIS_CACHE, or a default for the user.
 
     For a user without a home folder, a path is returned at which nothing can be stored.
     """
@@ -45,7 +45,7 @@ def make_private_folder(folder: Path) -> None:
 def describe_other_writers(folder: Path) -> str:
     """Return a clause that says how other users can write to a folder; empty if no other user can.
 
-    Folders above the user's home and folders that only root can write to count as safe.
+    Folders above the user's home count as safe, and so do folders that only root can write to.
     """
     if os.name != "posix":
         return ""  # Windows profiles are private

@@ -97,6 +97,7 @@ def read_text(path: str | Path, expected: str, max_bytes: int = MAX_TEXT_BYTES) 
     """Return the text of a file in UTF-8, with or without a byte order mark, or in UTF-16 with the mark.
 
     expected : what the file should be, for error messages
+    max_bytes : largest accepted size of the file
 
     Raises DermisError as `read_file` does, and for files that are not text.
     """

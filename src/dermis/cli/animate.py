@@ -111,8 +111,8 @@ def animate(
     fps:
         Frame rate of the output, such as 30, 23.976 or 24000/1001 [1/s]. [default: rate of the motion, or 30]
     motion_fps:
-        Frame rate of a mesh sequence [default: --fps, or 30], or of a motion file with timecodes or without
-        times [1/s].
+        Frame rate of a mesh sequence [default: --fps, or 30], or of a motion file that has no times or only
+        timecodes [1/s].
     begin:
         Start time within the motion [s]. [default: 0]
     end:
@@ -219,7 +219,10 @@ def _frame_digest(animated_scene: _AnimatedScene, options: SceneOptions, *files:
 
 
 def _file_fingerprint(file_name: str) -> str:
-    """Return the path, size and modification time of a file as text; for a name without a file, the name."""
+    """Return the path, size and modification time of a file as text.
+
+    If there is no file with this name, the name itself is returned.
+    """
     path = Path(file_name.partition("#")[0])
     if not path.exists():
         return file_name
@@ -252,7 +255,8 @@ class TimeSpan:
 
     begin, end : first and last time within the motion [s]
     rate : frame rate of the rendered animation, from --fps [1/s]
-    motion_rate : frame rate of motion files that have no time stamps, from --motion-fps [1/s]
+    motion_rate : frame rate of mesh sequences, and of motion files that have no times or only timecodes, from
+        --motion-fps [1/s]
     """
 
     begin: Fraction | None

@@ -149,7 +149,7 @@ def _refuse_unused_options(compared_subject: str, options: Options) -> None:
 
 
 def _comparison_arguments(options: Options, size_options: Options) -> Options:
-    """Return the keyword arguments of `dermis.apps.validation.comparisons.compare` for the command line.
+    """Return the keyword arguments of `dermis.apps.validation.comparisons.compare` that the options describe.
 
     options : options given on the command line, by name
     size_options : picture and atlas sizes given on the command line

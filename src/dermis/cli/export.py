@@ -41,8 +41,9 @@ def export(
 ) -> int:
     """Export a skin or a head to another program, and report how well that program can reproduce it.
 
-    The profile model of the program is fitted to the diffusion profile of the skin. The errors of the fit are
-    reported for the light within a radius, for the light beside a shadow edge, and for the total light.
+    The profile model of the program is fitted to the diffusion profile of the skin. The command reports three
+    errors of the fit: of the fraction of light within a radius, of the brightness beside a shadow edge, and
+    of the total light.
 
     Examples:
 

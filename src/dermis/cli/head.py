@@ -206,9 +206,10 @@ def _build_person(
 
 
 def _look_with_values(look: Look, option_values: list[str] | None, option_name: str) -> Look:
-    """Return a copy of a skin, eye or hair look with the fields set on the command line.
+    """Return a copy of an appearance of skin, eyes or hair, with the fields set that an option lists.
 
-    option_values : values "NAME=NUMBER,..." of an option such as --skin
+    option_values : values "NAME=NUMBER,..." of the option
+    option_name : option, such as --skin, for error messages
     """
     from dermis.human.skin.look import SITES_FIELD
 
@@ -224,7 +225,10 @@ def _look_with_values(look: Look, option_values: list[str] | None, option_name: 
 
 
 def _hair_look_with_values(look: HairLook, option_values: list[str] | None) -> HairLook:
-    """Return a copy of a hair look with the fields set by --hair: a style, and numbers for other fields."""
+    """Return a copy of an appearance of hair, with the fields set that the option --hair lists.
+
+    option_values : values "NAME=VALUE,..." of the option, with a word for the style and numbers otherwise
+    """
     pairs = [pair for pair in ",".join(option_values or []).split(",") if pair]
     styles = [pair.removeprefix("style=") for pair in pairs if pair.startswith("style=")]
     numbers = [pair for pair in pairs if not pair.startswith("style=")]

@@ -27,7 +27,14 @@ def _to_int(_: type, tokens: Sequence[Token]) -> int:
 def _to_choice(
     model: type[FrozenModel], field_name: str, choice_type: object, tokens: Sequence[Token]
 ) -> str:
-    """Return the word that the user typed; raise CoercionError unless the field has this choice."""
+    """Convert the value of an option to a choice, as a converter for cyclopts; return the word as typed.
+
+    model, field_name : settings model and its field that the option sets
+    choice_type : type of the option, which is not used
+    tokens : the option's words on the command line, of which there is one
+
+    Raises CoercionError if the field does not have this choice.
+    """
     from dermis.scene.frozen_model import field_choices
 
     if (word := tokens[0].value) in (choices := field_choices(model, field_name)):

@@ -95,7 +95,8 @@ def unmix(
         Relative standard deviation of the colour channels, from which the uncertainty of the result follows
         [-].
     shading:
-        Treat slow changes of brightness as shading: divide the colours by it, and write it to shading.exr.
+        Treat gradual changes of brightness across the map as shading: divide the colours by the shading, and
+        write the shading to shading.exr.
     widths:
         Also write three diffusion profiles and their mixing map, for `dermis render --profile-map`.
     as_json:

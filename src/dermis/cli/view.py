@@ -66,7 +66,7 @@ def view(
         Motion to play: a clip of a glTF file (file.glb or file.glb#clip), a .csv of Live Link Face, a .json
         of MediaPipe, or a sequence of meshes (a folder, or face_%05d.obj).
     motion_fps:
-        Frame rate of a mesh sequence, or of a motion file with timecodes or without times [1/s].
+        Frame rate of a mesh sequence, or of a motion file that has no times or only timecodes [1/s].
     """
     if not browser:
         for option, value in {"port": port, "host": host, "token": token or None}.items():

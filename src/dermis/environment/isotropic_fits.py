@@ -114,6 +114,7 @@ def _free_directions(target_lobe: LobeTarget, view_index: int) -> Floats:
     `fit_isotropic_lobes`). The two lobes of the pair either both stay in the plane, or remain mirror images
     of each other.
 
+    target_lobe : specular lobe to which isotropic lobes are fitted
     view_index : index of the view in LOBE_TABLE_COSINES
     """
     left, right = (LOBE_COUNT - 2, 1.0), (LOBE_COUNT - 1, 1.0)
@@ -145,6 +146,7 @@ def _arrange_lobe_pair(initial_parameters: Floats, target_lobe: LobeTarget, view
     they are placed on opposite sides of this plane.
 
     initial_parameters : (4, 5) initial parameters; axes: kind of parameter, lobe
+    target_lobe : specular lobe to which isotropic lobes are fitted
     view_index : index of the view in LOBE_TABLE_COSINES
     """
     lobes = initial_parameters.copy()
@@ -175,6 +177,7 @@ def _fit_parameters(
     the logarithm of its width, and the logarithm of its weight. The unit of lengths is the standard deviation
     of the specular lobe.
 
+    target_lobe : specular lobe
     view_index : index of the view in LOBE_TABLE_COSINES
     initial_parameters : initial parameters (4, 5)
     neighbour_mean : mean parameters (4, 5) of adjacent table entries; regularisation pulls the fit towards
@@ -197,9 +200,12 @@ def _fit_parameters(
 
     @lru_cache(maxsize=2)
     def reduced_system(parameter_bytes: bytes) -> Floats:
-        """Return the Jacobian and the residuals, reduced by QR decomposition to as many rows as columns.
+        """Return Jacobian and residuals of the fit side by side, reduced to as many rows as columns.
 
-        parameter_bytes : parameters along the free directions, as bytes of float64
+        A QR factorisation reduces the rows. The residuals are the last column.
+
+        parameter_bytes : coordinates of the lobe parameters along the directions of `_free_directions`, as
+            bytes of a float64 array, so that results can be cached
         """
         x = np.frombuffer(parameter_bytes)
         parameters = (fixed + free @ x).reshape(4, LOBE_COUNT)

@@ -23,7 +23,10 @@ Floats = NDArray[np.float64]
 
 
 def isotropic_lobe_constants() -> dict[str, float]:
-    """Return the sizes and roughness range of the table, as `#fill` constants for environment.wgsl."""
+    """Return named values that `//#fill` lines insert into environment.wgsl.
+
+    The values are the sizes and the roughness range of the table of isotropic lobes.
+    """
     return {
         "mirror_rough": ROUGHNESS_COUNT,
         "mirror_views": VIEW_COUNT,

@@ -143,6 +143,7 @@ def _symmetric_legendre_functions(sine: Floats, degree: int) -> Floats:
     """Return the associated Legendre functions (n, k) of the harmonics that `harmonic_terms` lists.
 
     sine : (k,) sines of the angle from the plane of incidence, which are cosines of the polar angle
+    degree : highest degree of the harmonics
     """
     return np.concatenate([rows[::2] for rows in legendre_functions(sine, degree, degree + 1)])
 
@@ -152,6 +153,7 @@ def _legendre_at_quadrature_angles(roughness: float, degree: int) -> Floats:
     """Return the associated Legendre functions (n, k) at k quadrature angles from the plane of incidence.
 
     roughness : roughness of the lobe, which determines the largest angle
+    degree : highest degree of the harmonics
     """
     t = (np.arange(_NODES_ACROSS_INCIDENCE) + 0.5) / _NODES_ACROSS_INCIDENCE
     return _symmetric_legendre_functions(np.sin(min(10.0 * roughness + 0.05, 0.5 * np.pi) * t**2), degree)
@@ -168,6 +170,7 @@ def _legendre_table(degree: int) -> Floats:
 def _interpolate_legendre(degree: int, plane_angles: Floats) -> tuple[Floats, Floats]:
     """Interpolate the associated Legendre functions to k angles; return values and derivatives, (n, k) each.
 
+    degree : highest degree of the harmonics
     plane_angles : (k,) angles from the plane of incidence [rad]
     """
     table, position = _legendre_table(degree), np.abs(plane_angles) / _LEGENDRE_TABLE_STEP_RADIANS
@@ -183,7 +186,8 @@ def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
     The first row contains the factors, interpolated between two layers of the prefiltered panorama as in the
     shader. The second row contains their derivatives with respect to the logarithm of the roughness.
 
-    log_roughness : logarithm of the roughness
+    log_roughness : logarithm of the roughness of the lobe
+    degree : highest degree of the harmonics
     """
     layers, degrees = np.log(LAYER_ROUGHNESSES), harmonic_terms(degree)[0]
     step = layers[1] - layers[0]
@@ -197,8 +201,8 @@ def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
 def _layer_factor_table() -> Floats:
     """Return the convolution factors of the reflection layers of a prefiltered panorama, (layers, degrees).
 
-    Each layer has a factor for each degree of the spherical harmonics. Factors for degrees above the highest
-    degree of the panorama are 0.
+    The reflection layers are convolved with lobes of several roughnesses. The lobe of each layer has a factor
+    for each degree of the spherical harmonics; above the highest degree of the panorama, the factors are 0.
     """
     kernels = np.stack([isotropic_lobe_factors(float(m)) for m in LAYER_ROUGHNESSES])
     return np.pad(kernels, ((0, 0), (0, max(_FIT_DEGREES[-1] + 1 - kernels.shape[1], 0))))

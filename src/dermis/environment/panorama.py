@@ -31,7 +31,7 @@ _MIN_SUN_IRRADIANCE_FRACTION = (
 def load_panorama(panorama_name: str, max_rows: int = _MAX_PANORAMA_ROWS) -> Floats:
     """Load a panorama of radiance (h, 2 h, 3), linear Rec. 709, with -Z at the centre, +X right and +Y up.
 
-    panorama_name : a sample, a file (.hdr, .exr), or "uniform"
+    panorama_name : name of a sample panorama, path of a file (.hdr, .exr), or "uniform"
     max_rows : largest number of rows h; larger pictures are reduced by averaging
 
     A few infinite, NaN or negative pixels are repaired, with a note to the user.
@@ -95,7 +95,7 @@ def _interval_means(interval_values: NDArray[np.floating], edges: Floats, target
     """Return the means of a piecewise constant function over target intervals, along the first axis.
 
     interval_values : (n, ...) values of the function between consecutive `edges`
-    edges : (n + 1,) increasing positions at which the function changes, with both ends
+    edges : (n + 1,) increasing positions of the ends of the intervals on which the function is constant
     target_edges : (k + 1,) edges of the target intervals, over which the k means are taken
     """
     first = np.clip(np.searchsorted(edges, target_edges[:-1], "right") - 1, 0, len(interval_values) - 1)

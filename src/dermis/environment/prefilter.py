@@ -36,7 +36,10 @@ def isotropic_lobe(theta: Floats, roughness: float) -> Floats:
 
 
 def reflection_constants() -> dict[str, float]:
-    """Return the number and roughness range of the layers, as `#fill` constants for environment.wgsl."""
+    """Return named values that `//#fill` lines insert into environment.wgsl.
+
+    The values are the number and the roughness range of the layers of reflected radiance.
+    """
     return {
         "reflections": len(LAYER_ROUGHNESSES),
         "smoothest_reflection": MIN_LAYER_ROUGHNESS,

@@ -180,6 +180,8 @@ def _fit_bone_weights(
 ) -> Doubles:
     """Return bone weights (q, b) for the points of a subdivided mesh, at most four above 0 for each point.
 
+    positions_mm : (p, 3) positions of the control points at rest
+    skeleton : the b bones
     control_weights : (p, b) bone weights of the control points
     subdivision_matrix : (q, p) subdivision matrix from control points to mesh points
     """
@@ -230,6 +232,8 @@ def _quadratic_error(
     The function is w H w - 2 g w [mm²], up to a constant. The vector w (u,) contains the weights of u
     candidate bones. The result is the matrices H (n, u, u) and the vectors g (n, u) of all points.
 
+    positions_mm : (p, 3) positions of the control points at rest
+    skeleton : all b bones
     descendant_weights : (p, b) for each control point and bone, the sum of the weights of the bone and of
         its descendants
     subdivision_matrix : (n, p) subdivision matrix from control points to the n points

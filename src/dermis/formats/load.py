@@ -334,7 +334,7 @@ class RiggedMesh(NamedTuple):
     materials : materials of the file, to which indices in `surface` refer; empty if the mesh is from the disk
         cache
     unit_mm : length unit of the file or of its format [mm]; None if the mesh is from the disk cache
-    file_vertices : relation between the points of the mesh and the vertices of the file
+    file_vertices : correspondence between vertices of the file and points of the mesh
     """
 
     mesh: Mesh

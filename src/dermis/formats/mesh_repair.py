@@ -64,7 +64,8 @@ class RawMesh:
     material : (f,) material index of each triangle
     quads : (q, 2) pairs of triangles that are the halves of a quad
     vertices : mesh part with the same vertices in the file's space, with their morph targets and bones
-    file_vertex : (v,) index of each vertex among the vertices that the file's triangles use
+    file_vertex : (v,) index of the file's vertex from which each vertex was made; only the vertices that the
+        file's triangles use are numbered
     """
 
     positions: Floats
@@ -172,6 +173,8 @@ def _drop_triangles(mesh: RawMesh, flat_mask: Mask, is_skin: Mask, notes: list[s
     exactly the same triangles, skin is kept, or else the first material.
 
     flat_mask : (f,) mask of flat triangles
+    is_skin : (m,) mask of the materials that are skin
+    notes : list to which this function appends a note on the removed triangles
     """
     if flat_mask.any():
         notes.append(f"left out {_count_with_noun(int(flat_mask.sum()), 'triangle')} without area")
@@ -255,7 +258,12 @@ def _label_components(node_count: int, node_pairs: NDArray[np.integer]) -> Index
 
 
 def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
-    """Return the mesh with separate points for sheets that meet at non-manifold edges."""
+    """Return the mesh with separate points for sheets that meet at non-manifold edges.
+
+    A sheet is one of the surfaces that meet at such an edge.
+
+    notes : list to which this function appends a note on the separated sheets
+    """
     count = int((mesh.sides.counts > 2).sum())
     if not 0 < count <= _MAX_NON_MANIFOLD_EDGES:
         return mesh
@@ -282,7 +290,7 @@ def _pair_continuing_sides(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGL
 
     The pairs of an edge are chosen one after another. Two sides of the same material are preferred, then two
     sides that run in opposite directions, then two sides whose triangles are closest to a common plane.
-    The sides of all pairs of an edge except the first must run in opposite directions.
+    After the first pair of an edge, only sides that run in opposite directions are paired.
 
     max_pairs_per_edge : largest number of pairs at an edge
     """
@@ -364,7 +372,10 @@ def _split_points(mesh: RawMesh, side_pairs: Index) -> Index:
 
 
 def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
-    """Return the mesh with consistently wound triangles and outward normals."""
+    """Return the mesh with consistently wound triangles and outward normals.
+
+    notes : list to which this function appends a note on the reversed triangles and normals
+    """
     component, reverse = _components_and_reversals(mesh)
     x = np.ascontiguousarray(mesh.positions.T, np.float64)
     a, b, c = (x.take(one, axis=1) for one in np.ascontiguousarray(mesh.triangles.T))
@@ -459,12 +470,12 @@ class _ComponentSurface:
         return total / np.where(length > 0, length, 1)
 
     def visible_sides(self, doubtful_components: Mask) -> tuple[Doubles, bool]:
-        """Return which side of each connected component is visible from outside, and whether backs prevail.
+        """Return which side of each component is visible from outside, and whether backs prevail overall.
 
         The first result is a number for each component: 1 if only its front is visible, -1 if only its back
         is visible, a number between -1 and 1 if both are visible, and 0 if hardly any of it is visible. The
-        second result is whether backs of triangles are visible at more than two thirds of the sample points
-        on the mesh that are visible at all.
+        second result is whether, on the whole mesh, the backs of triangles are seen more than twice as often
+        as their fronts.
 
         doubtful_components : mask of components that may be inside out; they get additional sample points
         """
@@ -544,6 +555,9 @@ def _move_uv_charts(mesh: RawMesh, materials: Sequence[FileMaterial | None], not
     """Return the mesh with uv charts moved by whole tiles to [0, 1]; charts that do not fit stay in place.
 
     The uv of charts that fit are clamped to [0, 1].
+
+    materials : for each material of the mesh, its description in the file, or None
+    notes : list to which this function appends a note on the moved charts
     """
     if mesh.uv.min() >= -UV_TOLERANCE and mesh.uv.max() <= 1 + UV_TOLERANCE:
         return mesh

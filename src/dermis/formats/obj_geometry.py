@@ -277,6 +277,8 @@ def _parse_number_table(
     """Return the numbers of n statements, (n, 6), and the count of numbers in each statement, (n,).
 
     Only the first six numbers of a statement are returned; shorter statements are padded with NaN.
+
+    statement_key : first word of the statements, such as "v", which determines how many numbers are expected
     """
     words = run_starts(statement_rows.text > _SPACE)
     first = np.searchsorted(words, statement_rows.start)
@@ -297,7 +299,7 @@ def _parse_number_table(
 
 
 def _first_non_numeric(statement_rows: _StatementRows, dtype: type[np.float64] | type[np.int64]) -> int:
-    """Return the index of the first statement with a word that is not a number."""
+    """Return the index of the first statement with a word that is not a number of the type `dtype`."""
     for index, statement in enumerate(statement_rows.text.tobytes().split(b"\n")):
         try:
             parse_numbers(np.frombuffer(statement, np.uint8), len(statement.split()), dtype)  # type: ignore[type-var]
@@ -376,6 +378,8 @@ def _unread_notes(
     """Return notes on statements that have no effect.
 
     statement_keys : first words of unknown statements
+    statements : known statements except positions, uv, normals and faces; may contain smoothing groups
+    has_normals : whether the file has normals; smoothing groups are then not needed, and get no note
     """
     kinds = {
         key: _KIND_OF_LEFT_OUT_STATEMENT.get(key)

@@ -212,8 +212,8 @@ def _parse_numbers(statement: str) -> list[float]:
 def _parse_texture(statement_key: str, statement: str) -> MtlTexture:
     """Parse a texture statement of an .mtl file; the file name extends to the end of the line.
 
-    statement_key : statement, such as map_Kd
-    statement : text after the key, options first
+    statement_key : first word of the statement, such as map_Kd
+    statement : rest of the statement: options, then the file name
     """
     texture, start = MtlTexture(statement_key, ""), 0
     while option := _OPTION_PATTERN.match(statement, start):

@@ -342,8 +342,9 @@ class _ElementReader:
     ) -> Numbers:
         """Return the values of a property in all rows, concatenated.
 
-        first_byte : (n,) position of the first value in each row [bytes]
-        value_count : (n,) number of values in each row
+        first_byte : (n,) position of the property's first value in each row [bytes]
+        value_count : (n,) number of the property's values in each row, 1 unless it is a list
+        type_name : NumPy type of the values, without byte order
         row_bytes : (n,) size of each row [bytes]
         """
         stored = self._dtype(type_name)
@@ -357,7 +358,10 @@ class _ElementReader:
         return np.asarray(values.astype(type_name))
 
     def _list_lengths(self, byte_position: int) -> list[Index]:
-        """Return for each list property the lengths (n,) of its lists in the n rows."""
+        """Return for each list property the lengths (n,) of its lists in the n rows.
+
+        byte_position : position of the first row [bytes]
+        """
         steps, skipped = list[_ListStep](), list[_Property]()
         for one in self.element.properties:
             skipped.append(one)
@@ -378,7 +382,9 @@ class _ElementReader:
     ) -> bool:
         """Return whether the lists of all rows are as long as in the first row.
 
+        byte_position : position of the first row [bytes]
         row_bytes : size of the first row [bytes]
+        list_steps : positions of the list properties in a row
         list_lengths : lengths of the lists in the first row
         """
         start = byte_position + row_bytes * np.arange(self.element.count)
@@ -399,7 +405,10 @@ class _ElementReader:
 
         The lengths have the shape (row_count, number of list properties).
 
+        byte_position : position of the first row [bytes]
+        list_steps : positions of the list properties in a row
         trailing_bytes : size of the properties after the last list [bytes]
+        row_count : number of rows to read
         """
         lengths, data, end = [], memoryview(self.data.tobytes()), len(self.data)
         readers = [struct.Struct(self.order + _STRUCT_CODES[step.length.str[1:]]) for step in list_steps]

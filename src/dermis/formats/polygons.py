@@ -47,7 +47,7 @@ class Polygons:
     ) -> list[MeshPart]:
         """Return a mesh part for each group that has polygons, in the order of the groups' first polygons.
 
-        groups : all groups
+        groups : groups of the file, some of which may have no polygons
         group_index : (n,) index in `groups` for each polygon
         triangle_order : order of the triangles, see `triangulate`
 

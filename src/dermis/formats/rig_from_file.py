@@ -28,6 +28,7 @@ def split_points(
     point_of_vertex : (v,) index of the point of each vertex, welded by position
     mesh_part : vertices with their morph targets and bone weights
     linear_to_head : (3, 3) matrix from the space of the file to that of the head [mm]
+    culprit : file, for errors
 
     Raises DermisError if too many vertices at one position move differently.
     """
@@ -86,13 +87,15 @@ def build_rig(
     to_head: Doubles,
     culprit: object,
 ) -> Rig | None:
-    """Return the rig that moves a mesh's points; None for a file without morph targets and bones.
+    """Return the rig that moves a mesh's points; None for a file with neither morph targets nor bones.
 
     positions_mm : (v, 3) vertices in the head's space
     point_of_vertex : (v,) index of the point of each vertex
     mesh_part : the same vertices with their morph targets and bone weights, in the file's space
+    bones : bones of the file; None if it has none
     weights : default weights of morph targets by name
     to_head : (4, 4) matrix from the space of the file to that of the head [mm]
+    culprit : file, for errors
 
     Raises DermisError for bones with a scale of 0.
     """
@@ -116,6 +119,7 @@ def _point_targets(
     point_of_vertex : (v,) index of the point of each vertex
     first_vertex : (p,) first vertex of each point, whose displacement the point gets
     weights : default weights by target name
+    mesh_part, to_head : see `build_rig`
     """
     if not mesh_part.targets:
         return no_targets()
@@ -145,6 +149,7 @@ def _point_skeleton(
     """Return the skeleton of the p points of a mesh.
 
     first_vertex : (p,) first vertex of each point, whose bone weights the point gets
+    mesh_part, bones, to_head, culprit : see `build_rig`
     """
     assert mesh_part.bone is not None and mesh_part.weight is not None
     bone = np.zeros((len(first_vertex), BONES_PER_POINT), np.int32)

@@ -46,6 +46,7 @@ def check_limit(culprit: object, actual_count: int, max_count: int, items_noun: 
     culprit : file, for the error
     actual_count : number of the objects
     items_noun : plural noun for the objects
+    advice : sentence for the error on how the user can correct the file
     """
     if actual_count > max_count:
         refuse(culprit, f"at most {max_count:,} {items_noun}", f"it has {actual_count:,}", advice)

@@ -97,7 +97,11 @@ def _has_skin_word(name_words: set[str]) -> bool:
 
 
 def _covers_head(mesh_parts: Sequence[MeshPart], is_not_skin: Sequence[bool]) -> list[bool]:
-    """Return whether each mesh part covers at least a minimum fraction of the head's area."""
+    """Return whether each mesh part covers at least a tenth of the head's area.
+
+    is_not_skin : for each part, whether its names exclude that it is skin; such a part does not count as
+        area of the head
+    """
     heights = np.concatenate([part.positions[:, 1] for part in mesh_parts])
     lowest = heights.max() - HEAD_HEIGHT_FRACTION * np.ptp(heights)
     area = np.zeros(len(mesh_parts))

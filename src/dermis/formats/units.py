@@ -37,7 +37,7 @@ _USUAL_SIZE_RANGE_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}
 def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, culprit: object) -> RiggedMesh:
     """Return the mesh of a file in millimetres, with a note if its unit was guessed or its size is unusual.
 
-    rigged : mesh and rig, read from the file with `unit_mm`; has no rig if the file's format has no unit
+    rigged : mesh and rig, read with the unit `unit_mm`; formats without a unit (OBJ, PLY, STL) have no rig
     unit_mm : unit of the file as the user states it [mm]; None to use the unit of the file or its format, or
         to guess it
     culprit : source of the mesh, for errors

@@ -165,7 +165,7 @@ def _shared_bindings(
 def _cached_sky_visibility(
     memo: Memo, device: Device, request: FrameRequest, layout: AtlasLayout, shape_resources: shape.Resources
 ) -> VertexSkyVisibility:
-    """Return the sky visibility at the vertices of the head at rest, from the cache or newly computed."""
+    """Return the sky visibility at the vertices of the head in its rest pose, cached if possible."""
     at_rest = rest_geometry(memo, device, layout.head, shape_resources.tables, request.topology, None, 0)
     return memo.get(make_vertex_sky_visibility, device, request.topology, untracked=(at_rest,))
 

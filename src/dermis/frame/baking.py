@@ -117,6 +117,7 @@ def _texel_weights(
 ) -> NDArray[np.float64]:
     """Return (n, 2) barycentric weights of texel centres for the second and third corner of their triangles.
 
+    map_side : side of the maps [texels]
     texel_index : (n,) indices of the texels, counted row by row
     triangle_index : (n,) indices of the triangles that cover these texels
     """
@@ -199,8 +200,10 @@ def _arrange_as_maps(
 ) -> BakedMaps:
     """Arrange the channels of skin texels as maps, and fill any other texel from the nearest skin texel.
 
+    map_side : side of the maps [texels]
     texel_index : (n,) indices of the skin texels, counted row by row
     texel_values : (n, BAKED_CHANNEL_COUNT) values of these texels; `BAKED_CHANNELS` names the columns
+    absence_reasons : dictionary from the name of each output that could not be computed to the reason
     """
     covered = np.zeros(map_side * map_side, np.bool_)
     covered[texel_index] = True

@@ -23,7 +23,7 @@ class FrameInputs:
     """Inputs of a frame: cached resources, and values that may differ between frames with equal resources.
 
     motion : pose of the head, as bytes for the shaders
-    face_movements : (9,) strength of the facial movements that change the painted maps; None if the maps are
+    face_movements : (9,) strength of the facial movements that change the skin maps; None if the maps are
         constant
     layouts : atlas layouts of `resources`, each with the uniform record of this frame's lights
     blurs : Gaussian blurs of each layout, with a factor that brings this frame's light into the range of the
@@ -33,7 +33,7 @@ class FrameInputs:
     camera_views : projection of the camera, with the positions of samples in a pixel
     window : rectangle of the image plane that the picture shows
     sky_view : views of the head from all directions, with their uniform record, to compute ambient occlusion;
-        None unless occlusion follows the shape
+        None if occlusion is not recomputed when the shape changes
     view : uniform record of the shading pass
     constants : pipeline constants of the shading pass
     centre_mm : centre of the head, the origin of positions in the scene [mm]

@@ -91,7 +91,10 @@ def suggest_settings(request: FrameRequest, budget_bytes: float) -> str:
 
 
 def frame_bytes(request: FrameRequest) -> dict[str, float]:
-    """Return the memory that a frame needs for each size setting, without the head and its maps [bytes]."""
+    """Return a dictionary from the name of a size setting to the memory that this setting determines [bytes].
+
+    Memory for the head and its maps is not included.
+    """
     technique, settings, atlases = request.technique, request.settings, request.atlas_plan
     width, height = settings.size
     pixel = _PICTURE_PIXEL_BYTES + _BYTES_PER_SAMPLE * settings.samples + technique.pixel_bytes

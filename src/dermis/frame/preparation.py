@@ -208,7 +208,9 @@ def interreflection_constants(resources: Resources) -> Constants:
 def _motion_bytes(head: Head, motion: Motion, rest_bytes: MotionBytes) -> MotionBytes:
     """Return a pose as bytes for the shaders.
 
-    rest_bytes : rest pose, whose positions are reused if the control points are the same"""
+    rest_bytes : bytes of the rest pose; its positions are reused for poses that keep the control points of
+        the head
+    """
     weights, matrices = motion.weights.tobytes(), motion.matrices.tobytes()
     is_rest = motion.positions_mm is head.control.positions_mm
     positions = rest_bytes.positions if is_rest else motion.positions_mm.tobytes()
@@ -216,7 +218,10 @@ def _motion_bytes(head: Head, motion: Motion, rest_bytes: MotionBytes) -> Motion
 
 
 def _rest_positions_mm(scene: Scene) -> NDArray[np.float32] | None:
-    """Return the (p, 3) control points of the person at rest [mm], None if they are those of the mesh."""
+    """Return the (p, 3) positions of the person's control points in the rest pose [mm].
+
+    The result is None for a person whose control points are those of the shared mesh.
+    """
     motion = scene.motion or scene.head.control.rest
     positions_mm = motion.positions_mm
     return None if positions_mm is scene.head.topology.control.positions_mm else positions_mm

@@ -128,7 +128,13 @@ def shader_options(
 def program_constants(
     device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
 ) -> dict[str, float]:
-    """Return a dictionary of `constants`, and of those `device_constants` that the shader declares."""
+    """Return the values of all pipeline constants of a shader, by name.
+
+    These are `constants`, and those constants from `device_constants` that the shader declares.
+
+    path : file of the shader
+    folders : folders that are searched for included files
+    """
     return used_constants(path, folders, device_constants(device)) | dict(constants)
 
 

@@ -25,7 +25,8 @@ class FrameRequest:
     """Everything that determines the cached resources of a frame.
 
     profile : diffusion profile of the skin; if a map blends several profiles, the first of them
-    rest_positions_mm : (p, 3) control points of the person at rest [mm], None if they are those of the mesh
+    rest_positions_mm : (p, 3) positions of the person's control points in the rest pose [mm], None if they
+        are those of the shared mesh
     environment_map : prefiltered map of `environment`
     light_part_counts : number of parts into which each light is divided, suns of the environment last
     shadow_layers : number of shadow maps
@@ -56,7 +57,7 @@ class FrameRequest:
 
     @property
     def topology(self) -> Head:
-        """Return the head without hair and maps; people made from the same template share its mesh."""
+        """Return the head for which the atlas is computed: the template that people share, or `head`."""
         return self.head.topology
 
     @property
@@ -76,9 +77,10 @@ class FrameRequest:
 
     @cached_property
     def split(self) -> ProfileSplit:
-        """Return the profile, split into Gaussians that are blurred and one that is evaluated per pixel.
+        """Return the profile, split into a narrow Gaussian and the Gaussians with which light is blurred.
 
-        The result includes the splits of any other profiles that a map blends.
+        Instead of a blur with the narrow Gaussian, light is evaluated at each pixel. The result
+        includes the splits of any other profiles that a map blends.
         """
         profiles = self.profile, *self.other_profiles
         first, *others = (self.technique.split(profile, self.albedo_from_map) for profile in profiles)
@@ -97,7 +99,7 @@ class FrameRequest:
 
     @property
     def has_interreflection(self) -> bool:
-        """Return whether interreflection is computed; scenes with an environment also require occlusion."""
+        """Return whether interreflection is computed; with an environment, it requires occlusion."""
         return self.settings.interreflection and (self.has_occlusion or self.environment is None)
 
     @property

@@ -22,7 +22,7 @@ class AtlasLayout(LitAtlas):
     """Atlas layout in which light is diffused, with its resources.
 
     translucency : resources of the light through thin parts of the head, None if the scene has no such light
-    occlusion : resources that update the occlusion map, None if occlusion does not follow the shape
+    occlusion : resources that update the occlusion map when the shape changes, None if it is not updated
     interreflection : resources of interreflection, None if there is no interreflection
     """
 
@@ -39,9 +39,9 @@ class Resources:
     layouts : atlas layouts in which light is diffused; the picture is shaded from the first layout
     scattered : texture over the atlas of the exitance by subsurface scattering
     technique : tables and textures of the technique; None if the technique needs none
-    output_layers : textures in which the technique diffuses subsurface light for outputs, apart from the
-        picture's textures; None if the technique needs none
-    sky : visible fraction of the sky at the vertices, None if occlusion does not follow the shape
+    output_layers : textures in which the technique diffuses subsurface light for the outputs besides the
+        picture; None if no requested output needs them
+    sky : visible fraction of the sky at the vertices, None if it is not recomputed when the shape changes
     hair : resources of the hair, None if no hair is drawn
     visibility : texture with the index of the triangle that covers each sample of the picture
     view : uniform record of the shading pass, without the camera

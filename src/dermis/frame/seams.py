@@ -17,7 +17,7 @@ class SeamMethod:
 
     layouts : names of the layouts: "stitched", "mesh" (the uv layout of the mesh) or "unwrapped" (a layout
         with other seams)
-    edge : filter mode at the edges of charts, one of `features.diffusion.blur.CHART_EDGE_MODES`
+    edge : what blurs read beyond the edge of a chart, one of `features.diffusion.blur.CHART_EDGE_MODES`
     feathered : whether the stretch map is changed near edges so that blurs become narrower there
     coloured : whether empty texels have the colour `Settings.seam_colour`; otherwise they are black
     """

@@ -96,8 +96,8 @@ def irradiance_at(
 
     The skin colour is the part of the albedo that is applied before the light scatters.
 
-    scene : scene without maps and environment, because the positions of the points in the atlas are unknown;
-        interreflection is ignored
+    scene : scene with neither maps nor an environment, because the positions of the points in the atlas are
+        unknown; interreflection is ignored
     triangle_index : (n,) indices of the triangles on which the points lie
     barycentric_weights : (n, 3) barycentric weights of the points
     """
@@ -117,9 +117,9 @@ def irradiance_at(
 def _compute_irradiance(
     renderer: Renderer, scene: Scene, settings: Settings, packed_points: NDArray[np.uint32]
 ) -> Floats:
-    """Return the (n * n, 3) irradiance at surface points, which are the texels of an n x n atlas [-].
+    """Return the (n * n, 3) irradiance at surface points, times the skin colour [-].
 
-    packed_points : (n, n, 2) packed surface points
+    packed_points : (n, n, 2) packed surface points, arranged like the texels of an atlas
     """
     device, side = renderer.device, len(packed_points)
     inputs = renderer.prepare(scene, settings.model_copy(update={"interreflection": False}))

@@ -39,12 +39,15 @@ class ProfileSplit:
 
     @property
     def relit_changes(self) -> Floats:
-        """Return, for each of n other profiles, its `relit` minus the `relit` of this profile, (n, 3) [-]."""
+        """Return the (n, 3) weights of the relit Gaussian in `others` minus those in this profile [-].
+
+        The relit Gaussian is so narrow that light is not blurred with it, but evaluated at each pixel.
+        """
         return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
 
     @property
     def weight_changes(self) -> tuple[Floats, ...]:
-        """Return, for each other profile, its (k, 3) `weight` minus the `weight` of this profile [-]."""
+        """Return, for each profile in `others`, its (k, 3) blur weights minus those of this profile [-]."""
         return tuple(one.weight - self.weight for one in self.others)
 
 
@@ -55,14 +58,14 @@ class TechniqueResources:
 class TechniqueTraits:
     """Properties of a technique; its subclass `techniques.technique.Technique` adds resources and passes.
 
-    sources : keys of the bibliography
+    sources : publications of the technique, as keys of the bibliography
     uses_atlas : whether light is diffused over the atlas
     mixes_profiles : whether a map can blend several profiles
     stitches_seams : whether light can cross the seams of the atlas
     supports_translucency : whether light can pass through thin parts of the head
     needs_curvature : whether the shading pass reads the curvature of the surface
     shade_constants : pipeline constants of the shading pass
-    pixel_bytes : memory per pixel besides the picture [bytes]
+    pixel_bytes : memory per pixel, without the memory for the picture itself [bytes]
     subsurface_layer_bytes : memory per pixel of the textures of `Technique.make_subsurface_layers` [bytes]
     """
 
@@ -77,9 +80,10 @@ class TechniqueTraits:
     subsurface_layer_bytes: ClassVar[int] = 0
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Split a profile into a Gaussian evaluated at each pixel (relit), and Gaussians that are blurred.
+        """Split a profile into a narrow Gaussian and the Gaussians with which light is blurred.
 
-        In this class, none is blurred.
+        Instead of a blur with the narrow Gaussian, light is evaluated at each pixel. In this class, no light
+        is blurred, and the narrow Gaussian has all the weight.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo

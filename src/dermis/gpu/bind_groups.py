@@ -103,7 +103,7 @@ class ResourceCache(Generic[T]):
             self._cache_keys_of(resource).add(cache_key)
 
     def _cache_keys_of(self, resource: object) -> set[ResourceKey]:
-        """Return the cache keys that contain a resource; if it is new, start to watch for its release."""
+        """Return the cache keys that contain a resource; for a new resource, start watching its release."""
         identity = id(resource)
         if identity not in self._keys:
             this = weakref.ref(self)

@@ -265,6 +265,7 @@ def make_dispatch(
 ) -> Dispatch:
     """Return the native arguments for a dispatch of a program.
 
+    stage : name of the stage, under which the dispatch is timed
     bind_group : bind group of the program
     record_offsets : offsets of the uniform records in their buffers [byte]
     workgroups : workgroups along each axis

@@ -52,7 +52,10 @@ class ResourceState:
         return found
 
     def set_version(self, version: int) -> None:
-        """Set the version of this resource and its views; the version of a viewed texture becomes unknown."""
+        """Set the version of this resource and of its views.
+
+        If this resource is a view, the version of the viewed texture becomes unknown.
+        """
         self.version = version
         for view in self.views:
             view.version = version
@@ -108,9 +111,9 @@ PassAccess = tuple[int, tuple[ResourceState, ...], tuple[ResourceState, ...]]
 class Dependencies:
     """Dependencies between the passes of a frame, used to find stale passes: those with outdated output.
 
-    The version that a pass writes is a hash of its key and of the versions that it reads. A pass is skipped
-    if its outputs already have that version. It is also skipped if no pass that runs reads its outputs, and
-    each output is scratch or overwritten later.
+    The version of a pass's output is a hash of the versions that the pass reads and of its key, which stands
+    for all other inputs. A pass is skipped if its outputs already have that version. It is also skipped if no
+    pass that runs reads its outputs, and each output is scratch or overwritten later.
 
     passes : for each pass, in order, its access id and the states of the resources that it reads and writes
     """
@@ -136,7 +139,7 @@ class Dependencies:
     def compute_versions(self, epoch: int, pass_keys: Iterable[Hashable]) -> list[int]:
         """Return the version of the output of each pass.
 
-        epoch : number that changes when all content becomes unknown
+        epoch : number that changes when the contents of all resources are invalidated
         pass_keys : for each pass, everything that its output depends on besides the resources that it reads
         """
         versions: list[int] = []

@@ -65,7 +65,7 @@ class Device:
     checked : the same functions with checks: they raise the errors that the library reports
     resource_states : versions of the content of textures, buffers and views, see dependencies.py
     programs : compiled shaders, see program.py
-    spare_chunks : unused host memory for uniforms, kept because allocation takes longer
+    spare_chunks : unused host memory for uniforms, kept for later frames because allocation is slow
     """
 
     def __init__(self, adapter: Adapter, reason: str, *, bare: bool = False) -> None:

@@ -70,6 +70,8 @@ class FrameListing:
     ) -> None:
         """Append a pass to the listing.
 
+        stage : name of the stage
+        workgroups : see `ListedPass.groups`
         declared_index : index of the declared pass, which may be a recording that contains several listed
             passes
         recorded : whether the pass belongs to a recording
@@ -280,7 +282,7 @@ class Graph(Recorder):
         return result
 
     def read_back(self, *buffers: Buffer) -> BufferReadback:
-        """Return a readback of the concatenated content that buffers have after the frame."""
+        """Return a readback of the content that buffers have after the frame, one buffer after another."""
         readback = BufferReadback(self.device, sum(buffer.size for buffer in buffers))
         self._readbacks.append((buffers, readback))
         return readback

@@ -113,7 +113,7 @@ class Program:
         return found
 
     def used_uniform_bytes(self, resources: Bindings, uniforms: Uniforms) -> tuple[Hashable, ...]:
-        """Return the bytes of uniform records that the shader reads; they are a part of the pass's key.
+        """Return the bytes of uniform records that the shader reads, to detect passes with changed inputs.
 
         Large records are returned completely, because Python caches the hash of the bytes for other passes.
         """

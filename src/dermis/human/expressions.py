@@ -35,7 +35,7 @@ def expand_targets(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def expand_sides(target_name: str) -> tuple[str, ...]:
-    """Return the left and the right target of a name without a side, or the name itself if there are none."""
+    """Return the left and the right target of a name without a side; any other name is returned alone."""
     return (
         tuple(f"{target_name}{side}" for side in TARGET_SIDES)
         if f"{target_name}Left" in _arkit_names()

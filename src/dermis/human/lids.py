@@ -106,6 +106,7 @@ def fit_lids(
 ) -> Points:
     """Return MakeHuman's points (n, 3) of a person with lids fitted to eyeballs of anatomical size [mm].
 
+    points_mm : (n, 3) MakeHuman's points of the person [mm]
     sockets : sockets of the left and the right eye
     is_closed : whether the upper lids are lowered onto the lower lids
     gaze_axis : (3,) unit viewing direction of the eyes
@@ -122,6 +123,7 @@ def _project_lids(
     """Move the lids of one eye onto its eyeball in place, for one person or for m poses of a person.
 
     points : (n, 3) points of the person, or (m, n, 3) for m poses [mm]
+    lid_side, socket : points that move with the lids of the eye, and socket of the eye
     is_closed : whether the upper lid is lowered onto the lower lid; (m,) for m poses
     gaze_axis : (3,) unit viewing direction of the eye; (m, 1, 3) for m poses
     """
@@ -165,6 +167,10 @@ def _lid_displacements(rings: Points, socket: EyeSocket, lid_is_closed: bool | B
 
     The x and y of open lids change only near the outline of the eyeball. The edges of the lids touch the
     eyeball, and the lids keep their thickness.
+
+    rings : (..., r, 3) positions of the lid points of lid_rings.csv, as MakeHuman models them [mm]
+    socket : socket of the eye
+    lid_is_closed : (...) whether the upper lid is lowered onto the lower lid
     """
     published = (rings - socket.centre) / socket.size
     relative, is_closed = published.copy(), np.asarray(lid_is_closed)

@@ -104,6 +104,8 @@ def _skin_weights(
     The points of an eyeball follow only the bone of that eye.
 
     eye_bones : indices of the bones of the left and the right eye
+    eyeball_point_count : number of points of an eyeball; the points of the left and then of the right eyeball
+        come after all other points
     """
     arrays = makehuman_arrays()
     weights = arrays["weight"].astype(np.float32)

@@ -160,8 +160,9 @@ def _sample_ancestry(
     sampled_fractions: NDArray[np.float64],
     fixed_fields: Mapping[str, Any],
 ) -> tuple[NDArray[np.float64], dict[str, float]]:
-    """Return ancestry fractions (3,) for the shape of a person, and weights of measured groups for the skin.
+    """Return ancestry fractions (3,) for a person's shape, and weights of groups of people for the skin.
 
+    The second result is a dictionary from groups of measured people to their weights in the skin's pigments.
     If the ancestry of the shape is fixed, the skin follows the shape. If only a skin ancestry or an ITA is
     fixed, the shape follows the skin. Otherwise some people of Caucasian shape have South Asian or Middle
     Eastern skin.
@@ -319,8 +320,8 @@ class Human:
     hair : HairLook, optional
         Look of the hair; by default typical for the person.
     skin_ancestry : str
-        Measured group that determines the colours of skin, eyes and hair independently of the shape, such as
-        "south asian"; "" for the colours of the shape's ancestries.
+        Name of a group of measured people whose colours of skin, eyes and hair the person gets, independently
+        of the shape, such as "south asian"; "" for the colours of the shape's ancestries.
     ita : float, optional
         Individual typology angle of the cheek if `skin` is not given, -65 (darkest) to 70 (lightest)
         [degrees]; the skin is otherwise typical of measured people with this angle.

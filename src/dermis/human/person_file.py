@@ -111,7 +111,7 @@ def write_person_glb(
 
 
 def relief_slopes(head: Head) -> NDArray[np.float32] | None:
-    """Return the slopes (n, n, 2) of a head's height map along +u and upwards, for normal maps [-].
+    """Return the slopes (n, n, 2) of a head's height map to the right and upwards, for normal maps [-].
 
     The result is None for heads that have a normal map already, or that have no square height map.
     """

@@ -130,8 +130,8 @@ def encode_png(pixel_levels: Numbers, zlib_level: int = 6, use_isal: bool = Fals
     """Encode a picture (H, W, C) of uint8 or uint16 with 1, 3 or 4 channels as a PNG file.
 
     zlib_level : compression level of zlib, from 1 (fast) to 9 (small files)
-    use_isal : whether to compress with ISA-L, from the extra "batch", instead of zlib; for rendered pictures,
-        ISA-L is four times as fast as zlib at level 1
+    use_isal : whether to compress with ISA-L instead of zlib; for rendered pictures, ISA-L is four times as
+        fast as zlib at level 1. ISA-L is among the optional dependencies "batch" of this package
 
     PNG's "up" filter is used: each row is stored as the difference from the row above. For rendered pictures,
     the files are as small as if the best filter were chosen for each row, and encoding is twice as fast.

@@ -315,6 +315,7 @@ def _decode_runs(file_bytes: bytes, byte_offset: int, height: int, width: int) -
 
     byte_offset : offset of the first scanline in the file [byte]
     height : number of scanlines
+    width : number of pixels per scanline
     """
     starts: list[int] = []
     marker, append = _scanline_marker(width), starts.append

@@ -121,9 +121,9 @@ def read_colours(
 
 
 def note_properties(path: str | Path | EmbeddedPicture, read_as_colours: bool) -> None:
-    """Issue the note on a picture's properties that reading the picture would issue.
+    """Issue the note on the properties of a picture that is taken from a cache.
 
-    This function serves for pictures that are taken from a cache instead.
+    It is the same note that is issued when the picture is read from its file.
 
     read_as_colours : whether to issue the note of `read_colours` instead of that of `read_image`
     """
@@ -332,8 +332,8 @@ def write_exr(
     """Write a float32 OpenEXR file with lossless compression.
 
     linear_picture : (H, W, 3) or (H, W, 4), linear Rec. 709, stored as channels R, G, B (and A)
-    use_run_length_encoding : whether to use run-length encoding instead of ZIP, which is twice as fast; files
-        of a rendered head are then 4 % larger
+    use_run_length_encoding : whether to compress by run-length encoding instead of ZIP; for a rendered head,
+        run-length encoding is twice as fast, and the files are 4 % larger
     """
     import OpenEXR
 

@@ -106,8 +106,8 @@ class ImageWriter:
 class FrameFiles:
     """Numbered picture files of a sequence, named by a pattern such as frames/%05d.png.
 
-    The content key of a sequence is a text that is equal for sequences with equal frames. A hidden record
-    file stores the content key of the sequence to which the existing pictures belong.
+    The content key of a sequence is a text that is equal for sequences with equal frames. A hidden file next
+    to the pictures stores the content key of the sequence to which the existing pictures belong.
     """
 
     pattern: Path
@@ -139,7 +139,7 @@ class FrameFiles:
         check_output(self.path(0))
 
     def start_sequence(self, content_key: str, *, force: bool = False) -> None:
-        """Start or continue a sequence; existing pictures are kept if the record file has this content key.
+        """Start a sequence, or continue it with its existing pictures if the stored content key is equal.
 
         content_key : text that is equal for sequences with equal frames
         force : whether to discard existing pictures even if the content keys are equal
@@ -160,7 +160,7 @@ class FrameFiles:
         ]
 
     def _record_matches(self, content_key: str) -> bool:
-        """Return whether the record file contains a content key."""
+        """Return whether the stored content key of the existing pictures is equal to `content_key`."""
         text = content_key.encode()
         try:
             return read_file(self._record_path, "a record of frames", len(text)) == text
@@ -175,7 +175,7 @@ class FrameFiles:
 def _is_complete(picture_path: Path, picture_size: tuple[int, int], start_ns: int) -> bool:
     """Return whether a file is a complete picture of a given size, written after the sequence was started.
 
-    start_ns : modification time of the record file [ns]
+    start_ns : time at which the sequence was started, as a file modification time [ns]
     """
     try:
         if not picture_path.is_file() or picture_path.stat().st_mtime_ns < start_ns:

@@ -105,7 +105,7 @@ class Head:
     def topology(self) -> Head:
         """Return the head for which the uv atlas and other shared data are computed: the template or `bare`.
 
-        It is the template if the rig is derived from the rig of the template.
+        It is the template if the rig of the head refers to the rig of the template, see `Rig.template`.
         """
         template = self.template
         if template is None or self.rig is None or self.rig.template is not template.rig:

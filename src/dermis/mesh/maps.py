@@ -22,7 +22,7 @@ class PartMaps(ShortRepr):
     colour : (H, W, 4) base colour, linear Rec. 709, and opacity; surfaces are cut out where opacity is below
         0.5 [-]
     surface : (H, W, 4) two slopes as in `Maps.normal`, perceptual roughness and metalness [-]
-    emission : (H, W, 3) emitted radiance; None if no group emits light
+    emission : (H, W, 3) emitted radiance; None if no material emits light
     """
 
     colour: Floats

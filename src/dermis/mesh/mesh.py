@@ -29,8 +29,8 @@ class Material:
     colour : diffuse albedo where there is no colour map, linear Rec. 709 [-]
     part : name of a part of the mouth, which selects a colour in mouth.wgsl; None for other surfaces
     eye : whether the file declares the group to be an eyeball
-    has_maps : whether `Maps.parts` contains the colour and surface of an opaque group, already multiplied by
-        the factors of the file's material
+    has_maps : whether `Maps.parts` contains colour and surface maps of an opaque group; the factors of the
+        file's material are already included in these maps
     roughness : perceptual roughness of an opaque group, see glTF [-]; None for wet eyes and teeth
     metalness : 1 for metal [-]
     emission : radiance that the group emits, linear Rec. 709
@@ -62,6 +62,7 @@ class Mesh(ShortRepr):
     point : (v,) index of the unique position
     triangles : (f, 3) vertex indices
     material : (f,) index into `materials`
+    materials : materials of the triangles
     quads : (q, 2) pairs of triangles (a, b, c) and (c, d, a) that form a quad abcd; no rows if the mesh has
         no quads
     """
@@ -165,6 +166,7 @@ def build_mesh(
     uv : (v, 2) v down
     triangles : (f, 3) vertex indices, at least one triangle
     material : (f,) index into `materials`
+    materials : materials of the triangles
     normals : (v, 3) unit normals; computed instead where they are invalid, or everywhere if None
     point : (v,) index of the unique position; if None, equal positions are welded
     quads : (q, 2) pairs of triangles that are a quad, see `Mesh`

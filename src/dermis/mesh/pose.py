@@ -183,6 +183,7 @@ def _bone_transforms(
 
     ordered_bones : (n,) index and name of each bone, parents before children
     bone_values : mapping from bone name to angles or matrix, see `Pose`
+    culprit : name of the pose in error messages
     """
     changes = np.empty((len(ordered_bones), 4, 4))
     rows: list[list[float]] = []
@@ -214,6 +215,7 @@ def _check_matrices(bone_matrices: Doubles, bone_names: list[str], culprit: obje
     """Raise DermisError if one of the matrices (n, 4, 4) is singular.
 
     bone_names : (n,) names of the bones
+    culprit : name of the pose in error messages
     """
     linear = bone_matrices[:, :3, :3]
     size = np.sqrt(np.einsum("nij,nij->n", linear, linear))
@@ -233,7 +235,9 @@ def _refuse_weights(
 ) -> NoReturn:
     """Raise DermisError for the first invalid weight or unknown morph target.
 
+    target_weights : mapping from names of morph targets to weights
     target_names : names of the morph targets of the rig
+    culprit : name of the pose in error messages
     """
     for name, weight in target_weights.items():
         if name not in target_names:
@@ -245,6 +249,8 @@ def _refuse_weights(
 def _refuse_name(culprit: str, unknown_name: object, known_names: Iterable[str], name_noun: str) -> NoReturn:
     """Raise DermisError for an unknown name; the message suggests similar known names.
 
+    culprit : name of the pose's field in the message
+    known_names : names of all bones or morph targets of the head
     name_noun : "bone" or "morph target"
     """
     names = list(known_names)

@@ -49,7 +49,8 @@ class Motion(NamedTuple):
 class Stencils(ShortRepr):
     """Points of a subdivided mesh as weighted means of control points, in compressed rows.
 
-    first : (q + 1,) index at which the control points of each mesh point start in `point` and `weight`
+    first : (q + 1,) index at which the control points of each mesh point start in `point` and `weight`; the
+        last element is n
     point : (n,) indices of control points
     weight : (n,) weights of these control points, which sum to 1 for each mesh point
     """
@@ -203,8 +204,8 @@ class Rig(ShortRepr):
     def _posable_lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
         """Return arrays for `lid_edges_mm` that do not depend on the pose.
 
-        They are the indices (n,) of the control points around the lid edges, and the weights (e, n) of these
-        control points in the e points along the edges. The `RigOutline` poses the control points.
+        They are the indices (n,) of the control points around the lid edges, the weights (e, n) of these
+        control points in the e points along the edges, and a `RigOutline` that poses these control points.
         """
         assert self.contact is not None
         edge = self.contact.edge.ravel().astype(np.intp)

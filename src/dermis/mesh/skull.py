@@ -148,7 +148,9 @@ class _Section(NamedTuple):
 def _horizontal_section(positions: Doubles, cut_triangles: Ints, plane_height: float) -> _Section:
     """Return the intersection of a mesh with the horizontal plane at a height.
 
+    positions : (v, 3) vertices of the mesh, Y up
     cut_triangles : (n, 3) vertex indices of the triangles that the plane cuts
+    plane_height : y coordinate of the plane
     """
     if not len(cut_triangles):
         return _Section(0, 0.0, 0.0)

@@ -197,7 +197,7 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
 
     The triangles are indices of vertices of the subdivided mesh. Triangles with an opacity map are left out.
 
-    min_faces : coarser levels are used only if the mesh has at least this number of faces at these levels
+    min_faces : levels are dropped only as long as the coarser mesh has at least this number of faces
     tolerance_mm : largest distance between a dropped vertex and the middle of the coarse edge that replaces
         it [mm]
     """
@@ -224,7 +224,9 @@ def _coarsen_triangles(
     triangles : (f, 3) triangles of the finest level; Loop's rules divide a triangle into four, of which the
         first three are at its corners
     dropped_levels : number of subdivision levels to leave out in flat regions
-    tolerance_mm : largest deviation of a region that counts as flat [mm]
+    positions_mm : (v, 3) vertices of the finest level [mm]
+    tolerance_mm : largest distance between a dropped vertex and the middle of the coarse edge that replaces
+        it, in regions that count as flat [mm]
     """
     coarse, finer = triangles, triangles
     for _ in range(dropped_levels):
@@ -243,7 +245,9 @@ def _coarsen_quads(
     quads : (q, 4) quads of the finest level; the rules divide a polygon into quads, one from each corner to
         its centre
     dropped_levels : number of subdivision levels to leave out in flat regions
-    tolerance_mm : largest deviation of a region that counts as flat [mm]
+    positions_mm : (v, 3) vertices of the finest level [mm]
+    tolerance_mm : largest distance between a dropped vertex and the middle of the coarse edge that replaces
+        it, in regions that count as flat [mm]
     """
     coarse = quads
     for _ in range(dropped_levels - 1):
@@ -266,7 +270,9 @@ def _edge_deviation_mm(
 ) -> Floats:
     """Return the distance between the middle vertex of each coarse edge and the midpoint of this edge [mm].
 
-    middle_vertex, start_vertex, end_vertex : indices of the vertices in the middle and at both ends of edges
+    positions_mm : (v, 3) positions of all vertices [mm]
+    middle_vertex, start_vertex, end_vertex : for each coarse edge, the indices of the vertex in its middle
+        and of the vertices at its ends
     """
     halfway = 0.5 * (positions_mm[start_vertex] + positions_mm[end_vertex])
     return np.asarray(np.linalg.norm(positions_mm[middle_vertex] - halfway, axis=-1))

@@ -195,11 +195,14 @@ def _edge_end_weights(sides: _Sides, edge_weight: Doubles) -> csr_array:
 def _old_point_weights(
     sides: _Sides, inner_weight: Doubles, neighbour_weight: Doubles, border_weight: float
 ) -> csr_array:
-    """Return the weights (p, p) of old points in the new positions of the old points.
+    """Return the weights (p, p) of the old positions of points in their new positions.
 
-    inner_weight : (p,) weight of each inner point in its own new position
-    neighbour_weight : (p,) weight of each of its neighbours in this position
-    border_weight : weight of each of the two neighbours on the border in the new position of a border point
+    Row i of the matrix is for the new position of point i.
+
+    inner_weight : (p,) weight of the old position of each inner point in its own new position
+    neighbour_weight : (p,) weight of every neighbour of an inner point in the new position of this point
+    border_weight : weight of each of the two border neighbours of a border point in the new position of this
+        point
     """
     is_inner, is_border = (sides.border_valence == 0) & (sides.valence > 0), sides.border_valence == 2
     both, other = sides.ends.T.ravel(), sides.ends[:, ::-1].T.ravel()

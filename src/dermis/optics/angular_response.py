@@ -53,11 +53,11 @@ def interpolate_columns(column_at: Callable[[float], Floats], table_positions: A
 class AngularResponse:
     """Factors that describe how the reflectance of a half-space depends on direction.
 
-    A shader multiplies diffuse light by them. The reflectance for an incident direction is
-    `relative_reflectance` times the reflectance at normal incidence. Light that scattered several times
-    emerges uniformly in all directions. Light that scattered once adds `single_scattering` times the
-    difference between the kernel 1/(a + b) and the mean of this kernel over exit directions, where a and b
-    are the cosines of the incident and the exit direction below the surface.
+    For each incident and exit direction, diffuse light is multiplied by the sum of two terms, which are
+    relative to the reflectance at normal incidence. The first term, `relative_reflectance`, is the
+    reflectance for the incident direction. The second term, for light that scattered once, is
+    `single_scattering` times the difference between the kernel 1/(a + b) and the mean of this kernel over
+    exit directions, where a and b are the cosines of the incident and the exit direction below the surface.
 
     eta : index of refraction relative to air [-]
     relative_reflectance : (DIRECTION_ROWS, c) reflectance relative to normal incidence, at incident cosines
@@ -152,7 +152,8 @@ class _HalfSpace:
     def _reflected_radiance(self, incident_cosine: Floats, h_values: Floats) -> Floats:
         """Return pi times the radiance that the medium reflects into each of the discrete directions [-].
 
-        The result (d, n) has a row for each discrete direction and a column for each incident direction.
+        The light from each incident direction has the irradiance 1 on the medium. The result (d, n) has a row
+        for each discrete direction and a column for each incident direction.
 
         incident_cosine : (n,) cosines of the directions of incident light below the surface
         h_values : (n,) H function at these cosines
@@ -186,6 +187,7 @@ def _response_column(eta: float, total_reflectance: float) -> Floats:
     The first DIRECTION_ROWS elements are `relative_reflectance`; the last two are
     `relative_diffuse_reflectance` and `single_scattering`.
 
+    eta : index of refraction relative to air [-]
     total_reflectance : reflectance of the half-space for light at normal incidence [-]
     """
     albedo = albedo_for_reflectance(total_reflectance, eta)

@@ -50,8 +50,8 @@ class CumulativeProfile:
     def from_radial_profile(cls, profile: RadialProfile, entering_fraction: float = 1.0) -> CumulativeProfile:
         """Return the cumulative profile of a radial profile with three channels.
 
-        entering_fraction : fraction of the incident light that enters, if the profile is per incident power;
-            1 if the profile is per power that enters [-]
+        entering_fraction : fraction of the incident light that enters, if the profile is relative to the
+            incident power; 1 if the profile is relative to the power that enters [-]
         """
         total = profile.total
         energy_within = np.concatenate([np.zeros((1, 3)), np.cumsum(profile.ring_energy, axis=0)])

@@ -52,6 +52,7 @@ def _half_space_column(eta: float, from_photons: bool, total_reflectance: float)
     the frequency at which the Hankel transform of R(r) has fallen to half of its value at 0 [1 / mean free
     path].
 
+    eta : index of refraction relative to air [-]
     from_photons : whether R(r) comes from a table of photon counts, if one exists, instead of layered
         diffusion
     total_reflectance : reflectance for light at normal incidence [-]

@@ -166,6 +166,7 @@ def published_media() -> Mapping[str, Medium]:
 def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
     """Return the medium that a parsed TOML file describes.
 
+    path : path of the file, for errors, and for the name of the medium if the file does not state a name
     document : content of the file: optionally `name` and `eta`, and `[[layers]]`, topmost first. Each layer
         has `absorption_per_mm`, `scattering_per_mm` (lists of 3 numbers) and, except for the last layer,
         `thickness_mm`

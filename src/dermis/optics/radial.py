@@ -28,8 +28,8 @@ class RadialProfile:
     ring_energy : (k, c) light that emerges through each ring [-]
     standard_error : (n, c) standard error of R(r) if it is from photon counts, else None [1/mm2]
     total_error : (c,) standard error of the total if it is from photon counts, else None [-]
-    incident : whether R(r) is per incident power instead of per power that enters; surface reflection is not
-        included in R(r) in either case
+    incident : whether R(r) is relative to the incident power instead of the power that enters; in both cases,
+        R(r) excludes surface reflection
     warnings : known inaccuracies of the profile, shown to the user
     sources : keys of the bibliography
     """

@@ -1,4 +1,4 @@
-"""Checks that scattering coefficients are reduced; the messages of the errors state the reduced values."""
+"""Checks that files contain reduced scattering coefficients; if not, errors state the reduced values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MAX_LISTED_THICKNESS_MM = 1e4  # thicker layers of MCML files stand for semi-in
 
 
 def check_reduced(culprit: str, layer_entries: Mapping[str, object]) -> None:
-    """Raise DermisError if a layer states an anisotropy, because its scattering is then probably not reduced.
+    """Raise DermisError for a layer with an anisotropy g: its scattering probably lacks the factor 1 - g.
 
     culprit : name of the file or layer, for the message
     layer_entries : entries of the layer in the file, including "scattering_per_mm"
@@ -39,7 +39,9 @@ def check_reduced(culprit: str, layer_entries: Mapping[str, object]) -> None:
 
 
 def refuse_mcml(path: Path) -> NoReturn:
-    """Raise DermisError for a file of MCML; the message states its layers in the units of this package.
+    """Raise DermisError for an input or output file of the Monte Carlo program MCML.
+
+    The message states the layers in the file, converted to the units of this package.
 
     Source: [Wang1995] for the format: refractive index, absorption, scattering [1/cm], g and thickness [cm].
     """
@@ -74,7 +76,7 @@ def _reduced_scattering(mu_s: float, g: float) -> float:
 
 
 def _parse_numbers(text_cells: list[str]) -> list[float]:
-    """Return the cells as numbers, or an empty list if any cell is not a number."""
+    """Return texts converted to numbers, or an empty list if any text is not a number."""
     try:
         return [float(cell) for cell in text_cells]
     except ValueError:

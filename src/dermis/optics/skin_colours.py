@@ -24,8 +24,8 @@ _COEFFICIENT_FIELDS = ("sigma_a", "sigma_s_prime")
 class ColourTable:
     """Table of the diffuse reflectance of skins, over melanin (first axis) and blood (second axis).
 
-    colours : (n, n, 3) diffuse reflectance per incident light, linear Rec. 709, at fractions of melanin and
-        blood whose square roots are evenly spaced from 0 to 1 [-]
+    colours : (n, n, 3) diffuse reflectance relative to the incident light, linear Rec. 709, at fractions of
+        melanin and blood whose square roots are evenly spaced from 0 to 1 [-]
     """
 
     colours: Floats
@@ -50,7 +50,14 @@ class ColourTable:
 
 
 def _cell_and_offset(pigment_fraction: Floats, node_count: int) -> tuple[NDArray[np.int64], Floats]:
-    """Return the table cell (k,) of each fraction, and the fraction's position (k, 1) in it, from 0 to 1."""
+    """Return the table interval (k,) that contains each fraction, and the position (k, 1) in this interval.
+
+    An interval is given by the index of its lower end. Positions are from 0 to 1, and linear in the square
+    root of the fraction.
+
+    pigment_fraction : (k,) fractions of melanin or blood [-]
+    node_count : number of fractions along the axis of the table
+    """
     position = np.sqrt(np.clip(pigment_fraction, 0.0, 1.0)) * (node_count - 1)
     cell = np.minimum(position.astype(np.int64), node_count - 2)
     return cell, (position - cell)[:, None]
@@ -84,7 +91,7 @@ def spectral_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_N
 
 
 def _select_rows(layer: Layer, row_indices: NDArray[np.int64]) -> Layer:
-    """Return a layer with k c channels: the coefficients in k rows of a layer's arrays, row after row.
+    """Return a layer whose k c channels are k rows of another layer's coefficients, one row after another.
 
     layer : layer with coefficients of the shape (n, c)
     row_indices : (k,) indices of the rows, which may repeat

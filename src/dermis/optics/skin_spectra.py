@@ -29,9 +29,10 @@ def skin_reflectance(
     baseline: ArrayLike,
     scattering: ArrayLike = 1.0,
 ) -> Floats:
-    """Return the diffuse reflectance (n, 31) of n "dj2006" skins by layered diffusion, per incident light.
+    """Return the diffuse reflectance spectra (n, 31) of n skins by layered diffusion [-].
 
-    All arguments are numbers or arrays (n,). Surface reflection is not included.
+    Each skin is an epidermis on a semi-infinite dermis, the structure "dj2006". The reflectance is relative
+    to the incident light and excludes surface reflection. All arguments are numbers or arrays (n,).
 
     melanin : fraction of the epidermal volume that is melanosomes [-]
     blood_fraction : fraction of the dermal volume that is blood [-]
@@ -59,7 +60,9 @@ def two_layer_reflectance(
     epidermis_mm: ArrayLike,
     scattering_ratio: float = DERMIS_SCATTERING_RATIO,
 ) -> Floats:
-    """Return the diffuse reflectance (n, c) of an epidermis on a semi-infinite dermis, per incident light.
+    """Return the diffuse reflectance (n, c) of an epidermis on a semi-infinite dermis [-].
+
+    The reflectance is relative to the incident light.
 
     epidermis_absorption, dermis_absorption : (n, c) absorption coefficients of the layers [1/mm]
     sigma_s_prime : (n, c) or (c,) reduced scattering coefficient of the epidermis [1/mm]

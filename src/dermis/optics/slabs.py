@@ -111,10 +111,11 @@ def solve_slabs(
     The result is exact except for the discretisation of directions.
 
     albedo : single-scattering albedo, or the reduced albedo if scattering is anisotropic [-]
-    optical_depth : (n,) thicknesses in mean free paths, reduced if scattering is anisotropic, above 0 [-]
+    optical_depth : (n,) thicknesses above 0, in mean free paths; in reduced mean free paths if scattering is
+        anisotropic [-]
     eta : index of refraction relative to the air on both sides, at least 1 [-]
-    direction_nodes : number of directions that escape from the slab; if eta is above 1, as many more are
-        totally reflected
+    direction_nodes : number of discrete directions in which light can leave the slab; if eta is above 1, the
+        same number of directions is added in which light is totally reflected
     g : mean cosine of the scattering angle, at least 0 [-]
 
     Source: [Chandrasekhar1960] section 50 for the addition of layers.
@@ -162,6 +163,8 @@ def half_space_radiance(
     - the fraction (m,) of the light from a uniform sky that enters in each direction;
     - the emerging radiance (m, m) by exit direction (row) and entry direction (column), scaled so that its
       mean over exit directions, weighted by these fractions, is the reflectance.
+
+    The arguments are those of `solve_slabs`; m is `direction_nodes`.
     """
     transport = _Transport.create(albedo, eta, direction_nodes, g)
     doublings = transport.doubling_count(DEEP_OPTICAL_DEPTH)
@@ -199,7 +202,7 @@ class _Transport:
         return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, direction_nodes))
 
     def doubling_count(self, depth: float) -> int:
-        """Return how many doublings turn a slab thin enough for single scattering into one of a given depth.
+        """Return how often a slab thin enough for single scattering must be doubled to reach a thickness.
 
         depth : thickness after the doublings, in reduced mean free paths [-]
         """
@@ -209,10 +212,11 @@ class _Transport:
 def _slabs_in_air(
     transport: _Transport, reflection: Floats, transmission: Floats, unscattered_fraction: Floats
 ) -> Slabs:
-    """Return the reflection and transmission of slabs with faces to air, from those of slabs without faces.
+    """Return the reflection and transmission of slabs in air, from those of slabs with index-matched faces.
 
-    reflection, transmission : (n, m, m) reflection and transmission without faces, as pi times the radiance
-        for unit power from each direction
+    transport : discrete directions, and reflectance of the faces
+    reflection, transmission : (n, m, m) reflection and transmission with index-matched faces, as pi times the
+        radiance for unit power from each direction
     unscattered_fraction : (n, m) fraction of light that crosses the slab without scattering [-]
     """
     flux, escapes = transport.flux, transport.escapes
@@ -270,7 +274,9 @@ def _doubling_steps(
     Reflection and transmission (n, m, m) are pi times the radiance for unit power from each direction. The
     unscattered light (n, m) is the fraction that crosses the slab without scattering.
 
+    transport : discrete directions, and phase function of the medium
     initial_depth : (n,) initial thicknesses in reduced mean free paths
+    doubling_count : number of doublings
     """
     mu, flux, albedo = transport.mu, transport.flux, transport.phase.albedo
     t = transport.phase.extinction * initial_depth[:, None, None]
@@ -305,8 +311,8 @@ def _add_faces(
         multiplied by the flux of its direction
     unscattered_fraction : (n, m) fraction of light that crosses the slab without scattering [-]
     face_reflectance : (m,) reflectance of a face from inside [-]
-    reflection, transmission : (n, m, m) reflection and transmission of the slabs without faces, as pi times
-        the radiance
+    reflection, transmission : (n, m, m) reflection and transmission of the slabs with index-matched faces, as
+        pi times the radiance
     """
     if not face_reflectance.any():
         return reflection, transmission
@@ -360,6 +366,8 @@ def _response_column(eta: float, g: float, total_reflectance: float) -> Floats:
     The first DIRECTION_ROWS elements are `relative_reflectance`; the last two are
     `relative_diffuse_reflectance` and `single_scattering`.
 
+    eta : index of refraction relative to air [-]
+    g : mean cosine of the scattering angle [-]
     total_reflectance : reflectance of the isotropic half-space for light at normal incidence [-]
     """
     a, fraction, radiance = half_space_radiance(

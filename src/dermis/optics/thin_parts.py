@@ -53,7 +53,7 @@ class ThinParts:
     lost : (THICKNESS_ROWS, k, 3) weights of the light that a half-space would reflect but the thin part does
         not; lost light spreads as widely as transmitted light [-]
     directionality : (THICKNESS_ROWS,) dependence of the transmittance on the incident direction, relative to
-        that of deep slabs (see `oblique_transmittance`); 0 for no dependence [-]
+        that of optically thick slabs (see `oblique_transmittance`); 0 for no dependence [-]
     """
 
     max_thickness_mm: float
@@ -93,15 +93,16 @@ def solve_thin_parts(
 def oblique_transmittance(
     total_reflectance: Floats, eta: float, from_photons: bool = False, g: float = 0.0
 ) -> Floats:
-    """Return the relative transmittance (DIRECTION_ROWS, c) of deep slabs for each incident direction [-].
+    """Return the relative transmittance (DIRECTION_ROWS, c) of optically thick slabs by direction [-].
 
-    The relative transmittance is t / r. Here, t is the transmittance of the slab for the direction, divided
+    The relative transmittance is t / r. Here, t is the transmittance for the incident direction, divided
     by the slab's transmittance for uniform light, and r is the same quotient for the reflectance of a
     half-space. The square roots of the cosines of incidence in air are evenly spaced from 0 to 1.
 
     total_reflectance : (c,) reflectance of the half-space for light at normal incidence [-]
     eta : index of refraction relative to air [-]
-    from_photons : whether the diffusion profile comes from photon counts instead of a diffusion model
+    from_photons : whether the albedo for this reflectance comes from a table of photon counts, if one exists,
+        instead of layered diffusion
     g : mean cosine of the scattering angle [-]
     """
     return interpolate_columns(partial(_oblique_column, eta, from_photons, g), total_reflectance)
@@ -117,9 +118,11 @@ def _oblique_column(eta: float, from_photons: bool, g: float, total_reflectance:
 
 
 def _deep_transmittance(albedo: float, eta: float, direction_nodes: int, g: float) -> tuple[Slabs, Floats]:
-    """Return a half-space with m incident directions, and the relative transmittance (m,) of deep slabs.
+    """Return the reflection of a half-space, and the relative transmittance (m,) of thick slabs [-].
 
-    Relative transmittance is defined as in `oblique_transmittance`.
+    Both are for m incident directions. Relative transmittance is defined as in `oblique_transmittance`.
+
+    albedo, eta, direction_nodes, g : as in `solve_slabs`
     """
     half_space = solve_slabs(albedo, DEEP_OPTICAL_DEPTH, eta, direction_nodes, g)
     deep = solve_slabs(albedo, _DEEP_SLAB_OPTICAL_DEPTH, eta, direction_nodes, g)
@@ -168,6 +171,8 @@ def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> It
 def _totals_column(eta: float, g: float, root_absorption: float) -> Floats:
     """Return the four fields of `_SlabTotals` for one albedo, (n, 4), at the n depths `_OPTICAL_DEPTHS`.
 
+    eta : index of refraction relative to air [-]
+    g : mean cosine of the scattering angle [-]
     root_absorption : square root of 1 minus the reduced albedo, the coordinate of the table [-]
     """
     albedo = min(max(1.0 - root_absorption**2, MIN_EQUIVALENT_ALBEDO), MAX_EQUIVALENT_ALBEDO)

@@ -81,9 +81,12 @@ class Tissue:
         return "\n".join([heading, f"  {thicknesses}", f"  {', '.join(ranges)}"])
 
     def spectrum(self, model: DiffusionModel = "layered", clamp: Clamp = "layer") -> Floats | None:
-        """Return the total diffuse reflectance (31,) at `WAVELENGTHS_NM`, per incident light [-].
+        """Return the total diffuse reflectance (31,) at `WAVELENGTHS_NM` [-].
 
-        Surface reflection is not included. The result is None for a medium whose channels are colours.
+        It is relative to the incident light and excludes surface reflection. The result is None for a medium
+        whose channels are colours.
+
+        model, clamp : diffusion model and an option of the multipole, see `diffusion_profile`
         """
         if self.rgb is None:
             return None
@@ -108,8 +111,8 @@ class Tissue:
     def profile(self, model: ProfileModel | None = None, clamp: Clamp = "layer") -> RadialProfile:
         """Return the diffusion profile R(r) of the tissue in linear Rec. 709.
 
-        R(r) is per incident power for a skin that is defined by its pigments, and per power that enters for
-        other media.
+        R(r) is relative to the incident power for a skin that is defined by its pigments, and relative to the
+        power that enters for other media.
 
         model : model that computes the profile; by default `default_model`
         clamp : whether the multipole's source stays inside thin layers ("layer") or not ("none"), see `Slab`
@@ -136,8 +139,8 @@ class Tissue:
     def transmittance(self, thickness_mm: ArrayLike) -> Floats:
         """Return the transmittance (n, 3) of slabs of the tissue [-].
 
-        The transmittance is per incident power for a skin that is defined by its pigments, and per power that
-        enters for other media.
+        The transmittance is relative to the incident power for a skin that is defined by its pigments, and
+        relative to the power that enters for other media.
 
         thickness_mm : (n,) thicknesses of the slabs [mm]
         """

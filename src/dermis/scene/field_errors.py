@@ -24,7 +24,7 @@ _MAX_TABLE_LENGTH = 160
 
 
 class AcceptedWords:
-    """Annotation of a numeric field for words that it also accepts, as in `AcceptedWords("auto")`."""
+    """Annotation that lets a numeric field also accept words, as in `AcceptedWords("auto")`."""
 
     def __init__(self, *words: str) -> None:
         self.words = words

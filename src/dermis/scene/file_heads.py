@@ -1,4 +1,4 @@
-"""Loading of heads from samples and mesh files, with their maps."""
+"""Loading of sample heads and of heads in mesh files, with their maps."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ MapFile = str | os.PathLike[str] | None
 class MapOptions:
     """Maps that users choose for the skin.
 
-    files : dictionary from each map role, such as "colour", to the user's picture file, or to None to keep
-        the mesh file's picture
+    files : dictionary from the role of each map, such as "colour", to the user's picture file, or to None if
+        the mesh file's picture is kept
     height_mm : height of one grey level of the height map, see `load_maps` [mm]
     normal_y : direction of green in the normal map, see `load_maps`
     skin_site : name of a measured skin colour, used for skin without a colour map; see `measured_tone`
@@ -88,10 +88,13 @@ class MapOptions:
 def load_file_head(
     sample_or_path: str, mesh_options: dict[str, Any], map_options: MapOptions
 ) -> tuple[Head, EyeLook]:
-    """Return the head of a sample or a mesh file, and its eye look, from the file or the default look.
+    """Return the head of a sample or a mesh file, and the look of its eyes.
 
-    sample_or_path : name of the sample, or path of the mesh file
+    The look of the eyes is that in the file, or the default look if the file has none.
+
+    sample_or_path : name of a sample head of the package, or path of a mesh file
     mesh_options : keyword arguments of `load_rigged`
+    map_options : maps that the user chooses for the skin
     """
     sample = SAMPLES.get(sample_or_path)
     if sample is not None:

@@ -197,7 +197,9 @@ def _emission_if_any(emission_texels: Floats | None) -> Floats | None:
 def _with_surface(material: Material, file_material: FileMaterial | None, has_maps: bool) -> Material:
     """Return a material with the surface properties that the file states; skin materials are not changed.
 
+    material : material of the mesh, which is returned with changes
     file_material : material in the file; None if the file has no material
+    has_maps : whether the common maps contain the pictures of this material, see `Material`
     """
     if material.kind == "skin":
         return material
@@ -222,8 +224,10 @@ def unused_properties(
 ) -> str:
     """Return a note on properties of a file's materials that are not drawn; empty if all are drawn.
 
-    file_material_index : (m,) index in the file of each material of the mesh, -1 for a material that the
-        file lacks
+    mesh : mesh with m materials
+    materials : materials of the file
+    file_material_index : (m,) for each material of the mesh its index in `materials`, or -1 if the file lacks
+        the material
     user_roles : roles, such as "colour", of skin maps that the user replaces
     skin_is_packed : whether pictures of the skin materials are packed into common maps
     """

@@ -303,8 +303,9 @@ def _parse_light(culprit: object, light_label: str, light_table: Any) -> Light:
 def _build_settings(settings_class: type[P], file_name: object, table_name: str, table_values: Any) -> P:
     """Return an instance of a settings class from a TOML table; errors name the file and the table.
 
-    file_name : name of the file, for error messages
-    table_name : name of the table, for error messages
+    settings_class : class of the settings, such as `Skin`
+    file_name, table_name : names of the file and of the table, for error messages
+    table_values : content of the table, a mapping from field names to values
     """
     if not isinstance(table_values, dict):
         actual = "there is none" if table_values is None else f"got {table_values!r}"

@@ -162,7 +162,7 @@ def slider(low: float, high: float, *, logarithmic: bool = False) -> dict[str, A
 
 
 def field_help(model: type[BaseModel], field: str) -> str:
-    """Return the help text of a field as one line, with a summary of each registered name it accepts."""
+    """Return the help text of a field as one line, with summaries of registered names the field accepts."""
     info = model.model_fields[field]
     text = re.sub(r"\s+", " ", info.description or "")
     summaries = [one for named in _registry_names(info) for one in named.registry.summaries()]
@@ -256,7 +256,10 @@ def accepted_values(model: type[BaseModel], field: str) -> str:
 
 
 def format_default(default_value: Any) -> str:
-    """Return a default value as a user types it on the command line; "" for None, booleans and no default."""
+    """Return a default value as a user types it on the command line.
+
+    The result is "" for None, for booleans and for a field without a default.
+    """
     if isinstance(default_value, tuple):
         return ("x" if all(isinstance(one, int) for one in default_value) else ",").join(
             map(format_default, default_value)

@@ -1,4 +1,4 @@
-"""Loading of heads by name: the parametric human, samples and files."""
+"""Loading of heads by name: the parametric human, sample heads and mesh files."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def load_head(
     subdivide: Subdivide = AUTO,
     regions: Literal["auto", "none"] = "auto",
 ) -> Head:
-    r"""Load a head: the parametric human, a sample or a file.
+    r"""Load a head: the parametric human, a sample head of the package or a mesh file.
 
     Options take precedence over what a sample, a glTF file or the .mtl of an OBJ file specifies. Morph
     targets and bones of a glTF file can move the head (`Pose`). In rest pose, the morph targets have the
@@ -228,6 +228,7 @@ def _load_human(
 
     head_name : "human", "human:SEED", or a person's .json file
     user_files : dictionary from map roles, such as "colour", to files that replace the painted maps
+    height_mm, normal_y : interpretation of the height map and the normal map, see `load_head`
     mesh_options : options that apply only to mesh files; DermisError is raised unless all have their defaults
     subdivision_levels : number of levels, or a function of the head that returns it
     """

@@ -53,7 +53,7 @@ def _equal_channels(number_or_colour: Any) -> Any:
 
 
 class _LightBase(FrozenModel):
-    """Fields that all lights have."""
+    """Base class of lights, with the fields that all lights have: irradiance and properties of shadows."""
 
     synonyms: ClassVar[Mapping[str, str]] = dict.fromkeys(_BRIGHTNESS_SYNONYMS, "irradiance")
 

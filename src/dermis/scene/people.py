@@ -13,7 +13,8 @@ def skin_of(person: Human, base_skin: Skin | None = None) -> Skin:
     In darker skin, light scatters less far. The settings do not change the colour of the skin, as the painted
     maps of the person determine this colour.
 
-    base_skin : skin settings from which all other fields are taken; None for the default skin
+    base_skin : skin settings from which all fields except `profile` and `pigments` are taken; None for the
+        default skin
     """
     look = person.look
     pigments = Pigments(

@@ -1,6 +1,6 @@
 """Choice of an atlas size for a picture. The atlas is the square texture in which light is diffused.
 
-On software adapters, where diffusion is slow, atlases have this size by default.
+On software adapters, where diffusion is slow, the size chosen here is the default.
 """
 
 from __future__ import annotations

@@ -31,8 +31,8 @@ def directional_albedo(
 ) -> Floats:
     """Return the directional-hemispherical reflectance rho_dt of a lobe of specular strength rho_s = 1 [-].
 
-    cos_theta : cosine between the normal and the direction to the viewer; for reciprocal lobes, the result
-        is the same for the direction to the light
+    cos_theta : cosine of the angle between the normal and the direction to the viewer; for reciprocal lobes,
+        the result is the same for the direction to the light
     m : roughness; broadcast against cos_theta [-]
     lobe : BRDF to integrate
     fresnel : function that returns the Fresnel reflectance of the lobe

@@ -31,7 +31,7 @@ def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
 def beckmann_table(table_side: int = BECKMANN_TABLE_SIDE) -> NDArray[np.float32]:
     """Return beckmann(cos_h, m)^0.1 / 2 as a table (table_side, table_side) for the shader.
 
-    Each row has one roughness m, the value at the texel's centre. Along a row, cos_h increases from 0 to 1
+    Row i is for the roughness m = (i + 1/2) / table_side. Along each row, cos_h increases from 0 to 1
     inclusive, so the table contains the peak of the highlight. The exponent 0.1 flattens the peak, which
     makes interpolation accurate. The shader recovers the distribution from a table value t as (2t)^10.
 

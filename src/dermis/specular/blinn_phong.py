@@ -41,6 +41,7 @@ def blinn_phong_plain(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick
     """Return the BRDF F (n.h)^s / (pi n.l) of the original Blinn-Phong highlight [1/sr].
 
     m : roughness, from which `blinn_phong_exponent` yields s; broadcast against the cosines [-]
+    fresnel : function that returns F from the cosine v.h
 
     The original highlight F (n.h)^s was not multiplied by n.l, so its BRDF contains 1 / n.l and is not
     reciprocal. Early renderers added the highlight to a diffuse term without the factor 1/pi; here both terms

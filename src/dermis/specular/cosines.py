@@ -16,8 +16,8 @@ Floats = NDArray[np.float64]
 class Cosines:
     """Cosines n.l, n.v, n.h and v.h of normal n, light l, view v and half vector h, as arrays of equal shape.
 
-    The half vector is (l + v) / |l + v|. These cosines suffice for isotropic microfacet lobes, as l.v is 2
-    (v.h)^2 - 1.
+    The half vector is (l + v) / |l + v|. These cosines suffice for isotropic microfacet lobes; the cosine l.v
+    follows from v.h as 2 (v.h)^2 - 1.
     """
 
     n_l: Floats
@@ -34,7 +34,7 @@ class Cosines:
 
 
 def cosines(n: Floats, l: Floats, v: Floats) -> Cosines:
-    """Return the cosines for a normal n, a direction l to the light and v to the viewer.
+    """Return the cosines for a normal n, a direction l to the light and a direction v to the viewer.
 
     n, l, v : (..., 3) unit vectors
     """

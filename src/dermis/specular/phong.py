@@ -30,10 +30,12 @@ def phong(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
 def phong_plain(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the BRDF W(i) (r.v)^s / (pi n.l) of the original Phong highlight [1/sr].
 
-    Here r is the light direction mirrored at the normal, s is a quarter of `blinn_phong_exponent(m)`, and
-    W(i) is the Fresnel reflectance at the angle of incidence i. Because of W(i) and the division by n.l, the
-    BRDF is not reciprocal. Phong added the highlight to a diffuse term without the factor 1/pi; here both
-    terms have this factor.
+    Here r is the light direction mirrored at the normal, and W(i) is the Fresnel reflectance at the angle of
+    incidence i. Because of W(i) and the division by n.l, the BRDF is not reciprocal. Phong added the
+    highlight to a diffuse term without the factor 1/pi; here both terms have this factor.
+
+    m : roughness; s is a quarter of `blinn_phong_exponent(m)`
+    fresnel : function that returns W(i) from the cosine n.l of the angle i
 
     Source: [Phong1975].
     """

@@ -66,7 +66,10 @@ def sampled_camera(
     )
 
     def scaled_aim_offset(offset_fraction: float) -> AimOffset:
-        """Return the aim offset [mm] that moves the face by a fraction of the sampled picture offset."""
+        """Return the offset of the camera's target [mm] for a fraction of the face's sampled offset.
+
+        The sampled offset is that of the face in the picture; the target is moved the opposite way.
+        """
         return -0.5 * frame * offset_fraction * offset[0], -0.5 * frame * offset_fraction * offset[1]
 
     fraction, low, high = 1.0, 0.0, 1.0

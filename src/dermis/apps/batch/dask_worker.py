@@ -138,9 +138,9 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
 
 
 def process_task(plugin_name: str, task: Shard) -> WorkerEvent:
-    """Process a task with a plugin of the dask worker that runs this function.
+    """Process a task inside a dask worker, with the `PartPlugin` that is registered with this worker.
 
-    plugin_name : name of the `PartPlugin`
+    plugin_name : name under which the plugin is registered
     task : part of a shard to render, or complete shard to verify
     """
     event: WorkerEvent = get_worker().plugins[plugin_name].process(task)

@@ -291,9 +291,12 @@ def parse_distribution(spec_value: object, is_nested: bool = False) -> Distribut
 
 
 def _number_list(spec_value: object, expected_text: str, number_count: int | None = None) -> list[float]:
-    """Return a list of numbers as floats; raise ValueError with `expected_text` for other values.
+    """Return the numbers in a list of a spec as floats.
 
+    expected_text : description of the valid values, for the message
     number_count : required length of the list; None for any length
+
+    Raises ValueError if the value is not a list of numbers, or has another length.
     """
     if not isinstance(spec_value, list | tuple) or number_count not in (None, len(spec_value)):
         raise ValueError(expected_text)

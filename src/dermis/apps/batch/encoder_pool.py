@@ -1,4 +1,4 @@
-"""Pool of processes that encode the images of a worker as files, in order."""
+"""Pool of processes that encode rendered images as files, and return the files in the order of the images."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class EncoderPool:
     """Pool of processes that encode images as files; the images are assigned to the processes in turn.
 
     process_count : number of processes; if 0, the calling process encodes the images
-    encode : picklable function that encodes an image; its arguments are the elements of an encoder job, and
-        it returns the image's number and the bytes of its files by suffix
+    encode : picklable function that encodes an image. It is called with the elements of an encoder job as
+        arguments, and returns the image's number and a dictionary from file suffix to the bytes of the file
     """
 
     def __init__(self, process_count: int, encode: Callable[..., EncodedImage]) -> None:

@@ -36,7 +36,7 @@ class FitTest(NamedTuple):
     """Result of testing the samples of a parameter against its distribution.
 
     parameter : name of the parameter
-    sample_count : number of samples: one per image, or one per person for a parameter of people
+    sample_count : number of samples: one per image; for a parameter that describes a person, one per person
     expected : mean and standard deviation of the distribution; probability of each value if the parameter is
         categorical
     observed : mean and standard deviation of the samples; fraction of each value if categorical
@@ -64,7 +64,7 @@ class FitTest(NamedTuple):
 def fit_tests(dataset_folder: Path, spec: Spec) -> Iterator[FitTest]:
     """Yield a goodness-of-fit test of each parameter with a varying distribution, from a data set's index.
 
-    A parameter of a person counts once per person, regardless of the number of that person's images.
+    A parameter that describes a person has one sample per person, whatever the person's number of images.
 
     Raises DermisError if there is no index.
     """

@@ -54,7 +54,7 @@ def write_index(dataset_folder: Path, spec: Spec) -> Path:
 def open_index(dataset_folder: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
     """Open the index of a data set and return its Parquet file, from which single columns can be read.
 
-    purpose : what pyarrow is needed for, for the message if pyarrow is missing
+    purpose : purpose for which pyarrow is needed; shown in the error message if pyarrow is missing
 
     Raises DermisError if there is no index.
     """
@@ -70,7 +70,7 @@ def open_index(dataset_folder: Path, purpose: str) -> pyarrow.parquet.ParquetFil
 
 
 def parameter_summaries(dataset_folder: Path) -> Iterator[tuple[str, int, str]]:
-    """Yield the name of each parameter in the index, the number of images with it, and a summary as text.
+    """Yield the name of each parameter in the index, the number of images that have it, and a text summary.
 
     Raises DermisError if there is no index.
     """

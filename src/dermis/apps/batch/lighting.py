@@ -78,7 +78,11 @@ def _preset_lights(preset_name: str) -> tuple[Light, ...]:
 
 
 def _rotate_light(light: Light, turn_deg: float, rig_strength: float) -> Light:
-    """Return a light of a preset rig, rotated about the upward axis, with its irradiance scaled."""
+    """Return a light of a preset rig, rotated about the upward axis.
+
+    turn_deg : rotation angle [degrees]
+    rig_strength : factor by which the light's irradiance is multiplied [-]
+    """
     sine, cosine = sin(radians(turn_deg)), cos(radians(turn_deg))
     values: dict[str, object] = {"irradiance": tuple(rig_strength * one for one in light.irradiance)}
     for name in _LIGHT_VECTOR_FIELDS:

@@ -32,7 +32,7 @@ class KeptImages(NamedTuple):
     """Images at the beginning of a shard's part that were rendered before the data set was enlarged.
 
     path : path of the existing shard or part that contains them; None if there are no such images
-    stop : number after the last of these images
+    stop : first image number after these images
     """
 
     path: Path | None

@@ -57,8 +57,10 @@ class ParameterRow(TypedDict):
 class Estimate(TypedDict):
     """Size and duration of a data set, estimated by rendering its first images at full size.
 
-    measured : number of rendered images
-    hours : duration with one worker
+    images : number of images of the data set
+    measured : number of images that were rendered for the estimate
+    bytes : size of the data set [bytes]
+    hours : duration of rendering the data set with one worker [h]
     """
 
     images: int

@@ -196,7 +196,11 @@ def _process_tasks(
     tasks: Sequence[Shard],
     on_progress: Callable[[Progress], None],
 ) -> tuple[int, set[Shard], tuple[Failure, ...]]:
-    """Render parts and verify shards; return the number of rendered images, damaged shards, and failures."""
+    """Render parts and verify shards, which are the tasks, with the workers of a pool.
+
+    The results are the number of rendered images, the set of damaged shards, and the images that could not
+    be rendered.
+    """
     to_render = [task for task in tasks if isinstance(task, Part)]
     progress = Progress(total=sum(map(len, to_render)), to_verify=len(tasks) - len(to_render))
     rendered, damaged, failed, notes = 0, set[Shard](), list[Failure](), set[str]()

@@ -117,12 +117,18 @@ class SceneBuilder:
         return _Person(head, face_hull_indices(head), find_rotation_bones(head.control.skeleton).head, skin)
 
     def _resolve_file(self, head_or_panorama: float | str) -> str:
-        """Return the path of the file in the spec's folder, or the argument if there is no such file."""
+        """Return the path of a head or panorama file, or the argument if it names no file.
+
+        File names are relative to the spec's folder.
+        """
         file = self.spec.folder / str(head_or_panorama)
         return str(file) if is_file(file) else str(head_or_panorama)
 
     def _pose_weights(self, parameters: Parameters, head: Head) -> dict[str, float]:
-        """Return the non-zero weights of morph targets that the head has or that the [pose] table names."""
+        """Return the non-zero weights of an image's morph targets, by name.
+
+        Targets that the head does not have are dropped, unless the [pose] table names them.
+        """
         posed = self.spec.pose_targets
         return {
             name: weight
@@ -139,7 +145,10 @@ class SceneBuilder:
 
 
 def sampled_person(parameters: Parameters) -> Human:
-    """Return the random person for the sampled seed; sampled parameters replace some of the random fields."""
+    """Return the random person of an image's sampled seed.
+
+    Fields of the person for which the image has sampled parameters get the values of these parameters.
+    """
     fields: dict[str, object] = {}
     appearance: dict[str, dict[str, object]] = {}
     for name, value in table_values(parameters, "person").items():

@@ -46,7 +46,7 @@ class ShardManifest:
     made_with: dict[str, str] = field(default_factory=dict)
 
     def to_bytes(self) -> bytes:
-        """Return the manifest as JSON, with a hash of all other entries at the end."""
+        """Return the manifest as JSON; the last entry is a hash of the entries before it."""
         values = asdict(self)
         check = hashlib.sha256(json.dumps(values).encode()).hexdigest()
         return (json.dumps({**values, "check": check}, indent=1) + "\n").encode()

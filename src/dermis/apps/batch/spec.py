@@ -144,7 +144,7 @@ class Spec(FrozenModel):
 
     @property
     def pose_targets(self) -> frozenset[str]:
-        """Return the morph targets in the [pose] table, which names each target or a left and right pair."""
+        """Return the morph targets that the [pose] table sets; one key may set a left and a right target."""
         return frozenset(expand_targets(self.pose))
 
     def parameters(self, image_number: int) -> Parameters:

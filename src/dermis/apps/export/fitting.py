@@ -36,6 +36,8 @@ _LOG_LENGTH_BOUND, _LOG_LENGTH_TOLERANCE = 2.0, 1e-4  # search range and toleran
 def cumulative_burley_profile(burley_width_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
     """Return the cumulative form of Burley's profile R(r) = A (exp(-r/d) + exp(-r/3d)) / (8 pi d r).
 
+    The cumulative form gives the fraction of the emerging light that leaves within each radius.
+
     burley_width_mm : (3,) width d of each channel [mm]
     energy : (3,) total energy A of each channel: emerging light per incident light [-]
     """
@@ -133,7 +135,9 @@ def fit_homogeneous_medium(
 
     energy : (3,) light that leaves the medium per incident light [-]; by default the energy of the reference
         profile
-    half_space_kind : surface and illumination of the half-space, see `half_space`
+    half_space_kind : surface and illumination of the medium: "skin" for a surface of index 1.4, or "matched"
+        for an index-matched surface, both lit along the normal; "walk" for an index-matched surface that is
+        lit from all directions
     """
     albedo = tabulated_albedo(half_space_kind, reference_profile.energy if energy is None else energy)
     unit = half_space(half_space_kind, albedo, np.ones(3))

@@ -43,7 +43,7 @@ class ExportReport:
     error, naive_error : predicted errors of the profile that the program renders, with the exported
         parameters and with the naive parameters
     limitations : sentences on what the program cannot reproduce
-    untested : whether the export has never been tried in the program itself
+    untested : True if files of this target have not been tested in the program
     files : paths of all written files
     """
 

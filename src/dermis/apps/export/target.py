@@ -149,7 +149,7 @@ class Target(ABC):
         return replace(self, variant=variant)
 
     def with_library(self, node_modules_folder: str | Path) -> Target:
-        """Return a copy of the target that embeds an installed JavaScript library in the page.
+        """Return a copy of the target that embeds an installed JavaScript library in the web page.
 
         Parameters
         ----------
@@ -204,7 +204,9 @@ class Target(ABC):
         return version
 
     def main_file(self, output: Path, subject: Subject, suffix: str = "") -> Path:
-        """Return the path of the main file: `output`, or a file inside `output` if `output` is a folder.
+        """Return the path of the main file, which is the file that the user opens in the program.
+
+        The path is `output` or, if `output` is a folder, that of a file inside this folder.
 
         Parameters
         ----------
@@ -302,13 +304,19 @@ class Target(ABC):
 
 
 class JsonTarget(Target):
-    """Base class of targets that only write a JSON file of parameters and were not tested in the program."""
+    """Base class of targets that only write a JSON file of parameters.
+
+    The files have not been tested in the programs for which they are written.
+    """
 
     suffixes = (".json", "")
     untested = True
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write a JSON file of the parameters with their units and meanings, and the remark "not run"."""
+        """Write a JSON file of the parameters with their units and meanings.
+
+        The file also states that it has not been tested in the program.
+        """
         file = self.main_file(output, subject)
         rows = {p.name: {"value": p.value, "unit": p.unit, "meaning": p.meaning} for p in parameters}
         content = {

@@ -51,7 +51,7 @@ class Studio:
         return self._load(head_name or self.name, subdivide=1, **options)
 
     def coloured_head(self) -> Head:
-        """Return the gallery's head with a colour map; procedural maps are painted into textures."""
+        """Return the gallery's head with a colour map; procedural maps are first painted into textures."""
         head = self.head()
         return with_painted_maps(self.renderer.device, head, 1024) if head.maps.is_painted else head
 

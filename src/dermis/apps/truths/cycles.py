@@ -216,8 +216,11 @@ def describe_scene(
 ) -> tuple[SceneDict, dict[str, NumericArray]]:
     """Return the contents of the files scene.json and arrays.npz, from which Cycles renders the scene.
 
-    The first result lacks the list of passes. The second result is a dictionary from name to array.
+    The first result has the entries of scene.json except the list of passes. The second result is a
+    dictionary from name to array.
 
+    medium : material of the skin
+    subsurface_method : subsurface method of Cycles, "random-walk" or "burley"
     picture_size : width and height of the picture [pixel]
     """
     world, panorama = cycles_world(scene.environment)

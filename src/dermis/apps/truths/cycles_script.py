@@ -155,7 +155,11 @@ def add_light(light_description: dict[str, Any]) -> None:
 def shape_stripe(light: Any, stripe: dict[str, Any]) -> None:
     """Turn a distant point light into a stripe light by shader nodes.
 
-    The irradiance is then Gaussian across the stripe and constant along the stripe.
+    The irradiance is then Gaussian across the stripe and, up to its ends, constant along the stripe.
+
+    light : Blender light
+    stripe : direction from the scene to the light ("forward"), distance of the light ("distance"), and
+        directions "across" and "along", divided by half the width and by half the length of the stripe
     """
     light.use_nodes = True
     nodes, links = light.node_tree.nodes, light.node_tree.links
@@ -190,7 +194,10 @@ def shape_stripe(light: Any, stripe: dict[str, Any]) -> None:
 
 
 def set_inputs(links: Any, node: Any, inputs: Any) -> Any:
-    """Set the inputs of a shader node to values, or connect them to sockets; return its first output."""
+    """Set or connect the inputs of a shader node, and return the node's first output.
+
+    inputs : for each input, a number, or the output of another node
+    """
     for socket, value in zip(node.inputs, inputs, strict=False):
         if isinstance(value, float):
             socket.default_value = value

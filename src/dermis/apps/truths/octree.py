@@ -185,6 +185,11 @@ def _central_moments(
     The first result is the flux (n, 3) by channel. The second is a list of four arrays (n, 3): the first
     moments of each of the three channels, and the centres of the nodes. The third is a list of the second
     moments (n, 3, 3) of each channel.
+
+    corners : (m, 3, 3) corners of the triangles [mm]
+    irradiance : (m, 3, 3) irradiance at the corners
+    area : (m,) areas of the triangles [mm²]
+    first_triangle, end_triangle : (n,) range of each node's triangles
     """
     moments = [_triangle_moments(corners, irradiance[..., c], area) for c in range(3)]
     sums = [

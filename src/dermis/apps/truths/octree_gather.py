@@ -114,6 +114,11 @@ def _gather_triangle(
     """Add to `exitance` the light that reaches a point from a triangle; return the number of parts visited.
 
     The triangle is split until the light of each part is approximated well by points at its side midpoints.
+
+    triangle_index : index of the triangle in the octree
+    error_bound : largest total error, as in `gather_exitance` [-]
+    triangle_stack : working memory for the parts of the triangle; previous content is overwritten
+    exitance : (3,) exitance at the point by channel
     """
     triangle_stack.corners[0], triangle_stack.irradiance[0], triangle_stack.area[0] = (
         octree.corners[triangle_index],

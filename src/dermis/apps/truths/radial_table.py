@@ -104,8 +104,8 @@ class ProfileTable(NamedTuple):
 def tabulate_profile(profile: Profile) -> ProfileTable:
     """Return the table of a profile, with bounds of its derivatives and the permitted error at each radius.
 
-    The permitted error is mainly proportional to the square root of the curvature. As a result, a surface
-    integral evaluates the profile for a small number of surface patches.
+    Most of the permitted error is distributed over the radii in proportion to the square root of the
+    curvature. A surface integral then needs few surface patches for the same total error.
     """
     end = profile.end_mm
     root = np.linspace(0.0, np.sqrt(end), PROFILE_TABLE_ROWS)
@@ -152,7 +152,7 @@ def _error_density(curvature: Floats, radius_mm: Floats) -> Floats:
 
 
 def _plane_integral(radial_values: Floats, radius_mm: Floats) -> Floats:
-    """Return the integrals (k,) of k radial functions f(r) over the plane: of 2 pi r f(r) over r.
+    """Return the integrals (k,) over the plane of k radial functions f(r): integrals of 2 pi r f(r) dr.
 
     radial_values : (rows, k) values of k functions at the radii
     radius_mm : (rows,) radii r [mm]

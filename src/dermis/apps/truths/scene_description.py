@@ -68,7 +68,8 @@ def mitsuba_projector(
     """Return Mitsuba's projector with a given intensity for each texel of its slide.
 
     intensity : (h, w, 3) radiant intensity [irradiance mm2]
-    cosine : (h, w) cosine of the angle between texel and axis
+    cosine : (h, w) cosine of the angle between the axis and the direction towards each texel
+    to_world : Mitsuba's transform of the projector, see `mitsuba_look_at`
     half_fov_tangent : tangent of half the horizontal field of view
     """
     # Mitsuba's slide is the irradiance on a plane perpendicular to the axis, divided by pi.
@@ -119,6 +120,8 @@ def cycles_light(
     lamp_type : Cycles' type of the light
     irradiance : (3,) field `irradiance` of the light in dermis
     energy_per_irradiance : factor from this irradiance to Cycles' energy of the light
+    position : (3,) position of the light relative to the head's centre [mm]
+    forward : (3,) direction in which the light shines
     lamp_properties : further properties of the light
     """
     brightest = float(max(irradiance))

@@ -44,7 +44,7 @@ def diffuse_on_surface(
 
     The blur by each variance, called a level, starts from the result of the next smaller variance. Each time
     step uses TR-BDF2, a scheme of second order that, unlike the Crank-Nicolson scheme, does not oscillate
-    near points of light.
+    near small bright spots.
 
     positions : (n, 3) vertex positions without duplicates, see `welded_surface` [mm]
     triangles : (f, 3) vertex indices

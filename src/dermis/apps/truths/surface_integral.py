@@ -29,7 +29,7 @@ def integrate_exitance(
 
     Irradiance is gathered from an octree. A node or triangle is replaced by three points if the remainder of
     Taylor's theorem is below a limit, and is divided otherwise. Most of these errors cancel in the sum, so
-    the limit is derived from `relative_error` by a measured relation.
+    the limit is computed from `relative_error` by an empirical formula.
 
     points : (n, 3) positions x on the surface [mm]
     samples : irradiance E, linear on triangles that must be small enough for shadows and other details

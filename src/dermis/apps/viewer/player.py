@@ -133,7 +133,7 @@ class MotionPlayer:
         self.is_playing, self._starting, self._start_time = True, True, None
 
     def stop(self) -> None:
-        """Stop playing, and display the pose of the state again."""
+        """Stop playing, and display the pose of the viewer state instead of the motion's pose."""
         self.is_playing, self._cached_display = False, None
 
     def pause(self) -> None:

@@ -202,7 +202,7 @@ def validated_copy(model: P, /, **fields: object) -> P:
 def save_state(path: Path, state: ViewerState) -> None:
     """Write a state as a scene file that `dermis render` and `dermis view` can open.
 
-    A view of an intermediate result is not saved.
+    The file does not store which intermediate result, such as irradiance or normals, the viewer displays.
 
     Raises DermisError if the head was created in memory, or if the file cannot be written.
     """

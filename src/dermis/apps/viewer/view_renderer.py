@@ -188,6 +188,8 @@ class ViewRenderer:
     ) -> Images:
         """Return the images of the live state and of the frozen state (None if there is no frozen state).
 
+        camera : camera to use instead of the cameras of both states
+        view_size : size of the view; while the picture is changing, the images may be smaller [pixel]
         is_moving : whether the picture is changing; if so, its quality is limited
 
         Raises DermisError if a state cannot be rendered or the device fails.
@@ -203,6 +205,7 @@ class ViewRenderer:
     ) -> Texture:
         """Return a texture of sRGB bytes for a state; the last texture is reused if nothing has changed.
 
+        camera : camera to use instead of the camera of the state
         view_size : size of the view; while the picture is changing, the texture may be smaller [pixel]
         is_moving : whether the picture is changing; if so, its quality is limited
 
@@ -303,7 +306,7 @@ class ViewRenderer:
         return self._views.draw(state.scene, settings, state.view, divider_side)
 
     def _atlas_shows_state(self, state: ViewerState, divider_side: str) -> bool:
-        """Return whether the maps in the atlas belong to a state already, so no frame needs to be rendered.
+        """Return whether the atlas already contains the maps of a state, so no frame needs to be rendered.
 
         divider_side : "before" for the frozen state left of the divider, "" for the live state
         """

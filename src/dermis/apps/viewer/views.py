@@ -61,7 +61,7 @@ class IntermediateViews:
         self._density: weakref.WeakKeyDictionary[Texture, float] = weakref.WeakKeyDictionary()
 
     def draw(self, scene: Scene, settings: Settings, view_name: str, divider_side: str = "") -> Texture:
-        """Return an image of sRGB bytes that shows an intermediate result of the last frame on the head.
+        """Return an image of the head that displays an intermediate result of the last frame, in sRGB bytes.
 
         view_name : name of the view, one of `VIEW_NAMES`
         divider_side : "before" for the frozen state left of the divider, "" for the live state
@@ -172,10 +172,13 @@ class IntermediateViews:
 def draw_thickness(device: Device, translucency: Translucency, target_texture: Texture) -> Texture:
     """Fill a texture with the tissue thickness at each texel of the coarse atlas [mm]; return the texture.
 
-    Light that leaves the skin at a texel has entered it at other texels, the sources. The thickness is the
-    smallest depth of the texel below the tangent plane of a source, but at most the search radius.
+    Light enters the skin at one texel, passes through the tissue and leaves the skin at another texel of the
+    same pair. The thickness at a texel where light leaves is its smallest depth below the tangent planes at
+    the texels where this light enters. It is at most the maximum distance of a pair.
 
-    target_texture : texture with the size of the coarse atlas; texels without sources are left unchanged
+    translucency : pairs of texels, and the points of the skin at these texels
+    target_texture : texture with the size of the coarse atlas; texels at which no such light leaves are left
+        unchanged
     """
     pairs, shader = translucency.pairs, program(device, Path(__file__).parent / "thickness.wgsl")
     count = pairs.receivers[1]

@@ -77,7 +77,9 @@ def serve(
     Pages show the progress of the preparation until the first picture.
 
     load_state : function that loads the initial state and motion, called in a thread
+    adapter : "auto", "cpu" or part of an adapter's name
     window_size : width and height of the canvas until a page reports the size of its window [logical pixel]
+    host : host name or IP address at which the pages are served
     port : port number; 0 for any free port
     announce_url : function called before serving, with the URL and whether other machines can reach it
     require_token : whether the URL contains a token even if only this machine can reach it

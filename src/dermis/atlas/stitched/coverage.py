@@ -82,7 +82,12 @@ def compute_coverage(
 
 
 def _add_gutters(coverage: Coverage, triangle_piece: Index, texels: GutterTexels) -> None:
-    """Add rim and gutter texels to a coverage that so far contains only the pieces of charts."""
+    """Add rims and gutters, the texels around chart pieces, to a coverage that contains only the pieces.
+
+    The rim of a piece is the texels outside it that bilinear interpolation within the piece reads.
+
+    triangle_piece : (f,) piece of each triangle, -1 if there is none
+    """
     y, x = texels.y, texels.x
     coverage.triangle[y, x], coverage.weights[y, x] = texels.triangle, texels.weights
     coverage.anchor_triangle[y, x] = texels.anchor_triangle
@@ -115,7 +120,8 @@ def _drawing_order(surface: FlatSurface, triangle_piece: Index, member_triangles
 
     Other triangles are drawn later and therefore own the texels that they share with mirrored triangles.
 
-    member_triangles : (t,) indices of the triangles
+    triangle_piece : (f,) piece of each triangle, -1 if there is none
+    member_triangles : (t,) indices of the triangles to sort
     """
     return member_triangles[
         np.argsort(
@@ -139,8 +145,9 @@ def _extend_surface_edge(
 ) -> None:
     """Copy neighbouring texels to gutter texels just beyond an edge at which the surface ends.
 
-    A blur along the edge then reads the same light from a gutter as from the rim of a piece.
+    A blur along the edge then reads the same light from a gutter as from the chart piece beside it.
 
+    triangle_piece : (f,) piece of each triangle, -1 if there is none
     beyond_end : (h, w) mask of texels beyond the end of the surface
     y, x : (n,) rows and columns of the gutter texels to fill, all of which are in this mask
     """

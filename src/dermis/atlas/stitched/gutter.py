@@ -95,7 +95,9 @@ def needed_texels(
     gutter_width: GutterWidth,
     grid_shape: tuple[int, int],
 ) -> Mask:
-    """Return the mask (h, w) of texels that pieces, their rims and their gutters may need.
+    """Return the mask (h, w) of texels that chart pieces, their rims and their gutters may need.
+
+    The rim of a piece is the texels outside it that bilinear interpolation within the piece reads.
 
     member_triangles : (t,) indices of the triangles of the pieces
     grid_shape : height and width of the grid of texels

@@ -52,7 +52,7 @@ _MAX_RELATIVE_AREA_GROWTH = 0.25  # largest growth of the area of all pieces by 
 class Conflicts(NamedTuple):
     """Conflicts in the gutters of a chart piece: pairs of border points whose gutters meet.
 
-    Where they meet, the two gutters show points that are apart on the surface.
+    Where they meet, the two gutters show points that are not adjacent on the surface.
 
     first, second : (n, 2) positions of the two border points of each pair, in uv scaled to texels [texel]
     inside : (m, 2) texels that the piece covers, in the same coordinates [texel]
@@ -100,6 +100,7 @@ def find_gutter_conflicts(
 
     mapped_triangles : (f,) mask of triangles that belong to any piece
     member_triangles : (t,) indices of the triangles of this piece
+    gutter_mm : width of the gutters [mm]
     """
     mm2, area_uv = surface.area_mm2[member_triangles].sum(), np.abs(surface.area_uv[member_triangles]).sum()
     low, high = surface.uv[member_triangles].min(axis=(0, 1)), surface.uv[member_triangles].max(axis=(0, 1))
@@ -230,7 +231,9 @@ def _cut_piece(
 ) -> Index | None:
     """Cut a chart piece where its gutters meet; return the part of each triangle (t,), None for no cut.
 
+    mapped_triangles : (f,) mask of triangles that belong to any piece
     member_triangles : (t,) indices of the piece's triangles
+    gutter_mm : width of the gutters [mm]
     """
     conflicts = find_gutter_conflicts(surface, mapped_triangles, member_triangles, gutter_mm)
     reach = gutter_mm / conflicts.texel_mm
@@ -268,6 +271,7 @@ def _conflict_clusters(conflicts: Conflicts, gutter_width_texels: float) -> list
 def _near_any_target(points: Doubles, target_points: Doubles, max_distance: float) -> Mask:
     """Return the mask (...) of points (..., 2) within about `max_distance` of any target point.
 
+    points : (..., 2) points to test
     target_points : (n, 2) points to which the distances are measured
     """
     cell = max_distance / _CELLS_PER_GUTTER
@@ -292,9 +296,10 @@ def _conflict_strip(
 ) -> Mask:
     """Return the mask (t,) of a piece's triangles near conflicts between gutters, on one side of a line.
 
-    Of the two sides of the line, this is the side where such triangles have less area.
+    The side is chosen so that the selected triangles have the smaller area.
 
-    one_side_mask : (t,) mask of the triangles on one side of the line; the result may be on the other side
+    member_triangles : (t,) indices of the piece's triangles
+    one_side_mask : (t,) mask of the triangles on either of the two sides, not necessarily the chosen one
     gutter_width_texels : gutter width [texel]
     """
     corners = surface.uv[member_triangles] * conflicts.texels_per_uv

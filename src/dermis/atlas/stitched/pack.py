@@ -37,6 +37,7 @@ def place_shapes(shapes: Sequence[Sequence[CellRun]], cells_per_side: int) -> li
     Each shape is placed at the first free position, searched row by row.
 
     shapes : cells of each shape as runs (row, first and last column), counted from row and column 0
+    cells_per_side : number n of cells along each side of the grid
     """
     occupied, corners = 0, []
     for spans in shapes:
@@ -57,6 +58,7 @@ def _free_positions(occupied_cells: int, shape_runs: Sequence[CellRun], cells_pe
 
     occupied_cells : bit mask of the occupied cells
     shape_runs : cells of the shape as runs, see `place_shapes`
+    cells_per_side : number n of cells along each side of the grid
     """
     height = 1 + max(row for row, _, _ in shape_runs)
     width = 1 + max(last for _, _, last in shape_runs)
@@ -253,7 +255,9 @@ def _bisect_scale(
 ) -> PieceLayout | None:
     """Return the layout with the largest scale that bisection finds, or None if no trial fits.
 
+    masks : cells that each piece occupies
     scale_bounds : lowest and highest scale
+    cells_per_side : cells along each side of the grid
     order_index : index of the packing order, see `_layout_at_scale`
     bisection_count : number of trials
     """
@@ -273,7 +277,9 @@ def _layout_at_scale(
 ) -> PieceLayout | None:
     """Return the layout of the pieces at one scale, or None if they do not fit.
 
+    masks : cells that each piece occupies
     scale : cells per unit of the pieces' scaled uv
+    cells_per_side : cells along each side of the grid
     order_index : index of the packing order: order_index // 2 selects the sort key (0 area, 1 height, 2
         width); if the index is odd, pieces are placed column by column instead of row by row
     """

@@ -178,6 +178,7 @@ def _uv_steps(
     Both fields are averaged over those triangles around a vertex that have the same orientation in uv.
 
     planar_corners, plane_axes : results of `_planar_corners`
+    uv, area_uv : as in `FlatSurface`
     """
     count = len(mesh.positions)
     corner = mesh.triangles + count * (area_uv < 0)[:, None].astype(np.int32)

@@ -20,6 +20,7 @@ def rasterise_texel_triangles(corners: Doubles, drawn_triangles: Index, grid_sha
 
     corners : (f, 3, 2) corners of all triangles [texel]
     drawn_triangles : (t,) indices in drawing order
+    grid_shape : height and width of the grid of texels
     """
     owner = np.full(grid_shape, -1, np.int32)
     texel, which = covered_texels(corners[drawn_triangles], grid_shape)
@@ -104,7 +105,9 @@ def anchors_diverge(first_texels: AnchoredTexels, second_texels: AnchoredTexels)
 
 
 def gap_limit_mm(first_texels: AnchoredTexels, second_texels: AnchoredTexels, axis: int) -> Doubles:
-    """Return the distance (n,) between surface points above which two adjacent texels have a gap [mm].
+    """Return the largest distance (n,) between the surface points of adjacent texels without a gap [mm].
+
+    If the points are farther apart, the surface is not continuous between the two texels.
 
     axis : 0 for texels adjacent along x, 1 along y
     """

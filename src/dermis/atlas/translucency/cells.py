@@ -35,8 +35,9 @@ class Cells:
     Translucency is light that enters the skin in one cell and leaves it in another, for example on the other
     side of an ear.
 
-    Cells are numbered row by row. An array that is sorted by tile comes with an array `..._first`: the
-    entries of tile k start at index `..._first[k]` and end before index `..._first[k + 1]`.
+    Cells are numbered row by row. An array that is sorted by tile or by cell comes with an array
+    `..._first`: the entries of tile or cell k start at index `..._first[k]` and end before index
+    `..._first[k + 1]`.
 
     size : texels along each side of the atlas
     side : cells along each side of the atlas
@@ -133,6 +134,7 @@ def _cells_with_marked_texels(texel_mask: Mask, atlas_side: int, cells_per_side:
     """Return the mask (cells_per_side, cells_per_side) of cells that contain a marked texel.
 
     texel_mask : mask of every `stride`-th texel of the map along each axis
+    atlas_side : texels along each side of the map
     """
     first = -(-np.arange(cells_per_side) * atlas_side // (cells_per_side * stride))
     rows = np.logical_or.reduceat(texel_mask, first, axis=0)
@@ -170,6 +172,7 @@ def _tiles_of_points(atlas: Atlas, points: Words, cells_per_side: int, tiles_per
     This is the position in the chart of the point's triangle, not in a gutter that also shows the point.
 
     points : (m, 2) triangle index, and packed barycentric weights
+    cells_per_side, tiles_per_side : cells and tiles along each side of the atlas
     """
     uv = np.stack(_atlas_uv(atlas, points[:, 0], points[:, 1]))
     column, row = (

@@ -87,6 +87,7 @@ def untangle(positions: Doubles, triangles: Index) -> Doubles:
 def _average_neighbours(positions: Doubles, edge_points: Index, free_points: Mask) -> Doubles:
     """Place all free points at the mean of their neighbours; return positions (n, 2).
 
+    positions : (n, 2) positions before the move
     edge_points : (e, 2) point indices of the edges
     free_points : (n,) mask of the points that may move
     """
@@ -228,6 +229,7 @@ def _make_map_rigid(
     """Make a flat map as rigid as possible [Liu2008]; return the positions (n,) as complex numbers.
 
     positions : (n,) positions before the first iteration, as complex numbers
+    triangles : (f, 3) vertex indices
     vertex_component : (n,) index of the connected component of each vertex
     triangle_shapes : (f, 3) desired shape and size of the triangles
     stretch_weight : (f,) weight of each triangle's stretch in the minimised sum [-]

@@ -78,10 +78,14 @@ def _packing_orders(chart_sizes: Doubles) -> Iterator[Index]:
 def _drop_charts(
     chart_edges: list[Doubles], chart_order: Index, scale: float, padding: float
 ) -> Doubles | None:
-    """Drop charts in an order; return their lower left corners (c, 2) [cell], or None if they do not fit.
+    """Drop charts onto each other on a square grid; return their lower left corners (c, 2) [cell].
+
+    The result is None if the charts do not fit.
 
     chart_edges : border edges of each chart, with the lower left corner of the chart at 0
+    chart_order : (c,) indices of the charts in the order in which they are dropped
     scale : cells per unit of the border edges
+    padding : width of the empty space between charts, as a fraction of the grid's side
     """
     margin = int(np.ceil(padding * _GRID_CELLS_PER_SIDE / 2))
     horizon, cells = np.zeros(_GRID_CELLS_PER_SIDE, dtype=np.int64), np.zeros((len(chart_edges), 2))

@@ -118,6 +118,7 @@ def _weight_track(
 ) -> AnimationTrack:
     """Return the track of the morph target weights of a node.
 
+    mesh_node_index : index of the node that carries the mesh with the morph targets
     sampler : JSON tree of the animation sampler
     culprit : file, clip and channel, for error messages
     mesh_targets : dictionary from mesh index to the names of the mesh's morph targets; used as a cache, to
@@ -152,7 +153,9 @@ def _read_keyframes(document: Document, sampler: Tree, component_count: int, cul
 
     The values have the shape (k, n). For cubic splines they include tangents and have the shape (k, 3, n).
 
+    sampler : JSON tree of the animation sampler
     component_count : number n of components per key
+    culprit : file, clip and channel, for error messages
     """
     kind = sampler.get("interpolation", "LINEAR")
     if kind not in get_args(Interpolation):

@@ -11,8 +11,10 @@ from dermis.base.native_decoding import answer_request
 def decode(request: Arrays) -> Arrays:
     """Return the attributes and triangles of compressed meshes.
 
-    The request contains the compressed bytes of each mesh under a name. The result contains arrays with names
-    such as "NAME/triangles" and "NAME/0", where 0 is the identifier of an attribute.
+    For a mesh named "head", the result contains its triangles under the name "head/triangles", and each of
+    its attributes under a name such as "head/0", where 0 is the attribute's identifier in the Draco data.
+
+    request : dictionary from the name of each mesh to its compressed bytes
     """
     import DracoPy
 

@@ -33,7 +33,7 @@ class SkinAdditions:
     """Properties that an export adds to the glTF material of skin.
 
     surface : members to add to the material's `pbrMetallicRoughness`; if there are any, the material's base
-        colour texture is removed from there
+        colour texture moves from there to its `extras`
     extensions : members to add to the material's `extensions`
     extras : members to add to the material's `extras`
     pictures : dictionary from name to PNG file; textures reference a picture as {"index": name}
@@ -47,7 +47,7 @@ class SkinAdditions:
     def add_to_material(self, material: FrozenTree) -> Tree:
         """Return a copy of a glTF material with these properties added.
 
-        If `surface` replaces the base colour texture, the texture moves to the extras.
+        If `surface` is not empty, the base colour texture moves to the extras.
         """
         extended = dict(material) | {"extensions": {**material.get("extensions", {}), **self.extensions}}
         surface = dict(material["pbrMetallicRoughness"])
@@ -104,6 +104,8 @@ def surface_material(
 
     The textures of the material reference pictures by name, as {"index": name}.
 
+    material : material of the head
+    pictures : PNG files of the skin's maps by name, see `encode_skin_maps`
     map_entries : description of the maps for the extras of the skin material, see `encode_skin_maps`
     roughness : Beckmann's m of skin without a roughness map [-]
     """

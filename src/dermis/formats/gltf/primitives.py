@@ -141,7 +141,7 @@ class HairPrimitive:
         return {"attributes": attributes, "indices": index, "extras": {"dermis": {"hair": True}}}
 
     def add_target(self, buffer_builder: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
-        """Append displacements of positions to the buffer; return their accessor index under "POSITION"."""
+        """Append displacements of positions to the buffer; return {"POSITION": index of their accessor}."""
         delta, mesh = np.zeros_like(self._rest_points), self.deformable.head.mesh
         delta[mesh.point[vertex_target.vertex]] = vertex_target.delta_mm
         vertex, displacement = self.fibres.tube_displacements(self._rest_points, delta)

@@ -209,7 +209,8 @@ class _MaterialReader:
     def _read_texture(self, reference: Tree | None, channel: int | None) -> Texture | None:
         """Return the texture that a material references; None without a reference or a picture.
 
-        channel : see `Texture`
+        reference : JSON object that refers to the texture, such as the material's "normalTexture"
+        channel : index of the picture's channel to use; None for colours, normals and grey pictures
         """
         if reference is None:
             return None

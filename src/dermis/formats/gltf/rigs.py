@@ -52,12 +52,12 @@ class Armature:
     static_bone: int | None
 
     def bone_for_node(self, nodes: Nodes, node_index: int) -> int | None:
-        """Return the index of the bone that moves the mesh of a node, if the mesh has no skin.
+        """Return the index of the bone that moves a mesh without a skin.
 
-        The bone belongs to the node itself, or to the nearest ancestor that has a bone. If no ancestor has a
-        bone, the result is `static_bone`.
+        It is the bone of the node that carries the mesh, or else of the nearest ancestor that has a bone. If
+        no ancestor has a bone, the result is `static_bone`.
 
-        node : index of the node that carries the mesh
+        node_index : index of the node that carries the mesh
         """
         bones = (self.bone_of_node[k] for k in nodes.node_and_ancestors(node_index) if k in self.bone_of_node)
         return next(bones, self.static_bone)
@@ -94,7 +94,8 @@ def _with_static_root(bones: Bones) -> Bones:
 
     The new bone has index 0 and lies at the origin.
 
-    bones : bones of the scene, whose parent indices must already count the new bone
+    bones : bones of the scene; their parent indices must already be those of the result, where bone k of the
+        scene has the index k + 1
     """
     name = node_names([{"name": known} for known in (*bones.names, _STATIC_BONE_NAME)])[-1]
     parent = np.concatenate([[-1], bones.parent]).astype(np.int32)

@@ -183,6 +183,7 @@ class _SceneReader:
         """Return a primitive as a mesh part in scene space, transformed by its node or by its skin.
 
         target_names : names of the morph targets of the mesh
+        node_index : index of the node that carries the mesh; None in a file whose meshes have no nodes
         """
         part, targets = self._read_primitive(mesh, target_names, primitive)
         if node_index is None:

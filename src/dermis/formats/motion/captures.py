@@ -169,11 +169,12 @@ def note_lost_frames(culprit: object, lost_frame_count: int, frame_count: int) -
 
 
 def fill_gaps(times_s: Doubles, channels: Doubles) -> Doubles:
-    """Return values (k, n) in which NaN is replaced by linear interpolation over time.
+    """Return the values of `channels` with each NaN replaced by linear interpolation over time.
 
-    Before the first and after the last known value, values are constant.
+    Before the first and after the last known value of a channel, its values are constant.
 
-    times_s : (k,) times of the rows [s]
+    times_s : (k,) times of the rows of `channels` [s]
+    channels : (k, n) values of n channels
     """
     filled = channels.copy()
     for column, known in zip(filled.T, ~np.isnan(channels).T, strict=True):

@@ -31,7 +31,8 @@ class _MatchedTrack(NamedTuple):
 
     path : "translation", "rotation", "scale" or "weights"
     columns : (n,) indices of these bones or morph targets in the track
-    indices : (n,) indices of their names in the result of `_matched_names`
+    indices : (n,) indices of their names among all animated bones, or all animated morph targets, that the
+        head has
     """
 
     path: str

@@ -182,11 +182,13 @@ def _row_values(
 def _fill_table_gaps(
     path: Path, line_numbers: list[str], capture_table: _CaptureTable, has_shape_count: Mask
 ) -> _CaptureTable:
-    """Return a table whose gaps are interpolated, with weights as fractions and angles in radians.
+    """Return a capture with weights as fractions, angles in radians, and missing values interpolated.
 
-    Columns without any value are left out.
+    Values are missing in empty cells and in frames without a face. Columns without any value are left out.
 
+    path : file of the capture, for notes
     line_numbers : file and line of each row, for errors
+    capture_table : columns of the capture, with NaN for empty cells
     has_shape_count : (k,) mask of rows that state a number of blend shapes above 0
     """
     values, names = capture_table.values, capture_table.names
@@ -216,6 +218,10 @@ def _rows_without_face(cell_values: Doubles, is_angle: Mask, has_shape_count: Ma
 
     A row of zeros has no face if most other rows contain rotations. It also has no face if other rows state
     a number of blend shapes above 0 and this row does not.
+
+    cell_values : (k, n) values of the cells, NaN for empty cells
+    is_angle : (n,) mask of the columns that contain angles
+    has_shape_count : (k,) mask of rows that state a number of blend shapes above 0
     """
     numbers = np.nan_to_num(cell_values)
     zero = np.asarray(~numbers.any(axis=1))

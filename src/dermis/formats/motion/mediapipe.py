@@ -333,7 +333,15 @@ def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None
 def _head_angles(
     path: Path, frames: Sequence[_CapturedFrame], times: Doubles, bones: RotationBones
 ) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Return the angles (k, 3) of bones by bone name [degrees], and a name for rotations without a bone."""
+    """Return the angles (k, 3) of the head and neck bones by bone name [degrees], and what is unused.
+
+    The second result is empty, unless the file has head rotations but the head has no bone for them; it then
+    contains a description of the missing bone for a note to the user.
+
+    path : file of the capture, for notes
+    times : (k,) times of the frames [s]
+    bones : bones of the head that perform the rotations
+    """
     matrices = [frame.matrix for frame in frames if frame.matrix is not None]
     if not matrices or not bones.head:
         return {}, ("bone for the matrix",) if matrices else ()

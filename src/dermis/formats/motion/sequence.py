@@ -316,10 +316,11 @@ def _split_vertex_lines(obj_bytes: bytes) -> tuple[list[tuple[bytes, bytes, byte
 def _obj_fingerprint(path: Path, obj_bytes: bytes) -> _ObjFingerprint:
     """Return the fingerprint of an OBJ file.
 
-    obj_bytes : text of the file in UTF-8
+    Before the file is parsed, the x coordinate in each `v` line is replaced by the index of that line. The
+    parsed x coordinate of a vertex is then the index of its line.
 
-    To find the line of each vertex, the x coordinate of each `v` line is replaced by the index of the line
-    before the file is parsed.
+    path : path of the file, for errors
+    obj_bytes : text of the file in UTF-8
     """
     positions, digest = _split_vertex_lines(obj_bytes)
     count = iter(range(len(positions)))

@@ -169,7 +169,10 @@ class _SceneReader:
         return points, _Faces(counts, np.cumsum(counts) - counts, vertex)
 
     def _corner_order(self, mesh: UsdGeom.Mesh, faces: _Faces, matrix: Doubles) -> Index:
-        """Return the order of corners (c,) in which polygons are anticlockwise when seen from outside."""
+        """Return the order of corners (c,) in which polygons are anticlockwise when seen from outside.
+
+        matrix : (4, 4) transform from the mesh to the scene
+        """
         is_left = mesh.GetOrientationAttr().Get(self.time) == "leftHanded"
         if is_left != bool(np.linalg.det(matrix[:3, :3]) < 0):
             return faces.reversed_corners()

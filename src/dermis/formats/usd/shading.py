@@ -102,7 +102,13 @@ class MaterialReader:
     def _add_source(
         self, material_tree: Tree, input_name: str, role: str, input_source: _InputSource
     ) -> None:
-        """Add to a material tree the texture or vertex colours to which an input is connected."""
+        """Add to a material tree the texture or vertex colours to which an input is connected.
+
+        material_tree : incomplete result of `read`
+        input_name : name of the input of the surface shader, such as "diffuseColor"
+        role : role of the texture in the result, such as "colour"
+        input_source : shader output to which the input is connected
+        """
         kind = str(input_source.shader.GetIdAttr().Get())
         if kind.startswith("UsdPrimvarReader_float") and role == "colour":
             material_tree |= {
@@ -164,6 +170,9 @@ class MaterialReader:
         """Add the opacity to a material tree.
 
         A picture of the opacity is only supported if it is the alpha channel of the colour picture.
+
+        material_tree : incomplete result of `read`, with the colour picture
+        input_values : constant values of the inputs of `surface_shader`, by name
         """
         source, cutoff = self._connected_source(surface_shader, "opacity"), input_values["opacityThreshold"]
         colour = material_tree["textures"].get("colour")

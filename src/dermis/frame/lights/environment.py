@@ -116,7 +116,10 @@ def environment_record(
     albedo: NDArray[np.float64],
     has_occlusion: bool,
 ) -> UniformRecord:
-    """Return the uniform record of the environment, which holds its rotation, exposure and reflection lobes.
+    """Return the uniform record of the environment.
+
+    The record holds the rotation and the exposure of the environment, and the albedo and the reflection lobes
+    of the skin that the environment lights.
 
     albedo : (3,) albedo of skin where its colour map is white [-]
     has_occlusion : whether the head hides parts of the environment from its own skin

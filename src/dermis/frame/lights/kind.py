@@ -27,6 +27,8 @@ class Kind(Generic[LightT]):
 
         fn NAME_incident(light: Light, p: vec3f, part: u32) -> Incident
 
+    The function returns the light that arrives at the point p from one part of the light, see `parts`.
+
     Attributes
     ----------
     always : bool

@@ -75,9 +75,11 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
 
 
 def with_oblique_constant(constants: Constants) -> Constants:
-    """Return `constants`, and add the constant for oblique incidence if they contain HALF_SPACE.
+    """Return `constants`, with OBLIQUE added if they contain HALF_SPACE.
 
-    Use the result only for passes that know the shape of the surface around a point.
+    HALF_SPACE makes the response of skin to light depend on direction. OBLIQUE also evaluates oblique light
+    at an offset along the surface; only passes that provide the shape of the surface around a point may use
+    it.
     """
     return (*constants, ("OBLIQUE", 1)) if ("HALF_SPACE", 1) in constants else constants
 
@@ -156,6 +158,8 @@ def _light_members(light: Light, centre: Triple, shadow_view: ShadowView | None,
     """Return the members of the shader struct `Light` for a light; members that are left out are 0.
 
     light : light, or one part of a divided light
+    centre : centre of the head, the origin of light positions [mm]
+    shadow_view : view for the light's shadow map, None if the light has no shadows
     part_count : number of parts of the light, 1 if it is not divided
     """
     kind, parallel = KINDS[light.kind], isinstance(light, DirectionalLight)

@@ -21,7 +21,7 @@ class _Rectangle(Kind[RectangleLight]):
     def parts(self, light: RectangleLight) -> list[Light]:
         """Divide the rectangle into parts whose sides are at most 0.35 of the distance from light to target.
 
-        A larger rectangle is divided into 3 x 3 parts with longer sides.
+        There are at most 3 parts along each side, even if their sides then exceed this limit.
         """
         path = vector_between(light.position, light.target)
         distance = math.hypot(*path)

@@ -34,6 +34,8 @@ TexturePair = tuple[TextureOrView, TextureOrView]
 class StretchedLevels(PyramidLevels):
     """Pyramid levels with textures for a stretch map that is blurred together with the light.
 
+    The stretch map holds the texel density on the surface along u and along v.
+
     stretch : blurred stretch map, and the stretch map that is blurred only along u
     """
 
@@ -65,7 +67,7 @@ class GpuGems3(AtlasTechnique):
         return float(TEXEL_FORMAT_BYTES[HALF_TEXEL_FORMAT] * (blur_count + 4))
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
-        """Return 0 for each level, because all levels have full resolution."""
+        """Return the number of halvings of each level's resolution: 0, as all levels have full resolution."""
         return (0,) * (len(split.blurred_mm2) + 1)
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:

@@ -25,11 +25,17 @@ class OneBlur(TextureSpace):
         return single_gaussian(profile)
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Return a split with one blurred Gaussian; light that varies within a texel is not corrected."""
+        """Return the split of a profile: a single Gaussian with which light is blurred.
+
+        The result does not correct light that varies within a texel.
+
+        normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
+            colour map sets the albedo
+        """
         return AtlasTechnique.split(self, profile, normalise_weights)
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
-        """Return False, because all light is blurred."""
+        """Return False: the Gaussian blurs all light, and no light is evaluated at each pixel instead."""
         return False
 
     def stretch(self, settings: Settings) -> str:

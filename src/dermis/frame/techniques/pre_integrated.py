@@ -61,7 +61,14 @@ class PreIntegratedSkin(Technique):
     def write_view_record(
         self, view: UniformRecord, shade: ComputeProgram, resources: TechniqueResources | None
     ) -> None:
-        """Write the largest curvature, the penumbra width and the relief widths to the shading record."""
+        """Write the members of the shading record that only this technique reads.
+
+        These are the largest curvature in the tables, the penumbra width, and the widths of the Gaussians
+        that smooth the relief.
+
+        shade : program of the shading pass
+        resources : result of `make`
+        """
         assert isinstance(resources, PreIntegratedTables)
         scales = {
             "max_curvature": MAX_CURVATURE_PER_MM,
@@ -115,10 +122,11 @@ def sphere_irradiance_table(profile: GaussianSum) -> Floats:
 def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
     """Return max(N.L, 0) convolved on the sphere with the normalised kernel exp(k cos a) [-].
 
-    The angle a is the angle between two points of the sphere, as seen from its centre.
+    The angle a is the angle between two points of the sphere, as seen from its centre. The kernel is close to
+    a Gaussian of the distance between the points.
 
     cosines : values of N.L at which the result is evaluated [-]
-    concentration : k, the squared radius of the sphere divided by the variance of the Gaussian [-]
+    concentration : k, the squared radius of the sphere divided by the variance of this Gaussian [-]
     """
     from scipy.special import i0e
 

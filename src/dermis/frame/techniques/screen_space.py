@@ -82,7 +82,7 @@ class ScreenSpace(Technique):
         return replace(layers, kernel=memo.get(make_kernel, device, profile))
 
     def make_subsurface_layers(self, memo: Memo, device: Device, settings: Settings) -> SubsurfaceLayers:
-        """Return the textures in which subsurface light is diffused for outputs."""
+        """Return the textures in which subsurface light is diffused for the outputs besides the picture."""
         return memo.get(make_subsurface_layers, device, settings.size, False, caller_name="outputs")
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
@@ -98,7 +98,7 @@ class ScreenSpace(Technique):
     def blur_subsurface_layers(
         self, graph: Graph, inputs: FrameInputs
     ) -> tuple[TextureOrView, TextureOrView]:
-        """Declare the passes that diffuse the subsurface light for outputs.
+        """Declare the passes that diffuse the subsurface light for the outputs besides the picture.
 
         Return texture views of the diffused light, and of the fraction of this light that leaves the skin
         towards the camera.

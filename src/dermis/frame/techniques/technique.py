@@ -49,7 +49,9 @@ class Technique(TechniqueTraits):
     """
 
     def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
-        """Create the textures of the blur pyramid, minimal for techniques that blur no light over the atlas.
+        """Create the textures of the blur pyramid.
+
+        Techniques that blur no light over the atlas get the smallest possible textures.
 
         atlas_side : side of the atlas [texels]
         halvings : for each atlas layout, the number of times that the resolution of each level is halved
@@ -63,19 +65,19 @@ class Technique(TechniqueTraits):
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert intermediate levels of weight 0, which make the chain of blurs cheaper.
+        """Insert intermediate levels of weight 0 into the blur pyramid, to make the chain of blurs cheaper.
 
         Return the new split of the profile, and the indices of the inserted levels. This base class inserts
         none.
 
-        edge_mode : filter mode at the edges of charts
+        edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
         return split, ()
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
-        edge_mode : filter mode at the edges of charts
+        edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
         return (0,) * (1 + len(split.blurred_mm2))
 
@@ -88,7 +90,10 @@ class Technique(TechniqueTraits):
     def make_subsurface_layers(
         self, memo: Memo, device: Device, settings: Settings
     ) -> TechniqueResources | None:
-        """Return textures in which subsurface light is diffused for outputs, None if none are needed."""
+        """Return textures in which subsurface light is diffused for the outputs besides the picture.
+
+        The result is None if the technique needs no such textures.
+        """
         return None
 
     def write_view_record(
@@ -129,13 +134,14 @@ class Technique(TechniqueTraits):
     def sum_translucency(
         self, graph: Graph, inputs: FrameInputs, atlas_textures: tuple[Texture, ...]
     ) -> Texture:
-        """Declare the passes that fill textures with only the light through thin parts of the head.
+        """Declare the passes that compute only the light through thin parts of the head, over the atlas.
 
-        Return the texture that combines all atlas layouts. The textures are for outputs that separate this
-        light from the rest of the picture.
+        Outputs use it to separate this light from the rest of the picture.
 
-        atlas_textures : textures of the atlas, one for each layout and, if there are several layouts, one for
-            their blend
+        Return the texture of the only layout or, if there are two layouts, the texture of their blend.
+
+        atlas_textures : textures that the passes fill: one for each atlas layout and, if there are two
+            layouts, one for their blend
         """
         raise NotImplementedError
 
@@ -150,11 +156,14 @@ class AtlasTechnique(Technique):
         return profile
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
-        """Return whether light evaluated at each pixel replaces the narrowest Gaussian."""
+        """Return whether light evaluated at each pixel replaces the blur with the narrowest Gaussian."""
         return bool(profile.variance_mm2[0] <= _MAX_RELIT_VARIANCE_MM2)
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Split a profile into Gaussians that are blurred and, if narrow enough, one evaluated at each pixel.
+        """Split a profile into its narrowest Gaussian and the Gaussians with which light is blurred.
+
+        Instead of a blur with the narrowest Gaussian, light is evaluated at each pixel. If even this Gaussian
+        is too wide for that, light is blurred with all of them.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
@@ -180,7 +189,7 @@ class AtlasTechnique(Technique):
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
-        edge_mode : filter mode at the edges of charts
+        edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
         max_halvings = len(atlas.mips_for_blurs(edge_mode)) - 1
         return choose_halvings(split.blurred_mm2, atlas.median_texels_per_mm, max_halvings)
@@ -251,13 +260,14 @@ class AtlasTechnique(Technique):
         layout_index: int,
         exitance_texture: Texture,
     ) -> None:
-        """Declare the passes that add the other profiles of a mixture to the exitance of the first profile.
+        """Declare the passes that compute the exitance of skin in which a map blends several profiles.
 
-        Each profile is weighted by the mean of its blend weights at the points where light enters and leaves,
-        so that light transport is reciprocal.
+        Between a point where light enters and a point where it leaves, each profile is weighted by the mean
+        of its blend weights at the two points, so that light transport is reciprocal.
 
+        mixture : resources for the blend, among them the exitance of the first profile alone
         layout_index : index of the atlas layout
-        exitance_texture : texture for the exitance
+        exitance_texture : texture for the exitance of the blend
         """
         for other, (entering, weight) in enumerate(zip(mixture.entering, blur.weight_changes, strict=True)):
             change = replace(blur, weight=weight)
@@ -270,9 +280,14 @@ class AtlasTechnique(Technique):
     def sum_translucency(
         self, graph: Graph, inputs: FrameInputs, atlas_textures: tuple[Texture, ...]
     ) -> Texture:
-        """Declare the passes that fill textures with the light through thin parts of the head only.
+        """Declare the passes that compute only the light through thin parts of the head, over the atlas.
 
-        The blurred levels are summed with weights of 0. Return the texture that combines all atlas layouts.
+        The blurred levels get weights of 0, so that they contribute no light.
+
+        Return the texture of the only layout or, if there are two layouts, the texture of their blend.
+
+        atlas_textures : textures that the passes fill: one for each atlas layout and, if there are two
+            layouts, one for their blend
         """
         layouts, levels = inputs.layouts, inputs.resources.diffusion.levels
         for layout, blur, texture in zip(layouts, inputs.blurs, atlas_textures, strict=False):

@@ -25,9 +25,11 @@ class TextureSpace(AtlasTechnique):
     mixes_profiles = True
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Split a profile into a Gaussian evaluated at each pixel (relit), and Gaussians that are blurred.
+        """Split a profile into its narrowest Gaussian and the Gaussians with which light is blurred.
 
-        The member `fine` of the result corrects light that varies within a texel.
+        Instead of a blur with the narrowest Gaussian, light is evaluated at each pixel. If even this Gaussian
+        is too wide for that, light is blurred with all of them. The member `fine` of the result corrects
+        light that varies within a texel.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
@@ -39,11 +41,11 @@ class TextureSpace(AtlasTechnique):
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert intermediate levels of weight 0, which make the chain of blurs cheaper.
+        """Insert intermediate levels of weight 0 into the blur pyramid, to make the chain of blurs cheaper.
 
         Return the new split of the profile, and the indices of the inserted levels.
 
-        edge_mode : filter mode at the edges of charts
+        edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
         max_halvings = len(atlas.mips_for_blurs(edge_mode)) - 1
         variances, steps = add_intermediate_levels(

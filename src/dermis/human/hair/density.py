@@ -39,7 +39,8 @@ class HairDensity(NamedTuple):
 
     relative : function that returns the relative density (n,), 0 to 1, at n skin points; its argument is an
         array (n, 4) with the columns of `average_points`
-    candidates : (p,) mask of the control points near hair; quads without any such corner are skipped
+    candidates : (p,) mask of the control points near which hair may grow; quads without such a corner get no
+        hair roots
     """
 
     relative: Callable[[Doubles], Doubles]
@@ -181,7 +182,10 @@ def _sum_zones(amount_name: str, zone_rows: Floats, points: Doubles) -> Doubles:
 
 @cache
 def skin_vertices_near_brows(root_finder: RootFinder) -> Index:
-    """Return the indices of the vertices of the subdivided mesh that brow hairs may touch."""
+    """Return the indices of the vertices of the subdivided mesh that brow hairs may touch.
+
+    root_finder : root finder of the mean person, with the subdivided mesh
+    """
     from scipy.spatial import cKDTree
 
     brow_points = quad_corners(root_finder.mesh, root_finder.brow_grid_roots.quad)

@@ -58,7 +58,11 @@ def add_hair(
 def _grow_brows(
     surface: GrowthSurface, root_finder: RootFinder, hair_look: HairLook, rngs: list[np.random.Generator]
 ) -> Iterator[HairGroup]:
-    """Yield the hairs of the left brow and then those of the right brow."""
+    """Yield the hairs of the left brow and then those of the right brow.
+
+    root_finder : root finder of the mean person
+    rngs : random generators for the left and for the right brow
+    """
     roots, parameters = [], []
     for side, rng in zip(SIDE_SIGNS, rngs, strict=True):
         u, v, x, y = brows.sample_positions(rng)
@@ -79,7 +83,9 @@ def _grow_lashes(
 ) -> Iterator[HairGroup]:
     """Yield the upper lashes and the lower lashes of the left eye, then those of the right eye.
 
+    root_finder : root finder of the mean person
     eyes : (2, 3) centres of the left and the right eye [mm]
+    rngs : random generators for the lashes of the left eye and for those of the right eye
     """
     roots, parameters, clumps = [], [], 0
     for side, eye, rng in zip(SIDE_SIGNS, eyes, rngs, strict=True):
@@ -108,7 +114,9 @@ def _hair_group(
 ) -> HairGroup:
     """Return a hair group, with knots converted from the coordinates of the head to the root frames.
 
+    root_frames : roots of the n hairs, with their frames
     knots_mm, radius_mm : (n, k, 3) positions and (n, k) radii of the knots [mm]
+    pigment_factor : pigment concentrations relative to those of the person's look [-]
     """
     offsets = offsets_in_frames(root_frames.frame, knots_mm - root_frames.positions_mm[:, None])
     return HairGroup(root_frames.roots, offsets, radius_mm.astype(np.float32), pigment_factor)

@@ -103,8 +103,13 @@ def _parameter_row(
 ) -> tuple[object, ...]:
     """Return the parameters of scalp hair or of a beard as a row of `HAIR_PARAMETERS_DTYPE`.
 
+    length_mm : length of the hair where it is longest [mm]
     densities : number of strand roots per area [1/cm2], number of real hairs per area [1/cm2], and fraction
         of the roots from which a strand grows
+    hair_radius_mm : radius of a single hair [mm]
+    fade : how much shorter the hair is at the sides and the nape than on top, 0 to 1
+    thinning : how far the hair on the crown has thinned, 0 to 1
+    hairline_effect : 1 for hair that is sparser, shorter and finer near the hairline, 0 for other hair
     """
     strands_per_cm2, hairs_per_cm2, density = densities
     hairs_per_strand = hairs_per_cm2 / strands_per_cm2

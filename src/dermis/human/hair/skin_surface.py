@@ -62,7 +62,7 @@ class RootFrames:
 
     @cached_property
     def frame_vectors(self) -> Floats:
-        """Return the coordinate frames as an array (3, 3, n): axis, component of the axis, root."""
+        """Return the frames as an array (3, 3, n), indexed by axis, component of the axis and root."""
         return np.ascontiguousarray(self.frame.transpose(1, 2, 0), np.float32)
 
 

@@ -142,7 +142,11 @@ def _near_guide_weights(guide_weight: Doubles, guide: NDArray[np.int64], knots: 
 
 
 def _root_locations(corner_weight: Doubles, corner_points: Doubles) -> Doubles:
-    """Return `StrandRoots.place` (n, 4): the angle, height, thinning and nape-to-top position of each root.
+    """Return the array `StrandRoots.place` (n, 4), which describes where on the head each root is.
+
+    The columns are the angle around the head from the front [degrees], the height above the midpoint of the
+    eyes [mm], how much hair thins there if the crown goes bald, and the position from the nape (0) to the top
+    of the head (1).
 
     corner_weight : (n, 4) weights of the corners of the quad on which each strand is rooted
     corner_points : (n, 4, 4) rows of `average_points` at these corners
@@ -160,9 +164,9 @@ def _clump_centre_strands(
 ) -> NDArray[np.int64]:
     """Return for each strand the index (n,) of the strand at the centre of its clump.
 
-    In cornrows, the centre is the strand nearest to the strand's root after this root was moved sideways onto
-    the centreline of its row. In other styles, random strands are centres, and each strand joins the clump of
-    the nearest centre.
+    In cornrows, the clump of a strand is found by moving its root sideways onto the centreline of its row;
+    the strand whose root is nearest to this position is the centre. In other styles, the centres are strands
+    chosen at random, and each strand belongs to the clump of the nearest centre.
 
     root_mm : (n, 3) roots on the mean person [mm]
     half_length_mm : (n, 3) points of the strands at half the length of their guides [mm]

@@ -36,7 +36,7 @@ class Style:
     braid : whether ropes are braids of three bundles instead of twists
     tie_mm : position of the hair tie of a ponytail or bun
     coil_mm : radius of the bun; 0 for a ponytail
-    crown : minimum recession of the hair at crown and temples, which the recession of `SkinLook` may exceed
+    crown : recession of the hair at crown and temples, 0 to 1; used if the recession in `SkinLook` is smaller
     women, men : relative probabilities of the style among women and among men
     tight : whether tightly coiled hair is worn in this style
     loose : whether hair that is not tightly coiled is worn in this style

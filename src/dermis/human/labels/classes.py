@@ -11,9 +11,10 @@ from dermis.base.tables import read_rows
 class LabelClass(NamedTuple):
     """Class of the surface that a pixel shows.
 
-    number : number of the class, which is the pixel value in the output `label`
+    number, name : number of the class, which is the pixel value in the output `label`, and name of the class
     face_synthetics : number of the class in the data set FaceSynthetics, which is the pixel value in the
         output `label_face_synthetics`
+    description : short description of what belongs to the class
     """
 
     number: int

@@ -50,7 +50,8 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE_NAM
     Parameters
     ----------
     head : Head
-        Head with known regions: the human, a sample, or a head with landmarks or labels in the table.
+        Head with known regions: a parametric human, a sample head of the package, a head with a label map, or
+        a head for which the table names landmarks or labels.
     table : RegionTable, str or path
         Roughness and specular strength of each region: a table, the path of a TOML file, or "default" for the
         package's table.

@@ -69,11 +69,12 @@ def _movement_matrix(target_names: tuple[str, ...]) -> Floats:
 def zone_table(recession: float = 0.0, site_differences: SiteDifferences | None = None) -> Floats:
     """Return the Gaussian zones of the face as rows (k, 24) for the paint shader.
 
-    The columns are the centre (3) [mm], a zero, the inverse radii (3) [1/mm], a zero, and the sixteen
-    `ZONE_AMOUNTS`.
+    The columns are the centre (3) [mm], a zero, the inverse radii (3) [1/mm], a zero, and sixteen amounts by
+    which the zone changes skin or hair, in the order of `ZONE_AMOUNTS`.
 
     recession : recession of the hair, 0 to 1, see `SkinLook`; it thins the hair at the crown
-    site_differences : differences in pigments between sites of the face and the cheek; None for none
+    site_differences : pigments at other sites of the face minus the pigments at the cheek; None if all sites
+        have the pigments of the cheek
     """
     rows = read_rows(__package__, "zones")
     for row in rows:
@@ -93,10 +94,10 @@ def zone_table(recession: float = 0.0, site_differences: SiteDifferences | None 
 
 @cache
 def _zone_amounts_of_sites() -> NDArray[np.float64]:
-    """Return amounts (k, 7) of k overlapping zones that change a pigment at only one site of the face.
+    """Return amounts (k, 7) for the k Gaussian zones of the face, with one column for each of seven sites.
 
-    Each column is for one of seven sites: first the cheek, then `FACE_SITES`. If the zones have the amounts
-    in a column, their sum is 1 at this site and 0 at the other six.
+    The sites are the cheek and then `FACE_SITES`. The zones overlap: if they have the amounts in one column,
+    the sum of their Gaussians is 1 at the site of this column and 0 at the other six sites.
     """
     zones, names = read_rows(__package__, "zones"), (_REFERENCE_SITE, *FACE_SITES)
     places = {row["site"]: row for row in read_rows(__package__, "sites")}

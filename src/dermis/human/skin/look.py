@@ -119,7 +119,7 @@ class SkinLook:
 
 
 def _checked_sites(site_differences: Any) -> SiteDifferences:
-    """Convert a mapping, as in files of people, to `SiteDifferences`; return `SiteDifferences` unchanged."""
+    """Convert a mapping, as read from a file, to `SiteDifferences`; return `SiteDifferences` unchanged."""
     known = [one.name for one in fields(SiteDifferences)]
     if isinstance(site_differences, Mapping) and site_differences.keys() <= set(known):
         return SiteDifferences(**site_differences)
@@ -132,10 +132,11 @@ def _checked_sites(site_differences: Any) -> SiteDifferences:
 class Demographics(NamedTuple):
     """Ancestry, sex and age of a person, from which typical looks of skin, eyes and hair are derived.
 
-    african, asian, caucasian : ancestry fractions of the shape, which add up to 1
+    african, asian, caucasian : ancestry fractions that determine the shape, which add up to 1
     sex : sex, from 0 (female) to 1 (male) [-]
     age : age [years]
-    skin_groups : weights of the measured groups that determine the skin, see `measured.group_weights`
+    skin_groups : weight of each group of measured people in the colours of skin, eyes and hair, see
+        `measured.group_weights`
     ita : individual typology angle (ITA) of the cheek [degrees]; None if it is not fixed
     """
 
@@ -172,7 +173,11 @@ def typical_skin(demographics: Demographics) -> SkinLook:
 def _typical_skin_look(
     demographics: Demographics, pigments: MeasuredPigments, site_differences: SiteDifferences
 ) -> SkinLook:
-    """Return the typical look of a person with measured pigments."""
+    """Return the typical skin look of a person whose pigments are known.
+
+    pigments : pigments of the person's cheek
+    site_differences : pigments at other sites of the head minus the pigments at the cheek
+    """
     old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
     spot_progress = max(demographics.age - _AGE_SPOTS_FROM_YEARS, 0.0) / (OLD_AGE - _AGE_SPOTS_FROM_YEARS)
     return SkinLook(
@@ -212,7 +217,10 @@ def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook
 def sample_skin(
     rng: np.random.Generator, pigment_rng: np.random.Generator, demographics: Demographics
 ) -> SkinLook:
-    """Return a random skin look of a person; pigments and site differences are distributed as measured.
+    """Return a random skin look of a person, with pigments that are distributed as in measured people.
+
+    rng : random generator for marks, folds, tan and shine
+    pigment_rng : random generator for the pigments of the cheek and of other sites of the head
 
     Source: [Lu2025] for the pigments.
     """

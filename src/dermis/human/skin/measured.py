@@ -1,4 +1,4 @@
-"""Pigments of human skin by ancestry, sex, age, site and skin tone, from measured people.
+"""Pigments of human skin by ancestry, sex, age, site of the body and skin tone, from measured people.
 
 The table `measured.json` is written by `python -m dermis.apps.validation.people table` from the spectra of
 the International Skin Spectra Archive, by inversion of the package's own model [Lu2025].
@@ -155,10 +155,10 @@ class MeasuredTable(NamedTuple):
     groups : mapping from group name to distribution
     sex, age : (4,) changes of the variables from female to male, and from young to old
     mean_age_term : mean of `age_term` over the ages that `Human.drawn` samples
-    site_slope : (12, 2) change of each site's difference in log2 of melanin per change of the cheek's log2 of
-        melanin, and the same for blood [-]
-    site_spread : (12, 2) standard deviations between people of each site's differences in log2 of melanin and
-        in log2 of blood [-]
+    site_slope : (12, 2) change of the difference between each site and the cheek per change of the cheek, for
+        log2 of melanin and for log2 of blood [-]
+    site_spread : (12, 2) standard deviations of the differences between each site and the cheek among people,
+        for log2 of melanin and for log2 of blood [-]
     """
 
     probabilities: Doubles
@@ -257,8 +257,9 @@ def age_term(age: ArrayLike) -> Doubles:
 def group_weights(
     african: float, asian: float, caucasian: float, skin_ancestry: str = ""
 ) -> dict[str, float]:
-    """Return a dictionary from measured group to weight, for ancestry fractions or for a skin ancestry.
+    """Return the weight of each group of measured people, for ancestry fractions or for a skin ancestry.
 
+    african, asian, caucasian : ancestry fractions, which add up to 1
     skin_ancestry : name of the ancestry of the skin, which replaces the fractions; "" for none
     """
     if skin_ancestry:
@@ -305,9 +306,11 @@ def group_probabilities(ita: float) -> dict[str, float]:
 def typical_pigments(
     weight_of_group: GroupWeights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
-    """Return the median pigments and site differences for a sex, an age and, optionally, an ITA.
+    """Return the median pigments of the cheek, and the median differences of other sites from the cheek.
 
-    weight_of_group : weight of each measured group
+    weight_of_group : weight of each group of measured people
+    sex, age : sex, from 0 (female) to 1 (male), and age [years]
+    ita : individual typology angle (ITA) that the cheek must have [degrees]; None for any
     """
     return _pigments_and_sites(weight_of_group, sex, age, ita, np.zeros(4), None)
 
@@ -315,9 +318,13 @@ def typical_pigments(
 def sample_pigments(
     rng: np.random.Generator, weight_of_group: GroupWeights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
-    """Return random pigments and site differences of a person; pigments are correlated as measured.
+    """Return random pigments of a person's cheek, and random differences of other sites from the cheek.
 
-    weight_of_group : weight of each measured group
+    The pigments are correlated as in measured people.
+
+    weight_of_group : weight of each group of measured people
+    sex, age : sex, from 0 (female) to 1 (male), and age [years]
+    ita : individual typology angle (ITA) that the cheek must have [degrees]; None for any
     """
     return _pigments_and_sites(
         weight_of_group, sex, age, ita, rng.standard_normal(4), rng.standard_normal((len(SITES), 2))
@@ -334,6 +341,9 @@ def _pigments_and_sites(
 ) -> tuple[MeasuredPigments, SiteDifferences]:
     """Return the pigments of a person's cheek, and the differences of other sites from the cheek.
 
+    weight_of_group : weight of each group of measured people
+    sex, age : sex, from 0 (female) to 1 (male), and age [years]
+    ita : individual typology angle (ITA) that the cheek must have [degrees]; None for any
     normal_samples : (4,) independent samples of the standard normal distribution, zeros for a typical person
     site_normal_samples : (12, 2) independent samples of the same distribution; None for a typical person
     """
@@ -389,7 +399,9 @@ def with_ita(
     If no melanin fraction gives this ITA, other parameters change too: very light skin gets less blood with
     more oxygen, and very dark skin gets a thicker epidermis.
 
-    ita : individual typology angle [degrees]
+    pigments : pigments of the skin before the change
+    ita : individual typology angle (ITA) that the skin must have [degrees]
+    eumelanin : fraction of eumelanin in the melanosomes, 0 to 1 [-]
     """
     for _ in range(_MAX_ITA_STEPS):
         table = skin_colour_table(eumelanin, pigments.oxygen, pigments.epidermis_mm)
@@ -415,7 +427,11 @@ def with_ita(
 
 
 def _ita_score(ita: float, weight_of_group: GroupWeights) -> float:
-    """Return the standard normal score of an ITA in a mixture of groups, limited to the range -2.9 to 2.9."""
+    """Return the standard normal score, limited to -2.9 to 2.9, of an ITA in a mixture of groups of people.
+
+    ita : individual typology angle [degrees]
+    weight_of_group : weight of each group in the mixture
+    """
     quantiles = measured_table().group_mean("ita", weight_of_group)
     return float(np.clip(_ita_scores(np.array([ita]), quantiles)[0], -_MAX_NORMAL_SCORE, _MAX_NORMAL_SCORE))
 
@@ -437,10 +453,10 @@ def symmetric_square_root(covariance: Doubles) -> Doubles:
 
 
 class MeasuredCell(NamedTuple):
-    """Medians of the measured people of one group, sex and age group, at one site.
+    """Median colour and pigments of one group of measured people at one site of the body.
 
-    group : one of the values of `GROUP_OF_CODE`
-    site : one of `SITES`
+    group : name of the group of people, one of the values of `GROUP_OF_CODE`
+    site : name of the site of the body, one of `SITES`
     sex : "F" or "M", or "" for both
     age_group : "1" (under 20), "2" (20 to 29) ... "6" (over 60), or "" for all ages
     people : number of measured people; 0 if they are too few, so that medians are estimated from all groups
@@ -459,9 +475,10 @@ class MeasuredCell(NamedTuple):
 
 @cache
 def measured_cells() -> tuple[MeasuredCell, ...]:
-    """Return the medians of measured skin for each group of people and each site.
+    """Return the medians of measured skin for each group of people and each site of the body.
 
-    There is one entry for all people of a group, and one for each sex and age group.
+    At each site, a group has one entry for all its people, and further entries for people of one sex or of
+    one age group.
 
     Source: [Lu2025].
     """
@@ -478,7 +495,7 @@ def measured_cells() -> tuple[MeasuredCell, ...]:
 
 
 class MeasuredTone(NamedTuple):
-    """Colour of a site of the body.
+    """Measured skin colour at a site of the body, such as the palm.
 
     colour : (3,) diffuse reflectance, linear Rec. 709 [-]
     note : text for the user, which states the origin of the colour and the pigments of such skin
@@ -520,6 +537,9 @@ def measured_tone(tone_name: str) -> MeasuredTone:
 
 @cache
 def typical_site_differences() -> SiteDifferences:
-    """Return the median differences between sites, averaged over all groups with equal weights."""
+    """Return the median differences in pigments between sites of the head and the cheek.
+
+    All groups of measured people have equal weights.
+    """
     count = len(GROUP_OF_CODE)
     return typical_pigments(dict.fromkeys(GROUP_OF_CODE.values(), 1.0 / count), 0.5, 30.0)[1]

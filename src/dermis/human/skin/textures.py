@@ -102,6 +102,7 @@ NOISES = (
 class DotLayer(NamedTuple):
     """Layer of soft round dots, such as freckles, with at most one dot in each cell of a cubic lattice.
 
+    name : name of the layer
     spacing_mm : side of the cells [mm]
     min_radius, max_radius : limits of the random radius as fractions of the spacing, up to 0.5
     edge_warp_mm : amplitude of the noise that distorts the outlines of the dots [mm]

@@ -44,7 +44,11 @@ class DetectedEyeball:
 
 @dataclass(frozen=True, eq=False)
 class _EyePiece:
-    """Connected component of the triangles that a file declares to be eyes, with a fitted sphere."""
+    """Connected component of the triangles that a file declares to be eyes, with a fitted sphere.
+
+    points, area : (n,) indices of the mesh points, and area of the surface around each of them [mm2]
+    sphere : sphere fitted to the points
+    """
 
     points: Index
     area: Doubles  # area of the surface around each point [mm2]
@@ -117,7 +121,7 @@ def _eye_pieces(mesh: Mesh, eye_triangles: Index) -> list[_EyePiece]:
 
 
 def _distance_in_radii(points: Doubles, eye_piece: _EyePiece) -> Doubles:
-    """Return the distances of points (..., 3) from the centre of an eyeball, divided by its radius."""
+    """Return the distances of points (..., 3) from the centre of a fitted sphere, divided by its radius."""
     return np.asarray(np.linalg.norm(points - eye_piece.sphere.centre, axis=-1) / eye_piece.sphere.radius)
 
 

@@ -95,9 +95,11 @@ def with_fitted_eyes(head: Head, coarse_mesh: Mesh | None = None, eye_look: EyeL
 def _ball_triangles(
     mesh: Mesh, stencils: Stencils | None, detected_eyeballs: tuple[DetectedEyeball, DetectedEyeball]
 ) -> tuple[Index, Index]:
-    """Return the indices of the triangles of each eyeball.
+    """Return the indices of the triangles of the left and of the right eyeball.
 
+    mesh : mesh of the head, which may be subdivided
     stencils : stencils of a subdivided mesh; None without subdivision
+    detected_eyeballs : left and right eyeball, detected before subdivision
     """
     first = mesh.point[mesh.triangles[:, 0]]
     if stencils is not None:
@@ -109,11 +111,12 @@ def _ball_triangles(
 def _eye_shapes(
     corners_mm: Doubles, detected_eyeballs: tuple[DetectedEyeball, DetectedEyeball]
 ) -> list[_EyeShape]:
-    """Return the shapes of both eyes.
+    """Return the shapes of the left and of the right fitted eye.
 
     If an eyeball of the file has no cornea, its axis points through the opening of the lids.
 
-    corners_mm : (f, 3, 3) corners of all triangles that are not eyeballs
+    corners_mm : (f, 3, 3) corners of all triangles except those of eyeballs [mm]
+    detected_eyeballs : left and right eyeball of the file
     """
     lids = [lids_in_front(corners_mm, ball.sphere, ball.gaze) for ball in detected_eyeballs]
     (left, a), (right, b) = (one.opening_angles for one in lids)

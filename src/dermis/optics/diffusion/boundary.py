@@ -58,6 +58,7 @@ def internal_moment(cosine_power: int, eta: float, node_count: int = 64) -> floa
 def diffuse_reflectance(eta: float, integral_method: DiffuseIntegral = "polynomial") -> float:
     """Return the reflectance F_dr of the surface for diffuse light from inside the medium [-].
 
+    eta : index of refraction relative to air [-]
     integral_method : "polynomial" for the polynomial fit that the published dipole and multipole use, or
         "exact" for the integral
 
@@ -76,6 +77,7 @@ def boundary_mismatch(eta: float, integral_method: DiffuseIntegral = "polynomial
     F_dr is the `diffuse_reflectance`. In diffusion theory, the fluence, extrapolated linearly beyond the
     surface, is zero at the height 2 A D, where D is the diffusion coefficient.
 
+    eta : index of refraction relative to air [-]
     integral_method : "polynomial" or "exact", see `diffuse_reflectance`
 
     Source: [Jensen2001] section 2.3.

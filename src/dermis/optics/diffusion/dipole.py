@@ -10,9 +10,10 @@ from dermis.optics.media import Floats, Layer
 
 
 def source_depths(layer: Layer, mismatch: float) -> tuple[Floats, Floats]:
-    """Return the depth (c,) of the real source, and the height (c,) of its image above the surface [mm].
+    """Return the depth (c,) of the point source, and the height (c,) of its image above the surface [mm].
 
-    mismatch : boundary mismatch [-]
+    layer : absorption and scattering of the half-space
+    mismatch : boundary mismatch A of the surface, see `boundary_mismatch` [-]
 
     Source: [Jensen2001] section 2.3.
     """
@@ -35,10 +36,13 @@ def point_source_flux(radius_mm: ArrayLike, depth_mm: Floats, sigma_tr: Floats) 
 
 
 def reflectance(radius_mm: ArrayLike, layer: Layer, mismatch: float) -> Floats:
-    """Return the diffusion profile R(r), (n, c), of the standard dipole per power that enters [1/mm2].
+    """Return the diffusion profile R(r), (n, c), of the standard dipole [1/mm2].
+
+    R(r) is relative to the power that enters the medium.
 
     radius_mm : (n,) distances r from the beam [mm]
-    mismatch : boundary mismatch [-]
+    layer : absorption and scattering of the half-space
+    mismatch : boundary mismatch A of the surface, see `boundary_mismatch` [-]
 
     Source: [JensenBuhler2002] eq. 5.
     """
@@ -50,9 +54,13 @@ def reflectance(radius_mm: ArrayLike, layer: Layer, mismatch: float) -> Floats:
 
 
 def reflectance_hankel(frequency: ArrayLike, layer: Layer, mismatch: float) -> Floats:
-    """Return the Hankel transform (n, c) of the dipole's R(r) at frequencies s [1/mm].
+    """Return the Hankel transform (n, c) of the standard dipole's R(r) [-].
 
     The transform is the integral of 2 pi r R(r) J0(s r) over r, with the Bessel function J0.
+
+    frequency : (n,) frequencies s [1/mm]
+    layer : absorption and scattering of the half-space
+    mismatch : boundary mismatch A of the surface, see `boundary_mismatch` [-]
     """
     z_r, z_v = source_depths(layer, mismatch)
     q = np.sqrt(layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)
@@ -60,7 +68,11 @@ def reflectance_hankel(frequency: ArrayLike, layer: Layer, mismatch: float) -> F
 
 
 def total_reflectance(layer: Layer, mismatch: float) -> Floats:
-    """Return the total reflectance (c,) of the dipole model per power that enters [-]."""
+    """Return the total reflectance (c,) of the dipole model, relative to the power that enters [-].
+
+    layer : absorption and scattering of the half-space
+    mismatch : boundary mismatch A of the surface, see `boundary_mismatch` [-]
+    """
     return np.asarray(reflectance_hankel(0.0, layer, mismatch))
 
 
@@ -69,9 +81,10 @@ def better_dipole_reflectance(
 ) -> Floats:
     """Return R(r), (n, c), of the better dipole for light that scattered at least twice [1/mm2].
 
-    R(r) is per power that enters.
+    R(r) is relative to the power that enters the medium.
 
     radius_mm : (n,) distances r from the beam [mm]
+    layer : absorption and scattering of the half-space
     eta : index of refraction relative to air [-]
     source_count : number of point sources along the beam
 

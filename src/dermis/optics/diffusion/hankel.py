@@ -48,7 +48,7 @@ def inverse_transform(transform: Floats) -> Floats:
     The relative error is 1e-8 where R(r) is within six decades of its maximum; elsewhere the error is 1e-9 of
     the maximum.
 
-    Source: [Hamilton2000], a fast Fourier transform in the logarithm of s.
+    Source: [Hamilton2000], a fast Fourier transform in the logarithm of the frequency.
     """
     from scipy.fft import fht
 

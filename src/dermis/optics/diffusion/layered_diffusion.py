@@ -1,7 +1,8 @@
 """Diffusion in layered media, with continuous fluence and flux at each interface.
 
-In the Hankel domain, the fluence phi(z) in each layer satisfies D phi'' - D q^2 phi = -S(z). Here, q^2 is
-sigma_tr^2 + s^2 at the frequency s, and S is the source of light that has just scattered for the first time.
+In the Hankel domain, the fluence phi(z) in each layer satisfies D phi'' - D q^2 phi = -S(z). Here, z is the
+depth, D is the diffusion coefficient, q^2 is sigma_tr^2 + s^2 at the frequency s, and S(z) is the power, per
+unit of depth, of the light that scatters for the first time at the depth z.
 At each face, the layers below impose the boundary condition D phi' = W - Z phi. A recursion computes Z and W
 of the faces from bottom to top.
 """
@@ -30,7 +31,10 @@ class _Sublayer(NamedTuple):
 
 
 class _BoundaryCondition(NamedTuple):
-    """Boundary condition D phi' = W - Z phi for the fluence phi at a face; Z and W depend on lower layers."""
+    """Boundary condition D phi' = W - Z phi of a face, with the fluence phi and the diffusion coefficient D.
+
+    The derivative phi' is with respect to depth; Z and W depend on the layers below the face.
+    """
 
     Z: Floats
     W: Floats
@@ -42,7 +46,7 @@ class _DownwardTransfer(NamedTuple):
     The fluence is a sum of three solutions of the diffusion equation: one decays downwards, one grows
     downwards, and a particular solution accounts for the source of light and is 0 at the upper face.
 
-    E : attenuation exp(-q d) across the thickness d of the sublayer [-]
+    E : attenuation exp(-q d) across the thickness d of the sublayer, where q is the rate of decay [-]
     rho : ratio of the growing to the decaying solution at the lower face, if there is no source [-]
     common : 1 / (1 + E^2 rho), which sums the reflections between both faces [-]
     beta : part of the growing solution that the sources cause at the lower face
@@ -68,7 +72,7 @@ def solve_layers(
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms (n, c) of R(r) and of T(r) of a layered medium [-].
 
-    R(r) and T(r) are the profiles at the upper and the lower face, per power that enters.
+    R(r) and T(r) are the profiles at the upper and the lower face, relative to the power that enters.
 
     frequency : (n,) frequencies s > 0 [1/mm]
     mismatch : boundary mismatch with air; internal interfaces are index-matched [-]
@@ -86,11 +90,13 @@ def solve_reflectance(
 ) -> Floats:
     """Return the Hankel transform (n, c) of R(r) of a layered medium [-].
 
-    R(r) is per power that enters. This function is faster than `solve_layers`, which also computes T(r).
+    R(r) is relative to the power that enters the medium. This function is faster than `solve_layers`, which
+    also computes T(r).
 
     frequency : (n,) frequencies s > 0 [1/mm]
     mismatch : boundary mismatch with air [-]
-    source_kind : "beam" or "point", the place where light first scatters, see `solve_layers`
+    source_kind : where light first scatters: along the refracted beam ("beam") or at one depth ("point"),
+        see `solve_layers`
     """
     return _solve_upwards(frequency, _sublayers(medium, source_kind), medium.channels, mismatch)[0] / (
         2.0 * mismatch
@@ -100,7 +106,7 @@ def solve_reflectance(
 def solve_two_layers(
     upper_layer: Layer, thickness_mm: ArrayLike, lower_layer: Layer, mismatch: float
 ) -> Floats:
-    """Return the total reflectance (n, c) of n skins with two layers, per power that enters [-].
+    """Return the total reflectance (n, c) of n skins with two layers, relative to the entering power [-].
 
     upper_layer : upper layers, with coefficients (n, c), or (c,) if they are the same for all skins
     thickness_mm : (n, 1) thicknesses of the upper layers, or one number [mm]
@@ -146,7 +152,7 @@ def _solve_sublayers(
 def _solve_upwards(
     frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, mismatch: float
 ) -> tuple[Floats, list[_DownwardTransfer]]:
-    """Return the fluence at the surface, and the transfer through each sublayer, topmost sublayer first."""
+    """Return the fluence at the surface, and the `_DownwardTransfer` of each sublayer, topmost first."""
     s = np.asarray(frequency, dtype=np.float64)[..., None]
     zero = np.zeros((*s.shape[:-1], channel_count))
     face, transfers = _BoundaryCondition(zero + 1.0 / (2.0 * mismatch), zero), list[_DownwardTransfer]()

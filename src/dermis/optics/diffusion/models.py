@@ -56,8 +56,8 @@ def diffusion_profile(
     model : "dipole" and "better-dipole" require one half-space; the other models accept any stack
     clamp : whether the multipole's source is kept inside thin layers ("layer") or not ("none"), see `Slab`
     rgb_weights : (3, c) weights that convert wavelengths to linear Rec. 709; the result then has three
-        channels and is per incident power. By default, the result has the medium's channels and is per power
-        that enters
+        channels and is relative to the incident power. By default, the result has the medium's channels and
+        is relative to the power that enters
 
     Raises DermisError when the model is not valid for the medium.
 
@@ -86,7 +86,10 @@ def diffusion_rings(
     clamp: Clamp = "layer",
     rgb_weights: Floats | None = None,
 ) -> RingTarget:
-    """Return only the ring energies of `diffusion_profile`, which is faster than the whole profile."""
+    """Return the light that emerges through rings, as in the result of `diffusion_profile` but faster.
+
+    The parameters are those of `diffusion_profile`.
+    """
     grid, values, total = _sampled_profile(medium, model, clamp, rgb_weights)
     edges = ring_edges()
     return RingTarget(edges, np.diff(enclosed_energy(edges, grid, values), axis=0), total)
@@ -163,9 +166,9 @@ def _medium_warnings(medium: Medium, model: DiffusionModel, clamp: Clamp) -> lis
 
 
 def _first_event_albedo(medium: Medium) -> Floats:
-    """Return the fraction (c,) of all events in the first mean free path that are scattering events [-].
+    """Return the probability (c,) that light scatters where it first interacts with a medium [-].
 
-    All other events are absorption.
+    Otherwise, the light is absorbed. The probability is a mean over the first mean free path.
     """
     depth, scattered = np.zeros(medium.channels), np.zeros(medium.channels)
     for layer in medium.layers:
@@ -210,7 +213,9 @@ def gaussian_transmittance(profile: GaussianSum, thickness_mm: ArrayLike) -> Flo
 def slab_transmittance(
     medium: Medium, thickness_mm: ArrayLike, model: Literal["layered", "multipole"] = "layered"
 ) -> Floats:
-    """Return the transmittance (n, c) of a medium that is cut off at a thickness, per power that enters [-].
+    """Return the transmittance (n, c) of a medium that is cut off at each of n thicknesses [-].
+
+    The transmittance is relative to the power that enters the medium.
 
     thickness_mm : (n,) thicknesses at which the medium is cut off [mm]
     model : "layered" includes unscattered light, attenuated by the reduced extinction; "multipole" assumes
@@ -265,6 +270,7 @@ class ModelError:
 def measured_model_error(model_name: str, tissue_name: str = "") -> ModelError | None:
     """Return the measured error of a diffusion model, or None if the model was never measured.
 
+    model_name : name of the diffusion model, such as "dipole"
     tissue_name : name of a tissue; if the name is empty or the tissue was not measured, the result covers all
         measured tissues
     """

@@ -70,10 +70,10 @@ def transmittance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
 
 
 def reflectance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Floats:
-    """Return the reflected profile R(r), (n, c), of a slab per power that enters [1/mm2].
+    """Return the reflected profile R(r), (n, c), of a slab, relative to the power that enters [1/mm2].
 
     radius_mm : (n,) distances r from the beam [mm]
-    tolerance : upper bound of the light from all image sources that are left out, per power that enters [-]
+    tolerance : upper bound of the light from all omitted image sources, relative to the power that enters [-]
 
     Source: [DonnerJensen2005] eq. 2-6.
     """
@@ -84,10 +84,10 @@ def reflectance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Fl
 
 
 def transmittance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Floats:
-    """Return the transmitted profile T(r), (n, c), of a slab per power that enters [1/mm2].
+    """Return the transmitted profile T(r), (n, c), of a slab, relative to the power that enters [1/mm2].
 
     radius_mm : (n,) distances r from the beam [mm]
-    tolerance : upper bound of the light from all image sources that are left out, per power that enters [-]
+    tolerance : upper bound of the light from all omitted image sources, relative to the power that enters [-]
 
     If the clamp moves the source onto the lower face, half of the source's light leaves directly at r = 0.
     This light is missing here, but `transmittance_hankel` includes it.
@@ -136,7 +136,7 @@ def _image_series(
 def image_pairs_needed(slab: Slab, tolerance: float, max_pairs: int = 2000) -> int:
     """Return how many pairs of image sources the multipole model needs on each side of a slab.
 
-    tolerance : upper bound of the light from all omitted pairs, per power that enters [-]
+    tolerance : upper bound of the light from all omitted pairs, relative to the power that enters [-]
     max_pairs : largest result; it is returned if the slab does not absorb, where no bound can be computed
     """
     decay = float((slab.image_period_mm * slab.layer.sigma_tr).min())
@@ -189,7 +189,11 @@ def stack_response(
 
 
 def layer_slabs(medium: Medium, mismatch: float, clamp: Clamp = "layer") -> list[Slab]:
-    """Return one slab per layer of a medium; only the faces that touch air have a given boundary mismatch."""
+    """Return one slab per layer of a medium.
+
+    mismatch : boundary mismatch of the faces that touch air; all other faces are index-matched [-]
+    clamp : whether sources are kept inside thin layers ("layer") or not ("none"), see `Slab`
+    """
     last = len(medium.layers) - 1
     layers = enumerate(medium.layers)
     return [

@@ -103,6 +103,9 @@ def _fit_channels(
 ) -> tuple[Floats, Floats]:
     """Fit k Gaussians to the channels of a target; return variances (k,) and weights (k, c).
 
+    target : samples of R(r), or light through rings
+    gaussian_count : number k of Gaussians
+    keep_energy : whether the weights must sum to the target's total reflectance
     start_variances_mm2 : (k,) variances from which the search starts; None for several default starts [mm2]
     """
     norm = np.linalg.norm(target.samples, axis=0)
@@ -151,8 +154,9 @@ def _log_variance_bounds(target: FitTarget) -> tuple[float, float]:
 def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
     """Return the least-squares equations of a target, with an equation for the total reflectance added.
 
-    The results are the design function and the right-hand sides. The added equation demands that the weights
-    sum to the total reflectance. It has so large a weight that it holds almost exactly.
+    The results are a function from the variances to the matrix of the equations and its derivatives, and the
+    right-hand sides. The added equation demands that the weights of the Gaussians sum to the total
+    reflectance. It has so large a weight in the fit that it holds almost exactly.
     """
     width = target.mean_radius_at([0.5]) ** 2 / 2.0
     stiffness = _ENERGY_EQUATION_WEIGHT * float(np.linalg.norm(target.design_and_derivatives(width)[0]))
@@ -186,6 +190,7 @@ def _combine_fits(channel_fits: list[tuple[Floats, Floats]], profile_name: str) 
     """Combine fits of separate channels into one sum of Gaussians, in which equal variances occur once.
 
     channel_fits : variances (k,) and weights (k, c) of each fit
+    profile_name : name of the resulting profile
     """
     variance, index = np.unique(np.concatenate([v for v, _ in channel_fits]), return_inverse=True)
     channels = sum(w.shape[1] for _, w in channel_fits)

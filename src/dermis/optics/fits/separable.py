@@ -101,7 +101,10 @@ def fit_separable(target: RingTarget) -> SeparableFit:
 
 
 def _fit_channel_kernel(target: RingTarget) -> Floats:
-    """Fit one channel; return (3,): weight of the first Gaussian, and logarithms of both variances."""
+    """Fit a separable kernel of two Gaussians to a target with one channel; return its parameters (3,).
+
+    The parameters are the weight of the first Gaussian and the logarithms of both variances.
+    """
     from scipy.optimize import least_squares
 
     scale = np.sqrt(SECTORS_PER_QUADRANT) / np.linalg.norm(target.energy)

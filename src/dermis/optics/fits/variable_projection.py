@@ -92,6 +92,10 @@ def _anderson_step(
 
     Plain steps neglect the curvature of the residuals and converge linearly. One extrapolated step replaces
     about a dozen plain steps.
+
+    log_variance : (k,) current logarithms of the variances
+    step : (k,) plain step from these logarithms
+    last_log_variance, last_step : (k,) the same for the previous iteration
     """
     change = step - last_step
     size = float(change @ change)

@@ -21,10 +21,11 @@ PRIOR_COLUMNS = ("weight", *PRIOR_NAMES, *_COVARIANCE_COLUMNS)
 
 @dataclass(frozen=True, eq=False)
 class SkinPrior:
-    """Joint distribution of the parameters `PRIOR_NAMES`, a mixture of k normal distributions.
+    """Joint distribution of four skin parameters, a mixture of k normal distributions.
 
-    The normal distributions are those of the parameters' logarithms, except for oxygen, where the value
-    itself is normally distributed.
+    The parameters are melanin, blood, oxygen and the thickness of the epidermis (`PRIOR_NAMES`). The normal
+    distributions are those of the parameters' logarithms, except for oxygen, where the value itself is
+    normally distributed.
 
     weight : (k,) weights, which sum to 1
     mean : (k, 4) means
@@ -57,7 +58,7 @@ class SkinPrior:
         return SkinPrior(weights / weights.sum(), np.array(mean), np.array(covariance))
 
     def sample(self, skin_count: int, seed: int = 0) -> dict[str, Floats]:
-        """Return random skins as a dictionary from each of `PRIOR_NAMES` to values (skin_count,).
+        """Return parameters of random skins: a dictionary from each of `PRIOR_NAMES` to values (skin_count,).
 
         Oxygen is clipped to the range from 0 to 1.
         """
@@ -94,7 +95,7 @@ def prior_points(parameter_values: dict[str, Floats]) -> Floats:
     The coordinates are the logarithms of the parameters, except for oxygen, where the coordinate is the
     value.
 
-    parameter_values : dictionary from each of `PRIOR_NAMES` to values (n,)
+    parameter_values : dictionary from the name of each parameter (`PRIOR_NAMES`) to its values (n,)
     """
     columns = [np.log(np.maximum(parameter_values[name], _MIN_PIGMENT_FRACTION)) for name in PRIOR_NAMES]
     columns[_OXYGEN_INDEX] = parameter_values["oxygen"]

@@ -96,7 +96,7 @@ def _build_donner2008(
 def _build_biospec(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
 ) -> tuple[Layer, ...]:
-    """Return four skin layers after [KrishnaswamyBaranoski2004], with constants from code by one author."""
+    """Return four skin layers after [KrishnaswamyBaranoski2004], with constants from one author's code."""
     reticular = replace(parameters, blood=_RETICULAR_BLOOD_RATIO * parameters.blood)
     return (
         Layer(
@@ -151,7 +151,9 @@ def _bloodless_absorption(parameters: SkinParameters, wavelength_nm: Floats) -> 
 
 
 def dj2006_layers(parameters: SkinParameters, pigment_fractions: Floats) -> tuple[Layer, Layer]:
-    """Return the epidermis and the dermis of "dj2006" for n pigment fractions, with coefficients (n, 31).
+    """Return epidermis and dermis of the structure "dj2006" for each of n pigment fractions.
+
+    The coefficients of both layers have the shape (n, 31).
 
     parameters : parameters of the skins; its fields `melanin` and `blood` are ignored
     pigment_fractions : (n,) fractions, used both as melanin fractions of the epidermis and as blood fractions

@@ -113,6 +113,7 @@ def pheomelanin_absorption(wavelength_nm: ArrayLike) -> Floats:
 def melanosome_absorption(wavelength_nm: ArrayLike, eumelanin_fraction: float) -> Floats:
     """Return the absorption coefficient of melanosomes with a mixture of eumelanin and pheomelanin [1/mm].
 
+    wavelength_nm : wavelengths from 380 to 780 [nm]
     eumelanin_fraction : fraction of the melanosomes that contain eumelanin, 0 to 1 [-]
 
     Source: [DonnerJensen2006].
@@ -148,6 +149,7 @@ def deoxyhaemoglobin_extinction(wavelength_nm: ArrayLike) -> Floats:
 def blood_absorption(wavelength_nm: ArrayLike, oxygen: float) -> Floats:
     """Return the absorption coefficient of whole blood [1/mm].
 
+    wavelength_nm : wavelengths from 380 to 780 [nm]
     oxygen : fraction of oxygenated haemoglobin, 0 to 1 [-]
 
     Source: [Prahl1999].

@@ -113,7 +113,11 @@ class MapFolder(Target):
         return replace_values(self.parameters(subject, version), {_SCATTERING_PARAMETER_NAME: False})
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile of the renderer's sum of Gaussians or, without diffusion, a step at radius 0."""
+        """Return the cumulative profile of the sum of Gaussians with which the renderer diffuses light.
+
+        Without diffusion, all light leaves where it enters, so the cumulative profile is 1 at all radii
+        above 0.
+        """
         energy = subject.curve.energy
         if not get_value(parameters, _SCATTERING_PARAMETER_NAME) or subject.scene is None:
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), energy)
@@ -145,7 +149,11 @@ def encode_map_exr(map_name: str, texels: Floats) -> bytes:
 def quantise_map(
     texels: Floats, png_encoding: PngEncoding
 ) -> tuple[NDArray[np.uint8 | np.uint16], RangeEntries]:
-    """Return a map quantised to integers for PNG, and JSON entries that say how to decode the integers."""
+    """Return a map quantised to integers for PNG, and JSON entries that say how to decode the integers.
+
+    png_encoding : encoding of the integers: sRGB for "colour" and "light", the square root for "root", and
+        linear for all others
+    """
     if png_encoding == "colour":
         return encode_srgb8(np.clip(texels, 0.0, 1.0)), {"png": "sRGB"}
     if png_encoding == "light":
@@ -166,6 +174,7 @@ def quantise_map(
 def orient_normal_map(normals: Floats, normal_y: NormalY) -> Floats:
     """Return normals whose y, the green channel, points towards row 0 of the map or away from row 0.
 
+    normals : (h, w, 3) normals whose y points towards row 0
     normal_y : "up" if y is to point towards row 0, as in OpenGL; "down" if away from row 0, as in DirectX
     """
     if normal_y == "up":

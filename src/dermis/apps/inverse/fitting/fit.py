@@ -124,13 +124,13 @@ class InitialGuess:
         return replace(self.point, logs=log_skin, suns=self.point.suns[suns])
 
     def melanin_ranges(self, best_point: FitPoint) -> list[Floats]:
-        """Return a range of melanin fractions around each local minimum of the residual, lowest first.
+        """Return a range of melanin fractions around each local minimum of the residual, best first.
 
         There can be several minima, such as dark skin in strong light and pale skin in weak light. Minima
-        with a residual much larger than the smallest residual are left out. A single minimum gets the whole
-        grid as its range.
+        with a residual much larger than the smallest residual are left out. If only one minimum remains, its
+        range is the whole grid of melanin fractions.
 
-        best_point : result of `best_point`
+        best_point : result of the method `best_point`, whose suns are used
         """
         suns = [int(np.argmax(self.point.suns @ one)) for one in best_point.suns]
         _, residuals = self._try_skins(best_point.logs, suns, _MELANIN_GRID)
@@ -155,6 +155,7 @@ class InitialGuess:
 
         log_skin : (4,) logarithms of the skin parameters (see `FitPoint`); only the roughness is used
         sun_indices : indices of the candidate suns
+        melanin_grid : melanin fractions to try
         """
         grid = product(np.log(melanin_grid), np.log(_BLOOD_GRID), np.log(_SPECULAR_STRENGTH_GRID))
         trials = [np.array([m, b, log_skin[2], s]) for m, b, s in grid]
@@ -313,9 +314,10 @@ def fit(
 
 
 def _sd_from_assumed_parameters(subject: FitSubject, best_point: FitPoint) -> dict[str, float]:
-    """Return a dictionary from pigment name to the standard deviation due to assumed skin parameters.
+    """Return standard deviations of melanin and blood due to skin parameters that are not fitted.
 
-    The standard deviations are those of the pigments' logarithms.
+    The values assumed for these parameters can differ from those of the person. The result is a dictionary
+    from pigment name to the standard deviation of the pigment's logarithm.
     """
     pigments = subject.scene.skin.pigments
     assert pigments is not None
@@ -359,7 +361,13 @@ def _find_skin(face_renderer: FaceRenderer, photo: Photograph) -> FitPoint:
 
 
 def _start_points(problem: FitProblem, candidate_point: FitPoint, sun_count: int) -> list[FitPoint]:
-    """Return the points where fits start: minima of a coarse search, refined by a search near their suns."""
+    """Return points at which to start fits, found by a coarse search and then a finer one near its suns.
+
+    There is one point for each minimum of the coarse search, see `InitialGuess.melanin_ranges`.
+
+    candidate_point : point with the skin parameters and all suns for the coarse search
+    sun_count : number of suns to choose from these
+    """
     frames, target, weight = problem.frames, problem.target, problem.initial_weights()
     coarse = InitialGuess(frames, candidate_point, target, weight)
     best = coarse.best_point(sun_count)

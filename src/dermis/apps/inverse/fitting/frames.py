@@ -63,7 +63,8 @@ class FaceRenderer:
     def single_light_radiance(self, fit_point: FitPoint) -> Floats:
         """Render the face under each light alone; return the radiance (9 + k, p, 3) of the p masked pixels.
 
-        The first nine lights are ambient lobes of radiance 1; the other k lights are suns of irradiance 1.
+        The first nine lights are wide lobes of ambient light, see `lobe_directions`, with radiance 1 along
+        their axes. The other k lights are suns with irradiance 1.
         """
         return np.stack(
             [self._masked_radiance(scene, view) for scene, view in self._single_light_scenes(fit_point)]

@@ -93,7 +93,7 @@ class FitProblem:
         )
 
     def reweighted_state(self, fit_state: FitState) -> FitState:
-        """Return the state with new pixel weights: from the model's brightness, and lower for outliers."""
+        """Return the state with pixel weights for the brightness of the model, lowered for outliers."""
         weights = self.pixel_weights(np.maximum(self.target - fit_state.residual, 0.0))
         scaled = np.abs(fit_state.residual * weights)
         limit = self.robust * max(_MAD_TO_SD * float(np.median(scaled)), 1.0)

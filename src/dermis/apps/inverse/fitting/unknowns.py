@@ -40,7 +40,11 @@ class SkinUnknown:
 def _measured_unknown(
     pigment_name: str, lower_limit: float, upper_limit: float, log_step: float
 ) -> SkinUnknown:
-    """Return a pigment as an unknown; its prior is its distribution among measured people of all groups."""
+    """Return a pigment as an unknown, whose prior is the pigment's distribution in measured skin.
+
+    lower_limit, upper_limit : smallest and largest value
+    log_step : step of the logarithm for finite differences
+    """
     mean, sd = skin_prior().moments(pigment_name)
     return SkinUnknown(pigment_name, float(np.exp(mean)), sd, lower_limit, upper_limit, log_step)
 

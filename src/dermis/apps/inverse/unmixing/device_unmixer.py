@@ -89,7 +89,8 @@ class Unmixer:
         """Record the pass that unmixes a texture of colours into two textures; return the two textures.
 
         The first texture has melanin, blood and their standard deviations. The second texture has the
-        residual and the third unknown. The next call for a texture of the same size overwrites both.
+        residual, and the third unknown of the model (see `SkinModel`). The next call for a texture of the
+        same size overwrites both.
         """
         size = colours.size[:2]
         shader = _unmixing_program(self.device, "unmix", self.model)
@@ -118,7 +119,8 @@ def recolour(
 ) -> Pixels:
     """Return the model's colours (h, w, 3) for changed pigments, multiplied by the residual.
 
-    unmixed_pigments : (h, w, 3) melanin, blood and the third unknown before the change
+    unmixed_pigments : (h, w, 3) melanin, blood and the model's third unknown (see `SkinModel`) before the
+        change
     residual : (h, w, 3) original colour divided by the model's colour
     pigment_factors : (3,) factors by which melanin, blood and the third unknown are multiplied
     added_fractions : (3,) constants that are added to these products

@@ -109,7 +109,10 @@ def _spectral_tissue(skin: SkinParameters, melanin: float, blood: float) -> Tiss
 
 
 def _ring_fractions(tissue: Tissue) -> Floats:
-    """Return the fraction (n, 3) of a tissue's diffuse reflectance that emerges through each of n rings."""
+    """Return the fraction (n, 3) of a tissue's diffuse reflectance that emerges through each of n rings.
+
+    The rings are concentric around the point where light enters.
+    """
     rings = tissue.rings()
     return np.asarray(rings.energy / rings.total)
 
@@ -141,7 +144,11 @@ def _mixture_weights(skin_ring_fractions: Floats, profile_ring_fractions: Floats
 
 
 def _rms_error(mixed_ring_fractions: Floats, skin_ring_fractions: Floats) -> Floats:
-    """Return the relative root-mean-square error (3,) of the ring fractions of n skins, by channel."""
+    """Return the relative root-mean-square error (3,) of mixtures of profiles, by channel.
+
+    mixed_ring_fractions : (n, r, 3) ring fractions (see `_ring_fractions`) of the mixtures for n skins
+    skin_ring_fractions : (n, r, 3) ring fractions of these skins
+    """
     squares = ((mixed_ring_fractions - skin_ring_fractions) ** 2).sum(axis=1) / (skin_ring_fractions**2).sum(
         axis=1
     )

@@ -234,6 +234,11 @@ def _damped_step(
     """Return the damped Gauss-Newton step (t, 3) of each colour's unknowns.
 
     The step is 0 for an unknown at a limit that it would cross.
+
+    unknowns : (t, 3) unknowns before the step, as in `SkinModel.evaluate`
+    log_colours : (t, 3) logarithms of the given colours
+    colour_weights : (t, 3) inverse variances of these logarithms
+    damping : (t,) damping factor of each colour
     """
     H, g = _normal_equations(model, unknowns, log_colours, colour_weights)
     diagonal = np.einsum("tii->ti", H)
@@ -250,7 +255,10 @@ def _damped_step(
 def _normal_equations(
     model: SkinModel, unknowns: Floats, log_colours: Floats, colour_weights: Floats
 ) -> tuple[Floats, Floats]:
-    """Return the Gauss-Newton matrix (t, 3, 3) and the negative gradient (t, 3) of half the cost."""
+    """Return the Gauss-Newton matrix (t, 3, 3) and the negative gradient (t, 3) of half the cost.
+
+    The cost is that of `solve_pigments`; the arguments are those of `_damped_step`.
+    """
     result, J = model.evaluate(unknowns)
     weighted = colour_weights[:, :, None] * J
     H = np.einsum("tci,tcj->tij", weighted, J)

@@ -105,7 +105,7 @@ class SpectralFit:
         return np.asarray(np.sqrt((self.residual**2).mean(axis=1)))
 
     def weighted_residual(self, criterion: Criterion) -> Floats:
-        """Return the residuals for a criterion: reflectances (n, 31), or CIEDE2000 differences (n, 1)."""
+        """Return the residuals for a criterion: differences of reflectance (n, 31) or CIEDE2000 (n, 1)."""
         return self.residual if criterion == "spectrum" else self.delta_e()[:, None]
 
     def delta_e(self, colour_weights: Floats | None = None) -> Floats:

@@ -82,9 +82,11 @@ class PigmentChange:
         return replace(skin, **{name: one for name, one in changed.items() if one is not None})
 
     def scales_and_offsets(self, melanin: float, blood: float) -> tuple[Floats, Floats]:
-        """Return factors (3,) and added constants (3,) for the maps of melanin, blood and the third unknown.
+        """Return factors (3,) and added constants (3,) for the maps of three unknowns.
 
-        melanin, blood : medians of these maps before the change [-]
+        These are melanin, blood and the third unknown of the `SkinModel`, which is not changed.
+
+        melanin, blood : medians of the maps of melanin and blood before the change [-]
         """
         pairs = self.melanin.scale_and_offset(melanin), self.blood.scale_and_offset(blood), (1.0, 0.0)
         factors, added = np.array(pairs).T

@@ -119,7 +119,9 @@ def deepest_albedo(medium: Medium, colour: ArrayLike) -> Doubles:
 def _reflectance_table(layers: tuple[tuple[float, float, float], ...], eta: float) -> Doubles:
     """Return the Monte Carlo reflectance of a stack of layers, for a series of albedos of its last layer [-].
 
-    layers : absorption and scattering [1/mm] and thickness [mm] of each layer
+    layers : absorption coefficient [1/mm], scattering coefficient [1/mm] and thickness [mm] of each layer; of
+        the last layer, only the sum of the coefficients is used
+    eta : index of refraction of all layers [-]
     """
     above = [ScatteringLayer(a, s, thickness, eta=eta) for a, s, thickness in layers[:-1]]
     extinction = layers[-1][0] + layers[-1][1]

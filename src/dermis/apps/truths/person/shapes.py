@@ -53,7 +53,7 @@ def coat_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
 
 
 def _reflection_lobes_bsdf(mi: Mitsuba, textures: SkinTextures, path_fraction: float) -> SceneDict:
-    """Return the BSDF of the skin's surface reflection: its relief with the two lobes of `specular.two_lobe`.
+    """Return the BSDF of the skin's surface: a bump map with the two specular lobes of `specular.two_lobe`.
 
     path_fraction : fraction of the paths that meet this BSDF; the reflectance is divided by it [-]
     """

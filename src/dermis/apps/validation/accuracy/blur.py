@@ -82,9 +82,10 @@ def blurred_levels(device: Device, mesh: Mesh, irradiance: Array, stretch_mode: 
 
 
 def lit_texel_row(device: Device, texels_per_mm: float) -> str:
-    """Return a Markdown row with errors in shape and energy after the light of one texel is blurred.
+    """Return a Markdown row with two errors of blurred light that comes from a single lit texel.
 
-    The surface is flat. The reference is the analytic sum of Gaussians.
+    The first is the largest difference from the analytic sum of Gaussians, divided by the peak of that sum.
+    The second is the relative error of the energy. The surface is flat.
 
     texels_per_mm : resolution of the atlas on the surface
     """
@@ -107,8 +108,9 @@ def lit_texel_row(device: Device, texels_per_mm: float) -> str:
 def sheared_uv_row(device: Device, shear_degrees: float) -> str:
     """Return a Markdown row with the widths to which the light of one texel is blurred on a sheared uv map.
 
-    The surface is flat. The widths are divided by the exact width. The cells are the smallest and the largest
-    width with the stretch map "axes", then the same with "full".
+    The surface is flat. The width depends on the direction on the surface. The first two cells are the
+    smallest and the largest width with the stretch map "axes"; the next two are the same with "full". All
+    are divided by the exact width.
 
     shear_degrees : angle between the uv axes on the flat surface [degrees]
     """
@@ -132,7 +134,7 @@ def sheared_uv_row(device: Device, shear_degrees: float) -> str:
 
 
 def constant_light_error(device: Device) -> float:
-    """Return the largest error after constant light is blurred on the atlas of a sphere [-]."""
+    """Return the largest error of a uniform irradiance of 1 after it is blurred on a sphere's atlas [-]."""
     atlas = build_atlas(uv_sphere(100.0), FLAT_PATCH_SIDE)
     levels = blurred_levels(device, uv_sphere(100.0), atlas.coverage.astype(np.float32))
     return max(float(np.abs(level[atlas.coverage] - 1).max()) for level in levels)
@@ -151,8 +153,8 @@ def sphere_blur_row(renderer: Renderer, radius_mm: float) -> str:
 
     They are the blur on the atlas, the heat equation on the sphere, and an integral over the sphere with
     weights that depend on Euclidean distance. Each blurs by the widest Gaussian of `BLUR_PROFILE`. The
-    irradiance is proportional to x, so that each blur multiplies it by a constant. The row contains these
-    constants.
+    irradiance is proportional to the coordinate x, so that each blur only scales it by a factor. The row
+    contains the radius and the three factors.
     """
     from atlas_reading import shown
     from cut_meshes import cut_sphere

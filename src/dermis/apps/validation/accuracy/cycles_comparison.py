@@ -77,7 +77,7 @@ class SkinRender(NamedTuple):
 
 
 def highlights(adapter: str = "auto") -> None:
-    """Compare highlights with Cycles and write benchmarks/results/highlights.json."""
+    """Compare highlights rendered by dermis and by Cycles; write benchmarks/results/highlights.json."""
     require_in_checkout(RESULTS)
     renderer, head = dermis.Renderer(adapter), scan_with_normal_map()
     rows = [row for view in HIGHLIGHT_VIEWS for row in highlight_rows(renderer, head, view)]

@@ -76,8 +76,8 @@ def _oblique_to_normal_ratio(albedo: float, eta: float) -> float:
 def _direction_errors(albedo: float) -> tuple[float, float]:
     """Return the relative RMS errors of the directional models "lambertian" and "half-space" [-].
 
-    The errors are averaged over the directions of light and view. The reference combines the exact radiance
-    of an index-matched half-space with all internal reflections at the surface.
+    The errors are averaged over the directions of light and view. The reference adds the surface, with
+    all orders of internal reflection, to the exact solution for a half-space without a reflecting surface.
 
     albedo : single-scattering albedo [-]
     """

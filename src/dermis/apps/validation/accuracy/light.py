@@ -79,7 +79,9 @@ def prefiltered_panorama(
 ) -> tuple[Array, Array, PrefilteredPanorama]:
     """Return directions (n, 3) and light (n, 3) of a panorama's texels, and the prefiltered panorama.
 
-    Light is radiance times solid angle; suns are removed.
+    The light of a texel is its radiance times its solid angle. Suns are removed from the panorama.
+
+    row_count : number of rows to which the panorama is resampled for the directions and the light
     """
     radiance = resample_panorama(split_suns(load_panorama(panorama_name))[0], row_count)
     light = radiance * texel_solid_angles(*radiance.shape[:2])[..., None]
@@ -153,7 +155,10 @@ def reflected_radiance(
 
 
 def lobe_parameters(cosine: float, roughness_m: float) -> Array:
-    """Return directions, roughness and weights of the isotropic lobes that approximate a specular lobe.
+    """Return the isotropic lobes (k, 4) that approximate a specular lobe: directions, roughness and weights.
+
+    The first two columns are the coordinates of the direction, in stereographic projection about the mirror
+    direction. The third is the roughness, the fourth the weight.
 
     cosine : cosine between view and normal
     roughness_m : roughness of the specular lobe

@@ -94,8 +94,8 @@ class Measurement:
 
     person : key of `_PEOPLE`
     view : key of `ALL_VIEWS`
-    truth : kind of path-traced reference, one of `comparisons.person.TRUTHS`
-    cause : cause of error that both renderers leave out, or None
+    truth : model of the skin that both renderers use, one of `comparisons.person.TRUTHS`
+    cause : cause of error that both renderers leave out, such as "hair"; None if they leave out nothing
     """
 
     person: PersonName
@@ -343,9 +343,10 @@ _MeasurementJob = tuple[str, str, Callable[[], Figures]]
 
 
 def _measurement_jobs(runner: ComparisonRunner) -> list[_MeasurementJob]:
-    """Return the comparisons in the order in which they are run, each with its group, its key and a function.
+    """Return the comparisons in the order in which they are run, each as a tuple (group, key, function).
 
-    The group and the key locate its results in the file of results. The function returns these results.
+    The function runs the comparison and returns its errors. The group and the key, such as "people" and the
+    name of the comparison, say where in the file of results these errors are stored.
     """
     people: list[_MeasurementJob] = [
         ("people", one.key, partial(runner.measure, one)) for one in list_measurements()
@@ -446,7 +447,7 @@ def region_table(people_figures: Figures) -> str:
 def cause_table(people_figures: Figures) -> str:
     """Return a Markdown table with the relative RMSE and energy ratio when one cause of error is left out.
 
-    Each row is for one cause, and the first for none.
+    In the first row, nothing is left out. Each further row is for one cause.
     """
     lines = [
         f"| left out on both sides | {' | '.join(f'{view} | energy' for view in _ABLATED_VIEWS)} |",

@@ -112,10 +112,10 @@ def slab_rows(renderer: dermis.Renderer) -> str:
 
 
 def light_across_air(mesh: Mesh, light_direction: Array, points: Array, normals: Array) -> Array:
-    """Return the red light (n,) that reaches points across air in the surface integral.
+    """Return the red light (n,) in the surface integral that would have to cross air to reach the points.
 
-    This is an error of the integral. Light crosses air if the straight path from the place where it enters
-    the skin to the point leaves the body.
+    This light is an error of the integral. It enters the skin where the straight line to the point would
+    leave the body.
 
     light_direction : (3,) direction of the light
     points : (n, 3) positions
@@ -164,8 +164,8 @@ def comparison_cells(
 
     point_filter : function that returns the mask of the points to compare, given positions and normals
     spacing_mm : largest distance between neighbouring samples of the irradiance
-    compares_without_air : whether to add a cell for "thin" with the energy ratio to a reference without
-        `light_across_air`
+    compares_without_air : whether to add a cell with the energy ratio for "thin" to a reference from which
+        `light_across_air` is subtracted
     """
     cells = []
     for transmission in ("none", "thin"):

@@ -204,7 +204,7 @@ def with_test_rig(head: Head, target_count: int) -> Head:
 
 
 def pose_at_moment(head: Head, moment_index: int) -> Pose:
-    """Return a pose of the synthetic rig in which every target and bone differs from the previous moment.
+    """Return a pose of the synthetic rig; all its targets and bones move from each frame to the next.
 
     moment_index : index of the frame
     """

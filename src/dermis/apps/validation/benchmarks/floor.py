@@ -104,10 +104,10 @@ def _scattering_bytes(traffic: FrameTraffic, shadow_bytes: int) -> dict[str, flo
 
 
 def _blur_surface_bytes(inputs: FrameInputs, texel_count: int) -> float:
-    """Return the memory traffic of blurs, except that of the light itself [byte].
+    """Return the memory traffic of everything that blurs read or write besides the light itself [byte].
 
-    It consists of stretch map, reach map and gutters. The reach map says how far the chart extends from each
-    texel. The passes of GPU Gems 3 have neither a reach map nor gutters, but also blur the stretch map.
+    This is the stretch map (texels per millimetre), the reach map (how far the chart extends from each texel)
+    and the gutters. The passes of GPU Gems 3 use no reach map and no gutters, but also blur the stretch map.
 
     texel_count : number of atlas texels that show the surface
     """

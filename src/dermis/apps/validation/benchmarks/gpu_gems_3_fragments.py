@@ -46,7 +46,12 @@ class FragmentPasses(GpuGems3):
     """
 
     def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
-        """Return textures for the irradiance and the pyramid levels, all in half precision."""
+        """Return textures for the irradiance and the pyramid levels, all in half precision.
+
+        atlas_side : side of the atlas [texel]
+        halvings : for each atlas layout, the number of times that the resolution of each level is halved;
+            only the number of levels is used
+        """
         count = max(map(len, halvings))
         stack = make_texture(
             device, (atlas_side, atlas_side), HALF_TEXEL_FORMAT, layer_count=count, content_source="raster"
@@ -102,7 +107,10 @@ class FragmentPasses(GpuGems3):
     ) -> None:
         """Record the render pass of a blur along one axis.
 
-        target_pair : textures of light and stretch to write
+        shader : render program from `blur_program`
+        shader_resources : resources that the shader reads
+        target_pair : textures for the blurred light and for the blurred stretch map
+        atlas_side : ignored
         """
         assert isinstance(graph, Graph) and isinstance(shader, RenderProgram)
         graph.fill("diffuse", shader, shader_resources, target_pair)

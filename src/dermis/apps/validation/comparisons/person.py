@@ -99,8 +99,8 @@ ERROR_CAUSES: tuple[Cause, ...] = get_args(Cause)
 class SharedSkin:
     """Skin in two equivalent forms: a medium for the path tracer, and a diffusion profile for dermis.
 
-    medium : layers of skin, with the mean colour of the person
-    profile : file with Gaussians fitted to the result of Monte Carlo in these layers
+    medium : homogeneous or layered skin with the mean colour of the person
+    profile : file with Gaussians fitted to the diffusion profile of the medium, computed by Monte Carlo
     """
 
     medium: Medium
@@ -110,9 +110,10 @@ class SharedSkin:
 def shared_skin(renderer: Renderer, head: Head, reference_kind: TruthName, folder: Path) -> SharedSkin:
     """Return the skin of a person for a kind of path-traced reference, and write its diffusion profile.
 
-    Homogeneous skin has the mean scattering distance of the default skin.
+    For the kind "layered", the skin has two layers with the pigments of the person. For the other kinds, it
+    is homogeneous, with the mean scattering distance of the default skin.
 
-    reference_kind : kind of path-traced reference, one of `TRUTHS`
+    reference_kind : model of the skin that both renderers use, one of `TRUTHS`
     folder : existing folder in which the file of the profile is written
     """
     maps, eta = head.maps, SKIN_ETA if reference_kind == "refracting" else 1.0
@@ -133,7 +134,7 @@ def shared_skin(renderer: Renderer, head: Head, reference_kind: TruthName, folde
 class PersonSubject:
     """Scene of a person, and the textures of the skin for the path tracer.
 
-    cause : cause of error that both renderers leave out, or None
+    cause : cause of error that both renderers leave out, such as "hair"; None if they leave out nothing
     """
 
     scene: Scene
@@ -358,8 +359,8 @@ class IrisErrors(NamedTuple):
 
     right : distance by which the path-traced pupil is further to the right [pixel]
     down : distance by which the path-traced pupil is further down [pixel]
-    brightness : mean brightness of the iris outside highlights, by dermis, divided by that in the path-traced
-        picture [-]
+    brightness : mean brightness of the iris outside highlights in the picture by dermis, divided by that in
+        the path-traced picture [-]
     left_half : `brightness` of the left half of the iris [-]
     right_half : `brightness` of the right half of the iris [-]
     """

@@ -65,9 +65,9 @@ def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, texture_si
 def _detail_heights_mm(pores: Floats, furrows: Floats, log2_mm_per_uv: Floats) -> Floats:
     """Return the heights (n, n) of fine pores and furrows, which are missing in the head's height map [mm].
 
-    They are two patterns that are tiled as in skin.wgsl.
+    The heights are the weighted sum of a pattern of pores and a pattern of furrows, tiled as in skin.wgsl.
 
-    pores, furrows : (n, n) weights of the two patterns
+    pores, furrows : (n, n) weights of the two patterns [-]
     log2_mm_per_uv : (n, n) binary logarithm of the length on the surface per unit of uv [mm]
     """
     side = len(pores)

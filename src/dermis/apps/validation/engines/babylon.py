@@ -72,8 +72,8 @@ def measured_radiance(
 
     Row 0 is at the bottom.
 
-    profile_colour : diffusion profile, which Babylon.js expresses as a colour
-    meters_per_unit : setting metersPerUnit of Babylon.js; the unit of the scene is a millimetre
+    profile_colour : colour by which Babylon.js describes the diffusion profile
+    meters_per_unit : value of the setting metersPerUnit of Babylon.js; the scene is in millimetres
     pixel_mm : size of a pixel [mm]
     azimuth : direction across the edge of the light [rad]
     """
@@ -95,8 +95,8 @@ def predicted_radiance(
 
     Sample positions are rounded to whole pixels.
 
-    profile_colour : diffusion profile, which Babylon.js expresses as a colour
-    meters_per_unit : setting metersPerUnit of Babylon.js; the unit of the scene is a millimetre
+    profile_colour : colour by which Babylon.js describes the diffusion profile
+    meters_per_unit : value of the setting metersPerUnit of Babylon.js; the scene is in millimetres
     pixel_mm : size of a pixel [mm]
     azimuth : direction across the edge of the light [rad]
     """
@@ -144,8 +144,8 @@ def edge_responses(
     averaged over directions across the edge. The predictions come from the samples of Babylon.js's shader and
     from exact Burley profiles.
 
-    profile_colour : diffusion profile, which Babylon.js expresses as a colour
-    meters_per_unit : setting metersPerUnit of Babylon.js; the unit of the scene is a millimetre
+    profile_colour : colour by which Babylon.js describes the diffusion profile
+    meters_per_unit : value of the setting metersPerUnit of Babylon.js; the scene is in millimetres
     burley_width_mm : (3,) widths of the Burley profiles, by channel [mm]
     """
     widest = float(burley_width_mm.max())

@@ -100,6 +100,8 @@ def measure_edge_response(
     An edge response is the radiance of a half-lit plane by distance from the edge of the light.
 
     python_program : Python program that has Blender's module bpy
+    blender_version : version of Blender for which the skin is exported
+    subsurface_method : name of a variant of the export target "blender"
     skin_name : name of the skin
     """
     subject, target = load_subject(skin_name), TARGET.with_variant(subsurface_method)
@@ -142,10 +144,12 @@ def measure_edge_response(
 
 
 def binned_edge_response(cumulative_profile: CumulativeProfile, burley_width_mm: Floats) -> Floats:
-    """Return the predicted edge response (3, n) of a profile, averaged over the pixel columns of each bin.
+    """Return the predicted edge response (3, n) of a profile, averaged over groups of pixel columns.
+
+    The pixel columns of the picture, 12 Burley widths wide, are divided into n groups of neighbours.
 
     cumulative_profile : cumulative form of the profile
-    burley_width_mm : (3,) Burley widths of the channels, to which the width of a bin is proportional [mm]
+    burley_width_mm : (3,) Burley width of each channel [mm]
     """
     columns = [
         cumulative_profile.edge_response(column_edge_distances() * burley_width_mm[c])[:, c] for c in range(3)

@@ -104,7 +104,10 @@ def column_radiance(
     """Render a picture across the edge of the light, and return the mean radiance of each pixel column.
 
     skin_script : exported script, imported as a module
-    width_m : width of the picture [m]
+    path : file to which the picture is written
+    width_m : width of the visible area [m]
+    picture_size : width and height of the picture [pixel]
+    parameters : values of options of the exported script, such as `samples` and `seed`
     """
     camera.ortho_scale = width_m
     scene = bpy.context.scene

@@ -102,7 +102,8 @@ def available_renderers(subject: Subject, dermis_picture: Floats) -> dict[str, C
 def render_babylon(subject: Subject, library_folder: Path, dermis_picture: Floats) -> Floats:
     """Return the linear picture (h, w, 4) that Babylon.js renders in the exported page, in Chromium.
 
-    dermis_picture : (h, w, 4) picture rendered by dermis; its alpha is used
+    dermis_picture : (h, w, 4) picture rendered by dermis; its alpha is copied to the result, except where
+        Babylon.js draws nothing
     """
     with TemporaryDirectory() as folder_name, chromium_page(HEAD_PICTURE_SIDE) as page:
         file = Path(folder_name) / "head.html"
@@ -118,7 +119,7 @@ def render_babylon(subject: Subject, library_folder: Path, dermis_picture: Float
 def render_mitsuba(subject: Subject, dermis_picture: Floats) -> list[Floats]:
     """Return linear pictures (h, w, 4) of the exported scene rendered by Mitsuba, one per random seed.
 
-    dermis_picture : (h, w, 4) picture rendered by dermis; its alpha is used
+    dermis_picture : (h, w, 4) picture rendered by dermis; its alpha is copied to the results
     """
     mi = load_mitsuba()
     with TemporaryDirectory() as folder_name, mitsuba_variant(mi, "scalar_rgb"):

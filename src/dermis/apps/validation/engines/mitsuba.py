@@ -1,7 +1,8 @@
 """Edge responses of exported skin in Mitsuba: light scattered across the edge of a half-lit plane.
 
-A lamp covers half of a plane of the exported medium, almost touching the plane. By reciprocity, the radiance
-along the normal, at each distance from the lamp's edge, is the edge response of the diffusion profile.
+The exported medium has a flat surface. A lamp that almost touches the surface lights one half of it. By
+reciprocity, the radiance along the normal, at each distance from the lamp's edge, is the edge response of the
+diffusion profile.
 """
 
 from __future__ import annotations
@@ -56,6 +57,9 @@ def half_lit_plane(
     The camera looks down on a rough surface. If the surface is smooth or absent, the camera is in the medium
     just below the plane; light along the normal crosses such a surface undeflected.
 
+    mi : module mitsuba
+    medium : medium below the plane
+    boundary : surface of the medium: "matched" for none, "smooth" or "rough"
     burley_width_mm : Burley width d of the profile; the view spans 3 d on each side of the edge [mm]
     is_black : whether the medium absorbs all light, so that only the surface reflects
     """
@@ -99,6 +103,9 @@ def measured_edge_response(
     Returns the edge response (n,) averaged over each pixel, its standard errors (n,), and the radiance in the
     lit area far from the edge.
 
+    mi : module mitsuba
+    medium : medium below the plane
+    boundary : surface of the medium: "matched" for none, "smooth" or "rough"
     burley_width_mm : Burley width of the profile [mm]
     samples : paths per pixel
     """
@@ -134,10 +141,12 @@ def pixel_edge_response(
 
 
 def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int) -> JsonObject:
-    """Return the measured edge responses of a skin with a model of its surface, and their errors, by channel.
+    """Return the measured edge responses of an exported skin, and their errors, by channel.
 
     An edge response is the radiance of a half-lit plane by distance from the edge of the light.
 
+    mi : module mitsuba
+    boundary : surface of the skin: "matched" for none, "smooth" or "rough"
     samples : paths per pixel
     """
     target = TARGET.with_variant(boundary)

@@ -68,7 +68,7 @@ class PeerPlan:
     side : side of the square image [pixel]
     samples : paths per pixel of each pass of Cycles
     paths : paths per pixel of Mitsuba
-    frames : number of frames of each variant of dermis to time between renderings by other programs
+    frames : number of frames of each variant of dermis that are timed per turn; the programs take turns
     """
 
     side: int = 512
@@ -104,8 +104,8 @@ class PeerRenders:
     light : name of the scene's light
     region : name of the visible region
     ours : dictionary from a name in `DERMIS_VARIANTS` or `GPU_GEMS_3_VARIANTS` to frames of dermis
-    cycles : dictionary from a method of Cycles to its images: for each of `FIRST_SEED_BY_TURN`, a list with
-        one image for each number of paths in `PeerPlan.samples`
+    cycles : dictionary from a method of Cycles to two lists of images, rendered with different random seeds;
+        each list has one image for each number of paths in `PeerPlan.samples`
     left_out : dictionary from a missing method of Cycles to the reason why it is missing
     reference : path-traced image by Mitsuba
     reference_core_seconds : CPU time of Mitsuba, including loading of the scene [s]
@@ -176,7 +176,7 @@ def _cycles_passes(
     subsurface_method: SubsurfaceMethod,
     first_seed: int,
 ) -> list[CyclesPass]:
-    """Render the scene with Cycles, once for each number of paths in `plan.samples`.
+    """Render the scene with Cycles, once for each number of paths in `comparison_plan.samples`.
 
     An earlier pass, in which Cycles builds the scene, is not returned.
 

@@ -45,7 +45,7 @@ def peers(
     Parameters
     ----------
     head:
-        A sample or a file.
+        Name of a sample head, or a file.
     lights:
         Names of lights, separated by commas: front, back or laser.
     quick:

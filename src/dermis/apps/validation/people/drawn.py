@@ -45,7 +45,11 @@ class DrawnPeople(NamedTuple):
 
 
 def site_skin_variables(look: SkinLook) -> Doubles:
-    """Return the arguments (7, 4) of `model_spectra` for a skin look, one row for each of `HEAD_SITES`."""
+    """Return the skin variables (7, 4) of a skin look, one row for each of `HEAD_SITES`.
+
+    The columns are melanin, blood, oxygenation and thickness of the epidermis, in the units of
+    `model_spectra`.
+    """
     differences = np.vstack([np.zeros(3), look.sites.as_array()])
     cheek = np.log2([look.melanin, look.blood])
     oxygen = np.clip(look.oxygen + differences[:, 2], 0.0, 1.0)

@@ -47,7 +47,7 @@ def model_lab(skin_variables: Doubles) -> Doubles:
 
 
 def invert_spectra(reflectance: Doubles) -> Doubles:
-    """Return the arguments (n, 4) of `model_spectra` for which the model fits spectra best.
+    """Return the skin variables (n, 4), as in `model_spectra`, with which the model fits n spectra best.
 
     The fit minimises differences in colour first, and then differences between the spectra.
 

@@ -144,9 +144,12 @@ def _group_masks(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
 
 
 def _sex_age_effects(cheek: Archive, skin_variables: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the effects (4,) of sex and of `age_term` on the four skin variables of `model_spectra`.
+    """Return two arrays (4,): the effects of sex and of `age_term` on the skin variables of `model_spectra`.
 
     The effects are fitted by least squares, with an intercept for each group.
+
+    cheek : n measurements at the cheek
+    skin_variables : (n, 4) skin variables of these measurements
     """
     known = np.isfinite(cheek.sex) & np.isfinite(cheek.age)
     levels = (cheek.group[known, None] == np.array(list(GROUP_OF_CODE))).astype(np.float64)
@@ -157,8 +160,11 @@ def _sex_age_effects(cheek: Archive, skin_variables: Doubles) -> tuple[Doubles, 
 
 
 def _centred_sex_age_effects(cheek: Archive, sex_effect: Doubles, age_effect: Doubles) -> Doubles:
-    """Return the deviations (n, 4) from group means that sex and age explain, for each skin variable.
+    """Return how much sex and age change the four skin variables of n people, (n, 4).
 
+    Each change is relative to the mean sex and the mean `age_term` of the person's group.
+
+    cheek : measurements of n people at the cheek
     sex_effect, age_effect : (4,) effects of sex and of `age_term` on the variables
     """
     result = np.zeros((len(cheek.group), 4))
@@ -171,7 +177,13 @@ def _centred_sex_age_effects(cheek: Archive, sex_effect: Doubles, age_effect: Do
 
 
 def _normal_scores(skin_variables: Doubles, archive_rows: Archive) -> Doubles:
-    """Return the normal scores (n, 5) for the ranks of the four skin variables and of the ITA."""
+    """Return the normal scores (n, 5) of four skin variables and of the individual typology angle.
+
+    A normal score is the quantile of the normal distribution that has the same rank as a measurement.
+
+    skin_variables : (n, 4) skin variables of the measurements
+    archive_rows : n measurements
+    """
     columns = np.column_stack([skin_variables, ita_degrees(archive_rows.cielab)])
     return np.asarray(ndtri((rankdata(columns, axis=0) - 0.5) / len(columns)))
 
@@ -179,9 +191,10 @@ def _normal_scores(skin_variables: Doubles, archive_rows: Archive) -> Doubles:
 def _site_differences(archive: Archive, skin_variables: Doubles) -> tuple[Doubles, Doubles, Doubles]:
     """Return how sites differ from the cheek: medians (g, 12, 3), slopes (12, 2) and spreads (12, 2).
 
-    A median is the difference between site and cheek in one of the g groups. In small groups it is blended
-    with the mean of larger groups. A slope is the change of this difference per unit of a person's deviation
-    from the group at the cheek. A spread is the standard deviation of the remaining differences.
+    The last axis has melanin, blood and, for medians only, oxygenation. A median is the difference between
+    site and cheek in one of the g groups; in small groups it is blended with the mean of larger groups. A
+    slope says how much the difference changes when the cheek of a person differs by 1 from the median of the
+    group. A spread is the standard deviation of the differences that remain, reduced by a constant factor.
     """
     shifts, counts = np.zeros((len(GROUP_OF_CODE), len(SITES), 3)), np.zeros((len(GROUP_OF_CODE), len(SITES)))
     slope, spread = np.zeros((len(SITES), 2)), np.zeros((len(SITES), 2))
@@ -252,8 +265,8 @@ def _calibrate_median_colours(
 class _Population(NamedTuple):
     """Random people for calibrating median colours: ages and sexes (n,), and normal random numbers.
 
-    normals : (n, 4) standard normal random numbers for the variables of the cheek
-    site_normals : (n, 12, 2) standard normal random numbers for the differences of sites
+    normals : (n, 4) standard normal random numbers for the skin variables of the cheek
+    site_normals : (n, 12, 2) standard normal random numbers for the differences of sites from the cheek
     """
 
     ages: Doubles
@@ -334,9 +347,13 @@ def _colour_matching_shift(
 
 
 def cells_csv(archive: Archive, skin_variables: Doubles, measured_table: MeasuredTable) -> str:
-    """Return a CSV table of medians and covariances, with one row for each group and site.
+    """Return a CSV table of measured skin, with one row for each group and site.
 
-    Further rows are for the people of one sex or one age group.
+    It has medians and covariances of CIELAB colours and of skin variables. Further rows are for the people of
+    one sex or one age group.
+
+    skin_variables : (n, 4) skin variables of the measurements, from `invert_spectra`
+    measured_table : statistics from which rows without measurements are filled
     """
     out = StringIO()
     out.write(_CELLS_CSV_HEADER)

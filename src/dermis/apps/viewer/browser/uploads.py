@@ -66,7 +66,7 @@ class Uploads:
     def _accept_upload(
         self, file_name: str, headers: dict[bytes, bytes]
     ) -> tuple[str, Callable[[Path, str], None]]:
-        """Return the suffix of an upload and the function that opens the uploaded file.
+        """Return the suffix of an upload, and a function that opens a file, given its path and original name.
 
         The suffix is one of `HEAD_FILE_SUFFIXES`.
 

@@ -44,7 +44,7 @@ class FieldStyle:
     label : label to show; in "text###key", only the text is shown, and the key identifies the control in
         `Session.positions` and in the undo history
     value_range : range of the slider; None for the range that the model declares for the field
-    unit : displayed unit, in units of the field; for example, 0.01 displays a fraction in percent
+    unit : number by which the value of the field is divided for display; 0.01 displays a fraction in percent
     number_format : printf format of the number
     options : integers to choose from in a drop-down list
     names : text to show for each keyword that the field accepts
@@ -228,6 +228,7 @@ def draw_slider(
 
     current_value : displayed number
     state_with_value : function that returns a state, given the new number
+    value_range : range of the slider
     number_format : printf format of the number
     """
     flags = _LOG_SLIDER_FLAG if value_range.logarithmic else 0
@@ -266,6 +267,7 @@ def draw_combo(
 ) -> None:
     """Draw a drop-down list, and change the state when a name is chosen.
 
+    current_name : name that is selected now
     names : names to choose from; "" draws a separator
     state_with_value : function that returns a state, given the chosen name
     display_names : text to show for each name whose text differs from the name

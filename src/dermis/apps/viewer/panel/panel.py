@@ -212,6 +212,7 @@ class Panel:
         """Draw the panel over the content of the target.
 
         window_size : width and height of the window [logical pixel]
+        pixel_ratio : number of physical pixels per logical pixel, in one direction
         """
         self._frames.make_context_current()
         imgui.get_io().display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)

@@ -325,6 +325,9 @@ def _person_seed(session: Session) -> int:
 class Section(NamedTuple):
     """Collapsible section of the panel.
 
+    title : displayed title
+    draw : function that draws the controls of the section
+    is_open : whether the section is open when the viewer starts
     applies : function that returns whether the section is shown for a session
     """
 

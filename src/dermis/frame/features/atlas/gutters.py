@@ -120,9 +120,12 @@ def _halving_buffers(
 def draw(
     graph: Recorder, atlas: AtlasTextures, gutter_tracing: GutterTracing, rest_head: HeadGeometry
 ) -> None:
-    """Declare the passes that trace from where each gutter texel copies light, at all atlas resolutions.
+    """Declare the passes that find, for each gutter texel, the position from which it copies light.
+
+    The passes cover all resolutions of the atlas.
 
     atlas : result of `with_separate_gutters`; the passes fill its gutter buffers
+    gutter_tracing : constant inputs of the passes
     rest_head : surface of the person at rest
     """
     device, size = graph.device, (("SIZE", atlas.resources["atlas"].size[0]),)

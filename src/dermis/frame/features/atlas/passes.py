@@ -14,7 +14,13 @@ _GUTTER_ENTRIES_PER_ROW = 1024  # ROW of gutter.wgsl
 
 
 def draw_stretch(graph: Recorder, head: HeadGeometry, atlas: AtlasTextures) -> None:
-    """Declare the passes that fill the stretch maps of an atlas at all its resolutions."""
+    """Declare the passes that fill the stretch maps of an atlas, one map for each of its resolutions.
+
+    A stretch map holds, at each texel, the texel densities on the surface along u and v, and the cosine of
+    the angle between these two directions.
+
+    head : triangles and vertices of the head
+    """
     device, bound, constants = graph.device, {**head.resources, **atlas.resources}, atlas.stretch_constants
     bound.setdefault("edge_map", _placeholder_edge_map(device))
     inside = program(device, "atlas/stretch.wgsl", constants)

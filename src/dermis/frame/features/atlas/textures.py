@@ -73,7 +73,8 @@ class AtlasTextures:
     def mips_for_blurs(self, edge_mode: str) -> tuple[AtlasTextures, ...]:
         """Return the atlas at all resolutions that blurs may use, the finest first.
 
-        edge_mode : filter mode at the edges of charts; only "repeated" permits coarser resolutions
+        edge_mode : what blurs read beyond the edge of a chart; only "repeated", which repeats the texel at
+            the edge, permits coarser resolutions
         """
         return (self, *(self.coarser if edge_mode == "repeated" else ()))
 
@@ -122,7 +123,8 @@ def _rms_density(stretch: NDArray[np.float16]) -> float:
 def _median_density(stretch: NDArray[np.float16], inside_mask: NDArray[np.bool_]) -> float:
     """Return the median over texels of min(density along u, density along v) [texels/mm].
 
-    inside_mask : mask of the texels inside charts, which excludes gutters
+    stretch : (n, n, 2) texel densities along u and v [texels/mm]
+    inside_mask : (n, n) mask of the texels inside charts, which excludes gutters
 
     The median is read from a histogram of the bit patterns, which is faster than sorting; non-negative half
     floats have the same order as their bit patterns.

@@ -104,7 +104,10 @@ def _level_variance_members(
 ) -> Iterator[dict[str, float]]:
     """Yield the members of the shader struct `Spread` for each blurred level.
 
-    They are the variance that the blur of the level adds, and the variances that resampling adds.
+    The members are the variance that the blur of the level adds, and the variances that resampling adds.
+
+    variance_mm2 : (k,) increasing variances of the blurred levels [mm^2]
+    halvings : (k + 1,) number of times that the resolution of each level is halved; level 0 is unblurred
     """
     source_mm2 = previous_resampling = previous_mm2 = 0.0
     for variance, (source_halvings, level_halvings) in zip(variance_mm2, pairwise(halvings), strict=True):

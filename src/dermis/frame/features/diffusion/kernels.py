@@ -79,12 +79,11 @@ def _kernel_variance(weight_ratio: Floats, tap_mask: NDArray[np.bool_]) -> Float
 def add_intermediate_levels(
     variance_mm2: NDArray[np.float64], texels_per_mm: float, max_halvings: int
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    """Insert levels into a chain of blurs that make the chain cheaper.
+    """Insert levels into a chain of blurs, so that the chain needs fewer texel reads.
 
     Return the variances of all levels [mm^2], and the indices of the inserted levels. In the chain, each
     level is computed by blurring the previous level; level 0 is the unblurred light. An inserted level is
-    blurred just enough for `choose_halvings` to halve the resolution of the next level, which saves texel
-    reads.
+    blurred just enough for `choose_halvings` to halve the resolution of the next level.
 
     variance_mm2 : (k,) increasing variances of the profile's levels [mm^2]
     texels_per_mm : texel density of the atlas at full resolution

@@ -31,9 +31,9 @@ class Mixture:
     entering : for each profile but the first, the blur pyramid of the light that enters the skin, multiplied
         by the blend weight of the profile
     atlas_weights : for each atlas layout, a texture over the atlas of the same blend weights
-    sums : texture array. Layer 0 is the exitance if all skin has the first profile. Each other profile has
-        two more layers with changes of the exitance, if this profile replaces the first. One is for all
-        entering light, the other for the weighted light in `entering`
+    sums : texture array. Layer 0 is the exitance of skin that has the first profile everywhere. Two layers
+        follow for each other profile: the light diffused by this profile minus the light diffused by the
+        first profile, in one layer for all entering light, in the next for the weighted light of `entering`
     """
 
     uv_weights: Texture
@@ -79,7 +79,7 @@ def sum_layer_count(other_profile_count: int) -> int:
 
 
 def upload_blend_weights(device: Device, blend_weights: NDArray[np.float32]) -> Texture:
-    """Upload the (h, w, 2) blend weights of two profiles as a texture with all its mip levels."""
+    """Upload the (h, w, 2) blend weights of the second and third profile as a texture with all mip levels."""
     height, width = blend_weights.shape[:2]
     mips = mip_chain(np.pad(blend_weights, ((0, 0), (0, 0), (0, 2))))
     texture = make_texture(
@@ -146,7 +146,7 @@ def draw_entering_light(
 
 
 def draw(graph: Recorder, mixture: Mixture, layout_index: int, blended_exitance: Texture) -> None:
-    """Declare the pass that blends the layers of `Mixture.sums` to the exitance of the skin.
+    """Declare the pass that combines the layers of `Mixture.sums` into the exitance of the skin.
 
     The alpha channel of the result stores the blend weights, packed.
 

@@ -18,7 +18,7 @@ from dermis.gpu import Device, Memo
 
 
 class BlurScheme(Protocol):
-    """Interface of techniques, which choose the texture format and the resolutions of their blurs."""
+    """Interface through which a rendering technique chooses the format and the resolutions of its blurs."""
 
     def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
         """Allocate the blur pyramid for a square atlas with a side of `atlas_side` texels."""
@@ -26,17 +26,19 @@ class BlurScheme(Protocol):
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert intermediate levels of weight 0, which make the chain of blurs cheaper.
+        """Insert blurred levels of weight 0, which make the chain of blurs cheaper.
 
-        Return the new split of the profile, and the indices of the inserted levels.
+        Return a copy of `split` with the inserted levels, and their indices.
 
-        edge_mode : filter mode at the edges of charts
+        split : division of a profile into Gaussians with which the atlas is blurred, and a narrow one
+        edge_mode : how blurs treat texels beyond the edge of a chart
         """
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
-        edge_mode : filter mode at the edges of charts
+        split : division of a profile into Gaussians with which the atlas is blurred, and a narrow one
+        edge_mode : how blurs treat texels beyond the edge of a chart
         """
 
 

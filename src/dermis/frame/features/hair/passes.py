@@ -192,8 +192,8 @@ def _pixel_footprint_mm(
 def _max_segments_in_tile(strand_tables: StrandTables, segment_count: int, pixel_mm: float) -> int:
     """Estimate the number of strand segments in a crowded tile of the picture.
 
-    The tile is assumed to contain all segments of brows and lashes, and several times as many segments of
-    other strands as the mean tile.
+    The estimate assumes that this tile contains all segments of brows and lashes. Of scalp hair and beard, it
+    is assumed to contain several times as many segments as the mean tile.
 
     segment_count : number of segments of all strands that are drawn
     pixel_mm : side of the square that a pixel covers at the depth of the strands [mm]

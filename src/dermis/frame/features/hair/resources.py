@@ -78,7 +78,10 @@ _GPU_DETAIL, _SOFTWARE_DETAIL = (
 
 
 class StrandCounts(NamedTuple):
-    """Number of strands of a group, such as scalp hair and beard, and number of knots of each strand."""
+    """Number of strands of a group, and number of knots (end points of segments) of each strand.
+
+    A group is for example scalp hair and beard, or brows and lashes.
+    """
 
     hairs: int
     knots: int

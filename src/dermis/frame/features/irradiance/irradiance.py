@@ -28,7 +28,8 @@ def fine_light_members(
 
     variance_mm2 : (k,) variances of the Gaussians with which the atlas is blurred [mm^2]
     weight : (k, 3) weights of these Gaussians for red, green and blue [-]
-    relit_mm2 : variance of the narrowest Gaussian, which is not blurred but evaluated at each pixel [mm^2]
+    relit_mm2 : variance of the narrowest Gaussian of the profile [mm^2]. It is too narrow for a blur; light
+        is evaluated at each pixel instead
     """
     count = min(len(variance_mm2), MAX_FINE_GAUSSIANS)
     level = np.zeros((MAX_FINE_GAUSSIANS, 4), np.float32)

@@ -62,7 +62,8 @@ def bake_occlusion(
     `result_side` rows of the result are the texels of the atlas, NaN where there is no surface; the other
     rows hold the vertices of the mesh.
 
-    bindings : resources that lighting shaders read; the geometry and the lights among them are not used
+    bindings : resources that lighting shaders read; the geometry and the lights among them are replaced by
+        those of the bake
     surface_texels : texture that maps each atlas texel to a surface point
     result_side : side of the atlas in the result [texels]
     direction_count : number of depth maps
@@ -142,7 +143,8 @@ def cached_occlusion_map(
     """Return a texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
 
     hair : hair of the head, which hides a part of the sky from the skin below it
-    bindings : resources that lighting shaders read; the geometry and the lights among them are not used
+    bindings : resources that lighting shaders read; the geometry and the lights among them are replaced by
+        those of the bake
     surface_texels : texture that maps each atlas texel to a surface point
     """
     side = min(atlas.size, _MAX_OCCLUSION_MAP_SIDE)

@@ -72,6 +72,7 @@ class RotationAnchors:
 def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
     """Return orthographic views from directions all around the head, each just wide enough to show all of it.
 
+    outline : points that bound the head in its current shape
     rotation : (3, 3) rotation of the head, which also rotates the view directions
     """
     axes = _sky_view_axes() @ rotation.T

@@ -137,7 +137,12 @@ def draw_thickness(
 
 
 def make_thickness_map(device: Device, pair_buffers: PairBuffers) -> Texture:
-    """Return a thickness texture over the coarse atlas, filled with the largest measurable thickness [mm]."""
+    """Return a texture of tissue thickness, filled with the largest measurable thickness [mm].
+
+    The texture has one texel for each cell of the atlas.
+
+    pair_buffers : pairs of cells between which light crosses the head
+    """
     surface = pair_buffers.cells.receiver_mask
     texels = np.zeros((*surface.shape, 4), np.float32)
     texels[..., 0], texels[..., 3] = pair_buffers.cells.radius_mm * surface, surface

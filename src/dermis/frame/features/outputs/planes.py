@@ -1,4 +1,4 @@
-"""Buffer for the outputs of a shader stage, one image after another, and the pass that fills the buffer."""
+"""Buffer for the outputs of a shader, one image after another, and the pass that fills the buffer."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PlaneArray = NDArray[Any]  # callers know the dtype by the output's name
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """Buffer for the outputs of a shader stage: one image after another, with interleaved channels.
+    """Buffer for the outputs of a shader: one image after another, with interleaved channels.
 
     stage : name of the shader that fills the buffer
     channels : number of channels of each output, in the order of the buffer
@@ -84,7 +84,7 @@ def make_planes(
     channel_counts: tuple[tuple[str, int], ...],
     picture_size: tuple[int, int],
 ) -> Planes:
-    """Allocate the buffer for the outputs of a stage, for a picture of size (width, height).
+    """Allocate the buffer for the outputs of a shader, for a picture of size (width, height).
 
     stage_name : name of the shader that fills the buffer
     channel_counts : (name, number of channels) of each output
@@ -108,9 +108,10 @@ def make_planes(
 
 
 def stage_program(device: Device, output_planes: Planes, constants: Constants = ()) -> ComputeProgram:
-    """Return the program that computes the requested outputs of a stage.
+    """Return the program that computes the requested outputs of a shader.
 
-    constants : pipeline constants of the surface and the lights, for stages that need them
+    output_planes : buffer of these outputs
+    constants : pipeline constants of the surface and the lights, for shaders that need them
     """
     return program(
         device, f"outputs/{output_planes.stage}.wgsl", (*output_planes.first_channel_constants, *constants)
@@ -118,8 +119,10 @@ def stage_program(device: Device, output_planes: Planes, constants: Constants = 
 
 
 def draw_planes(graph: Recorder, output_planes: Planes, shader: ComputeProgram, bindings: Bindings) -> None:
-    """Declare the pass that computes the outputs of a stage for each pixel.
+    """Declare the pass that computes the outputs of a shader for each pixel.
 
+    output_planes : buffer to fill with the outputs
+    shader : program that computes the outputs
     bindings : resources of the shader, apart from the buffer for the outputs
     """
     graph.compute("outputs", shader, {**bindings, "planes": output_planes.buffer}, output_planes.size)

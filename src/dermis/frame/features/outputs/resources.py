@@ -22,7 +22,7 @@ class Resources:
     """Resources of the outputs of a frame.
 
     names : names of the outputs in the order of the request
-    planes : buffers of the outputs, one for each shader stage
+    planes : buffers of the outputs, one for each shader that computes outputs
     centres : texture with the index of the triangle that covers each pixel centre; None without multisampling
     previous : shape of the head in the previous scene, None if no motion vectors are requested
     light : resources for outputs of light and skin
@@ -45,7 +45,7 @@ class Resources:
         return [*(planes.buffer for planes in self.planes), *landmarks]
 
     def planes_of_output(self, output_name: str) -> Planes:
-        """Return the buffer of the stage that computes an output."""
+        """Return the buffer that holds an output, of the shader that computes this output."""
         return next(planes for planes in self.planes if output_name in planes.channels)
 
 

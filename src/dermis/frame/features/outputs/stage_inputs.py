@@ -1,4 +1,4 @@
-"""Inputs of the shader stages that compute outputs."""
+"""Inputs of the shaders that compute outputs."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class PictureDiffusion:
 
 @dataclass(frozen=True, eq=False)
 class StageInputs:
-    """Inputs of the shader stages that compute outputs.
+    """Inputs of the shaders that compute outputs.
 
     lighting : resources of the lighting for the first layout
     view : uniform record of the struct Shade

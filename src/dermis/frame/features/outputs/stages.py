@@ -1,4 +1,4 @@
-"""Shader stages that compute outputs, and the passes that they declare; each is named like its shader."""
+"""Stages that compute outputs: each declares the passes of a shader, and has the name of this shader."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def _needs_hair_labels(resources: Resources | None, inputs: StageInputs) -> bool
 
 
 def _draw_centre_triangles(graph: Graph, inputs: StageInputs) -> None:
-    """Declare the passes that find the triangle at each pixel centre, unless that is the only sample."""
+    """Declare passes that find the triangle at each pixel centre, unless the centre is the only sample."""
     if inputs.centres is not inputs.visibility:
         draw_layers(graph, "outputs", inputs.centres, Views(inputs.camera.clips, PIXEL_CENTRE), inputs.head)
 

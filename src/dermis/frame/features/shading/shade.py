@@ -40,8 +40,10 @@ def draw(
     lighting_bindings : resources of the lighting
     shade_record : uniform record of the struct Shade
     constants : pipeline constants of the lights, the surface and the technique
+    visibility_layers : layers with the index of the triangle that is visible at each sample
     scattered_light : texture of scattered light over the atlas, or tables of pre-integrated skin
     radiance_image : texture for the radiance and, as alpha, the coverage by the head
+    picture_size : (width, height) [pixels]
     subsurface_layers : texture for the subsurface light (layer 0), and for the fraction of this light that
         leaves the skin towards the camera (layer 1); None to add the subsurface light to the image instead
     """

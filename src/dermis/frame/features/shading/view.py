@@ -85,6 +85,9 @@ def view_record(
 ) -> UniformRecord:
     """Return the uniform record of the struct Shade; `with_camera` adds the camera and the eye poses.
 
+    profile_split : division of the diffusion profile into Gaussians with which the atlas is blurred, and a
+        narrower Gaussian that is evaluated at each pixel
+
     Raises DermisError for a head with too many materials.
     """
     jitter = np.zeros((64, 4), np.float32)

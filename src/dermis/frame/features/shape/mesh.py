@@ -60,7 +60,7 @@ def upload_geometry(
     """Upload the triangles of a head with their atlas coordinates, to be drawn with the vertices of a shape.
 
     part_maps : maps of the parts that are not skin, among them an opacity map that cuts holes into parts;
-        None to leave out the triangles with such holes
+        None to leave out all triangles into which holes are cut
     """
     table, cut_out = _triangle_table(mesh, atlas), mesh.cut_out_mask
     if part_maps is None or not cut_out.any():

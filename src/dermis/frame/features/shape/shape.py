@@ -216,8 +216,9 @@ def _stencil_tables(stencils: Stencils) -> dict[str, NDArray[np.generic]]:
 def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     """Return the tables that shape_vertices.wgsl reads, by name: vertices, triangle corners and spans.
 
-    Vertices with different uv can share a point. Corners are ordered by point and then by vertex. The spans
-    give, for each vertex, the range of the corners at its point and the range of its own corners.
+    Vertices with different uv can share a point. Triangle corners are ordered by point and then by vertex, so
+    that the corners at a point, and also the corners of a vertex, are contiguous. For each vertex, the spans
+    store these two ranges of corners.
     """
     count, corner = len(mesh.positions), mesh.triangles.ravel().astype(np.int64)
     table = np.zeros(count, _VERTEX_DTYPE)
@@ -284,7 +285,7 @@ class MotionBytes(NamedTuple):
 
     @property
     def at_rest(self) -> MotionBytes:
-        """Return the rest pose of the head: the control points without morph weights and bone matrices."""
+        """Return the control points of this pose at rest, with neither morph weights nor bone matrices."""
         return MotionBytes(self.positions)
 
 
@@ -301,7 +302,7 @@ def draw(graph: Recorder, shape: Shape, motion: MotionBytes) -> None:
 
 
 def make_rest_shape(device: Device, shape_tables: ShapeTables) -> Shape:
-    """Create the buffers of a person's shape at rest, without morph targets and bones."""
+    """Create the buffers of a person's shape at rest, with neither morph targets nor bones."""
     return make_shape(device, shape_tables, is_animated=False)
 
 

@@ -85,7 +85,9 @@ def _paint_maps(
 ) -> tuple[MutableBindings, ExpressionMaps | None]:
     """Paint the maps that the head does not have as files; also return the maps that expressions change.
 
-    paint_options : side [texels], and whether expressions change the maps
+    maps : look of the skin to paint, and maps from files that replace painted maps
+    use_colour : whether to include the colour map
+    paint_options : side of the painted maps [texels], and whether expressions change them
     """
     surface, (side, animated) = _painted_surface(head), paint_options
     if device.adapter.kind == "CPU":
@@ -148,7 +150,10 @@ def _factor_channel(factor_map: NDArray[np.float32] | None) -> NDArray[np.float3
 
 
 def _divided_by_surface_mean(factor_map: NDArray[np.float32] | None, mesh: Mesh) -> NDArray[np.float32]:
-    """Return a map divided by its mean over the surface, as a factor of the skin's specular strength [-]."""
+    """Return a map divided by its mean over the surface, as a factor of the skin's specular strength [-].
+
+    factor_map : (h, w) map; None gives a 1 x 1 map of the factor 1
+    """
     if factor_map is None:
         return _factor_channel(None)
     texel, triangle = rasterise(mesh, _SURFACE_MEAN_GRID_SIDE, np.arange(len(mesh.triangles)))

@@ -76,6 +76,8 @@ def skin_record(
 
     Members with the name of a field or property of `skin` are copied from it; all other members are derived.
 
+    maps : maps of the head
+    profile : diffusion profile of the skin
     light_count : number of lights; each part of a divided light counts as one
     """
     members = struct_dtype(shading_program.source.text, "Skin").names or ()

@@ -109,7 +109,7 @@ def make_translucency(
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     weight : (k, 3) weights of the blurred levels [-]
     thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
-        weight a pair by the Gaussians at the straight distance between its cells
+        compute the weight of a pair from the Gaussians, at the straight-line distance between its cells
     shares_pairs : whether skins with similar profiles use the same pairs; true for skins that may change
         between frames
     layout_key : name of the atlas layout in the cache
@@ -173,6 +173,9 @@ def find_pairs(device: Device, surface_bindings: Bindings, atlas: Atlas, cells: 
     """Find the pairs of cells between which light passes through thin tissue.
 
     If a buffer cannot hold all pairs, coarser cells are used.
+
+    surface_bindings : resources of geometry.wgsl and of the atlas, for the shape to search in
+    cells : division of the atlas into cells
     """
     table, times = search_pairs(device, surface_bindings, cells), count(1)
     while table is None:
@@ -212,7 +215,7 @@ def _receiver_ranges(cells: Cells, pair_table: PairTable) -> NDArray[np.uint32]:
 
 
 def _black_light_texture(device: Device, surface_mask: NDArray[np.bool_]) -> Texture:
-    """Return a black texture over the coarse atlas; its alpha is 1 where `surface_mask` is set."""
+    """Return a black texture with one texel per cell of the atlas; alpha is 1 where `surface_mask` is set."""
     light = np.zeros((*surface_mask.shape, 4), np.float32)
     light[..., 3] = surface_mask
     texture = make_texture(device, surface_mask.shape, "rgba32float")
@@ -229,10 +232,12 @@ def with_profile_weights(
 ) -> Translucency:
     """Return a copy of the translucency resources with the weights of a diffusion profile.
 
+    Each pair of cells, one where light enters and one where it leaves, has one weight.
+
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     weight : (k, 3) weights of the blurred levels [-]
     thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
-        weight a pair by the Gaussians at the straight distance between its cells
+        compute the weight of a pair from the Gaussians, at the straight-line distance between its cells
     """
     fraction = weight / np.maximum(weight.sum(axis=0), MIN_WEIGHT_SUM)
     transmitted = weight if thickness_tables is None else thickness_tables.transmitted

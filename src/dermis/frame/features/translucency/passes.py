@@ -139,7 +139,7 @@ def sum_pair_light(
     """Declare the pass that sums, in each receiver cell, the light of its sources times the pair weights.
 
     source_light : buffer of the light of each source
-    light_sums : texture over the coarse atlas for the sums
+    light_sums : texture for the sums, with one texel per cell of the atlas
     constants : pipeline constants that replace the defaults of translucency.wgsl
     stage_name : name of the stage in timings
     """
@@ -206,7 +206,7 @@ def pair_weight_bindings(
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     weight : (k, 3) weights of the blurred levels [-]
     thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
-        weight pairs by the Gaussians
+        compute the weights of pairs from the Gaussians
     transmittance : (THICKNESS_ROWS, k, 3) table to use: `thickness_tables.transmitted` or
         `thickness_tables.lost`
     """
@@ -232,6 +232,8 @@ def _transmittance_table(
 
     The fourth channel holds `ThinParts.directionality` in the first row of each thickness, else 0. Without
     `thickness_tables`, the result is one row of zeros.
+
+    transmittance : (THICKNESS_ROWS, k, 3) transmittance, one of the arrays of `thickness_tables`
     """
     if thickness_tables is None or transmittance is None:
         return np.zeros((1, 4), np.float32)

@@ -12,17 +12,17 @@ from dermis.gpu import Bindings, Buffer, Texture
 class PairBuffers:
     """Pairs of surface cells between which light passes through thin tissue.
 
-    Light enters the source cell and leaves the receiver cell.
+    Light enters the source cell and leaves the receiver cell. Both are squares of texels of the atlas.
 
-    cells : cells of the coarse atlas
+    cells : division of the atlas into cells
     receivers : buffer of the receiver cells, and its number of rows, see translucency_receivers.wgsl
     sources : buffer of the source cells, and its number of rows, see translucency_sources.wgsl
     pairs : buffer of the source, receiver and offset in the atlas of each pair, see translucency_weights.wgsl
     count : number of pairs
     receiver_ranges : buffer of each receiver cell and the range of its pairs, see translucency.wgsl
-    transmitted : texture over the coarse atlas of transmitted light; alpha is 1 where there is surface
-    lost : texture over the coarse atlas of the fraction of blurred light that is lost because the tissue is
-        thin; alpha is 1 where there is surface
+    transmitted : texture of transmitted light, one texel per cell; alpha is 1 where there is surface
+    lost : texture of the fraction of blurred light that is lost because the tissue is thin, one texel per
+        cell; alpha is 1 where there is surface
     """
 
     cells: Cells

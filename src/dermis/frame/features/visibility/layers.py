@@ -189,7 +189,7 @@ def _draw_with_compute_pass(
 
 
 def _pass_modes(layers: ViewLayers, triangle_count: int, clip_matrices: Matrix) -> tuple[int, ...]:
-    """Return the modes in which the passes of visibility_buffer.wgsl run.
+    """Return the mode of each pass of visibility_buffer.wgsl: whether it records depth, triangles or both.
 
     One pass is enough if only depth is stored, or if depth and triangle fit in one word; otherwise the first
     pass records depth and the second records triangles.

@@ -1,9 +1,9 @@
 """Export to a web page with Babylon.js, which diffuses light in screen space.
 
 The formulas follow the shader subSurfaceScattering of babylonjs 9.28.0 and 9.34.0. A diffusion profile is set
-as a colour c. The shader takes samples on a spiral, with radii distributed like a Burley profile of width
-max(c). In each channel, a Burley profile of width 1/c gives the weights of the samples. A bug in the shader
-doubles all widths.
+as a colour c: in each channel, it is a Burley profile of width 1/c. The shader takes samples on a spiral, and
+weights the samples by these profiles. The radii of the samples are distributed like a Burley profile as well,
+but the width of that profile is max(c). A bug in the shader doubles all widths.
 """
 
 from __future__ import annotations
@@ -57,8 +57,9 @@ class Babylon(EnginePage):
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the profile's colour c and metersPerUnit for the fitted Burley widths d [mm].
 
-        With k = sqrt(d_min d_max), the colour is c = k/d and metersPerUnit is 2/k. The shader then renders
-        the width d in each channel, and distributes its samples by a profile with the largest width.
+        With k = sqrt(d_min d_max), the colour is c = k/d and metersPerUnit is 2/k, where d_min and d_max are
+        the smallest and the largest of the three widths. The shader then renders the width d in each channel,
+        and the radii of its samples are distributed like a Burley profile of width d_max.
         """
         d = fit_burley_width(subject.curve)
         k = float(np.sqrt(d.min() * d.max()))
@@ -77,7 +78,11 @@ class Babylon(EnginePage):
         return spiral_profile(profile, metres, subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the script elements of Babylon.js, and the URLs or hashes that script-src allows."""
+        """Return the script elements of Babylon.js, and the values to add to script-src.
+
+        script-src is the part of the page's Content-Security-Policy that lists the permitted scripts. The
+        values are URLs or hashes of scripts.
+        """
         files = self.library_files[version]
         if self.library_folder is None:
             return "\n".join(file.html_element for file in files), [file.url for file in files]
@@ -108,10 +113,11 @@ def spiral_samples(
 ) -> tuple[Floats, Floats, Floats]:
     """Return radii (n,), angles (n,) [rad] and normalised weights (n, 3) of the shader's samples.
 
-    The radii are for metersPerUnit 1 and for a shader without the bug that doubles the widths. Multiplied by
-    `RENDERED_WIDTH_RATIO` / metersPerUnit, they are in mm.
+    To get the rendered radii in mm, multiply the returned radii by `RENDERED_WIDTH_RATIO` / metersPerUnit.
+    The ratio is 2, as a bug in the shader doubles all widths.
 
     profile_colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
+    sample_count : number n of samples
     """
     s = np.asarray(profile_colour, np.float64)
     i = np.arange(sample_count)
@@ -138,7 +144,7 @@ def spiral_profile(profile_colour: ArrayLike, meters_per_unit: float, energy: Ar
     """Return the cumulative profile of the shader's samples, averaged over all rotations of the spiral.
 
     profile_colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
-    meters_per_unit : value of metersPerUnit
+    meters_per_unit : value of the setting metersPerUnit, which is inversely proportional to the radii
     energy : (3,) total energy of the profile [-]
     """
     radii, _, weight = spiral_samples(profile_colour)

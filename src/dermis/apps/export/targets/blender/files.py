@@ -109,6 +109,7 @@ def _write_script_files(
 ) -> list[Path]:
     """Write the script, and beside it the files of the head and the panorama; return all written paths.
 
+    skin_description : data of the skin for the script, such as the inputs of the Principled BSDF
     head_name : name of the file of the head
     """
     files, scene = [script_path], subject.scene

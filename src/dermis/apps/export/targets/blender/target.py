@@ -183,7 +183,7 @@ class RandomWalk(NamedTuple):
 
     @property
     def emerging_fraction(self) -> float:
-        """Return the light that leaves the skin along its normal, as a fraction of the incident light [-]."""
+        """Return the reflectance of the skin, as seen along its normal, that the random walk gives [-]."""
         return float(random_walk_cdf(np.array([_EFFECTIVELY_INFINITE_RADIUS]), self.albedo, self.entry)[0])
 
 
@@ -295,7 +295,7 @@ class Blender(Target):
         return [walk.cdf for walk in self._random_walks(subject, version)]
 
     def _energy_per_base_colour(self, subject: Subject, version: str) -> Floats:
-        """Return the light (3,) that leaves the skin along the normal, divided by the base colour [-]."""
+        """Return the reflectance (3,) of the skin, as seen along its normal, relative to the base colour."""
         if self.variant in ("burley", "eevee"):
             return np.ones(3)
         total = np.array([walk.emerging_fraction for walk in self._random_walks(subject, version)])

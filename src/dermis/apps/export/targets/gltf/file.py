@@ -45,10 +45,12 @@ def encode_glb(subject: Subject, material_extensions: Extensions, draft_notice: 
 def _skin_additions(
     subject: Subject, head: Head, material_extensions: Extensions, draft_notice: str
 ) -> SkinAdditions:
-    """Return the extensions and the base colour of the skin material, and the map that an extension needs.
+    """Return the extensions and base colour of the skin material, and an additional map if needed.
 
-    If the head has a colour map, the draft extension gets a map of multiscatter colours instead of a uniform
-    multiscatter colour.
+    If the head has a colour map and the export uses KHR_materials_scatter, a draft extension, a map of
+    multiscatter colours replaces the uniform multiscatter colour.
+
+    material_extensions, draft_notice : see `encode_glb`
     """
     if not draft_notice:
         colour = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}

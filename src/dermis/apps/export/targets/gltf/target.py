@@ -58,7 +58,7 @@ class Gltf(Target):
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour as the value of each colour, and guesses of the other parameters."""
+        """Return parameters in which each colour is the skin's colour, and the other values are guesses."""
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_transmission_parameters(subject, _NAIVE_TRANSMISSION_FACTOR, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())
@@ -66,7 +66,11 @@ class Gltf(Target):
         return _scatter_parameters(Volume(radius_m, colour, colour))
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile of the volume or, in the variant "diffuse-transmission", a step at radius 0."""
+        """Return the cumulative profile of the light that the skin returns.
+
+        In the variant "diffuse-transmission", all returned light leaves where it enters, so the cumulative
+        profile is 1 at all radii above 0.
+        """
         if self.variant == TRANSMISSION_VARIANT:
             reflected = (1.0 - get_numbers(parameters, _TRANSMISSION_FACTOR_NAME)[0]) * subject.curve.energy
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), reflected)

@@ -25,8 +25,8 @@ def skin_meshes(xml_backend: XmlBackend, head: Head) -> dict[str, bytes]:
     """Return the meshes of the skin's surface as PLY files, in a dictionary by shape name.
 
     Positions are in mm, relative to the head's centre. The shape "skin" has normals and uv, and "caps" closes
-    its openings. The shapes "upper" and "upper_caps" lie slightly outside "skin" and "caps". They are the
-    outer layer of an index-matched surface.
+    its openings. The shapes "upper" and "upper_caps" lie slightly outside "skin" and "caps". They are used
+    only for an index-matched surface, which consists of two layers: an outer and an inner one.
 
     Raises DermisError if the skin does not enclose a volume.
     """

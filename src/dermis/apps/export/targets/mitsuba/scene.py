@@ -137,7 +137,9 @@ def medium_description(medium: IsotropicMedium) -> SceneDict:
 def surface_bsdf(
     surface_model: Boundary, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
 ) -> SceneDict:
-    """Return Mitsuba's description of the skin's surface, or of the outer layer of an index-matched surface.
+    """Return Mitsuba's description of the skin's surface.
+
+    An index-matched surface consists of two layers; the description is that of the outer, reflecting layer.
 
     surface_model : surface model of the skin
     transmittance : texture that scales light on entry and again on exit; None for a factor of 1

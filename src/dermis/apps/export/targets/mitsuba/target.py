@@ -155,7 +155,10 @@ def _half_space_kind(surface_model: Boundary) -> HalfSpaceKind:
 
 
 def _boundary_transmittance(surface_model: Boundary) -> float:
-    """Return the transmittance of an index-matched surface, or 1 for a refracting surface [-]."""
+    """Return the transmittance of the reflecting layer on an index-matched medium; 1 without this layer.
+
+    Only the surface model "matched" has the layer.
+    """
     return 1.0 - MATCHED_REFLECTANCE if surface_model == "matched" else 1.0
 
 

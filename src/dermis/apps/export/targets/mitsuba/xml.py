@@ -33,7 +33,7 @@ _KIND_BY_PLUGIN = {plugin: kind for kind, plugins in _PLUGINS_BY_KIND.items() fo
 
 
 class Transform:
-    """Affine transformation; each method returns a combination of another transformation with this one."""
+    """Affine transformation; each method returns a new transformation followed by this one."""
 
     def __init__(self, matrix: ArrayLike | None = None) -> None:
         self.matrix = np.eye(4) if matrix is None else np.asarray(matrix, np.float64).reshape(4, 4)

@@ -186,7 +186,7 @@ def page_camera_json(scene: Scene, centre_mm: Sequence[float]) -> Json:
 
 
 def page_light_json(light: Light) -> Json:
-    """Return the JSON of a directional light with the direction and irradiance of a light at the head."""
+    """Return as JSON a directional light with the direction and irradiance that a light has at its target."""
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction, np.float64)
     else:

@@ -108,6 +108,8 @@ def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
     """Return the radiant exitance (m,) of light scattered more than once, for a unit extinction coefficient.
 
     radius : (m,) distances from a beam of unit power [mean free paths]
+    albedo : single-scattering albedo [-]
+    eta : index of refraction of the medium
     """
     D = (2.0 - albedo) / 3.0
     decay = np.sqrt((1.0 - albedo) / D)
@@ -127,9 +129,10 @@ def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
 
 
 def _single_scattering(radius: Floats, eta: float) -> Floats:
-    """Return the radiant exitance (m,) of light scattered once, for an albedo and an extinction of 1.
+    """Return the radiant exitance (m,) of light scattered once, for unit albedo and extinction coefficient.
 
     radius : (m,) distances from a beam of unit power [mean free paths]
+    eta : index of refraction of the medium
     """
     critical_depth = radius * np.sqrt(eta**2 - 1.0)  # light scattered at a smaller depth is totally reflected
     depth = critical_depth + _sample_depths()[:, None]
@@ -298,7 +301,8 @@ def _part_material_directives(
     """Return the material directives for a part of the head that is not skin.
 
     image_roles : roles of the texture images that the part uses, such as "colour"
-    material_name : name of the part's material; partly metallic parts mix two materials with this prefix
+    material_name : for a part with a map of metalness, prefix of the names of the two materials that the map
+        mixes
     file_prefix : prefix of the names of the image files
     """
     values: dict[str, ArrayLike | Sequence[str]] = {"rgb reflectance": material.colour}

@@ -65,7 +65,11 @@ class Three(EnginePage):
         return CumulativeProfile.from_function(lambda r: np.ones((len(r), 3)), subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the import map of three.js, and the hash, URLs or scheme that script-src allows."""
+        """Return the import map of three.js, and the values to add to script-src.
+
+        script-src is the part of the page's Content-Security-Policy that lists the permitted scripts. The
+        values are the hash of the import map, and the URLs of the scripts or the scheme "data:".
+        """
         files = self.library_files[version]
         if self.library_folder is None:
             imports = {file.name: file.url for file in files}

@@ -133,7 +133,7 @@ def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
 def add_rig(
     usd_stage: Usd.Stage, rig_root_path: Sdf.Path, mesh_prim: Usd.Prim, deformable_mesh: DeformableMesh
 ) -> None:
-    """Add blend shapes, a skeleton and a rest animation, so that programs can pose the head.
+    """Add blend shapes and a skeleton, which programs can pose, and an animation that holds the rest pose.
 
     rig_root_path : path of the UsdSkelRoot
     mesh_prim : mesh that the blend shapes and the skeleton deform

@@ -42,11 +42,11 @@ class PageContent:
 
     frames_by_kind : JSON of the captured frames for each kind of adapter, "gpu" or "software"
     byte_runs : compressed data of buffers and textures
-    maps : layers of maps, encoded as WebP images
-    pictures : WebP files of these images, in the order in which the page stores them
-    picture_entries : entry for each image, by role, mip level and layer of the map; an entry consists of the
-        index in `pictures`, the index in `byte_runs` of the curves that decode the channels, and the number
-        of colour channels
+    maps : maps of the head, encoded as one WebP image for each layer of a mip level
+    pictures : contents of the WebP files, in the order in which the page stores the files
+    picture_entries : dictionary from the role, mip level and layer of a map to three integers: the index of
+        the WebP file in `pictures`, the index in `byte_runs` of the curves that decode the channels, and the
+        number of colour channels
     poster : (h, w, 3) sRGB picture that the page shows until it renders
     """
 
@@ -172,10 +172,12 @@ def _frame_changes(
     default_frame_inputs: FrameInputs,
     named_frame: NamedFrame,
 ) -> Json:
-    """Return as JSON how a frame's uniform records and buffers change when a slider is moved.
+    """Return as JSON how the uniform and buffer data of a frame change when a slider is moved.
 
     For each slider, the JSON contains the changes at each value for which a frame is captured.
 
+    byte_runs : collector to which the changes are added
+    settings : render settings of the frame
     default_frame_inputs : inputs of the frame with all sliders at their default values
     named_frame : captured frame with all sliders at their default values
     """
@@ -235,7 +237,9 @@ def _colour_maps(
 def _colour_map_entry(
     page_content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, map_role: str
 ) -> tuple[int, int, int] | None:
-    """Return the entry in `PageContent.picture_entries` of a scene's colour map; None for the default map.
+    """Return the entry in `PageContent.picture_entries` of the colour map of a scene.
+
+    The result is None if the colour map is the same as with all sliders at their default values.
 
     scene : scene at a captured value of a slider; None at the default value
     map_role : role under which the map is stored, such as "melanin 0"

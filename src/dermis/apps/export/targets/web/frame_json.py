@@ -21,7 +21,7 @@ class NamedFrame:
     """Captured frame with its name and output picture.
 
     name : technique of the frame
-    captured : passes and uniform records of the frame
+    captured : passes of the frame, and the uniform data that shaders read
     picture : output of the frame on the device
     size : width and height of the picture [pixel]
     merged_hairs : number of hairs drawn as one thicker hair during interaction; 0 at full quality
@@ -100,7 +100,7 @@ def frames_json(
 
 
 def _triangle_column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], int]:
-    """Return a function that adds a buffer of triangle data to `byte_runs` and returns its index there.
+    """Return a function that adds a buffer of triangle data to `byte_runs`, and returns the run's index.
 
     The buffer contains three columns of equal length, one after another. Each column is packed separately.
     """
@@ -137,7 +137,7 @@ def _frame_json(named_frame: NamedFrame, picture_entry: list[int], byte_runs: By
 
 
 def _view_record_index(captured_frame: CapturedFrame, stage_name: str) -> int:
-    """Return the index of the uniform record with a stage's view matrices; -1 if there is no such record.
+    """Return the index in `captured_frame.records` of a stage's view matrices; -1 if there are none.
 
     stage_name : "visibility" or "shadows"
     """
@@ -147,7 +147,7 @@ def _view_record_index(captured_frame: CapturedFrame, stage_name: str) -> int:
 
 
 def _passes_json(captured_frame: CapturedFrame, byte_runs: ByteRunCollector) -> list[Json]:
-    """Return the JSON of a frame's passes, and store the data that the host writes to buffers."""
+    """Return the JSON of a frame's passes; add the data that the host writes to buffers to `byte_runs`."""
     writes = ((one, one.written) for one in captured_frame.passes)
     return [{**vars(one), "written": data and (data[0], byte_runs.add(data[1]))} for one, data in writes]
 
@@ -206,7 +206,10 @@ def resources_read_before_write(frame_capture: FrameCapture, captured_frames: Fr
 def resources_bound_as(
     frame_capture: FrameCapture, captured_frames: Frames, binding_names: tuple[str, ...]
 ) -> dict[int, str]:
-    """Return the resources that shaders bind by one of the given names, as a dictionary by resource index."""
+    """Return a dictionary from resource index to name, for the resources that shaders bind by given names.
+
+    binding_names : names of the bindings in the shaders
+    """
     found: dict[int, str] = {}
     for one in (one for frame in captured_frames for one in frame.passes if one.program is not None):
         bound_names = [name for _, name, _ in frame_capture.programs[one.program or 0]["bindings"]]
@@ -219,9 +222,9 @@ def resources_bound_as(
 
 
 def viewed_resource(frame_capture: FrameCapture, resource_index: int) -> int:
-    """Return the resource index of a view's texture; any other resource index is returned unchanged.
+    """Return the index of the texture to which a texture view belongs.
 
-    resource_index : index of the texture or buffer in the capture
+    resource_index : index of a resource in the capture; returned unchanged if it is not a texture view
     """
     return int(frame_capture.resources[resource_index].get("of", resource_index))
 

@@ -123,7 +123,10 @@ class MapPictures:
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, map_role: str, texels: NDArray[np.float16]) -> bool:
-        """Return whether texels equal the original texels of the first image encoded for a role."""
+        """Return whether texels equal those from which the first image of a map was encoded.
+
+        map_role : role of that map
+        """
         return bool(np.array_equal(self._encoded_texels[map_role], texels))
 
     def replace_textures(

@@ -46,7 +46,7 @@ class ByteRunCollector:
         """Add a run of bytes, and return the run's index in `runs`.
 
         candidate_layouts : layouts to try, of which the best is used: bytes per word, words per row, and
-            order of the differences
+            order of the differences; None for all layouts that suit the number of bytes
         """
         raw = np.frombuffer(raw_bytes, np.uint8)
         return self._add_run(raw, list(candidate_layouts or _possible_layouts(len(raw))), ())

@@ -1,4 +1,4 @@
-"""Sliders of the web page, stored as changes of the uniform records and buffers of a captured frame."""
+"""Sliders of the web page, stored as changes of the uniform and buffer data of a captured frame."""
 
 from __future__ import annotations
 
@@ -68,9 +68,9 @@ def slider_frame_changes(
 ) -> Json:
     """Return as JSON how the frame at one value of a slider differs from the frame at the default value.
 
-    The floats in uniform records, and the data that the host writes to buffers, are compared. Each change has
-    the index of the record or pass, the index of the first word that differs, and the index of the
-    differences in `byte_runs`.
+    Compared are the floats in uniform records (structs that shaders read as uniforms), and the data that
+    passes write from the host to buffers. Each change consists of three indices: of the record or pass, of
+    its first 4-byte word that differs, and of the differences in `byte_runs`.
 
     default_frame, moved_frame : captured frames at the default value and at the other value
 

@@ -66,7 +66,7 @@ class _TensorReader(pickle.Unpickler):
         raise pickle.UnpicklingError(f"{module_name}.{name}")
 
     def persistent_load(self, pid: object) -> object:
-        """Return the description of a tensor's storage."""
+        """Return `pid`, the description of a tensor's storage, unchanged."""
         return pid
 
 

@@ -92,9 +92,9 @@ class ExtendedModel:
             wavelength, 0.0
         )
         half_width = float(self.constants.get("bandwidth_nm", 0.0))
-        vessels = oxygen * _blood_in_bands(1.0, half_width) + (1.0 - oxygen) * _blood_in_bands(
-            0.0, half_width
-        )
+        vessels = oxygen * _blood_absorption_by_band(1.0, half_width) + (
+            1.0 - oxygen
+        ) * _blood_absorption_by_band(0.0, half_width)
         depth = np.maximum(vessels * parameter_column("vessel_mm"), 1e-9)
         vessels = vessels * -np.expm1(-depth) / depth
         m, b = parameter_column("melanin"), parameter_column("blood")
@@ -116,7 +116,7 @@ class ExtendedModel:
         )
 
 
-def _blood_in_bands(oxygen: float, half_width_nm: float) -> Floats:
+def _blood_absorption_by_band(oxygen: float, half_width_nm: float) -> Floats:
     """Return the absorption (31,) of blood, averaged over triangular wavelength bands [1/mm].
 
     oxygen : fraction of haemoglobin that carries oxygen [-]
@@ -132,12 +132,11 @@ def _blood_in_bands(oxygen: float, half_width_nm: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class SharedFit:
-    """Result of a fit of a skin model to spectra: constants shared by all spectra, and unknowns of each.
+    """Result of a fit of a skin model to spectra: shared constants, and unknowns of each spectrum.
 
-    constants : values of the constants by name
+    constants : values of the constants that all spectra share, by name
     fit : unknowns of each spectrum
-    confounded : names of two constants with strongly correlated errors, and the correlation, for each such
-        pair
+    confounded : for each pair of constants with strongly correlated errors, both names and the correlation
     """
 
     constants: dict[str, float]
@@ -154,9 +153,11 @@ def fit_constants(
 ) -> SharedFit:
     """Fit constants shared by all spectra, and unknowns of each spectrum, by least squares.
 
+    spectra : (n, 31) measured reflectance [-]
     unknowns : names of the parameters that are fitted to each spectrum separately
     free_constants : names of the `CONSTANTS` that are fitted to all spectra together
-    fixed_constants : values of constants that are not fitted
+    criterion : what the fit minimises: differences of the spectra ("spectrum") or of their colours ("colour")
+    fixed_constants : values of constants that are not fitted, by name
     """
     separate = [UNKNOWNS[name] for name in unknowns]
     shared = [CONSTANTS[name] for name in free_constants]

@@ -121,10 +121,10 @@ def measured_page() -> None:
 
 
 def _default_skin_errors(archive: Archive) -> JsonObject:
-    """Return errors of fits of two, three and five unknowns, for four skins that set the other parameters.
+    """Return the errors of fits with two, three and five unknowns, for each of four skins.
 
-    The skins are the former default skin, the present one, and two that are the former default with less
-    absorption by bloodless tissue.
+    The parameters that are not fitted are taken from each of four skins in turn: the former default skin, the
+    present one, and two that are the former default with less absorption by bloodless tissue.
     """
     skins = {
         "former": FORMER_SKIN,
@@ -175,9 +175,9 @@ def _default_skin_errors(archive: Archive) -> JsonObject:
 def _smooth_surface_errors(archive: Archive) -> JsonObject:
     """Return percentiles of the distances of measured colours from a smooth surface in colour space.
 
-    The surface is fitted to the colours of other people. A skin model with two unknowns per spectrum also
-    produces colours on a surface, so that its errors are hardly smaller than these distances. For the key
-    "each site", a surface is fitted to each site of the body.
+    The surface near a person's colour is fitted to the colours of other people. The colours that a skin model
+    with two unknowns can produce also form a surface; its errors can therefore hardly be smaller than these
+    distances. For the key "each site", a separate surface is fitted for each site of the body.
     """
     face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
     sites = [_surface_distances(archive.select_rows(archive.site == site)) for site in range(len(SITES))]
@@ -259,7 +259,11 @@ def _illuminant_errors(fits_by_unknown_count: dict[str, SpectralFit]) -> JsonObj
 
 
 def _fold_errors(archive: Archive) -> list[JsonObject]:
-    """Return cross-validated results: for each fold, constants fitted to all other folds, and errors."""
+    """Return cross-validated results: one object with constants and errors for each fold.
+
+    The constants are fitted to the other folds. The errors are those of the fitted and of the default
+    constants, in the fold itself.
+    """
     rows = []
     for fold in range(FOLD_COUNT):
         known = archive.select_rows(archive.fold != fold).sample_rows(_CONSTANTS_SAMPLE_COUNT, fold)
@@ -316,7 +320,12 @@ def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObjec
 
 
 def _jacques_model(parameter_values: ParameterValues) -> Floats:
-    """Return the reflectance (n, 31) of skins with the baseline and scattering of [Jacques1998]."""
+    """Return the reflectance (n, 31) of skins whose tissue scatters and absorbs as in [Jacques1998].
+
+    The formulae are for scattering and for absorption by tissue without blood and melanin.
+
+    parameter_values : parameters of the skins by name
+    """
     bloodless, sigma_s_prime = baseline_absorption(WAVELENGTHS_NM), jacques_scattering(WAVELENGTHS_NM)
 
     def parameter_column(name: str, default_value: float) -> Floats:
@@ -359,9 +368,9 @@ def _additional_constant_errors(archive_sample: Archive) -> list[JsonObject]:
 
 
 def _site_fits(archive: Archive) -> list[JsonObject]:
-    """Return the epidermis thickness and the oxygenation that fit the spectra of each site best.
+    """Return the epidermis thickness and the oxygenation for which the model fits each site's spectra best.
 
-    The values under the key "colour" fit the colours of the spectra best.
+    The key "colour" has the values for which the model fits the colours of these spectra best.
     """
     rows = []
     for site in range(len(SITES)):

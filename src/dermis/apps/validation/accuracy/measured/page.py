@@ -143,8 +143,8 @@ def _confounded_constant_texts(results: JsonObject) -> dict[str, str]:
     """Return texts on strongly correlated constants and on corrected spectra, keyed by placeholder.
 
     The text "confounded" lists pairs of constants with strongly correlated errors. The numbers "wide_factor"
-    and "small_factor" are baselines, fitted to spectra that are corrected for the edge loss of a wide and of
-    a small aperture.
+    and "small_factor" multiply the absorption of bloodless tissue. They are fitted to spectra that are
+    corrected for the light that a wide or a small aperture misses.
     """
     pairs = {}
     for row in results["additions"]:

@@ -49,11 +49,11 @@ def _missed_fraction(slab_result: SlabResult, measured_radius_mm: float, lit_rad
 
 
 def lit_fraction(distance_mm: Floats, measured_radius_mm: float, lit_radius_mm: float) -> Floats:
-    """Return the fraction (n,) of the points at a given distance that lie in the lit disc [-].
+    """Return the probability (n,) that a point at a given distance from a random measured point is lit [-].
 
-    The distance is from a point of the measured disc. The fraction is averaged over all points of that disc.
+    Measured points are uniformly distributed over the measured disc, and the direction is random.
 
-    distance_mm : (n,) distances
+    distance_mm : (n,) distances between the two points
     measured_radius_mm : radius of the measured disc
     lit_radius_mm : radius of the lit disc, which has the same centre
     """

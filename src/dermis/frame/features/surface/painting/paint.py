@@ -88,8 +88,9 @@ class PaintInputs(NamedTuple):
 
     paint : uniform record of the skin's appearance, such as pigments, gloss and age
     tables : tables of procedural noises and dots, facial zones, folds of the skin, and the hairline
-    colours : (3, n, n, 3) colour tables, linear Rec. 709 [-]: of skin with the lowest oxygen saturation, of
-        skin with the highest oxygen saturation, and of lips
+    colours : (3, n, n, 3) colour tables, linear Rec. 709 [-]. Table 0 is for skin with the lowest oxygen
+        saturation, table 1 for skin with the highest, and table 2 for lips. The rows of a table are for
+        evenly spaced square roots of the melanin fraction, the columns for those of the blood fraction
     surface : mesh that is painted
     """
 

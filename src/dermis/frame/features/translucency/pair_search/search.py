@@ -35,7 +35,8 @@ class SearchPasses:
     They are submitted in batches, because the sizes of later passes depend on earlier results.
 
     commands : command list of the passes that are not yet submitted
-    blocks : number of blocks of tiles along a side of the atlas
+    blocks : number of blocks along a side of the atlas; a block is a square of tiles, and a tile is a square
+        of cells
     """
 
     def __init__(self, device: Device, cells: Cells) -> None:
@@ -114,6 +115,8 @@ class TilePairs:
 def find_tile_pairs(passes: SearchPasses, surface_bindings: Bindings, cells: Cells) -> TilePairs:
     """Find the pairs of tiles between which light may pass through thin tissue.
 
+    A tile is a square of cells of the atlas.
+
     surface_bindings : resources of geometry.wgsl
     """
     device, count = passes.device, cells.tiles_per_side**2
@@ -135,7 +138,7 @@ def _find_block_pairs(
 ) -> Buffer:
     """Return a buffer with one bit for each pair of blocks, set if light may pass between them.
 
-    A block is a square of tiles.
+    A tile is a square of cells of the atlas, and a block is a square of tiles.
 
     tile_bounds : buffer to fill with the bounding box and normal cone of each tile
     """
@@ -158,7 +161,7 @@ class CandidateCells:
     """Cells between which light may pass through thin tissue, ordered by the tiles that contain them.
 
     receiver : (r,) cells that receive light, as indices into `Cells.receivers`
-    source : (s,) cells that emit light, as indices into the coarse atlas
+    source : (s,) indices of the cells that emit light
     first : (r,) for each receiver, index in `TilePairs.partners` where the partners of its tile start
     end : (r,) for each receiver, index where these partners end
     sources_first : (t,) for each of the t tiles of the atlas, index in `source` where its sources start
@@ -186,10 +189,12 @@ def candidate_cells(cells: Cells, tile_pairs: TilePairs) -> CandidateCells:
 
 
 def _expand_ranges(range_starts: Index, chosen_ranges: Index) -> tuple[Index, Index]:
-    """Return all integers in the chosen ranges, and the index of each integer's range in `chosen_ranges`.
+    """Return all integers in the chosen ranges and, for each integer, an index into `chosen_ranges`.
+
+    The index tells which of the chosen ranges contains the integer.
 
     range_starts : start of each range; a range ends where the next range starts
-    chosen_ranges : indices of the chosen ranges
+    chosen_ranges : indices of the chosen ranges in `range_starts`
     """
     count = range_starts[chosen_ranges + 1] - range_starts[chosen_ranges]
     position = np.repeat(np.arange(len(chosen_ranges)), count)
@@ -243,7 +248,9 @@ def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple
 
 
 def list_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, bindings: Bindings) -> Buffer:
-    """Add the pass that lists the gutter texels with copies of source cells; return its result buffer.
+    """Add the pass that lists, for each source cell, the positions in gutters that copy light near this cell.
+
+    Return the buffer of these positions.
 
     source_cells : (n,) indices of cells that emit light
     bindings : further resources of gutter_copies.wgsl
@@ -278,7 +285,7 @@ def upload_receivers(device: Device, cells: Cells, receiver_index: Index) -> tup
 def upload_sources(device: Device, cells: Cells, source_cells: Index) -> tuple[Buffer, int]:
     """Upload the packed (x, y) of cells that emit light; return the buffer and its number of rows.
 
-    source_cells : (n,) indices of these cells in the coarse atlas
+    source_cells : (n,) indices of these cells; the cells of the atlas are numbered row by row
     """
     return upload_words(device, source_cells % cells.side | (source_cells // cells.side << 16)), len(
         source_cells
