@@ -29,7 +29,9 @@ def draw(studio):
             weights = {"african": 0, "asian": 0, "caucasian": 0} | {ancestry: 1}
             head = dermis.Human(**weights, sex=float(style in MEN), age=30, hair=hair).head()
             camera = (dermis.side if style in FROM_THE_SIDE else dermis.three_quarter)(head)
-            panels[style] = studio.render(dermis.Scene(head, camera=camera))
+            panels[style] = studio.render(
+                dermis.Scene(head, camera=camera), background="gradient", exposure="auto"
+            )
     return panels
 
 
