@@ -52,7 +52,7 @@ def diffuse_albedo(albedo: float) -> float:
 
 
 def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: float) -> Floats:
-    """Return the ratio of the radiance that a half-space reflects to the irradiance of parallel light [1/sr].
+    """Return the reflected radiance of a half-space, divided by its irradiance by parallel light [1/sr].
 
     cosine_in : cosine of the angle between light and normal
     cosine_out : cosine of the angle between view and normal

@@ -141,9 +141,9 @@ def _edges_with_lengths(subdivision: _Subdivision) -> tuple[Index, Index, Floats
 def _add_longest_sides(
     side_edges: Index, edge_lengths: Floats, halved_edges: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return the mask of edges to halve, extended by the longest edge of each triangle with such an edge.
+    """Return a larger mask: if any edge of a triangle is halved, the triangle's longest edge is halved too.
 
-    Halving the longest edges avoids slivers.
+    This avoids slivers.
 
     side_edges : (m, 3) edge index of each side of the triangles
     edge_lengths : (e,) lengths of the edges [mm]
