@@ -421,7 +421,10 @@ def _cell_row(
 
 
 def _pooled_cell_texts(measured_table: MeasuredTable, group: str, site_index: int) -> list[str]:
-    """Return texts with the predicted median colour and pigments of a site without measurements."""
+    """Return CSV cells with the predicted median colour and skin variables of a site without measurements.
+
+    group : group of people
+    site_index : index of the site in `SITES`"""
     y = measured_table.cheek_variables({group: 1.0}, 0.5, 30.0, np.zeros((1, 4)))
     y[:, :3] += measured_table.site_differences({group: 1.0}, y, np.zeros((1, len(SITES), 2)))[:, site_index]
     colour, (melanin, blood, oxygen, thickness) = model_lab(y)[0], y[0]

@@ -181,7 +181,7 @@ def _constants_text(constants: dict[str, float]) -> str:
 
 
 def _residual_table(errors_by_model: JsonObject) -> str:
-    """Return the table of mean residuals, measured minus model, by wavelength."""
+    """Return a Markdown table of the mean difference of reflectance, measured minus fitted, by wavelength."""
     shown = range(0, 31, 2)
     heads = ("mean residual, 1e-4", *(f"{400 + 10 * k}" for k in shown))
     rows = [
