@@ -247,10 +247,11 @@ def _parse_render_table(picture_size: object, render_table: object) -> Settings:
 
 
 def _build_model(model_class: type[P], table_name: str, toml_table: object) -> P:
-    """Return the model of a spec table, including its subtables.
+    """Convert a table of a spec, with its subtables, to an instance of a pydantic class.
 
     model_class : pydantic class of the table
     table_name : name of the table in error messages
+    toml_table : parsed TOML of the table, or an instance of the class, which is returned unchanged
     """
     if isinstance(toml_table, model_class):
         return toml_table
@@ -297,8 +298,9 @@ def _toml_lines(table_name: str, table_values: Mapping[str, object]) -> list[str
 
 
 def _expand_patterns(spec_value: object, folder: Path, dotted_name: str) -> object:
-    """Return a spec value in which a `FileChoice` of sorted files replaces each {files = PATTERN}.
+    """Return a spec value with each {files = PATTERN} replaced by a `FileChoice` of the matching files.
 
+    folder : folder of the spec, to which patterns are relative
     dotted_name : dotted name of the value in error messages
 
     Raises DermisError for a pattern that matches no file.
