@@ -201,7 +201,7 @@ class AnimationOutput:
     def frames_to_render(
         self, frame_numbers: range, frame_size: tuple[int, int], frame_digest: str
     ) -> Sequence[int]:
-        """Return the numbers of the frames to render: all frames without a complete image of an earlier run.
+        """Return the numbers of the frames to render: those without a complete image from an earlier run.
 
         frame_digest : hash of everything that determines the frames; images with another hash are rendered
             again

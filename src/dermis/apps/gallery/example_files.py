@@ -39,7 +39,7 @@ class _Surface(NamedTuple):
 
     points_mm : (v, 3) positions of the vertices [mm]
     normals : (v, 3) unit normals of the vertices
-    uv : (v, 2) uv of the vertices
+    uv : (v, 2) texture coordinates of the vertices
     triangles : (f, 3) vertex indices
     """
 

@@ -188,7 +188,7 @@ def eye_material(material_name: str) -> OpenPbrMaterial:
 def hair_material(absorption_per_mm: Floats, radius_mm: float) -> OpenPbrMaterial:
     """Return the OpenPBR material of hairs: an opaque surface with the mean colour of the hairs.
 
-    absorption_per_mm : (n, 3) absorption coefficient inside the hairs [1/mm]
+    absorption_per_mm : (n, 3) absorption coefficient inside each of n hairs [1/mm]
     radius_mm : radius of the hairs [mm]
 
     Source: [Chiang2016] eq. 9 for the colour, at a roughness of 0.3.
@@ -201,7 +201,8 @@ def hair_material(absorption_per_mm: Floats, radius_mm: float) -> OpenPbrMateria
 def open_pbr_maps(head_maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
     """Return the maps of the skin by role, converted to the values that OpenPBR expects.
 
-    slopes : (n, n, 2) slopes of the relief, used if `head_maps` has no normals
+    slopes : (n, n, 2) slopes of the height map, from which normals are computed if `head_maps` has no
+        normals
     """
     arrays: dict[str, Floats] = {}
     if head_maps.colour is not None and skin.albedo == "map":

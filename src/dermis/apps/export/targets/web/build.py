@@ -94,7 +94,9 @@ class PageRequest:
     interactive: dict[str, tuple[int, int, int]] = field(default_factory=dict)
 
     def frame_settings(self, adapter_kind: str) -> Iterator[tuple[Settings, int]]:
-        """Yield the settings of each frame, and the number of hairs drawn as one hair (0 at full quality).
+        """Yield the settings of each frame, and how many hairs are merged into one.
+
+        At full quality, no hairs are merged, and the number is 0.
 
         adapter_kind : kind of adapter, "gpu" or "software"
         """
@@ -119,7 +121,7 @@ class PageRequest:
 def build_page_content(
     page_request: PageRequest, on_frames_captured: OnFramesCaptured = lambda *_: None
 ) -> PageContent:
-    """Capture the frames of all kinds of adapter, and return the data that the page embeds.
+    """Capture the frames for every requested kind of adapter, and return the data that the page embeds.
 
     on_frames_captured : function called for each kind of adapter after its frames were captured, with the
         renderer (which then uses the maps of the page), the scene and the settings
