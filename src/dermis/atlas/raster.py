@@ -190,11 +190,12 @@ def _triangles_of_overlapped_charts(
 def _assign_texels(
     mesh: Mesh, mapped_triangles: Mask, texel: Index, triangle: Index, atlas_side: int
 ) -> tuple[Ints, Mask]:
-    """Return the triangle that owns each texel, and the mask (f,) of triangles that own too few texels.
+    """Assign each texel to one triangle; return its index, and the mask (f,) of triangles with few texels.
 
-    Where a chart is folded onto itself in uv, its unmirrored triangles own the texels.
+    Where a chart is folded onto itself in uv, texels are assigned to its unmirrored triangles. The mask
+    selects triangles that get less than half of the texels that they cover.
 
-    mapped_triangles : (f,) mask of triangles that may own texels
+    mapped_triangles : (f,) mask of triangles to which texels may be assigned
     texel, triangle : (k,) flat texel index and triangle index of each covered texel centre
     """
     is_mapped = mapped_triangles[triangle]
@@ -220,10 +221,12 @@ def _dilate_texel_triangles(texel_triangle: Ints) -> Ints:
 
 
 def _interpolable_triangles(mesh: Mesh, atlas_side: int, texel_triangle: Ints) -> Mask:
-    """Return the mask (f,) of triangles for which bilinear interpolation finds only texels with an owner.
+    """Return the mask (f,) of triangles at whose corners bilinear interpolation reads no empty texel.
 
     Bilinear interpolation at a corner reads the four texels around the corner. At thin triangles, some of
-    these texels may be empty.
+    these texels may be empty, that is, assigned to no triangle.
+
+    texel_triangle : (n, n) index of the triangle to which each texel is assigned, -1 for empty texels
     """
     low = np.floor(texel_corners(mesh, atlas_side, np.arange(len(mesh.triangles)))).astype(np.int64)
     found = np.ones(len(low), dtype=bool)

@@ -190,8 +190,8 @@ def _barycentric_coordinates(corners: Doubles, points: Doubles) -> Doubles:
 def _material_factor(material: FileMaterial, role: Role, has_vertex_colours: bool) -> Floats:
     """Return the factor (k,) by which a material multiplies its picture for a map role, such as "colour".
 
-    has_vertex_colours : whether the mesh has vertex colours, which the factor must leave unchanged if the
-        material has no colour of its own
+    has_vertex_colours : whether the mesh has vertex colours; if so, a material without a colour has the
+        factor 1 instead of the default colour, so that the vertex colours are not changed
     """
     has_colour = has_vertex_colours or "colour" in material.textures
     colour = material.colour or ((1.0, 1.0, 1.0) if has_colour else DEFAULT_COLOUR)
@@ -230,7 +230,10 @@ def _scale_to_unit_range(image: Numbers) -> Floats:
 
 
 def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]) -> Floats:
-    """Return samples (h, w, k) of a picture with mip filtering, on a grid of positions u (w,) and v (h,)."""
+    """Return samples (h, w, k) of a picture with mip filtering, on a grid of positions u (w,) and v (h,).
+
+    wrap : wrap modes along u and v, such as "repeat"
+    """
     step = (
         max(abs(float(u[-1] - u[0])) / max(len(u) - 1, 1), 1e-9),
         max(abs(float(v[-1] - v[0])) / max(len(v) - 1, 1), 1e-9),
@@ -255,7 +258,10 @@ def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]
 
 
 def sample_points(picture: Floats, uv_positions: Floats, wrap: tuple[Wrap, Wrap]) -> Floats:
-    """Return bilinear samples (..., k) of a picture at positions (..., 2) in [0, 1]."""
+    """Return bilinear samples (..., k) of a picture at positions (..., 2) in [0, 1].
+
+    wrap : wrap modes along u and v, such as "repeat"
+    """
     left, right, across = _neighbour_texels(
         uv_positions[..., 0].astype(np.float64), picture.shape[1], wrap[0]
     )

@@ -30,7 +30,8 @@ class CommandList(Recorder):
     Stages that are not timed individually share compute passes. On software adapters, each timed stage is
     submitted separately, and the host waits until it has finished.
 
-    timed : see `Timing`; on software adapters, "whole" also times each stage
+    timed : True to time each stage, "whole" to time only the frame, False for no timing; on software
+        adapters, "whole" has the effect of True
     uniforms : uniform memory for the records of the passes; None to allocate new memory
     submitted : number of the last submission, for `Device.wait`
     """

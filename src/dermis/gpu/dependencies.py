@@ -86,7 +86,10 @@ def new_access_id() -> int:
 
 
 def mark_scratch(device: Device, resource: R) -> R:
-    """Mark a texture or buffer as scratch and return it; no pass runs only to update a scratch resource."""
+    """Mark a texture or buffer as scratch, and return it.
+
+    The content of a scratch resource is not needed after the frame, so no pass runs only to update it.
+    """
     resource_state(device, resource).scratch = True
     return resource
 

@@ -115,7 +115,8 @@ class Program:
     def used_uniform_bytes(self, resources: Bindings, uniforms: Uniforms) -> tuple[Hashable, ...]:
         """Return the bytes of uniform records that the shader reads, to detect passes with changed inputs.
 
-        Large records are returned completely, because Python caches the hash of the bytes for other passes.
+        For large records, all bytes are returned: they are the same object for all passes that use the
+        record, so Python computes their hash only once.
         """
         found: list[Hashable] = []
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
@@ -275,7 +276,7 @@ def shader_source(path: Path, folders: Sequence[Folder]) -> ShaderSource:
 
 
 def _binding_getter(resource_names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:
-    """Return a function that selects the resources called `resource_names`, in this order, from bindings."""
+    """Return a function that takes bindings and returns the resources with the given names, in order."""
     if len(resource_names) > 1:
         return itemgetter(*resource_names)
     return lambda resources: [

@@ -112,7 +112,10 @@ class Recorder(ABC):
         raise self._unsupported_error(stage)
 
     def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Add the passes that `record_passes(recorder, *args)` adds; they must depend only on `args`."""
+        """Add the passes that `record_passes(recorder, *args)` adds, and return the result of the call.
+
+        Passes and result must depend only on `args`.
+        """
         return record_passes(self, *args)
 
     def _unsupported_error(self, stage: str) -> NotImplementedError:

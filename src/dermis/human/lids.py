@@ -239,7 +239,7 @@ def _lid_side(rings: Index, points_mm: Points, body_points: Index, side_name: st
 
 
 def _sliding_points(rings: Index, candidate_points: Index, side_name: str) -> Index:
-    """Return the skin points (c,) outside the lid rings that a blink slides over the eye.
+    """Return the indices (c,) of the skin points outside the lid rings that slide over the eye in a blink.
 
     rings : (rows, 4) lid points from lid_rings.csv
     candidate_points : (n,) points from which the result is selected

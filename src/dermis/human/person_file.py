@@ -111,7 +111,9 @@ def write_person_glb(
 
 
 def relief_slopes(head: Head) -> NDArray[np.float32] | None:
-    """Return the slopes (n, n, 2) of a head's height map to the right and upwards, for normal maps [-].
+    """Return the slopes (n, n, 2) of a head's height map, from which a normal map is computed [-].
+
+    The channels are the slopes to the right and upwards.
 
     The result is None for heads that have a normal map already, or that have no square height map.
     """

@@ -84,7 +84,7 @@ def compute_coverage(
 def _add_gutters(coverage: Coverage, triangle_piece: Index, texels: GutterTexels) -> None:
     """Add rims and gutters, the texels around chart pieces, to a coverage that contains only the pieces.
 
-    The rim of a piece is the texels outside it that bilinear interpolation within the piece reads.
+    The rim of a piece consists of the texels outside it that are read by bilinear interpolation within it.
 
     triangle_piece : (f,) piece of each triangle, -1 if there is none
     """
@@ -118,7 +118,8 @@ def hidden_triangles(surface: FlatSurface, triangle_piece: Index, packing: Packi
 def _drawing_order(surface: FlatSurface, triangle_piece: Index, member_triangles: Index) -> Index:
     """Return triangle indices sorted so that triangles mirrored within their piece come first.
 
-    Other triangles are drawn later and therefore own the texels that they share with mirrored triangles.
+    Triangles that are drawn later replace earlier ones, so mirrored triangles get only the texels that no
+    unmirrored triangle covers.
 
     triangle_piece : (f,) piece of each triangle, -1 if there is none
     member_triangles : (t,) indices of the triangles to sort
@@ -207,10 +208,10 @@ def _pairs_with_gap(
     second_texels: Index,
     axis: int,
 ) -> Mask:
-    """Return the mask of pairs of adjacent texels whose surface points are not adjacent on the surface.
+    """Return the mask (n,) of pairs of adjacent texels whose surface points are not adjacent.
 
-    There is a gap if `anchors_diverge` is true for a pair, and its surface points are more than
-    `gap_limit_mm` apart.
+    These are the pairs for which `anchors_diverge` is true, and whose surface points are farther apart than
+    `gap_limit_mm`.
 
     first_texels, second_texels : (n,) flat indices of the texels
     axis : 0 for pairs along x, 1 along y

@@ -1,7 +1,7 @@
 """Borders of packed chart pieces, and gutter texels around them that continue the surface.
 
 A piece is a chart, or a part of a chart that is mirrored or was cut off. The rim of a piece consists of the
-texels outside it that bilinear interpolation within the piece reads.
+texels outside it that are read by bilinear interpolation within it.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def needed_texels(
 ) -> Mask:
     """Return the mask (h, w) of texels that chart pieces, their rims and their gutters may need.
 
-    The rim of a piece is the texels outside it that bilinear interpolation within the piece reads.
+    The rim of a piece consists of the texels outside it that are read by bilinear interpolation within it.
 
     member_triangles : (t,) indices of the triangles of the pieces
     grid_shape : height and width of the grid of texels
@@ -114,7 +114,7 @@ class GutterTexels(NamedTuple):
     """Gutter and rim texels (n,) outside the triangles of a piece, with the surface points that they show.
 
     y, x : row and column
-    rim : mask of texels that bilinear interpolation within the piece reads
+    rim : mask of texels that are read by bilinear interpolation within the piece
     distance_mm : distance of the texel from the piece, measured on the surface [mm]
     anchor_triangle : index of the triangle with the anchor, the border point nearest to the texel
     anchor_weights : barycentric weights of this triangle's second and third corner at the anchor

@@ -92,7 +92,10 @@ def _cached_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
 
 
 def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
-    """Return the guides and roots of one style, as arrays by field name of `Guides` and `StrandRoots`."""
+    """Return the guides and roots of one style, as a dictionary from field names to arrays.
+
+    The names are those of the fields of `Guides` and of `StrandRoots`.
+    """
     mesh, rng = root_finder.mesh, np.random.default_rng(_SEED)
     beard = style is BEARD
     where = density.beard_density() if beard else density.scalp_density(0.0)
