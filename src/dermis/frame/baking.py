@@ -138,7 +138,7 @@ def _available_outputs(
     output_names: tuple[str, ...],
     absence_reasons: dict[str, str],
 ) -> tuple[str, ...]:
-    """Return `output_names` if the renderer can compute these outputs for the scene, else ().
+    """Return `output_names`, or () if the renderer cannot compute these outputs for the scene.
 
     absence_reasons : dictionary from the name of a missing output to the reason; if the result is (), the
         outputs are added to this dictionary

@@ -60,8 +60,8 @@ def capture_mips(frame_capture: FrameCapture, texture: Texture) -> CapturedFrame
 def update_map(renderer: Renderer, texture: Texture, mip_levels: list[NDArray[np.float16]]) -> None:
     """Replace the texels of a map; if only the finest mip level is given, the other levels are computed.
 
-    mip_levels : for each mip level, the finest first, its (l, h, w, c) texels, where l is the number of array
-        layers
+    mip_levels : (l, h, w, c) texels of each mip level, starting with the finest level; l is the number of
+        array layers of the texture
     """
     for mip, layers in enumerate(mip_levels):
         for layer, texels in enumerate(layers):

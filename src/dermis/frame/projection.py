@@ -72,7 +72,10 @@ class ShadowView(NamedTuple):
 
 
 def shadow_map_views(views: Sequence[ShadowView | None]) -> Views:
-    """Return the projections of all shadow maps, sampled at pixel centres; None in `views` is skipped."""
+    """Return the projections of all shadow maps, sampled at pixel centres.
+
+    views : view of the head for each shadow map; None for a light without shadows, which is skipped
+    """
     return Views(np.array([view.clip for view in views if view]).reshape(-1, 4, 4), PIXEL_CENTRE)
 
 

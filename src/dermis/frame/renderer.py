@@ -49,7 +49,7 @@ def pipeline_frames(
     current_device: Callable[[], Device],
     frames: Iterable[tuple[SubmitFrame, ReceiveResult[T]]],
 ) -> Iterator[T]:
-    """Yield the results of frames in order; while one is read back, later frames are already submitted.
+    """Yield the results of frames in order; while a frame is read back, later frames are already submitted.
 
     A frame whose device is lost is submitted again.
 
@@ -152,9 +152,10 @@ class Renderer:
     ) -> tuple[CommandList, T | None]:
         """Declare the passes of a frame, run those whose inputs have changed, and start a readback.
 
-        All passes are in one submission.
+        All passes are in one submission. Returns the submitted commands, and the result of `read_back`.
 
-        force : whether to run all passes, changed or not
+        timed : whether stages or the whole frame are timed, see `draw`
+        force : whether to run all passes, instead of only the passes whose inputs have changed
         read_back : function that starts the readback of the picture, None for no readback
         """
         if force:
@@ -222,8 +223,8 @@ class Renderer:
             one pass. False returns as soon as the frame is submitted, and waits only if three frames are in
             flight.
         view : str
-            Name of the scene, for callers that draw several scenes in turn: each name caches its own light
-            and shadows.
+            Name under which light and shadows of the scene are cached, for callers that draw several scenes
+            in turn.
         outputs : iterable of str
             Names of outputs for `RenderedFrame.output`.
         previous : Scene, optional

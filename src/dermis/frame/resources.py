@@ -37,7 +37,7 @@ class Resources:
 
     expression_maps : painted maps that expressions change, None if no map changes
     layouts : atlas layouts in which light is diffused; the picture is shaded from the first layout
-    scattered : texture over the atlas of the exitance by subsurface scattering
+    scattered : texture with the exitance of scattered light over the atlas
     technique : tables and textures of the technique; None if the technique needs none
     output_layers : textures in which the technique diffuses subsurface light for the outputs besides the
         picture; None if no requested output needs them
@@ -49,7 +49,8 @@ class Resources:
     outputs : resources of the outputs besides the picture, None if none are requested
     suns : number of lights that the environment adds
     gaussians : number of Gaussians of the profile
-    unscattered_fraction : fraction of the skin's triangles outside the atlas, on which no light scatters [-]
+    unscattered_fraction : number of skin triangles that lie outside the atlas, where no light scatters,
+        divided by the number of all skin triangles [-]
     """
 
     shape: shape.Resources

@@ -1,4 +1,4 @@
-"""Methods of treating the seams of the atlas: stitching, and those of the 2007 talk [Dudash2007]."""
+"""Methods of treating the seams of the atlas: stitching, and the methods of a talk in 2007 [Dudash2007]."""
 
 from __future__ import annotations
 

@@ -135,8 +135,7 @@ def profile_name(icc_profile: bytes) -> str:
 def profile_colour_space(icc_profile: bytes) -> ColourSpace | None:
     """Return the colour space of an ICC profile; None if the profile has lookup tables or no curves.
 
-    `ColourSpace.to_linear` converts colours at the full bit depth of a picture, whereas LittleCMS in Pillow
-    supports only 8 bits.
+    LittleCMS is not used, because its interface in Pillow supports only 8 bits per channel.
 
     Raises ValueError, ArithmeticError and struct.error for a damaged profile.
     """

@@ -18,7 +18,9 @@ _MAX_LISTED_THICKNESS_MM = 1e4  # thicker layers of MCML files stand for semi-in
 
 
 def check_reduced(culprit: str, layer_entries: Mapping[str, object]) -> None:
-    """Raise DermisError for a layer with an anisotropy g: its scattering probably lacks the factor 1 - g.
+    """Raise DermisError if a layer in a file has an entry for the anisotropy g.
+
+    The scattering coefficient of such a layer is probably not yet multiplied by 1 - g.
 
     culprit : name of the file or layer, for the message
     layer_entries : entries of the layer in the file, including "scattering_per_mm"

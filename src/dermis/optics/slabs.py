@@ -140,7 +140,7 @@ def solve_doubled_slabs(
     The time is about that of `solve_slabs` for the thickest slabs alone.
 
     albedo, eta, direction_nodes, g : as in `solve_slabs`
-    smallest_depth : (n,) optical depths of similar size [-]
+    smallest_depth : (n,) optical depths before the doublings; they should be of similar size [-]
     doubling_count : number d of doublings; the result has n (d + 1) slabs, ordered by the number of
         doublings, then by `smallest_depth`
     """

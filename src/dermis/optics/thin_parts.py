@@ -42,7 +42,7 @@ _FIT_FREQUENCIES = np.geomspace(
 
 @dataclass(frozen=True, eq=False)
 class ThinParts:
-    """Light that thin parts of the body transmit, and the reflectance that they lack, by thickness.
+    """Light transmitted by thin parts of the body, and reflectance lost there, as functions of the thickness.
 
     Row 0 of each array is for the thickness 0, and the last row for `max_thickness_mm`; the square roots of
     the thicknesses are evenly spaced. The light is given as weights of k Gaussians in 3 channels, relative to

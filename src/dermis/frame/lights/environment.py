@@ -77,7 +77,7 @@ def _upload_panorama_layers(
 
 
 def _with_border(panorama: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return a panorama with a border of one texel for filters.
+    """Return a panorama with a border of one texel, so that bilinear filtering is correct at its edges.
 
     On the left and right, the border wraps around. Beyond a pole, the border continues on the opposite side
     of the sphere.

@@ -163,7 +163,7 @@ class AtlasTechnique(Technique):
         """Split a profile into its narrowest Gaussian and the Gaussians with which light is blurred.
 
         Instead of a blur with the narrowest Gaussian, light is evaluated at each pixel. If even this Gaussian
-        is too wide for that, light is blurred with all of them.
+        is too wide for that, light is blurred with all Gaussians of the profile.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo

@@ -49,7 +49,7 @@ class _DownwardTransfer(NamedTuple):
     E : attenuation exp(-q d) across the thickness d of the sublayer, where q is the rate of decay [-]
     rho : ratio of the growing to the decaying solution at the lower face, if there is no source [-]
     common : 1 / (1 + E^2 rho), which sums the reflections between both faces [-]
-    beta : part of the growing solution that the sources cause at the lower face
+    beta : growing solution at the lower face if there is no decaying solution; it is due to the light sources
     lower : particular solution at the lower face
 
     All coefficients are 0 for a semi-infinite sublayer. Only the last sublayer of a medium can be

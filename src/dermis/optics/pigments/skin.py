@@ -96,7 +96,10 @@ def _build_donner2008(
 def _build_biospec(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
 ) -> tuple[Layer, ...]:
-    """Return four skin layers after [KrishnaswamyBaranoski2004], with constants from one author's code."""
+    """Return four skin layers after [KrishnaswamyBaranoski2004].
+
+    The constants are from code that one of the paper's authors published.
+    """
     reticular = replace(parameters, blood=_RETICULAR_BLOOD_RATIO * parameters.blood)
     return (
         Layer(
