@@ -43,8 +43,8 @@ class Armature:
     """Bones of a glTF scene: the joints that deform meshes, and animated nodes.
 
     bone_of_node : dictionary from node index to bone index
-    static_bone : index of the root bone that was added for meshes that no bone moves; None if there are no
-        such meshes
+    static_bone : index of the additional root bone that carries the meshes that do not move; None if all
+        meshes can move
     """
 
     bones: Bones
@@ -91,7 +91,7 @@ def read_armature(document: Document, nodes: Nodes) -> Armature | None:
 
 
 def _with_static_root(bones: Bones) -> Bones:
-    """Return the bones of a scene, preceded by a new root bone for meshes that no bone moves.
+    """Return the bones of a scene, preceded by a new root bone, which carries the meshes that do not move.
 
     The new bone has index 0 and lies at the origin.
 
@@ -124,11 +124,13 @@ def _node_skin(document: Document, node_index: int) -> Tree:
 def read_influences(
     document: Document, nodes: Nodes, armature: Armature, mesh_node_index: int, primitive: Tree
 ) -> tuple[SkinInfluences, Doubles]:
-    """Return the bones and weights of a skinned primitive, and the skinning matrix of each vertex at rest.
+    """Return the bones and weights of a primitive, and the skinning matrix of each vertex at rest.
 
     The skinning matrices (v, 4, 4) map mesh space to scene space.
 
-    mesh_node_index : index of the node that carries the mesh and refers to its skin
+    armature : bones of the scene, to which the bone indices refer
+    mesh_node_index : index of the node that carries the mesh and refers to its glTF skin (list of joints)
+    primitive : JSON tree of the primitive
 
     Raises DermisError for invalid weights and joints.
     """
@@ -217,6 +219,7 @@ def read_targets(
 ) -> dict[str, VertexDisplacements]:
     """Return the vertex displacements of a primitive by morph target name, in the mesh's space.
 
+    mesh, primitive : JSON trees of the mesh and of one of its primitives
     all_target_names : names of the morph targets of the mesh
     vertex_count : number of vertices of the primitive
 

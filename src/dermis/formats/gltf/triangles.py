@@ -182,6 +182,7 @@ class _SceneReader:
     ) -> MeshPart:
         """Return a primitive as a mesh part in scene space, transformed by its node or by its joints.
 
+        mesh, primitive : JSON trees of the mesh and of one of its primitives
         target_names : names of the morph targets of the mesh
         node_index : index of the node that carries the mesh; None in a file whose meshes have no nodes
         """
@@ -325,6 +326,8 @@ def _skin_part(
 ) -> MeshPart:
     """Return a mesh part and its morph targets with each vertex transformed by its skinning matrix.
 
+    targets : morph targets of the part by name
+    influences : bones and weights of each vertex, which the result contains
     skinning_matrices : (v, 4, 4) skinning matrices at rest
     """
     if len(influences.bone) != len(mesh_part.positions):
