@@ -263,9 +263,9 @@ class StrandTables:
     possible : total number of coarse strands of the person
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
     length_mm : length of the scalp hair or the beard, whichever is longer [mm]
-    shortest_mm : length of the shorter of the two [mm]
-    width_mm : width of a strand of the longer of the two [mm]
-    cover : projected area of hair per area of skin, for the longer of the two [-]
+    shortest_mm : length of the scalp hair or the beard, whichever is shorter, and at least 1 [mm]
+    width_mm : width of the strands of scalp hair or beard, whichever is longer [mm]
+    cover : projected area of hair per area of skin, for scalp hair or beard, whichever is longer [-]
     """
 
     strands: Buffer
@@ -328,7 +328,7 @@ def shader_constants() -> dict[str, float]:
 
 
 def has_strands(head: Head, settings: Settings) -> bool:
-    """Return whether a head has strands and the settings show strands."""
+    """Return whether a head has strands of hair, and `settings` asks to draw them."""
     return settings.strands and any(part is not None and len(part) > 0 for part in (head.strands, head.hair))
 
 
