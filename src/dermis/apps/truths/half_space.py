@@ -20,7 +20,7 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
 
     The integral equation is solved by iteration at Gaussian nodes.
 
-    Source: [Chandrasekhar1960] section 38, in the form of the equation that avoids cancellation of digits.
+    Source: [Chandrasekhar1960] section 38; the equation has the form that avoids loss of significance.
     """
     if not 0.0 <= albedo < 1.0:
         refuse("half-space", "an albedo from 0 to below 1", f"got {albedo:g}", "Correct it")

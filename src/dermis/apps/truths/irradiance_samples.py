@@ -65,7 +65,8 @@ def sample_irradiance(
 
     irradiance_at : function that returns the irradiance (n, 3) at `MeshPoints`; called once for each point
     spacing_mm : greatest side length of the small triangles [mm]
-    min_spacing_mm : smallest side length that the further halving may yield; None for no further halving [mm]
+    min_spacing_mm : sides shorter than twice this length are not halved for contrast; None to halve no sides
+        for contrast [mm]
     contrast_threshold : contrast above which a side is halved further [-]
 
     Source: [JensenBuhler2002] for sampling the irradiance on the surface.

@@ -121,7 +121,10 @@ def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, light_label: str) 
 
 
 def mitsuba_stripe(mi: Mitsuba, light: StripeLight, light_label: str) -> SceneDict:
-    """Return Mitsuba's description of a stripe light: a distant slide projector whose slide is the stripe."""
+    """Return Mitsuba's description of a stripe light: a distant slide projector whose slide is the stripe.
+
+    light_label : name of the light in error messages
+    """
     width, length = light.width_mm, light.length_mm
     size = np.array([2.0 * _STRIPE_SLIDE_HALF_WIDTHS * width, length])
     texel = min(width / _MIN_STRIPE_SLIDE_TEXELS[0], length / _MIN_STRIPE_SLIDE_TEXELS[1])

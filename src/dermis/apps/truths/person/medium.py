@@ -213,7 +213,7 @@ def _skin_triangles(person: Person) -> NDArray[np.int32]:
 
 
 def colour_grid(person: Person, low_corner: Doubles, high_corner: Doubles, voxels_per_side: int) -> Doubles:
-    """Return the skin's colour (z, y, x, 3) in each voxel of a box: the mean of the nearest skin points.
+    """Return for each voxel of a box the mean colour (z, y, x, 3) of the skin points nearest to it.
 
     Voxels more than about 3 mm from the skin have the mean colour of all points.
 
