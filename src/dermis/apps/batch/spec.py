@@ -176,9 +176,10 @@ class Spec(FrozenModel):
 
 
 def _table_distributions(table_name: str, table_value: object) -> dict[str, Distribution]:
-    """Return the distributions in a TOML table and in the table's subtables, by dotted name.
+    """Return the distributions in a spec table and in the table's subtables, by dotted name.
 
-    table_name : name of the table
+    table_name : dotted name of the table; "" for the whole spec
+    table_value : the table, or one of its values; values that are not distributions are ignored
     """
     if isinstance(table_value, Distribution):
         return {table_name: table_value}

@@ -63,6 +63,7 @@ class IntermediateViews:
     def draw(self, scene: Scene, settings: Settings, view_name: str, divider_side: str = "") -> Texture:
         """Return an image of the head that displays an intermediate result of the last frame, in sRGB bytes.
 
+        scene, settings : scene and settings of the last frame
         view_name : name of the view, one of `VIEW_NAMES`
         divider_side : "before" for the frozen state left of the divider, "" for the live state
 
@@ -89,6 +90,7 @@ class IntermediateViews:
     ) -> Texture:
         """Return an image of sRGB bytes that shows a part of the atlas of the last frame.
 
+        atlas_view : part of the atlas to show
         divider_side : "before" for the frozen state left of the divider, "" for the live state
 
         Raises DermisError if the technique does not compute the displayed map.
