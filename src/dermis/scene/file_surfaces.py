@@ -96,7 +96,8 @@ def _has_colours(mesh: Mesh, surface: FileSurface, material_mask: Mask) -> bool:
     """Return whether any vertex of selected materials has a colour other than white.
 
     surface : surface data of the file, with vertex colours from 0 to 1 if the file has them
-    material_mask : (m,) mask of the selected materials"""
+    material_mask : (m,) mask of the selected materials
+    """
     if surface.colours is None:
         return False
     return bool((surface.colours[np.unique(mesh.triangles[material_mask[mesh.material]])] < 1.0).any())

@@ -164,7 +164,8 @@ def slider(low: float, high: float, *, logarithmic: bool = False) -> dict[str, A
 def field_help(model: type[BaseModel], field: str) -> str:
     """Return the help text of a field as one line, followed by summaries of the names that it accepts.
 
-    Only names from a registry, such as those of profiles, have summaries."""
+    Only names from a registry, such as those of profiles, have summaries.
+    """
     info = model.model_fields[field]
     text = re.sub(r"\s+", " ", info.description or "")
     summaries = [one for named in _registry_names(info) for one in named.registry.summaries()]

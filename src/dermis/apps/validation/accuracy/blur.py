@@ -73,7 +73,7 @@ def blurred_levels(device: Device, mesh: Mesh, irradiance: Array, stretch_mode: 
     """Blur light on the atlas of a mesh; return all pyramid levels (n, n), resampled to full resolution.
 
     irradiance : (n, n) irradiance of the texels of the atlas
-    stretch_mode : "full" to correct the blur for all uv distortion, or "axes" to ignore the angle of u and v
+    stretch_mode : "full" to correct blurs for uv distortion, or "axes" to ignore the angle between u and v
     """
     levels, blur = blur_light(
         device, mesh, build_atlas(mesh, len(irradiance)), irradiance[..., None], stretch_mode
@@ -180,7 +180,7 @@ def blur_light(
     The light is blurred by each Gaussian of `BLUR_PROFILE` except the narrowest.
 
     irradiance : (n, n, 1) irradiance of the texels of the atlas
-    stretch_mode : "full" to correct the blur for all uv distortion, or "axes" to ignore the angle of u and v
+    stretch_mode : "full" to correct blurs for uv distortion, or "axes" to ignore the angle between u and v
     """
     textures, variance = upload_atlas(device, atlas, stretch_mode), BLUR_PROFILE.variance_mm2[1:]
     max_halvings = len(textures.mips_for_blurs("repeated")) - 1
@@ -200,7 +200,10 @@ def blur_light(
 
 
 def resampled_level(device: Device, levels: PyramidLevels, blur: Blur, level_index: int) -> Array:
-    """Return a pyramid level (n, n), resampled bilinearly to the full resolution of the atlas."""
+    """Return a pyramid level (n, n), resampled bilinearly to the full resolution of the atlas.
+
+    level_index : 0 for the light before blurs, k for the light blurred by the k-th Gaussian that is used
+    """
     halvings = blur.halvings[level_index]
     layer = download(device, levels.stacks[halvings], layer=level_index - levels.first[halvings])[..., 0]
     return np.asarray(zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True))

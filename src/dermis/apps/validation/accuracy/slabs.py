@@ -112,8 +112,8 @@ def slab_error_rows(renderer: dermis.Renderer) -> str:
 def forward_scattering_error_rows(renderer: dermis.Renderer) -> str:
     """Return Markdown rows with errors of rendered slabs against references with forward scattering.
 
-    The `direction` of the rendered skin is "half-space". In half of the rows, the
-    `anisotropy` of this skin is 0; in the others, it is the mean cosine of the reference.
+    The `direction` of the rendered skin is "half-space". In half of the rows, the `anisotropy` of this skin
+    is 0; in the others, it is the mean cosine of the reference.
     """
     rows = []
     with tempfile.TemporaryDirectory() as folder:

@@ -373,7 +373,7 @@ class IrisErrors(NamedTuple):
 
 
 def iris_errors(comparison: PersonComparison, view_height_mm: float) -> IrisErrors:
-    """Return the errors of the iris in a comparison whose pictures show an eye from the front, at the centre.
+    """Return the errors of the iris in a comparison whose pictures show an eye from the front, in the middle.
 
     view_height_mm : height of the visible area [mm]
     """

@@ -184,6 +184,8 @@ def _cycles_rows(
     """Return the rows for a Cycles method: one for each number of paths, and one for the mean image.
 
     The errors of the mean image are corrected for its noise.
+
+    subsurface_method : method of Cycles, a key of `PeerRenders.cycles`
     """
     reference, rows = peer_renders.reference, []
     for level in zip(*peer_renders.cycles[subsurface_method], strict=True):
@@ -240,7 +242,9 @@ def _equal_error_costs(
 def _cycles_cost(
     paths_per_pixel: float, measured_passes: Sequence[CyclesPass], dermis_row: RendererRow
 ) -> dict[str, float]:
-    """Return the time of Cycles for a number of paths per pixel, and its ratio to the time of dermis.
+    """Return the elapsed time of Cycles for a number of paths per pixel, and ratios to the times of dermis.
+
+    Ratios are given for elapsed and for CPU times.
 
     measured_passes : images rendered by Cycles, from which the mean time per path is taken
     """

@@ -45,10 +45,12 @@ class DrawnPeople(NamedTuple):
 
 
 def site_skin_variables(look: SkinLook) -> Doubles:
-    """Return the skin variables (7, 4) of a skin look, one row for each of `HEAD_SITES`.
+    """Return the skin variables (7, 4) of a person, one row for each of `HEAD_SITES`.
 
     The columns are melanin, blood, oxygenation and thickness of the epidermis, in the units of
     `model_spectra`.
+
+    look : pigments and texture of the person's skin
     """
     differences = np.vstack([np.zeros(3), look.sites.as_array()])
     cheek = np.log2([look.melanin, look.blood])
