@@ -128,7 +128,7 @@ def option_name(field: str, option_names: Mapping[str, str] | None = None) -> st
 
 
 def is_option(model: type[FrozenModel], field: str) -> bool:
-    """Return whether a field gets an option: true for words, numbers and tuples, false for nested models."""
+    """Return whether a field gets an option: true if it holds words, numbers or tuples, false if a model."""
     return _option_type(model, field)[0] is not None
 
 

@@ -107,7 +107,7 @@ class ProfileReport:
     def ring_error(self) -> Floats:
         """Return the relative error (3,) of the fitted Gaussians for each colour channel [-].
 
-        The error is measured in the light that emerges through concentric rings around the point of entry.
+        The light that emerges through each of several concentric rings around the point of entry is compared.
         """
         return self.radial.rings().error(self.fit.profile.variance_mm2, self.fit.profile.weight)
 

@@ -134,7 +134,7 @@ def random_walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> 
 def _interpolate_random_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Floats, Floats]:
     """Return radii [mean free paths] and the fraction of light within each radius [-], for one albedo.
 
-    The fractions are interpolated from a table, at eight times as many radii as in the table.
+    The fractions are interpolated from a table that has an eighth of the returned number of radii.
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -148,9 +148,9 @@ def _interpolate_random_walk_table(albedo: float, walk_entry: WalkEntry) -> tupl
 
 @cache
 def _load_random_walk_tables() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
-    """Return a table of Cycles' random walks for each way in which a walk enters the medium.
+    """Return tabulated results of Cycles' random walks for each value of `WalkEntry`.
 
-    A table consists of three arrays: values of sqrt(1 - albedo) (n,) [-], radii (m,) [mean free paths], and
+    The results are three arrays: values of sqrt(1 - albedo) (n,) [-], radii (m,) [mean free paths], and
     the fraction of light (n, m) that leaves the medium within each radius [-].
     """
     by_entry: dict[str, list[list[float]]] = {}

@@ -127,7 +127,7 @@ def skin_material(
     """Return the OpenPBR material of skin.
 
     radius_m : (3,) mean free paths [m]
-    uniform_colour : (3,) uniform colour, used without a colour map; linear Rec. 709 [-]
+    uniform_colour : (3,) colour of the skin if it has no colour map; linear Rec. 709 [-]
     map_roles : roles of the maps that replace uniform values
     """
     longest = max(radius_m)
@@ -257,7 +257,7 @@ def write_maps(subject: Subject, output_folder: Path, file_name_prefix: str) -> 
 def write_part_pictures(
     subject: Subject, output_folder: Path, file_name_prefix: str, additional_roles: Iterable[PartRole] = ()
 ) -> list[Path]:
-    """Write the texture images of parts that are not skin as PNG files, and return their paths.
+    """Write PNG files of the texture images of the head's parts that are not skin; return the paths.
 
     file_name_prefix : prefix of the file names
     additional_roles : roles of additional images to write, which OpenPBR does not use

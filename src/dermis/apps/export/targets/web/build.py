@@ -123,8 +123,8 @@ def build_page_content(
 ) -> PageContent:
     """Capture the frames for every requested kind of adapter, and return the data that the page embeds.
 
-    on_frames_captured : function called for each kind of adapter after its frames were captured, with the
-        renderer (which then uses the maps of the page), the scene and the settings
+    on_frames_captured : function called after the frames for a kind of adapter were captured; its arguments
+        are the renderer (which then uses the maps of the page), the scene and the settings
     """
     content = PageContent()
     for adapter_kind in (one for one in ADAPTER_KINDS if page_request.sizes.get(one)):
