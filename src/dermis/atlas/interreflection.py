@@ -50,7 +50,8 @@ class FormFactors:
     nearest_patch : (CELLS_PER_SIDE^2,) index of the patch that contains each cell, or of the nearest patch
     confidence : (CELLS_PER_SIDE^2,) float32 number of traced lines that leave each cell, divided by the
         median number, at most 1 [-]
-    patch_first, patch_target, patch_factor : the same three arrays for form factors from patches to patches
+    patch_first, patch_target, patch_factor : as `cell_first`, `cell_target` and `cell_factor`, but for form
+        factors from patches, not cells, to patches
     sample_triangle : (p * SAMPLES_PER_PATCH,) uint32 triangle that contains each sample point of the p
         patches
     sample_weights : (p * SAMPLES_PER_PATCH,) uint32 packed weights of that triangle's second and third corner

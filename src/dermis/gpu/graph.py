@@ -268,7 +268,7 @@ class Graph(Recorder):
         self._declare_pass(stage, program, resources, (3,), program.access(resources), writes, add_fill)
 
     def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Declare the passes that `record_passes(recorder, *args)` adds.
+        """Declare the passes that `record_passes(recorder, *args)` adds, and return the result of the call.
 
         The passes are recorded once per set of arguments. Either all passes of a recording run, or none.
         Replaying a recording takes almost no time in Python.

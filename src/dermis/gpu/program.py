@@ -262,7 +262,7 @@ def cached_program(
 
 
 def used_constants(path: Path, folders: Sequence[Folder], constants: Constants) -> dict[str, float]:
-    """Return the pipeline constants that a shader declares, by name; WebGPU refuses all other constants."""
+    """Return, by name, only those pipeline constants that a shader declares, as WebGPU refuses others."""
     text = shader_source(path, folders).text
     return {name: value for name, value in constants if f"override {name}:" in text}
 

@@ -150,7 +150,7 @@ def _extend_surface_edge(
 
     triangle_piece : (f,) piece of each triangle, -1 if there is none
     beyond_end : (h, w) mask of texels beyond the end of the surface
-    y, x : (n,) rows and columns of the gutter texels to fill, all of which are in this mask
+    y, x : (n,) row and column of each gutter texel to fill; `beyond_end` is True at these texels
     """
     last = np.array(beyond_end.shape) - 1
     piece_of_texel, from_y, from_x = triangle_piece[coverage.anchor_triangle[y, x]], y.copy(), x.copy()

@@ -148,7 +148,13 @@ def _draw_piece_grid(
 
 
 def _gap_pairs(surface: FlatSurface, mapped_triangles: Mask, grid: _PieceGrid) -> tuple[Index, Index]:
-    """Return pairs of adjacent texels whose surface points are not adjacent on the surface, (n,) each."""
+    """Return pairs of adjacent texels whose surface points are not adjacent on the surface.
+
+    The two arrays (n,) hold the first and the second texel of each pair, as indices into
+    `_PieceGrid.anchored`.
+
+    mapped_triangles : (f,) mask of triangles that belong to any piece
+    """
     found = []
     for axis in (0, 1):
         a, b = (grid.row.ravel()[texel] for texel in unconnected_pairs(surface, grid.owner, axis))
