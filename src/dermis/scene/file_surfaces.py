@@ -230,8 +230,8 @@ def unused_properties(
 
     mesh : mesh with m materials
     materials : materials of the file
-    file_material_index : (m,) for each material of the mesh its index in `materials`, or -1 if the file lacks
-        the material
+    file_material_index : (m,) index in `materials` of each material of the mesh, or -1 if the file lacks the
+        material
     user_roles : roles, such as "colour", of skin maps that the user replaces
     skin_is_packed : whether pictures of the skin materials are packed into common maps
     """

@@ -153,7 +153,7 @@ class SliderRange(NamedTuple):
 
 
 def slider(low: float, high: float, *, logarithmic: bool = False) -> dict[str, Any]:
-    """Return the `json_schema_extra` that gives a field a slider range narrower than its bounds.
+    """Return the argument `json_schema_extra` for a field whose slider range is narrower than its bounds.
 
     low, high : values at the ends of the slider
     logarithmic : whether equal slider steps multiply the value by equal factors

@@ -309,7 +309,11 @@ def _calibrate_group(
 def _drawn_cheek_variables(
     table_document: dict[str, Any], group: str, random_people: _Population
 ) -> tuple[MeasuredTable, Doubles]:
-    """Return the parsed statistics, and skin variables (n, 4) at the cheek of people drawn from a group."""
+    """Return the parsed statistics, and skin variables (n, 4) at the cheek of people drawn from a group.
+
+    table_document : statistics to parse, as returned by `build_measured_table`
+    random_people : random numbers, ages and sexes of n people
+    """
     found, weights = parse_measured_table(table_document), {group: 1.0}
     scores = random_people.normals @ symmetric_square_root(found.group_mean("correlation", weights)[:4, :4])
     return found, found.cheek_variables(weights, random_people.sexes, random_people.ages, scores)
