@@ -96,7 +96,9 @@ def bake_albedo(
 
 
 def texel_surface_points(mesh: Mesh, map_side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
-    """Return the indices of texels whose centres are on skin, and these surface points packed for bake.wgsl.
+    """Return the indices of texels whose centres are on skin, and the surface points at these centres.
+
+    The surface points are packed for bake.wgsl.
 
     Where triangles overlap in uv, a triangle that is not mirrored takes precedence over a mirrored triangle,
     and a later triangle over an earlier triangle.

@@ -410,9 +410,9 @@ class Renderer:
         linear : bool
             True returns float32 linear Rec. 709 instead of sRGB bytes.
         previous : Scene or iterable of Scene, optional
-            Scenes for motion vectors: either an iterable with the previous scene of each scene, or only the
-            previous scene of the first scene. In the latter case, each later scene uses the scene before it,
-            if the head is the same.
+            Previous scenes, from which motion vectors are computed: an iterable with a previous scene for
+            each scene, or a single scene that precedes the first scene. In the latter case, each later scene
+            uses the scene before it, if the head is the same.
         landmarks : iterable of str
             Landmark sets (keys of `dermis.human.landmarks.sets.LANDMARK_SETS`), or files of rows name,vertex.
 

@@ -134,8 +134,8 @@ def refracted_cosine(cosine: ArrayLike, eta: float) -> Floats:
 class _HalfSpace:
     """Isotropically scattering half-space below a smooth surface, for a set of discrete directions.
 
-    The operator R describes reflection by the medium, and the operator r internal reflection by the surface.
-    One linear system is solved to sum the series R + R r R + ... of multiple reflections.
+    The operator R describes reflection by the medium. The operator r describes internal reflection by the
+    surface. The series R + R r R + ... of multiple reflections is summed by solving one linear system.
     """
 
     def __init__(self, albedo: float, eta: float) -> None:

@@ -26,8 +26,8 @@ _OFFSET_ABSORPTION_WEIGHT = 0.35  # of absorption in the published formula of th
 def equivalent_medium(profile: GaussianSum, total_reflectance: Floats, eta: float) -> Medium:
     """Return the half-space that has a given reflectance and spreads light as widely as a given profile.
 
-    The width of a profile R(r) is defined as the inverse of the frequency at which the Hankel transform of
-    R(r) has fallen to half of its value at frequency 0.
+    The Hankel transform of a profile R(r) decreases with frequency. The width of the profile is the inverse
+    of the frequency at which the transform is half of its value at frequency 0.
 
     profile : diffusion profile
     total_reflectance : (c,) reflectance of the half-space for light at normal incidence [-]

@@ -161,8 +161,9 @@ def half_space_radiance(
 
     - the cosines (m,) of the directions below the surface;
     - the fraction (m,) of the light from a uniform sky that enters in each direction;
-    - the emerging radiance (m, m) by exit direction (row) and entry direction (column), scaled so that its
-      mean over exit directions, weighted by these fractions, is the reflectance.
+    - the emerging radiance (m, m), with a row for each exit direction and a column for each entry direction.
+
+    The radiance is scaled so that the mean of each column, weighted by the fractions, is the reflectance.
 
     The arguments are those of `solve_slabs`; m is `direction_nodes`.
     """

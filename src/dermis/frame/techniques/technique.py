@@ -262,8 +262,8 @@ class AtlasTechnique(Technique):
     ) -> None:
         """Declare the passes that compute the exitance of skin in which a map blends several profiles.
 
-        Between a point where light enters and a point where it leaves, each profile is weighted by the mean
-        of its blend weights at the two points, so that light transport is reciprocal.
+        For light that enters at one point and leaves at another point, each profile is weighted by the mean
+        of its blend weights at the two points. Light transport is therefore reciprocal.
 
         mixture : resources for the blend, among them the exitance of the first profile alone
         layout_index : index of the atlas layout

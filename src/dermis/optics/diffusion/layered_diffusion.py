@@ -1,8 +1,8 @@
 """Diffusion in layered media, with continuous fluence and flux at each interface.
 
 In the Hankel domain, the fluence phi(z) in each layer satisfies D phi'' - D q^2 phi = -S(z). Here, z is the
-depth, D is the diffusion coefficient, q^2 is sigma_tr^2 + s^2 at the frequency s, and S(z) is the power, per
-unit of depth, of the light that scatters for the first time at the depth z.
+depth, D is the diffusion coefficient, and q^2 is sigma_tr^2 + s^2 at the frequency s. The source S(z) is the
+power per unit of depth of light that scatters for the first time at the depth z.
 At each face, the layers below impose the boundary condition D phi' = W - Z phi. A recursion computes Z and W
 of the faces from bottom to top.
 """
@@ -22,7 +22,13 @@ _NEAR_ZERO_FREQUENCY = np.array([1e-8])  # so low that a Hankel transform equals
 
 
 class _Sublayer(NamedTuple):
-    """Layer, or one of the two parts into which a layer is divided."""
+    """Layer, or one of the two parts into which a layer is divided, with its source of light.
+
+    layer : absorption and scattering; its field `thickness_mm` is ignored
+    thickness_mm : thickness of the sublayer [mm]
+    beam : fraction of the beam that reaches the upper face unscattered; 0 for a point source [-]
+    point : power of the point source on the lower face; 0 for a beam [-]
+    """
 
     layer: Layer
     thickness_mm: float | Floats
