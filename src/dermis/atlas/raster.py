@@ -240,6 +240,8 @@ def _texel_weights(mesh: Mesh, atlas_side: int, texel_triangle: Ints) -> NDArray
     """Return the barycentric weights of the second and third corner at each texel centre (n, n, 2) [1/65535].
 
     A gutter texel has the weights of the nearest point of its triangle.
+
+    texel_triangle : (n, n) index of the triangle to which each texel is assigned, -1 for empty texels
     """
     y, x = np.nonzero(texel_triangle >= 0)
     weights = barycentric_weights(
@@ -271,6 +273,9 @@ def _texel_metric(
     """Return each texel's stretch (n, n, 2) along u and v [1/mm], and shear (n, n), as defined in `Atlas`.
 
     Both are interpolated from the derivatives dp/du and dp/dv at the vertices.
+
+    texel_triangle : (n, n) index of the triangle to which each texel is assigned, -1 for empty texels
+    barycentric : (n, n, 2) weights from `_texel_weights`
     """
     y, x = np.nonzero(texel_triangle >= 0)
     corners = mesh.triangles[texel_triangle[y, x]]
@@ -288,7 +293,10 @@ def _texel_metric(
 
 
 def _chart_edge_distances(texel_chart: Ints) -> NDArray[np.uint16]:
-    """Return the distances (n, n, 4) to the left, right, top and bottom edge of the chart [texel]."""
+    """Return the distances (n, n, 4) to the left, right, top and bottom edge of the chart [texel].
+
+    texel_chart : (n, n) index of the chart to which each texel belongs
+    """
     left, right = connected_run_lengths(np.pad(texel_chart[:, 1:] == texel_chart[:, :-1], ((0, 0), (1, 0))))
     up, down = connected_run_lengths(np.pad(texel_chart.T[:, 1:] == texel_chart.T[:, :-1], ((0, 0), (1, 0))))
     return np.stack((left, right, up.T, down.T), axis=-1).astype(np.uint16)

@@ -138,7 +138,11 @@ class _Baker:
             colour_map[..., :3] *= self._interpolate_to_texels(tile, self.surface.colours[tile.vertices])
 
     def _sample_picture(self, tile: Tile, texture: Texture, role: Role) -> Floats:
-        """Return a picture resampled to the texels of a tile, (h, w, k)."""
+        """Return a picture resampled to the texels of a tile, (h, w, k).
+
+        texture : texture with the picture
+        role : map role of the texture, such as "colour"
+        """
         picture = read_linear_picture(texture, role)
         base = base_texture(self._tile_material(tile))
         if base is not None and base.uv_mapping == texture.uv_mapping:
@@ -279,7 +283,11 @@ def _matching_mip(picture: Floats, texels_per_sample: float) -> Floats:
 
 
 def _neighbour_texels(position: Doubles, texel_count: int, wrap: Wrap) -> tuple[Numbers, Numbers, Doubles]:
-    """Return the two texels around each position in [0, 1] on an axis, and the second texel's weight."""
+    """Return the two texels around each position in [0, 1] on an axis, and the second texel's weight.
+
+    texel_count : number of texels along the axis
+    wrap : wrap mode, such as "repeat", for texels beyond the ends of the axis
+    """
     texel = position * texel_count - 0.5
     texel = np.where(np.abs(texel - np.rint(texel)) < 1e-6 * texel_count, np.rint(texel), texel)
     first = np.floor(texel)

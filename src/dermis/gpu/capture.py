@@ -91,7 +91,10 @@ class CapturedFrame:
         self.passes.append(captured_pass)
 
     def index_of_record(self, struct_name: str, record: UniformRecord) -> int:
-        """Return the index of a uniform record in `records`, appending it on first use."""
+        """Return the index of a uniform record in `records`, appending it on first use.
+
+        struct_name : name of the WGSL struct of the record
+        """
         if id(record) not in self._record_index:
             self._record_index[id(record)] = len(self.records)
             self.records.append((struct_name, record))  # kept alive, so that its id stays unique
@@ -133,6 +136,8 @@ class FrameCapture(Graph):
 
         A texture has one image per layer and mip level; all layers of a mip level come before the next mip
         level.
+
+        resource_index : index of the resource in `resources`
         """
         value = self._objects[resource_index]
         if not is_texture(value):

@@ -207,7 +207,11 @@ class Dependencies:
     def _add_write(
         self, state: ResourceState, pass_index: int, last_writers: dict[ResourceState, int]
     ) -> None:
-        """Register a pass as the last writer of a resource and of overlapping views and textures."""
+        """Register a pass as the last writer of a resource and of overlapping views and textures.
+
+        state, pass_index : state of the resource, and index of the pass
+        last_writers : dictionary from each state to the index of its last writer so far, changed in place
+        """
         self._last_writer[state] = last_writers[state] = pass_index
         for view in state.views:
             if (

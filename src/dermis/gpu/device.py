@@ -167,6 +167,7 @@ class Device:
     def uniform_chunk(self, chunk_index: int, chunk_bytes: int) -> Buffer:
         """Return the uniform buffer at an index, created on first use; all frames share these buffers.
 
+        chunk_index : index of the buffer
         chunk_bytes : size of a new buffer [byte]
         """
         while len(self._uniform_chunks) <= chunk_index:

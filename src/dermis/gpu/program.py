@@ -75,7 +75,11 @@ class Program:
         return make_record(self.source.text, struct_name, **values)
 
     def record_positions(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
-        """Return the positions of the bound uniform records in uniform memory [byte]."""
+        """Return the positions of the bound uniform records in uniform memory [byte].
+
+        resources : resources and uniform records by their names in the shader
+        uniforms : memory in which the uniform records are placed
+        """
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
         try:
             return tuple([uniforms.position(records[name]) for name, _ in self._used_members])
@@ -87,6 +91,7 @@ class Program:
 
         resources : buffers, textures, texture views, samplers and NumPy records by their names in the shader;
             records are placed in uniform memory
+        uniforms : memory in which the records are placed
         """
         located = [uniforms.locate(position) for position in self.record_positions(resources, uniforms)]
         bound = [*self._bound_resources(resources), *(buffer for buffer, _ in located)]
@@ -117,6 +122,9 @@ class Program:
 
         For large records, all bytes are returned: they are the same object for all passes that use the
         record, so Python computes their hash only once.
+
+        resources : resources and uniform records by their names in the shader
+        uniforms : memory in which the uniform records are placed
         """
         found: list[Hashable] = []
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time

@@ -67,7 +67,11 @@ def read_person(path: Path) -> Human:
 
 
 def _build_dataclass(path: Path, dataclass_type: type[T], field_values: Any) -> T:
-    """Return an instance of a dataclass, such as `Human` or `SkinLook`, built from field values in a file."""
+    """Return an instance of a dataclass, such as `Human` or `SkinLook`, built from field values in a file.
+
+    path : path of the file, for error messages
+    field_values : mapping from field name to value, as read from the file
+    """
     known = [one.name for one in fields(dataclass_type)]
     if not isinstance(field_values, Mapping):
         actual = f"got {format_value(field_values)}"

@@ -74,7 +74,12 @@ def find_border(surface: FlatSurface, triangle_piece: Index, member_triangles: I
 def border_sides(
     surface: FlatSurface, border: Border, packing: Packing, gutter_width: GutterWidth
 ) -> BorderSides:
-    """Return the border sides on the texel grid, with surface metric and gutter width."""
+    """Return the border sides on the texel grid, with surface metric and gutter width.
+
+    border : border of the pieces, see `find_border`
+    packing : positions of the triangles on the texel grid
+    gutter_width : width of the gutters
+    """
     triangle, both = border.triangle, (border.side, (border.side + 1) % 3)
     ends = np.stack([packing.corners[triangle, k] for k in both], axis=1)
     steps = np.stack([surface.uv_steps[triangle, k] for k in both], axis=1)
@@ -100,6 +105,9 @@ def needed_texels(
     The rim of a piece consists of the texels outside it that are read by bilinear interpolation within it.
 
     member_triangles : (t,) indices of the triangles of the pieces
+    border : border of the pieces, see `find_border`
+    packing : positions of the triangles on the texel grid
+    gutter_width : width of the gutters
     grid_shape : height and width of the grid of texels
     """
     found = np.zeros(grid_shape, np.bool_)
@@ -139,6 +147,8 @@ def trace_gutter(
 ) -> GutterTexels:
     """Find the gutter texels of a border, and trace geodesics to the surface points that they show.
 
+    packing : positions of the triangles on the texel grid
+    gutter_width : width of the gutters
     texel_triangle : (h, w) index of the triangle that covers each texel of the pieces, -1 outside
     """
     nearest = nearest_border_points(

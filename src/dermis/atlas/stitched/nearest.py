@@ -68,6 +68,7 @@ def nearest_border_points(sides: BorderSides, inside_mask: Mask) -> NearestPoint
     Distances are measured by the surface metric at each border side. The rim consists of the texels that
     are read by bilinear interpolation at border points.
 
+    sides : border sides on the texel grid
     inside_mask : (h, w) mask of texels that chart pieces cover
     """
     metric = _side_metric(sides)
@@ -110,7 +111,11 @@ def _side_metric(sides: BorderSides) -> _SideMetric:
 def _candidate_texels(
     sides: BorderSides, metric: _SideMetric, grid_shape: tuple[int, ...]
 ) -> tuple[Index, Index, Index]:
-    """Return texels that may be in a gutter, as three arrays (n,): index of the border side, x and y."""
+    """Return texels that may be in a gutter, as three arrays (n,): index of the border side, x and y.
+
+    sides, metric : border sides on the texel grid, and their surface metric
+    grid_shape : height and width of the grid of texels
+    """
     height, width = grid_shape
     low = np.ceil(sides.ends.min(axis=1) - metric.half_extent)
     high = np.floor(sides.ends.max(axis=1) + metric.half_extent)

@@ -154,6 +154,7 @@ def _gap_pairs(surface: FlatSurface, mapped_triangles: Mask, grid: _PieceGrid) -
     `_PieceGrid.anchored`.
 
     mapped_triangles : (f,) mask of triangles that belong to any piece
+    grid : texel grid with the piece and its gutters
     """
     found = []
     for axis in (0, 1):
@@ -362,6 +363,10 @@ def _connected_parts(
     """Divide the parts of a cut chart into connected parts; merge small parts into their largest neighbour.
 
     Returns the part of each triangle (t,), or None if only one part remains.
+
+    member_triangles : (t,) indices of the piece's triangles
+    part_of_triangle : (t,) part to which each of these triangles belongs
+    gutter_mm : width of the gutters [mm]
     """
     index = np.full(len(surface.uv), -1, np.int64)
     index[member_triangles] = np.arange(len(member_triangles))

@@ -131,7 +131,13 @@ def grow_charts(positions: Doubles, triangles: Index, chart_count: int, seed: in
 
 
 def _seed_triangles(corners: Doubles, connected_piece: Index, chart_count: int, seed: int) -> Index:
-    """Return random triangles, drawn in proportion to area, with at least one in each connected piece."""
+    """Return random triangles, drawn in proportion to area, with at least one in each connected piece.
+
+    corners : (f, 3, 3) positions of the corners [mm]
+    connected_piece : (f,) connected piece to which each triangle belongs
+    chart_count : number of triangles to draw, before those for connected pieces without any are added
+    seed : seed of the random choice
+    """
     area = triangle_areas(corners)
     drawn = np.random.default_rng(seed).choice(
         len(area), min(chart_count, len(area)), replace=False, p=area / area.sum()
