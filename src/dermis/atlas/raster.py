@@ -166,7 +166,7 @@ def build_mesh_layout(mesh: Mesh, atlas_side: int) -> Atlas:
 def _triangles_of_overlapped_charts(
     triangle_chart: NDArray[np.integer], covered_texel: Index, covering_triangle: Index, atlas_side: int
 ) -> Mask:
-    """Return the mask (f,) of triangles in charts that a larger chart mostly covers in uv.
+    """Return the mask (f,) of triangles in charts that are mostly covered in uv by a larger chart.
 
     triangle_chart : (f,) chart index of each triangle
     covered_texel : (k,) flat index of each covered texel, once for each triangle that covers its centre

@@ -278,7 +278,7 @@ def used_constants(path: Path, folders: Sequence[Folder], constants: Constants) 
 def shader_source(path: Path, folders: Sequence[Folder]) -> ShaderSource:
     """Return a shader with its includes and other directives expanded.
 
-    folders : folders that are searched for included files, before the toolkit's own
+    folders : folders in which included files are searched, before the folder of this toolkit
     """
     return compose_shader(path, (*folders, _TOOLKIT_SHADER_FOLDER))
 

@@ -104,7 +104,7 @@ def fit_lids(
     is_closed: bool = False,
     gaze_axis: Points = REST_GAZE,
 ) -> Points:
-    """Return MakeHuman's points (n, 3) of a person with lids fitted to eyeballs of anatomical size [mm].
+    """Return a person's points (n, 3) after fitting the lids to eyeballs of anatomical size [mm].
 
     points_mm : (n, 3) MakeHuman's points of the person [mm]
     sockets : sockets of the left and the right eye

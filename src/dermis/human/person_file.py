@@ -30,7 +30,7 @@ _STRETCH_ATLAS_SIDE = 1024
 
 
 def person_parameters(person: Human) -> dict[str, Any]:
-    """Return all parameters of a person as a dictionary, with the typical looks of skin, eyes and hair."""
+    """Return all parameters of a person as a dictionary; looks that are not set are the typical looks."""
     numbers = {one.name: getattr(person, one.name) for one in fields(person)}
     numbers |= {"targets": dict(person.targets), "skin": asdict(person.look)}
     return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hairdo)}

@@ -109,7 +109,7 @@ def _add_gutters(coverage: Coverage, triangle_piece: Index, texels: GutterTexels
 
 
 def hidden_triangles(surface: FlatSurface, triangle_piece: Index, packing: Packing, atlas_side: int) -> Mask:
-    """Return the mask (f,) of triangles that other triangles of their piece mostly hide in uv.
+    """Return the mask (f,) of triangles that are mostly hidden in uv by other triangles of their piece.
 
     triangle_piece : (f,) piece of each triangle, -1 if there is none
     packing : positions of the triangles on the texel grid

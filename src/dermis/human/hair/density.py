@@ -166,7 +166,7 @@ def quad_areas_cm2(control_mesh: Mesh, quad_index: Index) -> Doubles:
 
 
 def _sum_zones(amount_name: str, zone_rows: Floats, points: Doubles) -> Doubles:
-    """Return an amount (n,), such as hair density, at points, as a sum of one Gaussian for each face zone.
+    """Return an amount (n,), such as hair density, at points, as a sum of Gaussians, one for each face zone.
 
     amount_name : one of `ZONE_AMOUNTS`, such as "hair"
     zone_rows : (k, 24) parameters of the zones, from `zone_table`
