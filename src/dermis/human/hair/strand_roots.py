@@ -148,8 +148,8 @@ def _root_locations(corner_weight: Doubles, corner_points: Doubles) -> Doubles:
     """Return the array `StrandRoots.place` (n, 4), which describes where on the head each root is.
 
     The columns are the angle around the head from the front [degrees], the height above the midpoint of the
-    eyes [mm], the thinning of the hair by baldness at the crown [-], and the position from the nape (0) to
-    the top of the head (1).
+    eyes [mm], how much the hair thins there at the strongest recession, 0 to 1, and the position from the
+    nape (0) to the top of the head (1).
 
     corner_weight : (n, 4) weights of the corners of the quad on which each strand is rooted
     corner_points : (n, 4, 4) rows of `average_points` at these corners
