@@ -35,7 +35,10 @@ def capture_renderer(device_kind: str, adapter: str) -> Renderer:
 
 
 def capture_frame(frame_capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
-    """Record the passes of a frame, with their resources, without running them."""
+    """Record the passes of a frame, with their resources, without running them.
+
+    frame_capture : recorder of the passes
+    """
     technique = TECHNIQUES[inputs.settings.technique]
     return frame_capture.capture(lambda graph: draw_frame(graph, inputs, technique))
 
@@ -53,7 +56,11 @@ def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFra
 
 
 def capture_mips(frame_capture: FrameCapture, texture: Texture) -> CapturedFrame:
-    """Record the passes that compute the coarser mip levels of a map from its finest level."""
+    """Record the passes that compute the coarser mip levels of a map from its finest level.
+
+    frame_capture : recorder of the passes
+    texture : texture of the map
+    """
     return frame_capture.capture(lambda graph: map_mips.fill_mips(graph, map_mips.with_mip_views(texture)))
 
 

@@ -160,9 +160,9 @@ def registry_version() -> int:
 def device_constants(device: Device) -> Constants:
     """Return the values of pipeline constants with which shaders run fastest on the device.
 
-    GPUs read buffers faster than textures, software adapters read textures faster. Shaders on software
-    adapters also skip lights behind the surface, shade a column of pixels per invocation, and take longer
-    steps along hairs to draw their shadows.
+    GPUs read buffers faster than textures, but software adapters read textures faster than buffers. On
+    software adapters, shaders also skip lights behind the surface, shade a column of pixels per invocation,
+    and take longer steps along hairs to draw their shadows.
     """
     if device.adapter.kind == "CPU":
         return (("SKIPS_UNLIT", 1), ("STRIP", _PIXELS_PER_COLUMN), ("SPLAT_STEP", _HAIR_SHADOW_STEP_TEXELS))

@@ -134,7 +134,11 @@ def _cross(first_vector: Sequence[float], second_vector: Sequence[float]) -> Tri
 
 
 def view_rows(eye: Triple, axes: Axes) -> MatrixRows:
-    """Return the upper three rows of the view matrix, which give x to the right, y up and depth forward."""
+    """Return the upper three rows of the view matrix, which give x to the right, y up and depth forward.
+
+    eye : position of the camera or light in the world [mm]
+    axes : unit vectors right, up and forward
+    """
     right, up, forward = axes
     return (*right, -_dot(right, eye)), (*up, -_dot(up, eye)), (*forward, -_dot(forward, eye))
 

@@ -188,7 +188,14 @@ class Renderer:
         outputs: tuple[str, ...] = (),
         landmarks: tuple[str, ...] = (),
     ) -> Readback:
-        """Submit a frame together with the readback of its picture and outputs."""
+        """Submit a frame together with the readback of its picture and outputs.
+
+        previous : scene of the same head for motion vectors; without it, motion is 0
+        linear : whether the picture is linear Rec. 709 instead of sRGB bytes
+        alpha : whether the picture gets the coverage by the head as alpha
+        outputs : names of outputs besides the picture
+        landmarks : names of landmark sets
+        """
         inputs = self.prepare(scene, settings, "", outputs, previous, landmarks)
         coverage, extra = settings if alpha else None, inputs.resources.outputs
         read_back = partial(start_readback, as_linear=linear, alpha_settings=coverage, outputs=extra)
@@ -256,6 +263,7 @@ class Renderer:
     def _draw(self, force: bool, timed: Timing, *prepared: Any) -> RenderedFrame:
         """Render one frame and leave the picture on the device.
 
+        force, timed : as in `draw`
         prepared : arguments of `Preparation.inputs`
         """
         started = time.perf_counter()

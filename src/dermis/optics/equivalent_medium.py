@@ -145,7 +145,7 @@ def oblique_offset_mm(medium: Medium) -> float:
     """Return the lateral shift of grazing light, as the mean over all channels [mm].
 
     The shift is the distance along the surface from the point where light enters to the mean point where it
-    leaves. At an angle t to the normal, the shift is sin t times that of grazing light.
+    leaves. For light at an angle t to the normal, the shift is sin t times the shift of grazing light.
 
     medium : medium with one layer
 

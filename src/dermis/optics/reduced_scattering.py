@@ -61,7 +61,13 @@ def refuse_mcml(path: Path) -> NoReturn:
 
 
 def _mcml_layer_text(eta: float, mu_a: float, mu_s: float, g: float, thickness_cm: float) -> str:
-    """Return a layer of MCML as text, with the keys and units of this package's TOML files."""
+    """Return a layer of MCML as text, with the keys and units of this package's TOML files.
+
+    eta : index of refraction relative to air [-]
+    mu_a, mu_s : absorption and scattering coefficient [1/cm]
+    g : mean cosine of the scattering angle [-]
+    thickness_cm : thickness of the layer [cm]
+    """
     thickness = (
         f"thickness_mm {10 * thickness_cm:.4g}"
         if 10 * thickness_cm <= _MAX_LISTED_THICKNESS_MM

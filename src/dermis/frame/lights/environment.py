@@ -121,6 +121,7 @@ def environment_record(
     The record holds the rotation and the exposure of the environment, and the albedo and the reflection lobes
     of the skin that the environment lights.
 
+    shading_program : program of the shading pass, which declares the record
     albedo : (3,) albedo of skin where its colour map is white [-]
     has_occlusion : whether the head hides parts of the environment from its own skin
     """

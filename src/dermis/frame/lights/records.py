@@ -126,6 +126,7 @@ def light_records(
 ) -> UniformRecord:
     """Return the uniform record `Lights` of all lights of the scene.
 
+    shading_program : program of the shading pass, which declares the record
     shadow_views : result of `light_shadow_views`
     """
     record = shading_program.record("Lights", sample_points=light_sample_points())

@@ -50,7 +50,11 @@ class GpuGems3(AtlasTechnique):
     supports_translucency = True
 
     def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
-        """Create textures for light, its blurred levels and a blurred stretch map."""
+        """Create textures for light, its blurred levels and a blurred stretch map.
+
+        atlas_side : side of the atlas [texels]
+        halvings : for each atlas layout, the number of times that the resolution of each level is halved
+        """
         pyramid = make_levels(device, atlas_side, halvings, HALF_TEXEL_FORMAT)
         first, second = (make_texture(device, (atlas_side, atlas_side), HALF_TEXEL_FORMAT) for _ in range(2))
         return StretchedLevels(

@@ -66,6 +66,7 @@ class PreIntegratedSkin(Technique):
         These are the largest curvature in the tables, the penumbra width, and the widths of the Gaussians
         that smooth the relief.
 
+        view : uniform record of the shading pass
         shade : program of the shading pass
         resources : result of `make`
         """

@@ -142,6 +142,8 @@ def draw(
 ) -> Texture:
     """Declare the passes that diffuse the subsurface light, and return the picture with this light.
 
+    subsurface_layers : textures of the subsurface light, and textures with which it is diffused
+    kernel : diffusion kernel of the profile
     window : rectangle of the image plane that the picture shows
     surface_light : shaded picture without the subsurface light
     """
@@ -163,6 +165,8 @@ def draw_blur(
 ) -> None:
     """Declare the passes that diffuse the subsurface light along rows, then along columns.
 
+    subsurface_layers : textures of the subsurface light, and textures with which it is diffused
+    kernel : diffusion kernel of the profile
     window : rectangle of the image plane that the picture shows
     """
     device, size = graph.device, subsurface_layers.scratch.size[:2]

@@ -70,6 +70,8 @@ class Technique(TechniqueTraits):
         Return the new split of the profile, and the indices of the inserted levels. This base class inserts
         none.
 
+        split : Gaussians with which light is blurred
+        atlas : textures of the atlas
         edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
         return split, ()
@@ -77,6 +79,8 @@ class Technique(TechniqueTraits):
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
+        split : Gaussians with which light is blurred
+        atlas : textures of the atlas
         edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
         return (0,) * (1 + len(split.blurred_mm2))
@@ -101,6 +105,7 @@ class Technique(TechniqueTraits):
     ) -> None:
         """Write the members of the shading record that only this technique reads.
 
+        view : uniform record of the shading pass
         shade : program of the shading pass
         resources : result of `make`
         """
@@ -176,7 +181,11 @@ class AtlasTechnique(Technique):
         return ProfileSplit(np.zeros(3), total, profile.variance_mm2, weight)
 
     def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
-        """Create the textures of the blur pyramid in the format that is fastest on the device."""
+        """Create the textures of the blur pyramid in the format that is fastest on the device.
+
+        atlas_side : side of the atlas [texels]
+        halvings : for each atlas layout, the number of times that the resolution of each level is halved
+        """
         return make_levels(device, atlas_side, halvings, level_format(device))
 
     def texel_bytes(self, blur_count: int) -> float:
@@ -189,6 +198,8 @@ class AtlasTechnique(Technique):
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
+        split : Gaussians with which light is blurred
+        atlas : textures of the atlas
         edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
         max_halvings = len(atlas.mips_for_blurs(edge_mode)) - 1
@@ -241,9 +252,11 @@ class AtlasTechnique(Technique):
     ) -> None:
         """Declare the passes that sum the blurred levels to the exitance, including light through thin parts.
 
+        levels : textures of the blurred levels
+        blur : Gaussians of the blur, with their weights
         thin_parts : resources of the light through thin parts of the head, None if the scene has no such
             light
-        exitance_texture : texture for the exitance
+        exitance_texture : texture to which the exitance is written
         """
         through = translucency.draw(graph, levels, blur, thin_parts) if thin_parts else None
         combine.draw(
@@ -265,9 +278,11 @@ class AtlasTechnique(Technique):
         For light that enters at one point and leaves at another point, each profile is weighted by the mean
         of its blend weights at the two points. Light transport is therefore reciprocal.
 
+        levels : textures of the blurred levels
+        blur : Gaussians of the blur, with their weights
         mixture : resources for the blend, among them the exitance of the first profile alone
         layout_index : index of the atlas layout
-        exitance_texture : texture for the exitance of the blend
+        exitance_texture : texture to which the exitance of the blend is written
         """
         for other, (entering, weight) in enumerate(zip(mixture.entering, blur.weight_changes, strict=True)):
             change = replace(blur, weight=weight)

@@ -45,6 +45,8 @@ class TextureSpace(AtlasTechnique):
 
         Return the new split of the profile, and the indices of the inserted levels.
 
+        split : Gaussians with which light is blurred
+        atlas : textures of the atlas
         edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
         max_halvings = len(atlas.mips_for_blurs(edge_mode)) - 1

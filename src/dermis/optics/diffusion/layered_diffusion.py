@@ -147,7 +147,12 @@ def solve_homogeneous_slabs(
 def _solve_sublayers(
     frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, mismatch: float
 ) -> tuple[Floats, Floats]:
-    """Return the Hankel transforms of R(r) and T(r) of a stack of sublayers, topmost first [-]."""
+    """Return the Hankel transforms (n, channel_count) of R(r) and of T(r) of a stack of sublayers [-].
+
+    frequency : (n,) frequencies s > 0 [1/mm]
+    sublayers : the sublayers, topmost first
+    mismatch : boundary mismatch with air [-]
+    """
     fluence, transfers = _solve_upwards(frequency, sublayers, channel_count, mismatch)
     R = fluence / (2.0 * mismatch)
     for transfer in transfers:
@@ -158,7 +163,10 @@ def _solve_sublayers(
 def _solve_upwards(
     frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, mismatch: float
 ) -> tuple[Floats, list[_DownwardTransfer]]:
-    """Return the fluence at the surface, and the `_DownwardTransfer` of each sublayer, topmost first."""
+    """Return the fluence at the surface, and the `_DownwardTransfer` of each sublayer, topmost first.
+
+    The arguments are those of `_solve_sublayers`.
+    """
     s = np.asarray(frequency, dtype=np.float64)[..., None]
     zero = np.zeros((*s.shape[:-1], channel_count))
     face, transfers = _BoundaryCondition(zero + 1.0 / (2.0 * mismatch), zero), list[_DownwardTransfer]()

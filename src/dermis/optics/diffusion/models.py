@@ -98,7 +98,10 @@ def diffusion_rings(
 def _sampled_profile(
     medium: Medium, model: DiffusionModel, clamp: Clamp, rgb_weights: Floats | None
 ) -> tuple[Floats, Floats, Floats]:
-    """Return radii r (n,) [mm], the profile R(r) (n, c) [1/mm2] and the total reflectance (c,) [-]."""
+    """Return radii r (n,) [mm], the profile R(r) (n, c) [1/mm2] and the total reflectance (c,) [-].
+
+    The parameters are those of `diffusion_profile`.
+    """
     if model in ("dipole", "better-dipole"):
         _check_half_space(medium, model)
     closed_form = rgb_weights is None and len(medium.layers) == 1 and model in ("dipole", "multipole")

@@ -233,6 +233,9 @@ def shared_gaussians(
 
     The total reflectances do not change. Profiles that already have the same variances are returned
     unchanged.
+
+    profiles : the profiles, each a sum of Gaussians
+    gaussian_count : number of Gaussians of each fit
     """
     first = profiles[0].variance_mm2
     if all(np.array_equal(first, one.variance_mm2) for one in profiles):
