@@ -151,6 +151,7 @@ def perspective_rows(
     Depth is reversed, which gives a similar precision at all distances, because floats are densest near 0.
 
     view_matrix_rows : upper three rows of the view matrix
+    window : rectangle of the image plane that the picture shows
     near, far : distances at which depth is 1 and 0 [mm]
     """
     scale = -near / (far - near)
@@ -236,6 +237,8 @@ def _largest_tangents(side_coordinates: NDArray[np.floating], depth: NDArray[np.
 def parallel_shadow_view(direction: Vectors, outline: Outline, map_side: int) -> ShadowView:
     """Return the narrowest view along the direction of parallel light that contains the whole mesh.
 
+    direction : (3,) direction in which the view looks
+    outline : outline of the head's shape
     map_side : side of the shadow map [texels]
     """
     points = outline.points_mm

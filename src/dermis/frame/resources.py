@@ -35,8 +35,11 @@ class AtlasLayout(LitAtlas):
 class Resources:
     """Cached resources of a frame, for all features.
 
+    shape : buffers of the head's shape
     expression_maps : painted maps that expressions change, None if no map changes
     layouts : atlas layouts in which light is diffused; the picture is shaded from the first layout
+    shadow_maps : shadow maps of all lights
+    diffusion : textures and Gaussians for blurs of the light in the atlas
     scattered : texture with the exitance of scattered light over the atlas
     technique : tables and textures of the technique; None if the technique needs none
     output_layers : textures in which the technique diffuses subsurface light for the outputs besides the
@@ -46,6 +49,7 @@ class Resources:
     visibility : texture with the index of the triangle that covers each sample of the picture
     view : uniform record of the shading pass, without the camera
     constants : pipeline constants of the shading pass
+    post : resources of post-processing, among them the picture
     outputs : resources of the outputs besides the picture, None if none are requested
     suns : number of lights that the environment adds
     gaussians : number of Gaussians of the profile

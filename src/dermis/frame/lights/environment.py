@@ -104,6 +104,7 @@ def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
     It is the irradiance of a surface that faces all lights and the brightest part of the environment.
 
     scene : scene whose lights include the suns of its environment
+    environment_map : prefiltered panorama of the environment
     """
     environment = environment_map.peak_irradiance * scene.environment.exposure if scene.environment else 0.0
     return environment + sum(max(light.irradiance) for light in scene.lights)

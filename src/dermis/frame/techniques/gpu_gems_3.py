@@ -121,6 +121,7 @@ class GpuGems3(AtlasTechnique):
     ) -> None:
         """Declare one blur pass, which writes blurred light and the blurred stretch map.
 
+        shader : result of `blur_program`
         shader_resources : resources that the shader reads
         target_pair : textures for blurred light and for the blurred stretch map
         atlas_side : side of the atlas [texels]

@@ -280,6 +280,7 @@ class AtlasTechnique(Technique):
 
         levels : textures of the blurred levels
         blur : Gaussians of the blur, with their weights
+        atlas : textures of the atlas
         mixture : resources for the blend, among them the exitance of the first profile alone
         layout_index : index of the atlas layout
         exitance_texture : texture to which the exitance of the blend is written
