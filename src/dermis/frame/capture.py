@@ -24,7 +24,7 @@ def capture_renderer(device_kind: str, adapter: str) -> Renderer:
     """Return a renderer that records passes for GPUs or for software adapters.
 
     device_kind : kind of adapter on which the passes will be replayed, "gpu" or "software"
-    adapter : selector of the adapter on which the passes are recorded, which may be of another kind
+    adapter : adapter on which the passes are recorded, as in `Renderer`; it may be of another kind
     """
     renderer = Renderer(adapter, cache_size=_RENDERER_CACHE_SIZE, cache_ttl=1000)
     if renderer.device.adapter.kind != ADAPTER_KINDS[device_kind]:
@@ -44,7 +44,9 @@ def capture_frame(frame_capture: FrameCapture, inputs: FrameInputs) -> CapturedF
 
 
 def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFrame:
-    """Return a captured frame with fewer but wider strands of scalp hair and beard, of the same total area.
+    """Return a captured frame with fewer but wider strands of scalp hair and beard.
+
+    The total area of the strands stays the same.
 
     hair_divisor : number by which the number of strands is divided; 0 keeps all strands
     """

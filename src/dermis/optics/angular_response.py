@@ -127,7 +127,11 @@ def mean_single_scattering_kernel(cosine: ArrayLike, eta: float) -> Floats:
 
 
 def refracted_cosine(cosine: ArrayLike, eta: float) -> Floats:
-    """Return the cosine of the angle of refraction below the surface, from the cosine of incidence in air."""
+    """Return the cosine of the angle of refraction below the surface.
+
+    cosine : cosine of the angle of incidence in air
+    eta : index of refraction relative to air [-]
+    """
     return np.asarray(np.sqrt(1.0 - (1.0 - np.asarray(cosine, np.float64) ** 2) / eta**2))
 
 

@@ -133,7 +133,10 @@ def _reflectance_transform(medium: Medium, frequency: float) -> float:
 
 
 def _half_frequency(hankel_transform: Callable[[float], float]) -> float:
-    """Return the frequency at which a Hankel transform has fallen to half of its value at 0 [1/mm]."""
+    """Return the frequency at which a Hankel transform is half of its value at frequency 0 [1/mm].
+
+    hankel_transform : function from a frequency to the Hankel transform, which decreases with frequency
+    """
     from scipy.optimize import brentq
 
     total = hankel_transform(float(hankel.NEAR_ZERO_FREQUENCY[0]))

@@ -345,8 +345,8 @@ def anisotropic_response(total_reflectance: ArrayLike, eta: float, g: float) -> 
     g : mean cosine of the scattering angle, at least 0 [-]
 
     The field `single_scattering` is that of `angular_response` plus a correction for anisotropy. To find the
-    correction, this field is fitted to the emerging radiance by least squares, both for g and for isotropic
-    scattering. The correction is the difference of the two fits.
+    correction, this field is fitted to the emerging radiance by least squares, once for g and once for
+    isotropic scattering. The correction is the difference of the two fits.
     """
     isotropic = angular_response(total_reflectance, eta)
     if g == 0.0:

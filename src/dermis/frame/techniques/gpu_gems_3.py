@@ -32,7 +32,7 @@ TexturePair = tuple[TextureOrView, TextureOrView]
 
 @dataclass(frozen=True, eq=False)
 class StretchedLevels(PyramidLevels):
-    """Pyramid levels with textures for a stretch map that is blurred together with the light.
+    """Textures of the blur pyramid, and of a stretch map that is blurred together with the light.
 
     The stretch map holds the texel density on the surface along u and along v.
 

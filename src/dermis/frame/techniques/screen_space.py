@@ -189,9 +189,10 @@ def draw_blur(
 
 
 def kernel_integral_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
-    """Return (1, n, 4) integrals of the kernel from 0 to each of n distances, and the largest distance [mm].
+    """Return integrals of a kernel from 0 to each of n distances, and the largest distance [mm].
 
-    The square roots of the distances are evenly spaced.
+    The integrals are one row (1, n, 4) of texels: red, green and blue, and a fourth channel of 0. The square
+    roots of the distances are evenly spaced.
     """
     reach = _kernel_reach_mm(kernel)
     fractions = kernel.half_line_integral(reach * np.linspace(0.0, 1.0, _KERNEL_ENTRY_COUNT) ** 2)

@@ -141,7 +141,7 @@ class Technique(TechniqueTraits):
     ) -> Texture:
         """Declare the passes that compute only the light through thin parts of the head, over the atlas.
 
-        Outputs use it to separate this light from the rest of the picture.
+        The result serves outputs that separate this light from the rest of the picture.
 
         Return the texture of the only layout or, if there are two layouts, the texture of their blend.
 
@@ -206,7 +206,10 @@ class AtlasTechnique(Technique):
         return choose_halvings(split.blurred_mm2, atlas.median_texels_per_mm, max_halvings)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
-        """Declare the passes that light, blur and sum each atlas layout, and blend two layouts."""
+        """Declare the passes that light the atlas, blur the light and sum the blurred levels.
+
+        If there are two atlas layouts, a last pass blends them. Return the texture of the exitance.
+        """
         resources = inputs.resources
         levels, layouts, mixture = resources.diffusion.levels, inputs.layouts, resources.diffusion.mixture
         if not inputs.blurs:
