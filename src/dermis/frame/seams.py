@@ -39,7 +39,9 @@ SEAM_METHODS = {
 
 
 def seam_method(method_name: str, can_stitch: bool) -> SeamMethod:
-    """Return the seam method of a name; "clear-colour" replaces "stitch" if the technique cannot stitch.
+    """Return the seam method with a given name.
+
+    If the technique cannot stitch, "clear-colour" replaces "stitch".
 
     can_stitch : whether the technique can carry light across seams
     """

@@ -46,10 +46,10 @@ def equivalent_medium(profile: GaussianSum, total_reflectance: Floats, eta: floa
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
 def _half_space_column(eta: float, from_photons: bool, total_reflectance: float) -> Floats:
-    """Return albedo and width of the half-space with a given reflectance, as a column (2,) of a table.
+    """Return two properties of the half-space with a given reflectance, as a column (2,) of a table.
 
     The first element is the square root of 1 minus the single-scattering albedo [-]. The second element is
-    the frequency at which the Hankel transform of R(r) has fallen to half of its value at 0 [1 / mean free
+    the frequency at which the Hankel transform of R(r) is half of its value at frequency 0 [1 / mean free
     path].
 
     eta : index of refraction relative to air [-]
