@@ -1,5 +1,5 @@
-"""Atlases: uv layouts in which light is diffused, with data for two further paths of light.
+"""Atlases: uv layouts in which light is diffused, with data for interreflection and translucency.
 
-These are the form factors for interreflection, and the cells for translucency, which is light that passes
+Interreflection is light that skin reflects through the air onto other skin. Translucency is light that passes
 through ears, lips and other thin parts of a head.
 """

@@ -38,8 +38,8 @@ class Atlas:
     border_weights : (r, 2) uint16 weights of that triangle's second and third corner at the nearest point of
         this edge [1/65535]
     texels_per_uv : (f,) float32 texels per unit of the mesh's own uv in each triangle
-    mapped : (f,) mask of triangles that own texels; light on the remaining triangles (opaque, collapsed,
-        overlapped in uv) is not diffused
+    mapped : (f,) mask of triangles that have texels of their own; light on all other triangles (opaque,
+        collapsed, overlapped in uv) is not diffused
     """
 
     triangle: Ints

@@ -60,8 +60,9 @@ def cached_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: f
 
 
 def cached_occlusion(mesh: Mesh, atlas: Atlas, inputs_key: str, bake_occlusion: Callable[[], Array]) -> Array:
-    """Return the occlusion of the texels of an atlas, from the cache on disk or from `bake_occlusion`.
+    """Return the result of `bake_occlusion`, which is cached on disk if a cache folder is writable.
 
+    bake_occlusion : function that computes the occlusion map of the atlas
     inputs_key : text that identifies all inputs of `bake_occlusion` except the mesh and the atlas
     """
     digest = hashlib.sha256(f"{_atlas_key(mesh, atlas.size)} {inputs_key}".encode())

@@ -50,7 +50,8 @@ class FormFactors:
     nearest_patch : (CELLS_PER_SIDE^2,) index of the patch that contains each cell, or of the nearest patch
     confidence : (CELLS_PER_SIDE^2,) float32 number of traced lines that leave each cell, divided by the
         median number, at most 1 [-]
-    patch_first, patch_target, patch_factor : the same three arrays for form factors from patches to patches
+    patch_first, patch_target, patch_factor : as `cell_first`, `cell_target` and `cell_factor`, but for form
+        factors from patches, not cells, to patches
     sample_triangle : (p * SAMPLES_PER_PATCH,) uint32 triangle that contains each sample point of the p
         patches
     sample_weights : (p * SAMPLES_PER_PATCH,) uint32 packed weights of that triangle's second and third corner
@@ -74,7 +75,11 @@ class FormFactors:
 
 
 def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) -> FormFactors:
-    """Return the result of `compute_form_factors`, read from the package or the disk cache if possible."""
+    """Return the result of `compute_form_factors`, read from the package or the disk cache if possible.
+
+    corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
+    mapped_triangles : (f,) mask of triangles that have texels
+    """
     names = [field.name for field in fields(FormFactors)]
     if shipped := shipped_arrays(mesh, form_factor_table_name(mapped_triangles), names):
         return FormFactors(**shipped)
@@ -131,6 +136,8 @@ def _trace_lines(
     Returns the index pairs (m, 2) of cells that a line connects, one pair for each line and direction. Also
     returns the number of lines that left each cell, (CELLS_PER_SIDE^2,).
 
+    corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
+    mapped_triangles : (f,) mask of triangles that have texels
     bundle_count : number of bundles of parallel lines, one per direction
     lines_per_side : number of lines along each side of a bundle
     """
@@ -265,6 +272,8 @@ def _form_factors(
 
     facing_cells : (m, 2) index pairs of cells that lines connect, from `_trace_lines`
     line_counts : (CELLS_PER_SIDE^2,) number of lines that left each cell
+    corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
+    mapped_triangles : (f,) mask of triangles that have texels
     """
     patch_of, triangle, weights = _divide_into_patches(mesh, corner_uv, mapped_triangles)
     count = len(triangle) // SAMPLES_PER_PATCH
@@ -325,6 +334,9 @@ def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) 
 
     Returns the patch index of each cell (CELLS_PER_SIDE^2,), which is -1 for cells without texels. Also
     returns the triangles and the packed weights of the sample points, as in `FormFactors`.
+
+    corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
+    mapped_triangles : (f,) mask of triangles that have texels
     """
     triangle, weights, rank = _sample_points(mesh, mapped_triangles)
     half, cell = CELLS_PER_SIDE // 2, _cell_index(corner_uv[triangle], weights)
@@ -346,6 +358,8 @@ def _sample_points(mesh: Mesh, mapped_triangles: Mask) -> tuple[Index, Doubles, 
 
     Each triangle has at least one point, so points are denser on small triangles. The ranks are random
     numbers. Points that are chosen in order of rank are uniformly distributed over the surface.
+
+    mapped_triangles : (f,) mask of triangles that have texels
     """
     a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     area = np.where(mapped_triangles, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), 0.0)

@@ -166,7 +166,7 @@ def build_mesh_layout(mesh: Mesh, atlas_side: int) -> Atlas:
 def _triangles_of_overlapped_charts(
     triangle_chart: NDArray[np.integer], covered_texel: Index, covering_triangle: Index, atlas_side: int
 ) -> Mask:
-    """Return the mask (f,) of triangles in charts that a larger chart mostly covers in uv.
+    """Return the mask (f,) of triangles in charts that are mostly covered in uv by a larger chart.
 
     triangle_chart : (f,) chart index of each triangle
     covered_texel : (k,) flat index of each covered texel, once for each triangle that covers its centre
@@ -190,11 +190,12 @@ def _triangles_of_overlapped_charts(
 def _assign_texels(
     mesh: Mesh, mapped_triangles: Mask, texel: Index, triangle: Index, atlas_side: int
 ) -> tuple[Ints, Mask]:
-    """Return the triangle that owns each texel, and the mask (f,) of triangles that own too few texels.
+    """Assign each texel to one triangle; return its index, and the mask (f,) of triangles with few texels.
 
-    Where a chart is folded onto itself in uv, its unmirrored triangles own the texels.
+    Where a chart is folded onto itself in uv, texels are assigned to its unmirrored triangles. The mask
+    selects triangles that get less than half of the texels that they cover.
 
-    mapped_triangles : (f,) mask of triangles that may own texels
+    mapped_triangles : (f,) mask of triangles to which texels may be assigned
     texel, triangle : (k,) flat texel index and triangle index of each covered texel centre
     """
     is_mapped = mapped_triangles[triangle]
@@ -220,10 +221,12 @@ def _dilate_texel_triangles(texel_triangle: Ints) -> Ints:
 
 
 def _interpolable_triangles(mesh: Mesh, atlas_side: int, texel_triangle: Ints) -> Mask:
-    """Return the mask (f,) of triangles for which bilinear interpolation finds only texels with an owner.
+    """Return the mask (f,) of triangles at whose corners bilinear interpolation reads no empty texel.
 
     Bilinear interpolation at a corner reads the four texels around the corner. At thin triangles, some of
-    these texels may be empty.
+    these texels may be empty, that is, assigned to no triangle.
+
+    texel_triangle : (n, n) index of the triangle to which each texel is assigned, -1 for empty texels
     """
     low = np.floor(texel_corners(mesh, atlas_side, np.arange(len(mesh.triangles)))).astype(np.int64)
     found = np.ones(len(low), dtype=bool)
@@ -237,6 +240,8 @@ def _texel_weights(mesh: Mesh, atlas_side: int, texel_triangle: Ints) -> NDArray
     """Return the barycentric weights of the second and third corner at each texel centre (n, n, 2) [1/65535].
 
     A gutter texel has the weights of the nearest point of its triangle.
+
+    texel_triangle : (n, n) index of the triangle to which each texel is assigned, -1 for empty texels
     """
     y, x = np.nonzero(texel_triangle >= 0)
     weights = barycentric_weights(
@@ -268,6 +273,9 @@ def _texel_metric(
     """Return each texel's stretch (n, n, 2) along u and v [1/mm], and shear (n, n), as defined in `Atlas`.
 
     Both are interpolated from the derivatives dp/du and dp/dv at the vertices.
+
+    texel_triangle : (n, n) index of the triangle to which each texel is assigned, -1 for empty texels
+    barycentric : (n, n, 2) weights from `_texel_weights`
     """
     y, x = np.nonzero(texel_triangle >= 0)
     corners = mesh.triangles[texel_triangle[y, x]]
@@ -285,7 +293,10 @@ def _texel_metric(
 
 
 def _chart_edge_distances(texel_chart: Ints) -> NDArray[np.uint16]:
-    """Return the distances (n, n, 4) to the left, right, top and bottom edge of the chart [texel]."""
+    """Return the distances (n, n, 4) to the left, right, top and bottom edge of the chart [texel].
+
+    texel_chart : (n, n) index of the chart to which each texel belongs
+    """
     left, right = connected_run_lengths(np.pad(texel_chart[:, 1:] == texel_chart[:, :-1], ((0, 0), (1, 0))))
     up, down = connected_run_lengths(np.pad(texel_chart.T[:, 1:] == texel_chart.T[:, :-1], ((0, 0), (1, 0))))
     return np.stack((left, right, up.T, down.T), axis=-1).astype(np.uint16)

@@ -20,7 +20,7 @@ _POSITION_TOLERANCE_MM = 1e-4  # processors differ in the last bits of a positio
 def shipped_arrays(mesh: Mesh, table_name: str, array_names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
     """Return the arrays of a table that the package contains for a mesh; None if there is no such table.
 
-    table_name : name of the table; this text contains all parameters that affect the arrays, except the mesh
+    table_name : name of the table, which includes all parameters, except the mesh, that affect the arrays
     array_names : names of the arrays
     """
     file = resources.files(__package__).joinpath("data", table_file_name(mesh))

@@ -138,7 +138,11 @@ class _Baker:
             colour_map[..., :3] *= self._interpolate_to_texels(tile, self.surface.colours[tile.vertices])
 
     def _sample_picture(self, tile: Tile, texture: Texture, role: Role) -> Floats:
-        """Return a picture resampled to the texels of a tile, (h, w, k)."""
+        """Return a picture resampled to the texels of a tile, (h, w, k).
+
+        texture : texture with the picture
+        role : map role of the texture, such as "colour"
+        """
         picture = read_linear_picture(texture, role)
         base = base_texture(self._tile_material(tile))
         if base is not None and base.uv_mapping == texture.uv_mapping:
@@ -190,8 +194,8 @@ def _barycentric_coordinates(corners: Doubles, points: Doubles) -> Doubles:
 def _material_factor(material: FileMaterial, role: Role, has_vertex_colours: bool) -> Floats:
     """Return the factor (k,) by which a material multiplies its picture for a map role, such as "colour".
 
-    has_vertex_colours : whether the mesh has vertex colours, which the factor must leave unchanged if the
-        material has no colour of its own
+    has_vertex_colours : whether the mesh has vertex colours; if so, a material without a colour has the
+        factor 1 instead of the default colour, so that the vertex colours are not changed
     """
     has_colour = has_vertex_colours or "colour" in material.textures
     colour = material.colour or ((1.0, 1.0, 1.0) if has_colour else DEFAULT_COLOUR)
@@ -230,7 +234,10 @@ def _scale_to_unit_range(image: Numbers) -> Floats:
 
 
 def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]) -> Floats:
-    """Return samples (h, w, k) of a picture with mip filtering, on a grid of positions u (w,) and v (h,)."""
+    """Return samples (h, w, k) of a picture with mip filtering, on a grid of positions u (w,) and v (h,).
+
+    wrap : wrap modes along u and v, such as "repeat"
+    """
     step = (
         max(abs(float(u[-1] - u[0])) / max(len(u) - 1, 1), 1e-9),
         max(abs(float(v[-1] - v[0])) / max(len(v) - 1, 1), 1e-9),
@@ -255,7 +262,10 @@ def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]
 
 
 def sample_points(picture: Floats, uv_positions: Floats, wrap: tuple[Wrap, Wrap]) -> Floats:
-    """Return bilinear samples (..., k) of a picture at positions (..., 2) in [0, 1]."""
+    """Return bilinear samples (..., k) of a picture at positions (..., 2) in [0, 1].
+
+    wrap : wrap modes along u and v, such as "repeat"
+    """
     left, right, across = _neighbour_texels(
         uv_positions[..., 0].astype(np.float64), picture.shape[1], wrap[0]
     )
@@ -273,7 +283,11 @@ def _matching_mip(picture: Floats, texels_per_sample: float) -> Floats:
 
 
 def _neighbour_texels(position: Doubles, texel_count: int, wrap: Wrap) -> tuple[Numbers, Numbers, Doubles]:
-    """Return the two texels around each position in [0, 1] on an axis, and the second texel's weight."""
+    """Return the two texels around each position in [0, 1] on an axis, and the second texel's weight.
+
+    texel_count : number of texels along the axis
+    wrap : wrap mode, such as "repeat", for texels beyond the ends of the axis
+    """
     texel = position * texel_count - 0.5
     texel = np.where(np.abs(texel - np.rint(texel)) < 1e-6 * texel_count, np.rint(texel), texel)
     first = np.floor(texel)

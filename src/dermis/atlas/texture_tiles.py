@@ -143,7 +143,10 @@ def _shift_charts_to_unit_square(
 def _set_sizes_without_pictures(
     mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMaterial]
 ) -> list[Tile]:
-    """Set the sizes of tiles without pictures; skin gets the median texel density of tiles with pictures."""
+    """Return the tiles, with sizes also for tiles without pictures.
+
+    Skin gets the median texel density of the tiles with pictures; other materials get a small fixed size.
+    """
     areas = [float(triangle_areas(mesh.positions[mesh.triangles[tile.triangles]]).sum()) for tile in tiles]
     density = [tile.size[0] * tile.size[1] / max(mm2, 1e-9) for tile, mm2 in zip(tiles, areas, strict=True)]
     median_density = float(np.median([value for value in density if value > 0] or [0.0]))

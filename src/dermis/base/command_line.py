@@ -1,4 +1,4 @@
-"""Framework for command-line programs, whose commands are functions; errors print one line to stderr."""
+"""Framework for command-line programs: commands are functions, and an error is one line on stderr."""
 
 from __future__ import annotations
 

@@ -272,7 +272,7 @@ def _temporary_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def _prune_folder(cache_path: Path) -> None:
-    """Delete unfinished old files of a cache folder, and the least recently used files above a size limit."""
+    """Delete the least recently used files of a cache folder that is too large, and old unfinished files."""
     newest_first = sorted(
         _folder_files(cache_path, _CACHE_FILE_SUFFIX), key=lambda entry: entry[1].st_mtime, reverse=True
     )

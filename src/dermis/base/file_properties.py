@@ -20,8 +20,8 @@ class FileProperty:
     name : property as the documentation shows it, in Markdown
     detail : how the property affects the picture, or why it does not, in Markdown
     keys : words by which the reader recognises the property, such as statements or extensions
-    other_parts : treatment if the material is not that of skin but of another part of a model, such as
-        clothes; None if it is treated as in skin
+    other_parts : treatment in the materials of other parts of a model, such as clothes; None if it is the
+        same as in materials of skin
     """
 
     treatment: Treatment
@@ -47,7 +47,7 @@ def _file_property(
     *keys: str,
     other_parts: Treatment | None = None,
 ) -> FileProperty:
-    """Return a file property; `drawn`, `noted` and similar functions call this one with a treatment."""
+    """Return a `FileProperty` with these fields; `drawn`, `noted` and similar functions set `treatment`."""
     return FileProperty(treatment, property_name, detail_text, keys, other_parts)
 
 

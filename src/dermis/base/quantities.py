@@ -95,10 +95,11 @@ def _number_in_range(value: object, low: float, high: float) -> int | float | No
 
 
 def _has_text(values: Any, dimension_count: int) -> bool:
-    """Return whether nested lists or arrays contain text or booleans, which NumPy would convert to numbers.
+    """Return whether nested lists or arrays contain text or booleans, or are nested too deeply.
 
-    dimension_count : number of dimensions of the expected array; the result is True for more deeply nested
-        lists
+    NumPy would convert text and booleans to numbers.
+
+    dimension_count : number of dimensions of the expected array, and largest permitted depth of nested lists
     """
     import numpy as np
 

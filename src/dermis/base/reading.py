@@ -94,7 +94,9 @@ def is_file(path: str | Path) -> bool:
 
 
 def read_text(path: str | Path, expected: str, max_bytes: int = MAX_TEXT_BYTES) -> str:
-    """Return the text of a file in UTF-8, with or without a byte order mark, or in UTF-16 with the mark.
+    """Return the text of a file in UTF-8, or in UTF-16 with a byte order mark.
+
+    A byte order mark is not part of the returned text.
 
     expected : what the file should be, for error messages
     max_bytes : largest accepted size of the file
@@ -169,7 +171,11 @@ def parsing(culprit: object, expected: str, *errors: type[Exception]) -> Iterato
 
 
 def _open_regular_descriptor(path: str | Path, culprit: object, expected: str) -> int:
-    """Open a regular file and return its descriptor; pipes and devices are refused without blocking."""
+    """Open a regular file and return its descriptor; pipes and devices are refused without blocking.
+
+    culprit : name of the file, for the error
+    expected : what the file should be, for the error
+    """
     descriptor = os.open(path, os.O_RDONLY | _OPEN_FLAGS)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)

@@ -52,7 +52,7 @@ class _AnimatedScene:
     first: int
 
     def scenes(self, frame_numbers: Iterable[int]) -> Iterator[Scene]:
-        """Yield the scene at each frame; morph targets and bones that the clip lacks stay as in the scene.
+        """Yield the scene at each frame; morph targets and bones not in the clip keep the pose of `scene`.
 
         frame_numbers : numbers of the frames to yield
         """

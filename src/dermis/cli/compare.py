@@ -349,7 +349,9 @@ def _lobe_figure(roughness: float) -> Figure:
 
 
 def _lobe_intensity(model_name: str, roughness: float) -> Doubles:
-    """Return the reflected intensity f cos(theta_i) cos(theta_o), (3, n), for the BRDF f of a model [1/sr].
+    """Return the reflected intensity (3, n) of a specular model [1/sr].
+
+    The intensity is f cos(theta_i) cos(theta_o), where f is the BRDF of the model.
 
     Each row belongs to an angle of incidence in `_COLOUR_OF_INCIDENCE_DEGREES`, each column to an angle in
     `_view_angles`.

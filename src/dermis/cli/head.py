@@ -206,7 +206,7 @@ def _build_person(
 
 
 def _look_with_values(look: Look, option_values: list[str] | None, option_name: str) -> Look:
-    """Return a copy of an appearance of skin, eyes or hair, with the fields set that an option lists.
+    """Return a copy of a skin, eye or hair look with the field values that an option gives.
 
     option_values : values "NAME=NUMBER,..." of the option
     option_name : option, such as --skin, for error messages
@@ -225,7 +225,7 @@ def _look_with_values(look: Look, option_values: list[str] | None, option_name: 
 
 
 def _hair_look_with_values(look: HairLook, option_values: list[str] | None) -> HairLook:
-    """Return a copy of an appearance of hair, with the fields set that the option --hair lists.
+    """Return a copy of a hair look with the field values that the option --hair gives.
 
     option_values : values "NAME=VALUE,..." of the option, with a word for the style and numbers otherwise
     """
@@ -237,7 +237,7 @@ def _hair_look_with_values(look: HairLook, option_values: list[str] | None) -> H
 
 
 def _head_with_maps(head: Head, map_files: Options) -> Head:
-    """Return a copy of the head with maps loaded from files; a normal map also removes the height map."""
+    """Return a copy of the head with maps loaded from files; a loaded normal map replaces the height map."""
     from dermis.formats.maps import load_maps
 
     loaded = load_maps(**map_files)

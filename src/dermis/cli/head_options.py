@@ -60,7 +60,7 @@ EyeOptions = Annotated[
 
 
 def note_kept_eyeballs(head: Head, eyes_option: str | None) -> None:
-    """Print a note on stderr if a mesh file kept its eyeballs instead of getting the package's eyes.
+    """Print a note on stderr if a head keeps the eyeballs of its mesh file, or if no eyeballs were found.
 
     eyes_option : value of the option --eyes
     """

@@ -43,7 +43,7 @@ def lights(name: str = "", /, *, as_json: JsonOption = False) -> int:
 
 
 def _first_sentence(preset_toml: str) -> str:
-    """Return the first sentence of the comment at the top of a light preset: its summary.
+    """Return the summary of a light preset: the first sentence of the comment at the top of its TOML.
 
     preset_toml : TOML of the preset
     """

@@ -27,13 +27,15 @@ def _to_int(_: type, tokens: Sequence[Token]) -> int:
 def _to_choice(
     model: type[FrozenModel], field_name: str, choice_type: object, tokens: Sequence[Token]
 ) -> str:
-    """Convert the value of an option to a choice, as a converter for cyclopts; return the word as typed.
+    """Check that the value of an option is one of the allowed choices, and return the value unchanged.
 
-    model, field_name : settings model and its field that the option sets
-    choice_type : type of the option, which is not used
-    tokens : the option's words on the command line, of which there is one
+    This function is a converter for cyclopts.
 
-    Raises CoercionError if the field does not have this choice.
+    model, field_name : settings model, and the field of this model that the option sets
+    choice_type : type of the option; unused, but passed by cyclopts
+    tokens : list with one element, the value of the option on the command line
+
+    Raises CoercionError if the value is not one of the field's choices.
     """
     from dermis.scene.frozen_model import field_choices
 
@@ -87,8 +89,8 @@ def model_options(
     """Return a parameter type for cyclopts that has one option per field of a settings model.
 
     An option has the type, choices, bounds and help of the field; fields that hold other models have no
-    option. The value of the parameter is a dictionary from field names to the options given on the command
-    line.
+    option. The value of the parameter is a dictionary from field names to values, with entries only for
+    the options given on the command line.
 
     only_fields : names of the fields to include; all fields by default
     excluded_fields : names of the fields to exclude
@@ -126,7 +128,7 @@ def option_name(field: str, option_names: Mapping[str, str] | None = None) -> st
 
 
 def is_option(model: type[FrozenModel], field: str) -> bool:
-    """Return whether a field gets an option: true for words, numbers and tuples, false for nested models."""
+    """Return whether a field gets an option: true if it holds words, numbers or tuples, false if a model."""
     return _option_type(model, field)[0] is not None
 
 

@@ -120,7 +120,7 @@ class FrameLandmarks:
             check_output(self.path, (self.path.suffix,))
 
     def check(self, head: Head) -> None:
-        """Raise DermisError if the head lacks a requested landmark set, before anything is rendered."""
+        """Raise DermisError if the head lacks a requested landmark set; to be called before rendering."""
         if self.names:
             from dermis.human.landmarks.points import landmark_points
 
@@ -182,7 +182,7 @@ class AnimationOutput:
         return self.path.suffix.lower() == ".exr"
 
     def check(self, frame_size: tuple[int, int]) -> None:
-        """Raise DermisError if frames of this size cannot be written, before anything is rendered."""
+        """Raise DermisError if frames of this size cannot be written; to be called before rendering."""
         from dermis.images.movie import DEFAULT_CRF, MOVIE_SUFFIX, check_movie
         from dermis.images.writer import FrameFiles
 
@@ -201,7 +201,7 @@ class AnimationOutput:
     def frames_to_render(
         self, frame_numbers: range, frame_size: tuple[int, int], frame_digest: str
     ) -> Sequence[int]:
-        """Return the numbers of the frames to render: all frames without a complete image of an earlier run.
+        """Return the numbers of the frames to render: those without a complete image from an earlier run.
 
         frame_digest : hash of everything that determines the frames; images with another hash are rendered
             again

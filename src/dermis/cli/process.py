@@ -66,7 +66,7 @@ class StandardStreams:
         return next((fault for fault in faults if not isinstance(fault, BrokenPipeError)), None)
 
     def discard_stdout(self) -> None:
-        """Discard all further output to stdout, which nobody may be reading after an interruption."""
+        """Discard all further output to stdout, as its reader may have been interrupted as well."""
         for raw in self._raw:
             if raw.descriptor == 1:
                 raw.fault = raw.fault or BrokenPipeError()

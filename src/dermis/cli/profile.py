@@ -28,7 +28,7 @@ _PIGMENT_OPTION_NAMES = {"structure": "skin"}
 
 
 def _pigment_default_texts() -> dict[str, str]:
-    """Return the help text of each pigment option: its default, and the differing values of named skins."""
+    """Return each pigment option's default as help text, with differing values of named skins."""
     defaults: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
     for field in Pigments.model_fields.keys() - defaults.keys():
         default = getattr(DEFAULT_SKIN, field)

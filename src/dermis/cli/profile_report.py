@@ -107,13 +107,13 @@ class ProfileReport:
     def ring_error(self) -> Floats:
         """Return the relative error (3,) of the fitted Gaussians for each colour channel [-].
 
-        The error is measured in the light that emerges through concentric rings around the point of entry.
+        The light that emerges through each of several concentric rings around the point of entry is compared.
         """
         return self.radial.rings().error(self.fit.profile.variance_mm2, self.fit.profile.weight)
 
     @property
     def tone(self) -> SkinTone | None:
-        """Return the description of the colour of a skin made of pigments; None for other media."""
+        """Return the description of the colour of a skin given by its pigments; None for other media."""
         return None if self.spectrum is None else skin_tone(rgb_weights(WAVELENGTHS_NM) @ self.spectrum)
 
     def as_json(self) -> object:
@@ -247,10 +247,10 @@ class ProfileReport:
         return {"burley": values | engines}
 
     def _transmitted_colours(self) -> dict[str, Floats]:
-        """Return the transmittances (n, 3) of slabs by name of the method [-].
+        """Return a dictionary from the name of a method to the transmittances (n, 3) of n slabs [-].
 
-        The n slabs have the thicknesses `through_mm`. The methods are "gaussians" (from the fit) and "slab"
-        (from the tissue, if it is known).
+        The slabs have the thicknesses `through_mm`. The methods are "gaussians" (computed from the fitted
+        Gaussians) and "slab" (computed from the tissue, and absent if the tissue is not known).
         """
         if not self.through_mm:
             return {}

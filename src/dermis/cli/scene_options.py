@@ -141,7 +141,7 @@ def assemble_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Se
 
 
 def shrink_atlas_on_cpu(scene: Scene, settings: Settings, adapter_kind: str) -> Settings:
-    """Return settings with a smaller atlas for a software adapter, as large as the picture needs.
+    """Return settings in which, for a software adapter, the atlas is only as large as the picture needs.
 
     The atlas is the texture in which light is diffused. A note on stderr states its new size. A size that
     the user or the scene file specifies is kept.
@@ -201,7 +201,7 @@ def _note_profile_map(skin: Skin, settings: Settings) -> None:
 
 
 def _base_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Settings]:
-    """Return the scene of a scene file, or a default scene of a head, before options are applied."""
+    """Return the scene and settings of a scene file, or default ones for a head, before options apply."""
     from dermis.scene import Scene, load_camera, load_scene
     from dermis.scene.files import load_head_and_skin
     from dermis.scene.smoothness import SmoothIn

@@ -96,7 +96,7 @@ def _active_lobes(view_index: int) -> NDArray[np.bool_]:
 
 
 def _parameter_direction(parameter_kind: int, *lobe_amounts: tuple[int, float]) -> Floats:
-    """Return a direction (20,) in the space of all lobe parameters: a change of one parameter of some lobes.
+    """Return the direction (20,) in lobe parameter space that changes one parameter of one or more lobes.
 
     parameter_kind : index of the parameter that changes, such as `_IN_PLANE_POSITION`
     lobe_amounts : index of each lobe that changes, and the amount by which its parameter changes

@@ -103,8 +103,9 @@ def lobe_target(lobe: Lobe, view_cosine: float, roughness: float) -> LobeTarget:
 def harmonic_terms(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
     """Return degree, order and weight of the n harmonics that are symmetric about the plane of incidence.
 
-    The weights serve to compare two lobes: the sum of the squared, weighted differences of their coefficients
-    is the expected squared difference of their reflections of a randomly rotated environment.
+    The weights serve to compare two lobes. If the differences of their coefficients are multiplied by the
+    weights, squared and summed, the result is the expected squared difference between the light that both
+    lobes reflect from a randomly rotated environment.
     """
     pairs = [(l, m) for m in range(degree + 1) for l in range(m, degree + 1, 2)]
     degrees, orders = np.array(pairs, np.intp).T

@@ -36,7 +36,7 @@ def load_panorama(panorama_name: str, max_rows: int = _MAX_PANORAMA_ROWS) -> Flo
 
     A few infinite, NaN or negative pixels are repaired, with a note to the user.
 
-    Raises DermisError for any other name, and for a picture without radiance.
+    Raises DermisError for an unknown name, and for a picture that is not a panorama of radiance.
     """
     path = panorama_file(panorama_name)
     if path is None:

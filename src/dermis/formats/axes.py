@@ -40,7 +40,7 @@ class Axes(NamedTuple):
     def fill_unknown_from(self, stated_axes: Axes) -> Axes:
         """Return a copy of these axes in which the axes stated by a file replace unknown axes.
 
-        The file's front replaces an unknown front only if the file's up axis equals that of the result.
+        An unknown front is replaced by the file's front only if the copy and the file have the same up axis.
 
         stated_axes : axes that the file states
         """

@@ -1,7 +1,8 @@
 """Deformation data of exported meshes: morph targets and bone weights of every vertex.
 
-Export formats allow four bones per vertex. For a subdivided mesh, the bones and weights of each vertex are
-fitted. They move the vertex as closely as possible to its position on the subdivided, skinned control mesh.
+Export formats allow four bones per vertex. For a subdivided mesh, four bones and their weights
+are fitted for each vertex, so that the posed vertex lies as close as possible to its position on the
+subdivided surface of the posed control mesh.
 """
 
 from __future__ import annotations
@@ -146,6 +147,7 @@ class DeformableMesh:
 def point_bone_influences(rig: Rig, subdivision_matrix: csr_array | None) -> tuple[Index, Doubles]:
     """Return four bone indices and weights for each of q mesh points, (q, 4) each; weights sum to 1.
 
+    rig : rig of the head, which moves p control points
     subdivision_matrix : (q, p) matrix from control points to mesh points; None without subdivision
 
     Without subdivision, the weights of the rig are kept. With subdivision, four bones and their weights are

@@ -174,9 +174,11 @@ def _find_front(
 ) -> tuple[Axes, str]:
     """Detect the front axis from the shape of the mesh; return the axes with this front, and a note.
 
-    The axes are unchanged, and the note is empty, if `axes` has a front, if this package wrote the file, or
-    if the detected front is the default.
+    The axes are unchanged, and the note is empty, if the front is already known, if this package wrote the
+    file, if no front is detected, or if the detected front is the one that is assumed by default.
 
+    axes : up axis and front axis of the file, either of which may be unknown
+    mesh_file : content of the file
     joined_part : mesh part with all vertices of the file
     skin_triangles : (f,) mask of triangles that are skin
     """
@@ -205,7 +207,10 @@ def _weld_groups(mesh_parts: list[MeshPart]) -> Floats:
 
 
 def _uv_from_top(uv: Doubles, mesh_path: Path, v_origin: Origin) -> Doubles:
-    """Return uv (v, 2) with v = 0 at the top edge; rounding errors beyond [0, 1] are clamped."""
+    """Return uv (n, 2) with v = 0 at the top edge; rounding errors beyond [0, 1] are clamped.
+
+    v_origin : edge of textures at which v is 0 in the file, see `load_rigged`
+    """
     from_top = v_origin == "top" or (v_origin == "auto" and is_gltf(mesh_path))
     flipped = uv if from_top else np.column_stack((uv[:, 0], 1 - uv[:, 1]))
     clamped = np.clip(flipped, 0, 1)
@@ -313,7 +318,7 @@ class GroupNames(NamedTuple):
 
 
 class FileSurface(NamedTuple):
-    """Data of a mesh file for applying the materials and pictures of the file to the mesh.
+    """Data with which the materials and pictures of a mesh file are applied to the mesh read from it.
 
     in_file : (m,) index in the file of each material of the mesh, -1 for a material that is not in the file
     has_uv : (m,) mask of materials whose triangles have uv in the file
@@ -423,7 +428,8 @@ def _rigged_from_arrays(arrays: Arrays) -> RiggedMesh:
 def is_eye_name(group_names: Sequence[str]) -> bool:
     """Return whether a group's names denote an eyeball or its parts, such as Eye_L, sclera, Std_Cornea_R.
 
-    group_names : names of the group, the name of its material first; the first name with a known word decides
+    group_names : names of the group, the name of its material first; the result is decided by the first
+        name that contains a word for an eyeball, or a word such as "lash" that excludes an eyeball
 
     Lashes, brows, lids and transparent layers on the eye, such as tear films, are not eyes.
     """

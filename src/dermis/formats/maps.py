@@ -86,10 +86,10 @@ def height_map(path: PathLike, relief_mm: np.float32) -> Floats:
 
 
 def mixture_map(path: PathLike) -> Floats:
-    """Read a map (H, W, 2) of the fractions of two diffusion profiles in a mixture with the main profile.
+    """Read a map (H, W, 2) of the fractions of two further diffusion profiles, mixed with the main profile.
 
-    At each texel, the sum of the two fractions is at most 1; the remainder is the fraction of the main
-    profile. Larger sums are scaled to 1.
+    At each texel, the two fractions and the fraction of the main profile sum to 1. If the two fractions in
+    the picture sum to more than 1, they are scaled so that their sum is 1.
 
     A colour picture holds the fractions in red and green. A grey picture holds the first fraction, and the
     second is 0.

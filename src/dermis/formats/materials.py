@@ -31,7 +31,7 @@ class Texture:
 
     uv_set : index of the uv set of the mesh
     transform : (a, b, c, d, e, f) with u' = a u + b v + c and v' = d u + e v + f, where v points down
-    wrap : continuation beyond the picture along u and v
+    wrap : how the texture continues beyond the edges of the picture, along u and along v
     channel : index of the picture's channel that is used; None for colours, normals and grey pictures
     """
 

@@ -56,6 +56,8 @@ _UV_PERIOD_OF_WRAP: dict[Wrap, float] = {"repeat": 1.0, "mirror": 2.0, "clamp": 
 class RawMesh:
     """Triangles of a file in the head's space, before they become a `Mesh`.
 
+    Vertices that differ only in uv or normal lie at the same point, where the triangles are connected.
+
     positions : (v, 3) vertex positions [mm]
     normals : (v, 3) normals of the file, NaN where the file has none
     uv : (v, 2) uv with v down
@@ -64,8 +66,8 @@ class RawMesh:
     material : (f,) material index of each triangle
     quads : (q, 2) pairs of triangles that are the halves of a quad
     vertices : mesh part with the same vertices in the file's space, with their morph targets and bones
-    file_vertex : (v,) index of the file's vertex from which each vertex was made; only the vertices that the
-        file's triangles use are numbered
+    file_vertex : (v,) index of the file's vertex from which each vertex was made; vertices of the file that
+        no triangle uses are not counted
     """
 
     positions: Floats
@@ -196,8 +198,9 @@ def _drop_triangles(mesh: RawMesh, flat_mask: Mask, is_skin: Mask, notes: list[s
 def _duplicate_materials(triangle_key: Index, material: Ints, is_skin: Mask) -> Mask:
     """Return the mask (m,) of materials to drop, because a kept material has exactly the same triangles.
 
-    triangle_key : (f,) key of each triangle, see `triangle_keys`
+    triangle_key : (f,) number that is equal for triangles with the same three points, see `triangle_keys`
     material : (f,) material index of each triangle
+    is_skin : (m,) mask of the materials that are skin, which are kept in preference to others
     """
     ends = np.cumsum(np.bincount(material, minlength=len(is_skin)))
     triangles = np.split(triangle_key[np.lexsort((triangle_key, material))], ends[:-1])
@@ -538,11 +541,11 @@ def _inside_out_components(
 
     A component is inside out in any of these cases:
 
-    1. Mainly its back is visible from outside.
-    2. Its front is not the side that is mainly visible, and the file's normals are opposite to those of the
-       triangles.
-    3. Neither side is visible, and the visible triangles of the whole mesh mainly show their backs.
+    1. Its back is the side that is mainly visible from outside.
+    2. Neither side is mainly visible, and the file's normals point away from the triangles' normals.
+    3. Neither side is visible at all, and most visible triangles of the whole mesh show their backs.
 
+    surface : triangles of all components
     doubtful_components : mask of components that may be inside out
     normals_cosine : for each component, the mean cosine between the file's normals and the triangles' normals
     """

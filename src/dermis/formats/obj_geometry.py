@@ -259,7 +259,7 @@ def _parse_vertices(path: Path, statement_rows: _StatementRows) -> tuple[Doubles
 
 
 def _parse_polypaint(hex_digits: str, vertex_count: int) -> tuple[Doubles | None, list[str]]:
-    """Return the linear colours (n, 3) of the polypaint of ZBrush, or None and a note.
+    """Return linear vertex colours (n, 3) from ZBrush's polypaint, or None if it is invalid; and notes.
 
     hex_digits : two hexadecimal digits each for mask, red, green and blue of each vertex
     vertex_count : number of vertices

@@ -104,7 +104,7 @@ class MtlTexture:
     factor : option -bm, by which the map is multiplied [-]
     scale : option -s along u and v, where v points up
     offset : option -o along u and v
-    wrap : continuation beyond the picture, as the option -clamp states
+    wrap : how the texture continues beyond the edges of the picture, as the option -clamp states
     unused : options without effect, such as the turbulence -t
     """
 
@@ -253,6 +253,7 @@ def with_materials(
 
     path : path of the OBJ file
     mesh_parts : mesh parts, whose groups have the names of their materials
+    library : materials of the .mtl files by name
     """
     materials: list[FileMaterial] = []
     notes = [f"mtllib: {name} is not in its folder. {_MISSING_FILE_ADVICE}" for name in library.missing]
@@ -294,7 +295,11 @@ def _udim_tiles(mesh_part: MeshPart) -> list[tuple[int, MeshPart]]:
 
 
 def _file_material(path: Path, material_name: str, material: MtlMaterial, udim_tile: int) -> FileMaterial:
-    """Return a material of an .mtl file."""
+    """Convert a material of an .mtl file.
+
+    path : path of the OBJ file
+    udim_tile : number of the UDIM tile whose pictures are used, if the pictures are a sequence of tiles
+    """
     textures, missing, unused = dict[Role, Texture](), dict[str, str](), list(material.unread)
     skin_only = list[str]()
     row, column = divmod(udim_tile - _FIRST_UDIM, _UDIM_COLUMNS)

@@ -39,7 +39,7 @@ class PartPictures:
         return None if head.maps.parts is None else cls(head.mesh, head.maps.parts)
 
     def needed_roles(self, material: Material) -> set[PartRole]:
-        """Return the roles of the pictures that a part with a given material needs."""
+        """Return the roles, such as "colour" and "normal", of the pictures that a material needs."""
         is_cut, is_metal = material.opacity_cutoff > 0.0, material.metalness > 0.0
         is_rough = material.roughness is not None
         needed: dict[PartRole, bool] = {

@@ -139,7 +139,7 @@ class _Header(NamedTuple):
 
 
 class _Columns(dict[str, "Numbers | _ListColumn"]):
-    """Columns of an element by property name; methods that return columns record that these are used."""
+    """Columns of an element by property name; the methods that return columns mark them as used."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -25,7 +25,7 @@ def split_points(
 ) -> Ints:
     """Return point indices (v,) in which coincident vertices that move differently have different points.
 
-    point_of_vertex : (v,) index of the point of each vertex, welded by position
+    point_of_vertex : (v,) index of the point of each vertex, as found by welding vertices by position
     mesh_part : vertices with their morph targets and bone weights
     linear_to_head : (3, 3) matrix from the space of the file to that of the head [mm]
     culprit : file, for errors

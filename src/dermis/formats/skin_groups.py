@@ -67,13 +67,13 @@ def choose_skin(
     The following rules are tried in this order, and the first that selects any part decides. If no rule
     selects a part, all parts are skin.
 
-    1. The material of the part scatters light.
+    1. The file states that light scatters below the surface of the part.
     2. A name of the part contains a word of `SKIN_WORDS`.
     3. A name contains a word of `BODY_WORDS`, and no name contains a word of `NON_SKIN_WORDS`.
     4. The part covers at least a tenth of the head, and no name contains a word of `NON_SKIN_WORDS`.
 
-    groups : groups with the names of the parts
-    is_scattering : for each part, whether the file states that light scatters below the surface
+    groups : for each part, the group that contains its names
+    is_scattering : for each part, whether the file states that light scatters below its surface
     """
     words = [_group_words(group) for group in groups]
     is_other = [bool(own & set(NON_SKIN_WORDS)) for own in words]
@@ -99,8 +99,8 @@ def _has_skin_word(name_words: set[str]) -> bool:
 def _covers_head(mesh_parts: Sequence[MeshPart], is_not_skin: Sequence[bool]) -> list[bool]:
     """Return whether each mesh part covers at least a tenth of the head's area.
 
-    is_not_skin : for each part, whether its names exclude that it is skin; such a part does not count as
-        area of the head
+    is_not_skin : for each part, whether its names show that it is something else, such as hair; the area of
+        these parts is not included in the area of the head
     """
     heights = np.concatenate([part.positions[:, 1] for part in mesh_parts])
     lowest = heights.max() - HEAD_HEIGHT_FRACTION * np.ptp(heights)

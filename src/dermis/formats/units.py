@@ -37,9 +37,13 @@ _USUAL_SIZE_RANGE_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}
 def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, culprit: object) -> RiggedMesh:
     """Return the mesh of a file in millimetres, with a note if its unit was guessed or its size is unusual.
 
-    rigged : mesh and rig, read with the unit `unit_mm`; formats without a unit (OBJ, PLY, STL) have no rig
+    A guessed unit scales only the mesh, because the unit is only guessed for OBJ, PLY and STL, which have no
+    rigs.
+
+    rigged : mesh and rig, in millimetres according to `unit_mm`, or else to the unit of the file or format
+    path : path of the file, whose suffix tells the format
     unit_mm : unit of the file as the user states it [mm]; None to use the unit of the file or its format, or
-        to guess it
+        to guess it for OBJ, PLY and STL
     culprit : source of the mesh, for errors
 
     Raises DermisError for a mesh that is smaller than a millimetre or larger than three metres.
@@ -108,7 +112,7 @@ def _size_text(sizes_mm: Floats) -> str:
 
 
 def _refuse_size(mesh: Mesh, unit_mm: float, culprit: object) -> None:
-    """Refuse a mesh of impossible size; the error advises units with which the size would be usual.
+    """Refuse a mesh of impossible size; the error suggests units with which the size would be usual.
 
     unit_mm : unit with which the file was read [mm]
     """

@@ -199,6 +199,7 @@ def _make_layout(
     """Return the resources of one atlas layout, except the record of the lights, which each frame adds.
 
     uploaded_atlas : the atlas, and its textures on the device
+    shape_resources : buffers of the head's shape
     shared_bindings : result of `_shared_bindings`, to which the maps of the head have been added
     layout_index : index of the layout, part of the keys of its resources in the cache
     """

@@ -96,7 +96,9 @@ def bake_albedo(
 
 
 def texel_surface_points(mesh: Mesh, map_side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
-    """Return the indices of texels whose centres are on skin, and these surface points packed for bake.wgsl.
+    """Return the indices of texels whose centres are on skin, and the surface points at these centres.
+
+    The surface points are packed for bake.wgsl.
 
     Where triangles overlap in uv, a triangle that is not mirrored takes precedence over a mirrored triangle,
     and a later triangle over an earlier triangle.
@@ -138,7 +140,7 @@ def _available_outputs(
     output_names: tuple[str, ...],
     absence_reasons: dict[str, str],
 ) -> tuple[str, ...]:
-    """Return `output_names` if the renderer can compute these outputs for the scene, else ().
+    """Return `output_names`, or () if the renderer cannot compute these outputs for the scene.
 
     absence_reasons : dictionary from the name of a missing output to the reason; if the result is (), the
         outputs are added to this dictionary

@@ -24,7 +24,7 @@ def capture_renderer(device_kind: str, adapter: str) -> Renderer:
     """Return a renderer that records passes for GPUs or for software adapters.
 
     device_kind : kind of adapter on which the passes will be replayed, "gpu" or "software"
-    adapter : selector of the adapter on which the passes are recorded, which may be of another kind
+    adapter : adapter on which the passes are recorded, as in `Renderer`; it may be of another kind
     """
     renderer = Renderer(adapter, cache_size=_RENDERER_CACHE_SIZE, cache_ttl=1000)
     if renderer.device.adapter.kind != ADAPTER_KINDS[device_kind]:
@@ -35,13 +35,18 @@ def capture_renderer(device_kind: str, adapter: str) -> Renderer:
 
 
 def capture_frame(frame_capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
-    """Record the passes of a frame, with their resources, without running them."""
+    """Record the passes of a frame, with their resources, without running them.
+
+    frame_capture : recorder of the passes
+    """
     technique = TECHNIQUES[inputs.settings.technique]
     return frame_capture.capture(lambda graph: draw_frame(graph, inputs, technique))
 
 
 def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFrame:
-    """Return a captured frame with fewer but wider strands of scalp hair and beard, of the same total area.
+    """Return a captured frame with fewer but wider strands of scalp hair and beard.
+
+    The total area of the strands stays the same.
 
     hair_divisor : number by which the number of strands is divided; 0 keeps all strands
     """
@@ -53,15 +58,19 @@ def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFra
 
 
 def capture_mips(frame_capture: FrameCapture, texture: Texture) -> CapturedFrame:
-    """Record the passes that compute the coarser mip levels of a map from its finest level."""
+    """Record the passes that compute the coarser mip levels of a map from its finest level.
+
+    frame_capture : recorder of the passes
+    texture : texture of the map
+    """
     return frame_capture.capture(lambda graph: map_mips.fill_mips(graph, map_mips.with_mip_views(texture)))
 
 
 def update_map(renderer: Renderer, texture: Texture, mip_levels: list[NDArray[np.float16]]) -> None:
     """Replace the texels of a map; if only the finest mip level is given, the other levels are computed.
 
-    mip_levels : for each mip level, the finest first, its (l, h, w, c) texels, where l is the number of array
-        layers
+    mip_levels : (l, h, w, c) texels of each mip level, starting with the finest level; l is the number of
+        array layers of the texture
     """
     for mip, layers in enumerate(mip_levels):
         for layer, texels in enumerate(layers):

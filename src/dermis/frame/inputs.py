@@ -22,6 +22,7 @@ from dermis.scene.settings import Settings
 class FrameInputs:
     """Inputs of a frame: cached resources, and values that may differ between frames with equal resources.
 
+    resources : cached textures, buffers and records of the frame
     motion : pose of the head, as bytes for the shaders
     face_movements : (9,) strength of the facial movements that change the skin maps; None if the maps are
         constant

@@ -74,7 +74,7 @@ def out_of_memory_error(
 def suggest_settings(request: FrameRequest, budget_bytes: float) -> str:
     """Return advice on settings whose frame fits into `budget_bytes` bytes.
 
-    The setting that needs the most memory is halved until the frame fits.
+    In each step, the setting that needs the most memory is halved, until the frame fits.
     """
     smaller, changed = request, dict[str, str]()
     needed = frame_bytes(request)
@@ -125,7 +125,7 @@ def _mixing_texel_bytes(request: FrameRequest) -> float:
 def _halved_settings(settings: Settings, option_name: str) -> Settings | None:
     """Return settings with half the value of a size setting, None if this value would be too small.
 
-    For "size", the samples per pixel are halved first.
+    For "size", the number of samples per pixel is halved instead while it exceeds a minimum.
     """
     if option_name == "size" and settings.samples > _MIN_SUGGESTED_SAMPLES:
         return settings.model_copy(update={"samples": settings.samples // 2})

@@ -84,7 +84,7 @@ class Preparation:
         Resources are taken from the cache where nothing has changed; cached resources that are no longer used
         are released.
 
-        view : name of the scene, which tells apart the cached lights of scenes that are drawn in turn
+        view : name under which the lights of the scene are cached, for callers that draw scenes in turn
         outputs : names of outputs besides the picture
         previous : scene of the same head for motion vectors; without it, motion is 0
         landmarks : names of landmark sets
@@ -208,8 +208,7 @@ def interreflection_constants(resources: Resources) -> Constants:
 def _motion_bytes(head: Head, motion: Motion, rest_bytes: MotionBytes) -> MotionBytes:
     """Return a pose as bytes for the shaders.
 
-    rest_bytes : bytes of the rest pose; its positions are reused for poses that keep the control points of
-        the head
+    rest_bytes : bytes of the rest pose; its positions are reused if the pose has the same control points
     """
     weights, matrices = motion.weights.tobytes(), motion.matrices.tobytes()
     is_rest = motion.positions_mm is head.control.positions_mm

@@ -55,8 +55,9 @@ _COMMON_SHADERS = (  # shaders of most frames
 def shader_folders(*option_names: str) -> tuple[Folder, ...]:
     """Return the folders from which shaders include files, with the lists and constants of all features.
 
-    A feature is a package in `features`. The functions `shader_constants` and `shader_lists` of each package
-    are found automatically, so that features need not be registered.
+    A feature is a package in `features`. Its optional function `shader_constants` returns numbers that
+    shaders share with Python. Its optional function `shader_lists` returns the lists over which the lines
+    `//#include <list>` and `//#each list` of shaders iterate. Both functions are found without registration.
 
     option_names : names of the `//#if` conditions that are true
     """
@@ -101,7 +102,7 @@ def program(
     constants : pipeline constants
     source_format : format of the texture from which the shader reads light
     store_format : format of the texture to which the shader writes light
-    with_labels : whether the shader, a hair pass, stores labels besides the picture
+    with_labels : for shaders that draw hair, whether they store the labels of pixels besides the picture
     """
     active = shader_options(source_format, store_format, with_labels, constants)
 
@@ -159,9 +160,9 @@ def registry_version() -> int:
 def device_constants(device: Device) -> Constants:
     """Return the values of pipeline constants with which shaders run fastest on the device.
 
-    GPUs read buffers faster than textures, software adapters read textures faster. Shaders on software
-    adapters also skip lights behind the surface, shade columns of pixels, and take longer steps along hairs
-    that cast shadows.
+    GPUs read buffers faster than textures, but software adapters read textures faster than buffers. On
+    software adapters, shaders also skip lights behind the surface, shade a column of pixels per invocation,
+    and take longer steps along hairs to draw their shadows.
     """
     if device.adapter.kind == "CPU":
         return (("SKIPS_UNLIT", 1), ("STRIP", _PIXELS_PER_COLUMN), ("SPLAT_STEP", _HAIR_SHADOW_STEP_TEXELS))

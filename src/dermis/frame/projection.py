@@ -72,7 +72,10 @@ class ShadowView(NamedTuple):
 
 
 def shadow_map_views(views: Sequence[ShadowView | None]) -> Views:
-    """Return the projections of all shadow maps, sampled at pixel centres; None in `views` is skipped."""
+    """Return the projections of all shadow maps, sampled at pixel centres.
+
+    views : view of the head for each shadow map; None for a light without shadows, which is skipped
+    """
     return Views(np.array([view.clip for view in views if view]).reshape(-1, 4, 4), PIXEL_CENTRE)
 
 
@@ -131,7 +134,11 @@ def _cross(first_vector: Sequence[float], second_vector: Sequence[float]) -> Tri
 
 
 def view_rows(eye: Triple, axes: Axes) -> MatrixRows:
-    """Return the upper three rows of the view matrix, which give x to the right, y up and depth forward."""
+    """Return the upper three rows of the view matrix, which give x to the right, y up and depth forward.
+
+    eye : position of the camera or light in the world [mm]
+    axes : unit vectors right, up and forward
+    """
     right, up, forward = axes
     return (*right, -_dot(right, eye)), (*up, -_dot(up, eye)), (*forward, -_dot(forward, eye))
 
@@ -144,6 +151,7 @@ def perspective_rows(
     Depth is reversed, which gives a similar precision at all distances, because floats are densest near 0.
 
     view_matrix_rows : upper three rows of the view matrix
+    window : rectangle of the image plane that the picture shows
     near, far : distances at which depth is 1 and 0 [mm]
     """
     scale = -near / (far - near)
@@ -229,6 +237,8 @@ def _largest_tangents(side_coordinates: NDArray[np.floating], depth: NDArray[np.
 def parallel_shadow_view(direction: Vectors, outline: Outline, map_side: int) -> ShadowView:
     """Return the narrowest view along the direction of parallel light that contains the whole mesh.
 
+    direction : (3,) direction in which the view looks
+    outline : outline of the head's shape
     map_side : side of the shadow map [texels]
     """
     points = outline.points_mm

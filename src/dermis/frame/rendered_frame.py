@@ -47,7 +47,8 @@ class RenderedFrame(ShortRepr):
     frame_ms : time from recording the frame to its completion [ms]
     setup_ms : time before the frame for uploads, the atlas and shaders [ms]
     gaussians : number of Gaussians of the profile
-    unscattered_fraction : fraction of the skin's triangles outside the atlas, where no light scatters [-]
+    unscattered_fraction : number of skin triangles that lie outside the atlas, where no light scatters,
+        divided by the number of all skin triangles [-]
     suns : number of lights that the environment adds
     settings : settings of the frame
     start_readback : function that starts the readback of a picture, see `features.outputs.readback`

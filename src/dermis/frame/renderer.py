@@ -49,7 +49,7 @@ def pipeline_frames(
     current_device: Callable[[], Device],
     frames: Iterable[tuple[SubmitFrame, ReceiveResult[T]]],
 ) -> Iterator[T]:
-    """Yield the results of frames in order; while one is read back, later frames are already submitted.
+    """Yield the results of frames in order; while a frame is read back, later frames are already submitted.
 
     A frame whose device is lost is submitted again.
 
@@ -152,9 +152,10 @@ class Renderer:
     ) -> tuple[CommandList, T | None]:
         """Declare the passes of a frame, run those whose inputs have changed, and start a readback.
 
-        All passes are in one submission.
+        All passes are in one submission. Returns the submitted commands, and the result of `read_back`.
 
-        force : whether to run all passes, changed or not
+        timed : whether stages or the whole frame are timed, see `draw`
+        force : whether to run all passes, instead of only the passes whose inputs have changed
         read_back : function that starts the readback of the picture, None for no readback
         """
         if force:
@@ -187,7 +188,14 @@ class Renderer:
         outputs: tuple[str, ...] = (),
         landmarks: tuple[str, ...] = (),
     ) -> Readback:
-        """Submit a frame together with the readback of its picture and outputs."""
+        """Submit a frame together with the readback of its picture and outputs.
+
+        previous : scene of the same head for motion vectors; without it, motion is 0
+        linear : whether the picture is linear Rec. 709 instead of sRGB bytes
+        alpha : whether the picture gets the coverage by the head as alpha
+        outputs : names of outputs besides the picture
+        landmarks : names of landmark sets
+        """
         inputs = self.prepare(scene, settings, "", outputs, previous, landmarks)
         coverage, extra = settings if alpha else None, inputs.resources.outputs
         read_back = partial(start_readback, as_linear=linear, alpha_settings=coverage, outputs=extra)
@@ -222,8 +230,8 @@ class Renderer:
             one pass. False returns as soon as the frame is submitted, and waits only if three frames are in
             flight.
         view : str
-            Name of the scene, for callers that draw several scenes in turn: each name caches its own light
-            and shadows.
+            Name under which light and shadows of the scene are cached, for callers that draw several scenes
+            in turn.
         outputs : iterable of str
             Names of outputs for `RenderedFrame.output`.
         previous : Scene, optional
@@ -255,6 +263,7 @@ class Renderer:
     def _draw(self, force: bool, timed: Timing, *prepared: Any) -> RenderedFrame:
         """Render one frame and leave the picture on the device.
 
+        force, timed : as in `draw`
         prepared : arguments of `Preparation.inputs`
         """
         started = time.perf_counter()
@@ -409,9 +418,9 @@ class Renderer:
         linear : bool
             True returns float32 linear Rec. 709 instead of sRGB bytes.
         previous : Scene or iterable of Scene, optional
-            Scenes for motion vectors: either an iterable with the previous scene of each scene, or only the
-            previous scene of the first scene. In the latter case, each later scene uses the scene before it,
-            if the head is the same.
+            Previous scenes, from which motion vectors are computed: an iterable with a previous scene for
+            each scene, or a single scene that precedes the first scene. In the latter case, each later scene
+            uses the scene before it, if the head is the same.
         landmarks : iterable of str
             Landmark sets (keys of `dermis.human.landmarks.sets.LANDMARK_SETS`), or files of rows name,vertex.
 

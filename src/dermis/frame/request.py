@@ -115,7 +115,7 @@ class FrameRequest:
 
     @property
     def painted_side(self) -> int:
-        """Return the side of the maps that the device paints [texels], 0 if the maps come from files."""
+        """Return the side of the maps that are painted on the device [texels]; 0 for maps from files."""
         if not isinstance(self.head.maps, PaintedMaps):
             return 0
         side = 1 << (self.settings.atlas - 1).bit_length()

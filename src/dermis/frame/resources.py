@@ -35,9 +35,12 @@ class AtlasLayout(LitAtlas):
 class Resources:
     """Cached resources of a frame, for all features.
 
+    shape : buffers of the head's shape
     expression_maps : painted maps that expressions change, None if no map changes
     layouts : atlas layouts in which light is diffused; the picture is shaded from the first layout
-    scattered : texture over the atlas of the exitance by subsurface scattering
+    shadow_maps : shadow maps of all lights
+    diffusion : textures and Gaussians for blurs of the light in the atlas
+    scattered : texture with the exitance of scattered light over the atlas
     technique : tables and textures of the technique; None if the technique needs none
     output_layers : textures in which the technique diffuses subsurface light for the outputs besides the
         picture; None if no requested output needs them
@@ -46,10 +49,12 @@ class Resources:
     visibility : texture with the index of the triangle that covers each sample of the picture
     view : uniform record of the shading pass, without the camera
     constants : pipeline constants of the shading pass
+    post : resources of post-processing, among them the picture
     outputs : resources of the outputs besides the picture, None if none are requested
     suns : number of lights that the environment adds
     gaussians : number of Gaussians of the profile
-    unscattered_fraction : fraction of the skin's triangles outside the atlas, on which no light scatters [-]
+    unscattered_fraction : number of skin triangles that lie outside the atlas, where no light scatters,
+        divided by the number of all skin triangles [-]
     """
 
     shape: shape.Resources

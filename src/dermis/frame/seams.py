@@ -1,4 +1,4 @@
-"""Methods of treating the seams of the atlas: stitching, and those of the 2007 talk [Dudash2007]."""
+"""Methods of treating the seams of the atlas: stitching, and the methods of a talk in 2007 [Dudash2007]."""
 
 from __future__ import annotations
 
@@ -39,7 +39,9 @@ SEAM_METHODS = {
 
 
 def seam_method(method_name: str, can_stitch: bool) -> SeamMethod:
-    """Return the seam method of a name; "clear-colour" replaces "stitch" if the technique cannot stitch.
+    """Return the seam method with a given name.
+
+    If the technique cannot stitch, "clear-colour" replaces "stitch".
 
     can_stitch : whether the technique can carry light across seams
     """
@@ -56,6 +58,7 @@ class AtlasPlan(NamedTuple):
 def plan_atlases(method: SeamMethod, settings: Settings, blur_count: int, has_occlusion: bool) -> AtlasPlan:
     """Return the layouts and the side of the atlases; if the atlas is not used, it has the smallest side.
 
+    method : method of treating seams, which has the names of the layouts
     blur_count : number of Gaussians that blur light over the atlas
     has_occlusion : whether the atlas stores occlusion of the environment
     """

@@ -179,7 +179,7 @@ def list_adapters() -> list[Adapter]:
 def select_adapters(selector: str) -> tuple[list[Adapter], str]:
     """Return the adapters that match a selector, best first, and the reason for the choice as text.
 
-    selector : "auto", "cpu", part of a name, or "#1" for the adapter with the number 1, counted from 0
+    selector : "auto", "cpu", part of a name, or "#" and a number, which is counted from 0, such as "#1"
 
     Raises DermisError if no adapter matches.
     """
@@ -239,10 +239,12 @@ def check_limits(adapter_name: str, adapter_limits: Mapping[str, int]) -> None:
 
 
 def device_limits(adapter_limits: Mapping[str, int], full_limit_names: Sequence[str]) -> dict[str, int]:
-    """Return the limits to request for a device: WebGPU's defaults, or less where the adapter offers less.
+    """Return the limits to request for a device, as a dictionary from the name of a limit to its value.
+
+    Most limits are WebGPU's defaults, or lower where the adapter offers less.
 
     adapter_limits : dictionary from the name of a limit to its value on the adapter
-    full_limit_names : limits that are requested at the full value that the adapter offers
+    full_limit_names : names of the limits that are requested as high as the adapter offers instead
     """
     limits = {
         name: (max if name.startswith("min-") else min)(default, adapter_limits.get(name, default))

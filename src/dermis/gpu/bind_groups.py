@@ -53,6 +53,8 @@ def make_bind_group(
 ) -> BindGroup:
     """Create the bind group of a program.
 
+    layout : native bind group layout of the program
+    bindings : bindings that the shader declares
     bound_objects : buffer, texture, texture view or sampler for each binding, the uniform buffers last
     record_sizes : size of the record in each uniform buffer [byte]
     """

@@ -49,9 +49,11 @@ class CapturedPass:
         empty for a write from the host
     groups : for a compute pass, the workgroups along each axis; for a render pass, the number of vertices;
         for a write from the host, the number of bytes
-    completes : index of the resource that the pass extends in place (see `Recorder.dispatch`); -1 if none
-    raster : for a render pass, the layer, the depth to which it clears, and the resource indices of index
-        buffer, depth view and colour target, each -1 if there is none; None for other passes
+    completes : index of the resource whose content the pass only completes, such as a map whose gutters it
+        fills (see `Recorder.dispatch`); -1 if there is none
+    raster : for a render pass, a dictionary of five numbers: the layer, the depth to which the pass clears,
+        and the indices of three resources (index buffer, depth view, colour target), where -1 stands for a
+        missing resource; None for other passes
     written : for a write from the host, the index of the buffer and the bytes; None for other passes
     unit : index of the unit to which the pass belongs; a unit is a recording or a single pass, and its passes
         are run or skipped together
@@ -89,7 +91,10 @@ class CapturedFrame:
         self.passes.append(captured_pass)
 
     def index_of_record(self, struct_name: str, record: UniformRecord) -> int:
-        """Return the index of a uniform record in `records`, appending it on first use."""
+        """Return the index of a uniform record in `records`, appending it on first use.
+
+        struct_name : name of the WGSL struct of the record
+        """
         if id(record) not in self._record_index:
             self._record_index[id(record)] = len(self.records)
             self.records.append((struct_name, record))  # kept alive, so that its id stays unique
@@ -131,6 +136,8 @@ class FrameCapture(Graph):
 
         A texture has one image per layer and mip level; all layers of a mip level come before the next mip
         level.
+
+        resource_index : index of the resource in `resources`
         """
         value = self._objects[resource_index]
         if not is_texture(value):
@@ -202,7 +209,10 @@ class FrameCapture(Graph):
         raise NotImplementedError(f"{stage}: passes that fill targets cannot be captured")
 
     def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Capture the passes that `record_passes` adds as one unit; players run all of them or none."""
+        """Capture all passes of `record_passes(recorder, *args)` as one unit, and return its result.
+
+        Players run either all passes of a unit or none.
+        """
         if self._unit is not None:
             return record_passes(self, *args)
         passes = self._frame.passes

@@ -30,7 +30,8 @@ class CommandList(Recorder):
     Stages that are not timed individually share compute passes. On software adapters, each timed stage is
     submitted separately, and the host waits until it has finished.
 
-    timed : see `Timing`; on software adapters, "whole" also times each stage
+    timed : True to time each stage, "whole" to time only the frame, False for no timing; on software
+        adapters, "whole" has the effect of True
     uniforms : uniform memory for the records of the passes; None to allocate new memory
     submitted : number of the last submission, for `Device.wait`
     """
@@ -216,7 +217,7 @@ class CommandList(Recorder):
         self._pass = None
 
     def _begin_stage(self, stage: str) -> TimestampWrites | None:
-        """Begin a stage and return the `timestamp_writes` of its pass; None without timestamps."""
+        """Begin a stage; return wgpu's description of the timestamps that its pass writes, None for none."""
         if self._wall_clock and self._stage not in ("", stage):
             self._end_stage(self._wall_clock)
         self._stage = stage
@@ -321,7 +322,8 @@ class Timestamps:
     The time of a pass extends to the start of the next pass, so that the times of the stages sum to the
     total.
 
-    frame_only : whether to take only the first and the last timestamp, because each timestamp costs time
+    frame_only : whether to take only the first and the last timestamp of a frame, which takes less time than
+        one for each pass
     """
 
     def __init__(self, device: Device, *, frame_only: bool = False) -> None:
@@ -330,7 +332,7 @@ class Timestamps:
         self._stages: list[str] = []
 
     def begin(self, stage: str) -> TimestampWrites | None:
-        """Reserve a timestamp for a pass and return the `timestamp_writes`; None if no timestamp is taken."""
+        """Reserve a timestamp for a pass; return wgpu's description of it, or None if none is taken."""
         is_full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
         if is_full or (self._frame_only and self._stages):
             return None

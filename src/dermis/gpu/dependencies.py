@@ -86,7 +86,10 @@ def new_access_id() -> int:
 
 
 def mark_scratch(device: Device, resource: R) -> R:
-    """Mark a texture or buffer as scratch and return it; no pass runs only to update a scratch resource."""
+    """Mark a texture or buffer as scratch, and return it.
+
+    The content of a scratch resource is not needed after the frame, so no pass runs only to update it.
+    """
     resource_state(device, resource).scratch = True
     return resource
 
@@ -204,7 +207,11 @@ class Dependencies:
     def _add_write(
         self, state: ResourceState, pass_index: int, last_writers: dict[ResourceState, int]
     ) -> None:
-        """Register a pass as the last writer of a resource and of overlapping views and textures."""
+        """Register a pass as the last writer of a resource and of overlapping views and textures.
+
+        state, pass_index : state of the resource, and index of the pass
+        last_writers : dictionary from each state to the index of its last writer so far, changed in place
+        """
         self._last_writer[state] = last_writers[state] = pass_index
         for view in state.views:
             if (

@@ -60,8 +60,8 @@ class Device:
     executor : threads for work outside Python (compiling, reading, copying); jobs that have not started are
         cancelled when the device is dropped
     ffi : cffi interface of wgpu's native library
-    lib : functions of the native library, which frames call directly to save the overhead of wgpu's Python
-        code; errors in a pass are raised when its encoder is submitted
+    lib : functions of the native library, called directly to save the overhead of wgpu's Python code; errors
+        in a pass are raised when its encoder is submitted
     checked : the same functions with checks: they raise the errors that the library reports
     resource_states : versions of the content of textures, buffers and views, see dependencies.py
     programs : compiled shaders, see program.py
@@ -167,6 +167,7 @@ class Device:
     def uniform_chunk(self, chunk_index: int, chunk_bytes: int) -> Buffer:
         """Return the uniform buffer at an index, created on first use; all frames share these buffers.
 
+        chunk_index : index of the buffer
         chunk_bytes : size of a new buffer [byte]
         """
         while len(self._uniform_chunks) <= chunk_index:

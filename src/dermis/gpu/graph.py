@@ -268,7 +268,7 @@ class Graph(Recorder):
         self._declare_pass(stage, program, resources, (3,), program.access(resources), writes, add_fill)
 
     def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Declare the passes that `record_passes(recorder, *args)` adds.
+        """Declare the passes that `record_passes(recorder, *args)` adds, and return the result of the call.
 
         The passes are recorded once per set of arguments. Either all passes of a recording run, or none.
         Replaying a recording takes almost no time in Python.
@@ -282,13 +282,16 @@ class Graph(Recorder):
         return result
 
     def read_back(self, *buffers: Buffer) -> BufferReadback:
-        """Return a readback of the content that buffers have after the frame, one buffer after another."""
+        """Return a readback: a copy, made after the frame, of the content of buffers one after another."""
         readback = BufferReadback(self.device, sum(buffer.size for buffer in buffers))
         self._readbacks.append((buffers, readback))
         return readback
 
     def submit(self, timed: Timing = False) -> CommandList:
-        """Run the stale passes and return their command list, from which stage times can be read."""
+        """Run the stale passes and return their command list, from which stage times can be read.
+
+        timed : True to time each stage, "whole" to time only the frame, False for no timing
+        """
         frame = CommandList(self.device, timed=timed, uniforms=self._uniforms)
         try:
             dependencies = self._find_dependencies()

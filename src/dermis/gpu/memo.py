@@ -99,7 +99,10 @@ class Memo:
     def submit(
         self, executor: Executor, function: Callable[[*Ts], T], *args: *Ts, caller_name: str = ""
     ) -> Future[T]:
-        """Return a future of `function(*args)`, which runs on a thread of `executor`; futures are cached."""
+        """Return a future of `function(*args)`, which runs on a thread of `executor`; futures are cached.
+
+        caller_name : name of the caller, if several callers use the same function, see `get`
+        """
         return self.get(_submit_to_executor, executor, function, args, caller_name=caller_name)
 
     def result(self, future: Future[T]) -> T:

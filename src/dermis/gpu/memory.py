@@ -60,7 +60,7 @@ class OutOfMemoryError(DermisError):
 def checked_allocation(
     adapter_name: str, resource_name: str, resource_bytes: float, max_bytes: float
 ) -> Iterator[None]:
-    """Raise OutOfMemoryError if the resource that the body of this context creates does not fit.
+    """Raise OutOfMemoryError if the resource that is created in this context does not fit into memory.
 
     adapter_name : name of the adapter, for the message
     resource_name : name of the resource, for the message

@@ -75,7 +75,11 @@ class Program:
         return make_record(self.source.text, struct_name, **values)
 
     def record_positions(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
-        """Return the positions of the bound uniform records in uniform memory [byte]."""
+        """Return the positions of the bound uniform records in uniform memory [byte].
+
+        resources : resources and uniform records by their names in the shader
+        uniforms : memory in which the uniform records are placed
+        """
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
         try:
             return tuple([uniforms.position(records[name]) for name, _ in self._used_members])
@@ -87,6 +91,7 @@ class Program:
 
         resources : buffers, textures, texture views, samplers and NumPy records by their names in the shader;
             records are placed in uniform memory
+        uniforms : memory in which the records are placed
         """
         located = [uniforms.locate(position) for position in self.record_positions(resources, uniforms)]
         bound = [*self._bound_resources(resources), *(buffer for buffer, _ in located)]
@@ -115,7 +120,11 @@ class Program:
     def used_uniform_bytes(self, resources: Bindings, uniforms: Uniforms) -> tuple[Hashable, ...]:
         """Return the bytes of uniform records that the shader reads, to detect passes with changed inputs.
 
-        Large records are returned completely, because Python caches the hash of the bytes for other passes.
+        For large records, all bytes are returned: they are the same object for all passes that use the
+        record, so Python computes their hash only once.
+
+        resources : resources and uniform records by their names in the shader
+        uniforms : memory in which the uniform records are placed
         """
         found: list[Hashable] = []
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
@@ -261,7 +270,7 @@ def cached_program(
 
 
 def used_constants(path: Path, folders: Sequence[Folder], constants: Constants) -> dict[str, float]:
-    """Return the pipeline constants that a shader declares, by name; WebGPU refuses all other constants."""
+    """Return, by name, only those pipeline constants that a shader declares, as WebGPU refuses others."""
     text = shader_source(path, folders).text
     return {name: value for name, value in constants if f"override {name}:" in text}
 
@@ -269,13 +278,13 @@ def used_constants(path: Path, folders: Sequence[Folder], constants: Constants) 
 def shader_source(path: Path, folders: Sequence[Folder]) -> ShaderSource:
     """Return a shader with its includes and other directives expanded.
 
-    folders : folders that are searched for included files, before the toolkit's own
+    folders : folders in which included files are searched, before the folder of this toolkit
     """
     return compose_shader(path, (*folders, _TOOLKIT_SHADER_FOLDER))
 
 
 def _binding_getter(resource_names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:
-    """Return a function that selects the resources called `resource_names`, in this order, from bindings."""
+    """Return a function that takes bindings and returns the resources with the given names, in order."""
     if len(resource_names) > 1:
         return itemgetter(*resource_names)
     return lambda resources: [

@@ -66,6 +66,8 @@ class Recorder(ABC):
     ) -> None:
         """Add a dispatch in which square workgroups cover a 2-D grid of invocations.
 
+        stage : name of the stage, under which the pass is timed
+        resources : resources and uniform records by their names in the shader
         invocation_counts : number of invocations along x and y
         tile_side : side of a workgroup [invocations]
         in_place_resource : see `dispatch`
@@ -98,6 +100,8 @@ class Recorder(ABC):
     ) -> None:
         """Add a render pass of triangles.
 
+        stage : name of the stage, under which the pass is timed
+        resources : resources and uniform records by their names in the shader
         vertex_count : number of vertices, three per triangle
         target : depth and colour attachments
         index_buffer : index buffer; None to number the vertices in order
@@ -108,11 +112,19 @@ class Recorder(ABC):
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Add a render pass that runs a program once per texel of its targets."""
+        """Add a render pass that runs a program once per texel of its targets.
+
+        stage : name of the stage, under which the pass is timed
+        resources : resources and uniform records by their names in the shader
+        targets : colour attachments, which the pass writes
+        """
         raise self._unsupported_error(stage)
 
     def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Add the passes that `record_passes(recorder, *args)` adds; they must depend only on `args`."""
+        """Add the passes that `record_passes(recorder, *args)` adds, and return the result of the call.
+
+        Passes and result must depend only on `args`.
+        """
         return record_passes(self, *args)
 
     def _unsupported_error(self, stage: str) -> NotImplementedError:

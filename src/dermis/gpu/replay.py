@@ -108,7 +108,10 @@ class RecordingCache:
     def get(
         self, device: Device, record_passes: Callable[[Recorder, *Ts], T], args: tuple[*Ts]
     ) -> tuple[Recording, T]:
-        """Return the recording and the result of `record_passes(recorder, *args)`, cached if possible."""
+        """Return the passes that `record_passes(recorder, *args)` records, and its result.
+
+        A cached recording is returned if its arguments were equal and all its resources still exist.
+        """
         known = self._recordings.setdefault(record_passes, [])
         found = next((one for one in known if one[1].is_valid and _matches_copy(one[0], args)), None)
         if found is None:

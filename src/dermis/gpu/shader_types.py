@@ -175,8 +175,8 @@ def _round_up_to_alignment(byte_count: int, alignment: int) -> int:
 def shader_bindings(wgsl_text: str) -> tuple[Binding, ...]:
     """Return the resource bindings that a shader declares, ordered by index; all are in group 0.
 
-    Float textures are unfilterable unless `// filtered` follows their declaration; samplers filter unless `//
-    non-filtering` follows their declaration.
+    A float texture cannot be filtered unless the comment "filtered" follows its declaration. A sampler
+    filters unless the comment "non-filtering" follows its declaration.
 
     wgsl_text : text of the shader
     """

@@ -93,7 +93,7 @@ def compose_shader(path: Path, folders: Sequence[Folder]) -> ShaderSource:
     """Return a shader with its directives expanded.
 
     path : file of the shader
-    folders : folders that are searched for included files that are not next to the including file
+    folders : folders in which an included file is searched if it is not next to the file that includes it
 
     Raises DermisError for a missing file, list, {word} or `//#end`.
     """

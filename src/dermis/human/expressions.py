@@ -27,7 +27,7 @@ def expression(name: str) -> dict[str, float]:
 
 
 def expand_targets(names: Iterable[str]) -> tuple[str, ...]:
-    """Return unique names of morph targets; a name without a side is replaced by its left and right targets.
+    """Return morph target names without duplicates; names without a side become the names for both sides.
 
     For example, "mouthSmile" is replaced by "mouthSmileLeft" and "mouthSmileRight".
     """
@@ -35,7 +35,7 @@ def expand_targets(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def expand_sides(target_name: str) -> tuple[str, ...]:
-    """Return the left and the right target of a name without a side; any other name is returned alone."""
+    """Return the names of the left and right targets for a name without a side; return other names alone."""
     return (
         tuple(f"{target_name}{side}" for side in TARGET_SIDES)
         if f"{target_name}Left" in _arkit_names()

@@ -104,7 +104,7 @@ def fit_lids(
     is_closed: bool = False,
     gaze_axis: Points = REST_GAZE,
 ) -> Points:
-    """Return MakeHuman's points (n, 3) of a person with lids fitted to eyeballs of anatomical size [mm].
+    """Return a person's points (n, 3) after fitting the lids to eyeballs of anatomical size [mm].
 
     points_mm : (n, 3) MakeHuman's points of the person [mm]
     sockets : sockets of the left and the right eye
@@ -239,7 +239,7 @@ def _lid_side(rings: Index, points_mm: Points, body_points: Index, side_name: st
 
 
 def _sliding_points(rings: Index, candidate_points: Index, side_name: str) -> Index:
-    """Return the skin points (c,) outside the lid rings that a blink slides over the eye.
+    """Return the indices (c,) of the skin points outside the lid rings that slide over the eye in a blink.
 
     rings : (rows, 4) lid points from lid_rings.csv
     candidate_points : (n,) points from which the result is selected

@@ -160,9 +160,10 @@ def _sample_ancestry(
     sampled_fractions: NDArray[np.float64],
     fixed_fields: Mapping[str, Any],
 ) -> tuple[NDArray[np.float64], dict[str, float]]:
-    """Return ancestry fractions (3,) for a person's shape, and weights of groups of people for the skin.
+    """Return the ancestry fractions (3,) of a person's shape, and the ancestry of the skin.
 
-    The second result is a dictionary from groups of measured people to their weights in the skin's pigments.
+    The skin's ancestry is a dictionary from the names of groups of measured people to weights, with which the
+    pigments of these groups are averaged.
     If the ancestry of the shape is fixed, the skin follows the shape. If only a skin ancestry or an ITA is
     fixed, the shape follows the skin. Otherwise some people of Caucasian shape have South Asian or Middle
     Eastern skin.
@@ -263,8 +264,8 @@ class _OppositeTargets(NamedTuple):
     less, more : names of the targets for negative and positive weights
     spread : standard deviation of the weight
     truncated : whether the weight is limited to two standard deviations
-    shared_name : name without the side, shared with the target of the opposite half of the face, so that both
-        get similar weights; "" for targets in the middle
+    shared_name : name that both sides of the face have in common, such as "ears/ear-flap-"; targets with the
+        same shared name get similar weights; "" for targets in the middle of the face
     """
 
     less: str

@@ -30,7 +30,7 @@ _STRETCH_ATLAS_SIDE = 1024
 
 
 def person_parameters(person: Human) -> dict[str, Any]:
-    """Return all parameters of a person as a dictionary, with the typical looks of skin, eyes and hair."""
+    """Return all parameters of a person as a dictionary; looks that are not set are the typical looks."""
     numbers = {one.name: getattr(person, one.name) for one in fields(person)}
     numbers |= {"targets": dict(person.targets), "skin": asdict(person.look)}
     return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hairdo)}
@@ -67,7 +67,11 @@ def read_person(path: Path) -> Human:
 
 
 def _build_dataclass(path: Path, dataclass_type: type[T], field_values: Any) -> T:
-    """Return an instance of a dataclass, such as `Human` or `SkinLook`, built from field values in a file."""
+    """Return an instance of a dataclass, such as `Human` or `SkinLook`, built from field values in a file.
+
+    path : path of the file, for error messages
+    field_values : mapping from field name to value, as read from the file
+    """
     known = [one.name for one in fields(dataclass_type)]
     if not isinstance(field_values, Mapping):
         actual = f"got {format_value(field_values)}"
@@ -111,7 +115,9 @@ def write_person_glb(
 
 
 def relief_slopes(head: Head) -> NDArray[np.float32] | None:
-    """Return the slopes (n, n, 2) of a head's height map to the right and upwards, for normal maps [-].
+    """Return the slopes (n, n, 2) of a head's height map, from which a normal map is computed [-].
+
+    The channels are the slopes to the right and upwards.
 
     The result is None for heads that have a normal map already, or that have no square height map.
     """

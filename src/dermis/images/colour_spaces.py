@@ -135,8 +135,7 @@ def profile_name(icc_profile: bytes) -> str:
 def profile_colour_space(icc_profile: bytes) -> ColourSpace | None:
     """Return the colour space of an ICC profile; None if the profile has lookup tables or no curves.
 
-    `ColourSpace.to_linear` converts colours at the full bit depth of a picture, whereas LittleCMS in Pillow
-    supports only 8 bits.
+    LittleCMS is not used, because its interface in Pillow supports only 8 bits per channel.
 
     Raises ValueError, ArithmeticError and struct.error for a damaged profile.
     """
@@ -219,5 +218,8 @@ def _profile_curve(curve_tag: bytes) -> Doubles:
 
 
 def _fixed_point_numbers(tag_bytes: bytes, number_count: int, byte_offset: int = 8) -> list[float]:
-    """Read numbers in signed fixed point with 16 fractional bits from a tag of an ICC profile."""
+    """Read numbers in signed fixed point with 16 fractional bits from a tag of an ICC profile.
+
+    byte_offset : offset of the first number in the tag [byte]
+    """
     return [value / 65536.0 for value in struct.unpack_from(f">{number_count}i", tag_bytes, byte_offset)]

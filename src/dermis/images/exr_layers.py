@@ -47,7 +47,7 @@ def choose_layer(channels_of_parts: Sequence[tuple[str, Sequence[str]]]) -> tupl
     Layers with colours are preferred to grey layers. Among layers with colours, a layer without a name is
     preferred; the second choice is a layer whose name means the whole picture, such as "beauty".
 
-    channels_of_parts : name and channels of each part
+    channels_of_parts : for each part of the file, its name and the names of its channels
 
     A file with a single channel of any name is read as grey.
 

@@ -15,8 +15,9 @@ def mip_chain(image: NDArray[np.floating]) -> list[Floats]:
 
     image : (H, W, C) or (H, W), linear values; level k has max(1, H >> k) x max(1, W >> k) texels
 
-    Even sides are averaged in pairs. An odd side of 2m + 1 texels becomes m texels, each the mean of a window
-    of 2 + 1/m texels: three texels weighted by their overlap with the window.
+    Along even sides, pairs of texels are averaged. An odd side of 2m + 1 texels becomes m texels. Each of
+    these is the mean over a window of 2 + 1/m texels, in which three texels are weighted by their overlap
+    with the window.
     """
     levels = [np.asarray(image, np.float32)]
     while max(levels[-1].shape[:2]) > 1:

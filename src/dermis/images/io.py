@@ -68,7 +68,7 @@ INVALID_PIXEL_PROPERTIES = (
 class EmbeddedPicture:
     """Picture file that belongs to a glTF file or USD package.
 
-    The colours are read as sRGB, even if the picture has another colour profile.
+    Colour profiles of the picture are ignored: integer colours are read as sRGB, floats as linear Rec. 709.
 
     name : name of the picture in error messages
     data : bytes of the picture file, in any format but OpenEXR, or path of a file beside the glTF file
@@ -121,9 +121,9 @@ def read_colours(
 
 
 def note_properties(path: str | Path | EmbeddedPicture, read_as_colours: bool) -> None:
-    """Issue the note on the properties of a picture that is taken from a cache.
+    """Issue the note on a picture's properties, for a caller that has the pixels in a cache.
 
-    It is the same note that is issued when the picture is read from its file.
+    The note is the same as when the picture is read from its file.
 
     read_as_colours : whether to issue the note of `read_colours` instead of that of `read_image`
     """

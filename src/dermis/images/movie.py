@@ -101,8 +101,8 @@ def _check_encoder(path: str | Path) -> None:
 class MovieWriter:
     """Writer of an H.264 movie, which encodes on another thread and writes the file atomically.
 
-    Frame k is shown at exactly k / rate. Levels are stored and tagged with the primaries and matrix of
-    BT.709.
+    Frame k is shown at exactly k / rate. Pixels are converted to YCbCr by the matrix of BT.709, and the file
+    declares BT.709 as its colour space.
 
     Parameters
     ----------

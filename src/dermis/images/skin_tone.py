@@ -64,8 +64,9 @@ class SkinTone(NamedTuple):
 def ita_degrees(cielab: ArrayLike) -> Doubles:
     """Return the individual typology angle (...) of CIELAB colours (..., 3) [degrees].
 
-    The individual typology angle is the angle of a colour about the point L* = 50, b* = 0 in the plane of b*
-    and L*, from 90 (light) to -90 (dark). Colours with negative b*, which skin does not have, get 90 or -90.
+    In the plane of b* and L*, the individual typology angle is the angle of a colour about the point
+    b* = 0, L* = 50. It is from 90 (light) to -90 (dark). Colours with negative b*, which skin does not have,
+    get 90 or -90.
 
     Source: [Chardon1991].
     """

@@ -139,7 +139,9 @@ class FrameFiles:
         check_output(self.path(0))
 
     def start_sequence(self, content_key: str, *, force: bool = False) -> None:
-        """Start a sequence, or continue it with its existing pictures if the stored content key is equal.
+        """Start a sequence, or continue it if its stored content key is equal to `content_key`.
+
+        A sequence that is continued keeps its existing pictures.
 
         content_key : text that is equal for sequences with equal frames
         force : whether to discard existing pictures even if the content keys are equal

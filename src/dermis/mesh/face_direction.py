@@ -33,7 +33,7 @@ _MIN_ASYMMETRY_RATIO, _MIN_RELIEF_RATIO, _MIN_NOSE_RATIO = 2.2, 1.4, 1.35
 
 
 def face_direction(positions: Doubles, triangles: Index, eyes: Doubles) -> Direction | None:
-    """Return the horizontal axis along which a face looks; None if the axis is uncertain.
+    """Return the direction in which a face looks: x, z, -x or -z; None if it is uncertain.
 
     positions : (v, 3) vertices of any unit, Y up
     triangles : (f, 3) vertex indices

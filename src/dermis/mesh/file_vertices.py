@@ -12,7 +12,7 @@ from dermis.base.summary import ShortRepr
 class FileVertices(ShortRepr):
     """Correspondence between the vertices of a mesh file and the points of a head, for mesh sequences.
 
-    Repairs of the mesh may leave a vertex of the file without a point, or give it several points where two
+    If the mesh was repaired, a vertex of the file may have no point, or may have several points where two
     layers of the surface were separated.
 
     count : number of vertices that the triangles of the file use

@@ -25,8 +25,8 @@ class Guides(ShortRepr):
     The arrays are for g guides with k knots each, where each knot follows m quads.
 
     corner : (g, k, m, 4) control points at the corners of the quads, in order around each quad
-    local_mm : (g, k, m, 3) position of each knot relative to each quad: components along the quad, across it
-        and along its normal, from the mean of the corners [mm]
+    local_mm : (g, k, m, 3) position of each knot relative to the mean of each quad's corners: components
+        along the quad (from its first to its second corner), across it and along its normal [mm]
     weight : (g, k, m) weights of the quads, which add up to 1 for each knot [-]
     rest_mm : (g, k, 4) position of each knot on the mean person at rest, and its height above the skin [mm]
     cut : (g,) where the style cuts each guide, as a fraction of the guide's length [-]

@@ -148,7 +148,7 @@ class Head:
 
     @cached_property
     def centre_mm(self) -> Point:
-        """Return the origin of the scene: the skull, or the centre of a mesh without a head [mm]."""
+        """Return the origin of the scene: the centre of the skull, or of a mesh without a head [mm]."""
         return self.skull_mm or centre_of_box(self.mesh.positions)
 
     @cached_property

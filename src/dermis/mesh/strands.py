@@ -33,8 +33,8 @@ class Strands(ShortRepr):
     """Hair strands: thin round fibres, each a polyline of k knots.
 
     roots : root of each strand
-    knots_mm : (n, k, 3) knots from root to tip in the frame of the root: components along the quad, across
-        it, and along its normal
+    knots_mm : (n, k, 3) knots from root to tip, relative to the root: components along the root's quad (from
+        its first to its second corner), across it, and along its normal
     radius_mm : (n, k) radius of the fibre at the knots
     absorption : (n, 3) absorption coefficient of the fibre [1/mm]
     cover : (n,) projected area of the hair around each root, per area of skin; None if negligible [-]
@@ -130,7 +130,8 @@ def hair_cover_of_points(mesh: Mesh, roots: Roots, area_mm2: Doubles) -> Doubles
 def root_frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
     """Return the positions of roots (n, 3) [mm] and their frames (n, 3, 3).
 
-    The rows of a frame are unit vectors along the quad, across it, and along its normal.
+    The rows of a frame are unit vectors along the quad (from its first to its second corner), across it, and
+    along its normal.
 
     points_mm : (p, 3) points of the mesh in a pose
     """

@@ -198,8 +198,8 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
     The triangles are indices of vertices of the subdivided mesh. Triangles with an opacity map are left out.
 
     min_faces : levels are dropped only as long as the coarser mesh has at least this number of faces
-    tolerance_mm : largest distance between a dropped vertex and the middle of the coarse edge that replaces
-        it [mm]
+    tolerance_mm : a coarse face counts as flat if, on each of its edges, the dropped vertex is at most this
+        far from the middle of the edge [mm]
     """
     mesh, levels = head.mesh, head.levels
     by_quads = len(mesh.quads) > 0
@@ -225,8 +225,8 @@ def _coarsen_triangles(
         first three are at its corners
     dropped_levels : number of subdivision levels to leave out in flat regions
     positions_mm : (v, 3) vertices of the finest level [mm]
-    tolerance_mm : largest distance between a dropped vertex and the middle of the coarse edge that replaces
-        it, in regions that count as flat [mm]
+    tolerance_mm : a coarse face counts as flat if, on each of its edges, the dropped vertex is at most this
+        far from the middle of the edge [mm]
     """
     coarse, finer = triangles, triangles
     for _ in range(dropped_levels):
@@ -242,12 +242,12 @@ def _coarsen_quads(
 ) -> Ints:
     """Return triangles (t, 3) of a mesh after Catmull-Clark subdivision, with fewer levels in flat regions.
 
-    quads : (q, 4) quads of the finest level; the rules divide a polygon into quads, one from each corner to
-        its centre
+    quads : (q, 4) quads of the finest level; Catmull and Clark's rules divide a polygon with k corners into
+        k quads, which meet at its centre
     dropped_levels : number of subdivision levels to leave out in flat regions
     positions_mm : (v, 3) vertices of the finest level [mm]
-    tolerance_mm : largest distance between a dropped vertex and the middle of the coarse edge that replaces
-        it, in regions that count as flat [mm]
+    tolerance_mm : a coarse face counts as flat if, on each of its edges, the dropped vertex is at most this
+        far from the middle of the edge [mm]
     """
     coarse = quads
     for _ in range(dropped_levels - 1):

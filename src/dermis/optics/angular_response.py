@@ -25,7 +25,7 @@ def interpolate_table(column_at: Callable[[float], Floats], table_position: floa
 
     The positions of the table's columns are the multiples of 1 / INTERPOLATION_STEPS from 0 to 1.
 
-    column_at : function that returns the column, an array, at such a position; it should cache its results
+    column_at : function from the position of a column to the column, an array; it should cache its results
     table_position : position between 0 and 1; values outside this range are clamped
     """
     scaled = min(max(table_position, 0.0), 1.0) * INTERPOLATION_STEPS
@@ -53,11 +53,12 @@ def interpolate_columns(column_at: Callable[[float], Floats], table_positions: A
 class AngularResponse:
     """Factors that describe how the reflectance of a half-space depends on direction.
 
-    For each incident and exit direction, diffuse light is multiplied by the sum of two terms, which are
-    relative to the reflectance at normal incidence. The first term, `relative_reflectance`, is the
-    reflectance for the incident direction. The second term, for light that scattered once, is
-    `single_scattering` times the difference between the kernel 1/(a + b) and the mean of this kernel over
-    exit directions, where a and b are the cosines of the incident and the exit direction below the surface.
+    For each pair of an incident and an exit direction, subsurface light is multiplied by the sum of two
+    terms. Both terms are relative to the reflectance at normal incidence. The first term,
+    `relative_reflectance`, is the reflectance for the incident direction. The second term, for light that
+    scattered once, is `single_scattering` times the difference between the kernel 1/(a + b) and the mean of
+    this kernel over exit directions. Here, a and b are the cosines of the incident and the exit direction
+    below the surface.
 
     eta : index of refraction relative to air [-]
     relative_reflectance : (DIRECTION_ROWS, c) reflectance relative to normal incidence, at incident cosines
@@ -126,15 +127,19 @@ def mean_single_scattering_kernel(cosine: ArrayLike, eta: float) -> Floats:
 
 
 def refracted_cosine(cosine: ArrayLike, eta: float) -> Floats:
-    """Return the cosine of the angle of refraction below the surface, from the cosine of incidence in air."""
+    """Return the cosine of the angle of refraction below the surface.
+
+    cosine : cosine of the angle of incidence in air
+    eta : index of refraction relative to air [-]
+    """
     return np.asarray(np.sqrt(1.0 - (1.0 - np.asarray(cosine, np.float64) ** 2) / eta**2))
 
 
 class _HalfSpace:
     """Isotropically scattering half-space below a smooth surface, for a set of discrete directions.
 
-    The operator R describes reflection by the medium, and the operator r internal reflection by the surface.
-    One linear system is solved to sum the series R + R r R + ... of multiple reflections.
+    The operator R describes reflection by the medium. The operator r describes internal reflection by the
+    surface. The series R + R r R + ... of multiple reflections is summed by solving one linear system.
     """
 
     def __init__(self, albedo: float, eta: float) -> None:

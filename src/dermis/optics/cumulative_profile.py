@@ -70,8 +70,8 @@ class CumulativeProfile:
 
         distance_mm : signed distances x from the edge, positive in the uniformly lit half-plane [mm]
 
-        With the fraction P(r) of the light within a radius r, the response at x > 0 is 1/2 plus 1/pi times
-        the integral of P(x / sin t) over t from 0 to pi/2. The response at -x is 1 minus the response at x.
+        P(r) is the fraction of the light within a radius r. The response at x > 0 is 1/2 plus 1/pi times the
+        integral of P(x / sin t) over t from 0 to pi/2. The response at -x is 1 minus the response at x.
         """
         x = np.asarray(distance_mm, np.float64)
         t = (np.arange(_EDGE_RESPONSE_ANGLE_COUNT) + 0.5) * (0.5 * np.pi / _EDGE_RESPONSE_ANGLE_COUNT)

@@ -26,8 +26,8 @@ _OFFSET_ABSORPTION_WEIGHT = 0.35  # of absorption in the published formula of th
 def equivalent_medium(profile: GaussianSum, total_reflectance: Floats, eta: float) -> Medium:
     """Return the half-space that has a given reflectance and spreads light as widely as a given profile.
 
-    The width of a profile R(r) is defined as the inverse of the frequency at which the Hankel transform of
-    R(r) has fallen to half of its value at frequency 0.
+    The Hankel transform of a profile R(r) decreases with frequency. The width of the profile is the inverse
+    of the frequency at which the transform is half of its value at frequency 0.
 
     profile : diffusion profile
     total_reflectance : (c,) reflectance of the half-space for light at normal incidence [-]
@@ -46,10 +46,10 @@ def equivalent_medium(profile: GaussianSum, total_reflectance: Floats, eta: floa
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
 def _half_space_column(eta: float, from_photons: bool, total_reflectance: float) -> Floats:
-    """Return albedo and width of the half-space with a given reflectance, as a column (2,) of a table.
+    """Return two properties of the half-space with a given reflectance, as a column (2,) of a table.
 
     The first element is the square root of 1 minus the single-scattering albedo [-]. The second element is
-    the frequency at which the Hankel transform of R(r) has fallen to half of its value at 0 [1 / mean free
+    the frequency at which the Hankel transform of R(r) is half of its value at frequency 0 [1 / mean free
     path].
 
     eta : index of refraction relative to air [-]
@@ -133,7 +133,10 @@ def _reflectance_transform(medium: Medium, frequency: float) -> float:
 
 
 def _half_frequency(hankel_transform: Callable[[float], float]) -> float:
-    """Return the frequency at which a Hankel transform has fallen to half of its value at 0 [1/mm]."""
+    """Return the frequency at which a Hankel transform is half of its value at frequency 0 [1/mm].
+
+    hankel_transform : function from a frequency to the Hankel transform, which decreases with frequency
+    """
     from scipy.optimize import brentq
 
     total = hankel_transform(float(hankel.NEAR_ZERO_FREQUENCY[0]))
@@ -145,7 +148,7 @@ def oblique_offset_mm(medium: Medium) -> float:
     """Return the lateral shift of grazing light, as the mean over all channels [mm].
 
     The shift is the distance along the surface from the point where light enters to the mean point where it
-    leaves. At an angle t to the normal, the shift is sin t times that of grazing light.
+    leaves. For light at an angle t to the normal, the shift is sin t times the shift of grazing light.
 
     medium : medium with one layer
 

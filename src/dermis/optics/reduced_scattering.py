@@ -18,7 +18,9 @@ _MAX_LISTED_THICKNESS_MM = 1e4  # thicker layers of MCML files stand for semi-in
 
 
 def check_reduced(culprit: str, layer_entries: Mapping[str, object]) -> None:
-    """Raise DermisError for a layer with an anisotropy g: its scattering probably lacks the factor 1 - g.
+    """Raise DermisError if a layer in a file has an entry for the anisotropy g.
+
+    The scattering coefficient of such a layer is probably not yet multiplied by 1 - g.
 
     culprit : name of the file or layer, for the message
     layer_entries : entries of the layer in the file, including "scattering_per_mm"
@@ -59,7 +61,13 @@ def refuse_mcml(path: Path) -> NoReturn:
 
 
 def _mcml_layer_text(eta: float, mu_a: float, mu_s: float, g: float, thickness_cm: float) -> str:
-    """Return a layer of MCML as text, with the keys and units of this package's TOML files."""
+    """Return a layer of MCML as text, with the keys and units of this package's TOML files.
+
+    eta : index of refraction relative to air [-]
+    mu_a, mu_s : absorption and scattering coefficient [1/cm]
+    g : mean cosine of the scattering angle [-]
+    thickness_cm : thickness of the layer [cm]
+    """
     thickness = (
         f"thickness_mm {10 * thickness_cm:.4g}"
         if 10 * thickness_cm <= _MAX_LISTED_THICKNESS_MM

@@ -91,7 +91,9 @@ def spectral_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_N
 
 
 def _select_rows(layer: Layer, row_indices: NDArray[np.int64]) -> Layer:
-    """Return a layer whose k c channels are k rows of another layer's coefficients, one row after another.
+    """Return a layer with the channels of k selected rows of another layer's coefficients.
+
+    The coefficients of the result have the shape (k * c,), one row after another.
 
     layer : layer with coefficients of the shape (n, c)
     row_indices : (k,) indices of the rows, which may repeat

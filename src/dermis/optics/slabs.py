@@ -140,7 +140,7 @@ def solve_doubled_slabs(
     The time is about that of `solve_slabs` for the thickest slabs alone.
 
     albedo, eta, direction_nodes, g : as in `solve_slabs`
-    smallest_depth : (n,) optical depths of similar size [-]
+    smallest_depth : (n,) optical depths before the doublings; they should be of similar size [-]
     doubling_count : number d of doublings; the result has n (d + 1) slabs, ordered by the number of
         doublings, then by `smallest_depth`
     """
@@ -161,8 +161,9 @@ def half_space_radiance(
 
     - the cosines (m,) of the directions below the surface;
     - the fraction (m,) of the light from a uniform sky that enters in each direction;
-    - the emerging radiance (m, m) by exit direction (row) and entry direction (column), scaled so that its
-      mean over exit directions, weighted by these fractions, is the reflectance.
+    - the emerging radiance (m, m), with a row for each exit direction and a column for each entry direction.
+
+    The radiance is scaled so that the mean of each column, weighted by the fractions, is the reflectance.
 
     The arguments are those of `solve_slabs`; m is `direction_nodes`.
     """
@@ -344,8 +345,8 @@ def anisotropic_response(total_reflectance: ArrayLike, eta: float, g: float) -> 
     g : mean cosine of the scattering angle, at least 0 [-]
 
     The field `single_scattering` is that of `angular_response` plus a correction for anisotropy. To find the
-    correction, this field is fitted to the emerging radiance by least squares, both for g and for isotropic
-    scattering. The correction is the difference of the two fits.
+    correction, this field is fitted to the emerging radiance by least squares, once for g and once for
+    isotropic scattering. The correction is the difference of the two fits.
     """
     isotropic = angular_response(total_reflectance, eta)
     if g == 0.0:

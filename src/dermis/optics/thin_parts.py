@@ -42,7 +42,7 @@ _FIT_FREQUENCIES = np.geomspace(
 
 @dataclass(frozen=True, eq=False)
 class ThinParts:
-    """Light that thin parts of the body transmit, and the reflectance that they lack, by thickness.
+    """Light transmitted by thin parts of the body, and reflectance lost there, as functions of the thickness.
 
     Row 0 of each array is for the thickness 0, and the last row for `max_thickness_mm`; the square roots of
     the thicknesses are evenly spaced. The light is given as weights of k Gaussians in 3 channels, relative to
@@ -95,9 +95,10 @@ def oblique_transmittance(
 ) -> Floats:
     """Return the relative transmittance (DIRECTION_ROWS, c) of optically thick slabs by direction [-].
 
-    The relative transmittance is t / r. Here, t is the transmittance for the incident direction, divided
-    by the slab's transmittance for uniform light, and r is the same quotient for the reflectance of a
-    half-space. The square roots of the cosines of incidence in air are evenly spaced from 0 to 1.
+    The relative transmittance is t / r. Here, t is the slab's transmittance for the incident direction,
+    divided by its transmittance for uniform light. The divisor r is the reflectance of a half-space for this
+    direction, divided by its reflectance for uniform light. The square roots of the cosines of incidence in
+    air are evenly spaced from 0 to 1.
 
     total_reflectance : (c,) reflectance of the half-space for light at normal incidence [-]
     eta : index of refraction relative to air [-]
@@ -169,7 +170,9 @@ def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> It
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
 def _totals_column(eta: float, g: float, root_absorption: float) -> Floats:
-    """Return the four fields of `_SlabTotals` for one albedo, (n, 4), at the n depths `_OPTICAL_DEPTHS`.
+    """Return the fields of `_SlabTotals` as columns (n, 4), for one albedo and n optical depths.
+
+    The optical depths are `_OPTICAL_DEPTHS`.
 
     eta : index of refraction relative to air [-]
     g : mean cosine of the scattering angle [-]

@@ -215,7 +215,7 @@ def load_tissue(
 
 
 def _checked_pigments(pigments: Mapping[str, Any]) -> dict[str, Any]:
-    """Return pigments as a dictionary.
+    """Check the names of pigment parameters, and return the parameters as a dictionary.
 
     Raises DermisError unless all keys are fields of `SkinParameters`.
     """

@@ -185,7 +185,10 @@ def _tuple_length_text(pydantic_error: ErrorDetails, model: type[BaseModel]) -> 
 
 
 def _unknown_field_message(field_name: str, model: type[Any]) -> str:
-    """Return the message for an unknown field name; suggest a similar name, or a class with this field."""
+    """Return the message for an unknown field name, with a suggestion.
+
+    The suggestion is a similar field name, or another settings class that has a field of this name.
+    """
     known, finding = list(model.model_fields), "but this name is unknown"
     plain = field_name[:_MAX_NAME_LENGTH].lower().replace("-", "_")
     similar = difflib.get_close_matches(plain, known, 1, 0.7)

@@ -93,7 +93,11 @@ def _materials_of_kind(mesh: Mesh, material_kind: str) -> Mask:
 
 
 def _has_colours(mesh: Mesh, surface: FileSurface, material_mask: Mask) -> bool:
-    """Return whether any vertex of the materials in a mask has a colour other than white."""
+    """Return whether any vertex of selected materials has a colour other than white.
+
+    surface : surface data of the file, with vertex colours from 0 to 1 if the file has them
+    material_mask : (m,) mask of the selected materials
+    """
     if surface.colours is None:
         return False
     return bool((surface.colours[np.unique(mesh.triangles[material_mask[mesh.material]])] < 1.0).any())
@@ -133,7 +137,7 @@ def with_file_textures(
 
 
 def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) -> list[Material]:
-    """Return copies of the materials; those with maps get the mean colour of the maps as uniform colour."""
+    """Return the materials; each one with maps gets, as uniform colour, the mean colour of its map texels."""
     size = np.array(maps.colour.shape[1::-1])
     coloured = []
     for index, material in enumerate(materials):
@@ -226,8 +230,8 @@ def unused_properties(
 
     mesh : mesh with m materials
     materials : materials of the file
-    file_material_index : (m,) for each material of the mesh its index in `materials`, or -1 if the file lacks
-        the material
+    file_material_index : (m,) index in `materials` of each material of the mesh, or -1 if the file lacks the
+        material
     user_roles : roles, such as "colour", of skin maps that the user replaces
     skin_is_packed : whether pictures of the skin materials are packed into common maps
     """

@@ -102,7 +102,7 @@ class _DocumentedMeta(ModelMetaclass):
 class FrozenModel(BaseModel, metaclass=_DocumentedMeta):
     """Base class of immutable settings with validated fields, such as `Camera` and `Skin`.
 
-    The string below a field is its help text in Python, on the command line, in the viewer and in the
+    The string literal below a field is its help text in Python, on the command line, in the viewer and in the
     documentation.
     """
 
@@ -153,7 +153,7 @@ class SliderRange(NamedTuple):
 
 
 def slider(low: float, high: float, *, logarithmic: bool = False) -> dict[str, Any]:
-    """Return the `json_schema_extra` that gives a field a slider range narrower than its bounds.
+    """Return the argument `json_schema_extra` for a field whose slider range is narrower than its bounds.
 
     low, high : values at the ends of the slider
     logarithmic : whether equal slider steps multiply the value by equal factors
@@ -162,7 +162,10 @@ def slider(low: float, high: float, *, logarithmic: bool = False) -> dict[str, A
 
 
 def field_help(model: type[BaseModel], field: str) -> str:
-    """Return the help text of a field as one line, with summaries of registered names the field accepts."""
+    """Return the help text of a field as one line, followed by summaries of the names that it accepts.
+
+    Only names from a registry, such as those of profiles, have summaries.
+    """
     info = model.model_fields[field]
     text = re.sub(r"\s+", " ", info.description or "")
     summaries = [one for named in _registry_names(info) for one in named.registry.summaries()]

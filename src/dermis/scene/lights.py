@@ -305,7 +305,7 @@ def _place_light(light: Light, head: Head) -> Light:
 
 
 def _ignores_body_size(light: Light) -> bool:
-    """Return whether a light is not moved away from large bodies: a directional light or a narrow spot."""
+    """Return whether a light is placed independently of the body's size: parallel light or a narrow spot."""
     return not isinstance(light, PointLight) or (
         isinstance(light, SpotLight) and light.outer_degrees < _NARROW_SPOT_DEGREES
     )

@@ -177,18 +177,18 @@ class Skin(FrozenModel):
 
     @property
     def overrides_tissue(self) -> bool:
-        """Return whether `pigments` or `layers` override the tissue of the skin profile."""
+        """Return whether `pigments` or `layers` replace optical properties that the profile describes."""
         return self.pigments is not None or bool(self.layers)
 
     @property
     def strength(self) -> float:
-        """Return the specular strength: rho_s, increased by oiliness to at most 1; 0 without a lobe [-]."""
+        """Return the specular strength: rho_s increased by oiliness, at most 1; 0 without a lobe [-]."""
         oily = min(1.0, self.rho_s * (1.0 + (_OILY_RHO_S_FACTOR - 1.0) * self.oiliness))
         return 0.0 if self.specular == "none" else oily
 
     @property
     def smoothing(self) -> float:
-        """Return the factor by which oiliness reduces the roughness of the skin, at most 1 [-]."""
+        """Return the factor, at most 1, by which the roughness is multiplied to account for oiliness [-]."""
         return 1.0 - (1.0 - _OILY_ROUGHNESS_FACTOR) * self.oiliness
 
 

@@ -59,7 +59,7 @@ def scattering_sources(settings: Settings) -> tuple[str, ...]:
 
 
 def profile_sources(skin: Skin) -> tuple[str, ...]:
-    """Return the bibliography keys of a skin's diffusion profile; empty for a user's table of Gaussians."""
+    """Return the bibliography keys of a skin's diffusion profile; empty for Gaussians from a user's file."""
     from dermis.optics.profiles import find_gaussians
     from dermis.scene.tissue import skin_tissue
 

@@ -30,8 +30,10 @@ def normal_incidence_peak(model_name: str, m: float) -> float:
 def reciprocity_error(model_name: str) -> float:
     """Return a BRDF's largest change when light and view are exchanged, relative to the BRDF's maximum [-].
 
-    Light and view are random directions up to 85 degrees from the normal. The result is the maximum over all
-    compared roughnesses.
+    Light and view are random directions up to 85 degrees from the normal. The result is the maximum over the
+    roughnesses in `COMPARED_ROUGHNESSES`.
+
+    model_name : name of the specular model
     """
     rng = np.random.default_rng(1)
     l, v = (_random_directions(rng) for _ in range(2))

@@ -66,9 +66,11 @@ def sampled_camera(
     )
 
     def scaled_aim_offset(offset_fraction: float) -> AimOffset:
-        """Return the offset of the camera's target [mm] for a fraction of the face's sampled offset.
+        """Return the offset of the camera's target that shifts the face in the picture [mm].
 
-        The sampled offset is that of the face in the picture; the target is moved the opposite way.
+        A target that is moved to the left shifts the face to the right.
+
+        offset_fraction : fraction of the sampled shift of the face that is to be applied [-]
         """
         return -0.5 * frame * offset_fraction * offset[0], -0.5 * frame * offset_fraction * offset[1]
 
@@ -108,8 +110,8 @@ def _max_projected_coordinate(
 ) -> float:
     """Return the largest absolute picture coordinate of the points: 0 at the centre, 1 at an edge.
 
-    positions_mm : (n, 3) positions to the right, upwards and towards the camera, relative to the face's
-        centre [mm]
+    positions_mm : (n, 3) coordinates of the points along the axes of `_camera_axes`, with the face's centre
+        as the origin [mm]
     distance_mm : distance of the camera from the face's centre [mm]
     aim_offset : offset of the camera's target to the right and upwards [mm]
     visible_height_mm : visible height at the face's centre [mm]

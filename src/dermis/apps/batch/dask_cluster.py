@@ -108,6 +108,7 @@ def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> I
     """Submit the tasks to dask, and yield an event whenever a task is complete.
 
     plugin_name : name of the `PartPlugin` that processes the tasks
+    tasks : parts of shards to render, and complete shards to verify
     """
     from distributed import Future, as_completed
 

@@ -146,8 +146,8 @@ class TruncatedNormal(Distribution):
     def _limit_probabilities(self) -> tuple[float, float]:
         """Return the cumulative probabilities of the untruncated normal distribution at both limits.
 
-        Limits that both exceed the mean are mirrored about the mean and swapped, because the difference of
-        two probabilities near 1 would lose precision.
+        If both limits exceed the mean, they are mirrored about the mean and swapped, because the difference
+        of two probabilities near 1 would lose precision.
         """
         low, high = (self.low - self.mean) / self.sd, (self.high - self.mean) / self.sd
         return (float(ndtr(-high)), float(ndtr(-low))) if low > 0 else (float(ndtr(low)), float(ndtr(high)))

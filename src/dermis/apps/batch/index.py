@@ -70,7 +70,9 @@ def open_index(dataset_folder: Path, purpose: str) -> pyarrow.parquet.ParquetFil
 
 
 def parameter_summaries(dataset_folder: Path) -> Iterator[tuple[str, int, str]]:
-    """Yield the name of each parameter in the index, the number of images that have it, and a text summary.
+    """Yield the name, the number of values and a text summary of the values of each parameter in the index.
+
+    Only images that use a parameter have a value of it.
 
     Raises DermisError if there is no index.
     """

@@ -57,7 +57,7 @@ def _matches_sha256(path: Path, expected_sha256: str) -> bool:
 
 
 def copy_images(writer: ShardWriter, source_path: Path, first_image: int, stop_image: int) -> None:
-    """Copy a range of images from a shard or part to another one.
+    """Copy a range of images from a shard or part to another shard or part.
 
     For images of the range that could not be rendered, the recorded reasons are copied.
 

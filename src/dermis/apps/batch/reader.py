@@ -158,9 +158,10 @@ def read_record(json_bytes: bytes, culprit: object) -> Record:
 
 @contextmanager
 def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
-    """Open a shard and yield, for each image key and file suffix, a function that reads the file.
+    """Open a shard for a with block, and yield its images by key (the number with 9 digits).
 
-    The functions can be called inside the with block.
+    Each image is a dictionary from file suffix to a function that reads the file. The functions can only be
+    called inside the with block.
 
     Raises DermisError if the shard is truncated, or if the path is not a shard.
     """

@@ -25,7 +25,7 @@ _DIRECTION_DECIMALS = 8  # rotations and directions
 
 
 class CameraRecord(TypedDict):
-    """Camera in OpenCV's convention: K (R X + t) is the homogeneous pixel of a point X [mm]."""
+    """Camera in OpenCV's convention: K (R X + t) are homogeneous pixel coordinates of a point X [mm]."""
 
     K: NestedNumbers
     R: NestedNumbers

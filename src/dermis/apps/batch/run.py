@@ -196,10 +196,12 @@ def _process_tasks(
     tasks: Sequence[Shard],
     on_progress: Callable[[Progress], None],
 ) -> tuple[int, set[Shard], tuple[Failure, ...]]:
-    """Render parts and verify shards, which are the tasks, with the workers of a pool.
+    """Process the tasks with a pool; return the image count, the damaged shards and the failed images.
 
-    The results are the number of rendered images, the set of damaged shards, and the images that could not
-    be rendered.
+    tasks : parts of shards to render, and complete shards to verify
+    on_progress : function called whenever images were rendered or a shard was verified
+
+    The image count is the number of rendered images; failed images are those that could not be rendered.
     """
     to_render = [task for task in tasks if isinstance(task, Part)]
     progress = Progress(total=sum(map(len, to_render)), to_verify=len(tasks) - len(to_render))

@@ -83,8 +83,8 @@ class Movement:
     """Movement of a part of the face in random expressions: a row of mixture.csv.
 
     probability : probability of this movement among the movements of the same part of the face [-]
-    max_weight : largest weight of the morph targets of the movement [-]
-    target_weights : weights of the morph targets relative to each other
+    max_weight : factor of `target_weights` for the movement at full strength [-]
+    target_weights : relative weights of the morph targets, by name
     jaw_closing : fraction by which the movement, at full strength, reduces the opening of the jaw [-]
     """
 
@@ -231,7 +231,7 @@ class Sampler:
         return float(ndtri(self._uniform_number(image_number, parameter)))
 
     def _target_weights(self, image_number: int, sampled_parameters: Parameters) -> dict[str, float]:
-        """Return the weights that all morph targets used by the spec have in one image.
+        """Return the weights in one image of all morph targets that the spec can use, by name.
 
         image_number : number of the image
         sampled_parameters : parameters of the image that have been sampled so far

@@ -127,7 +127,7 @@ class SceneBuilder:
     def _pose_weights(self, parameters: Parameters, head: Head) -> dict[str, float]:
         """Return the non-zero weights of an image's morph targets, by name.
 
-        Targets that the head does not have are dropped, unless the [pose] table names them.
+        Targets that the head lacks are omitted, except those that the [pose] table of the spec sets.
         """
         posed = self.spec.pose_targets
         return {
@@ -145,9 +145,9 @@ class SceneBuilder:
 
 
 def sampled_person(parameters: Parameters) -> Human:
-    """Return the random person of an image's sampled seed.
+    """Return the person of an image: a random person, in whom sampled parameters replace random values.
 
-    Fields of the person for which the image has sampled parameters get the values of these parameters.
+    parameters : sampled parameters of the image, including the seed of the random person
     """
     fields: dict[str, object] = {}
     appearance: dict[str, dict[str, object]] = {}

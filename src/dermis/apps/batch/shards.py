@@ -139,14 +139,17 @@ class ShardWriter:
         self._left_out[image_number] = shorten(reason, _MAX_REASON_LENGTH)
 
     def add_versions(self, versions: Mapping[str, str]) -> None:
-        """Record in the manifest the adapter and the versions with which copied images were rendered."""
+        """Record in the manifest the adapter and the software that rendered copied images.
+
+        versions : name of the adapter and versions of the software, as from `software_versions`
+        """
         for name, value in versions.items():
             known = self._made_with.get(name, value).split(_VERSION_SEPARATOR)
             merged = sorted({*known, *value.split(_VERSION_SEPARATOR)})
             self._made_with = {**self._made_with, name: _VERSION_SEPARATOR.join(merged)}
 
     def __exit__(self, exception_type: type[BaseException] | None, *_: object) -> None:
-        """Write the manifest and rename the shard to its final path; on an error, remove the shard."""
+        """Finish the shard and rename it to its final path; on an error, remove the unfinished shard."""
         try:
             if exception_type is None:
                 self._files.finish(self._manifest_bytes())

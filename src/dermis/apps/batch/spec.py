@@ -176,9 +176,10 @@ class Spec(FrozenModel):
 
 
 def _table_distributions(table_name: str, table_value: object) -> dict[str, Distribution]:
-    """Return the distributions in a TOML table and in the table's subtables, by dotted name.
+    """Return the distributions in a spec table and in the table's subtables, by dotted name.
 
-    table_name : name of the table
+    table_name : dotted name of the table; "" for the whole spec
+    table_value : the table, or one of its values; values that are not distributions are ignored
     """
     if isinstance(table_value, Distribution):
         return {table_name: table_value}
@@ -247,10 +248,11 @@ def _parse_render_table(picture_size: object, render_table: object) -> Settings:
 
 
 def _build_model(model_class: type[P], table_name: str, toml_table: object) -> P:
-    """Return the model of a spec table, including its subtables.
+    """Convert a table of a spec, with its subtables, to an instance of a pydantic class.
 
     model_class : pydantic class of the table
     table_name : name of the table in error messages
+    toml_table : parsed TOML of the table, or an instance of the class, which is returned unchanged
     """
     if isinstance(toml_table, model_class):
         return toml_table
@@ -297,8 +299,9 @@ def _toml_lines(table_name: str, table_values: Mapping[str, object]) -> list[str
 
 
 def _expand_patterns(spec_value: object, folder: Path, dotted_name: str) -> object:
-    """Return a spec value in which a `FileChoice` of sorted files replaces each {files = PATTERN}.
+    """Return a spec value with each {files = PATTERN} replaced by a `FileChoice` of the matching files.
 
+    folder : folder of the spec, to which patterns are relative
     dotted_name : dotted name of the value in error messages
 
     Raises DermisError for a pattern that matches no file.

@@ -162,9 +162,11 @@ def _check_table(
 ) -> None:
     """Raise DermisError for unknown keys of a spec table, and for distributions with invalid samples.
 
+    table_name : dotted name of the table
+    distributions : distributions of all tables, by dotted name
     allowed_keys : allowed keys of the table
-    make_model : class or function that accepts the keys as keyword arguments and raises DermisError for
-        invalid values; called with the smallest and the largest sample of each distribution
+    make_model : class or function that accepts each key as a keyword argument and raises DermisError for an
+        invalid value; called once for each value in the `support` of each distribution
     """
     for name, distribution in table_values(distributions, table_name).items():
         if name not in allowed_keys:

@@ -281,10 +281,10 @@ class Worker:
             )
 
     def _previous_scene(self, image_number: int) -> Scene | None:
-        """Return the scene of the image before `image_number`, from which motion vectors are computed.
+        """Return the scene of the preceding image, from which motion vectors are computed.
 
-        The result is None without the output "motion", and if that image shows another person or cannot be
-        rendered.
+        The result is None if the spec does not request the output "motion", if the preceding image shows
+        another person, or if its scene cannot be built.
         """
         spec = self._options.spec
         if "motion" not in spec.outputs or image_number % spec.images_per_person == 0:

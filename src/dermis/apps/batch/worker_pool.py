@@ -24,8 +24,8 @@ _MAX_ENCODERS_PER_WORKER = 8  # per worker: more would wait for the renderer
 class SlotRequest:
     """Requested number of workers, and their graphics adapters; None selects a default for this machine.
 
-    adapter : "auto", "cpu", a number such as "#1", or a part of an adapter's name; if several adapters match,
-        all that are of the same kind as the best one are used
+    adapter : "auto", "cpu", a number such as "#1", or a part of an adapter's name. If several adapters match,
+        the best adapter is used, and with it all GPUs that have its device type and its graphics API
     numbers : numbers of the adapters to use, in place of `adapter`
     workers : total number of workers
     workers_per_gpu : workers on each adapter, if `workers` is None
@@ -104,7 +104,7 @@ class _WorkerProcess:
 
 
 class _PoolState:
-    """State of a run on this machine: its worker processes, and the queue of tasks that have no worker."""
+    """State of a run on this machine: its worker processes, and the queue of unassigned tasks."""
 
     def __init__(self, options: RunOptions, tasks: Sequence[Shard], slots: list[WorkerSlot]) -> None:
         self._options, self._queue, self._attempts = options, deque(tasks), Counter[Shard]()
@@ -163,6 +163,8 @@ class _PoolState:
 
     def _return_tasks(self, worker: _WorkerProcess, reason: str) -> None:
         """Put the tasks of an exiting worker back into the queue.
+
+        reason : reason why the worker exits, for the error
 
         Raises DermisError if the task in progress has failed `MAX_TASK_ATTEMPTS` times.
         """

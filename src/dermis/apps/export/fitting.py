@@ -135,9 +135,9 @@ def fit_homogeneous_medium(
 
     energy : (3,) light that leaves the medium per incident light [-]; by default the energy of the reference
         profile
-    half_space_kind : surface and illumination of the medium: "skin" for a surface of index 1.4, or "matched"
-        for an index-matched surface, both lit along the normal; "walk" for an index-matched surface that is
-        lit from all directions
+    half_space_kind : surface and illumination of the medium: "skin" (refracting surface of index 1.4, lit
+        along the normal), "matched" (index-matched surface, lit along the normal) or "walk" (index-matched
+        surface, lit from all directions)
     """
     albedo = tabulated_albedo(half_space_kind, reference_profile.energy if energy is None else energy)
     unit = half_space(half_space_kind, albedo, np.ones(3))
@@ -196,7 +196,8 @@ def fit_length_scale(
 ) -> float:
     """Return the length by which a profile's radii are multiplied to match a reference profile [mm].
 
-    The sum of squared differences is minimised at radii that are spaced evenly on a logarithmic scale.
+    The sum of squared differences between the two cumulative profiles is minimised. The differences are
+    taken at radii that are spaced evenly on a logarithmic scale.
 
     colour_channel : channel of the reference profile that is matched, 0 for red
     unit_cdf : cumulative profile to scale, for a length of 1: a function that takes radii (n,) and returns
@@ -223,7 +224,7 @@ def fit_length_scale(
 class ProfileError:
     """Errors of the profile that a program renders, relative to the reference profile, by colour channel.
 
-    cdf : (3,) largest difference between the fractions of light within the same radius [-]
+    cdf : (3,) largest difference between the two profiles in the fraction of light within a radius [-]
     edge : (3,) largest difference in brightness across a straight shadow edge blurred by the profile [-]
     energy : (3,) relative error of the total energy [-]
     """

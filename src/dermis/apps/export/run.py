@@ -141,7 +141,7 @@ def _format_colour_channels(channel_values: Floats) -> str:
 
 
 def _as_single_line(text: str) -> str:
-    """Return a text without line breaks and backticks, which could end a code block of Markdown."""
+    """Return a text with line breaks and backticks replaced, as these could end a code block of Markdown."""
     return text.replace("`", "'").replace("\n", " ").replace("\r", " ")
 
 

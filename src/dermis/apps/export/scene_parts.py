@@ -15,7 +15,7 @@ from dermis.scene.lights import Light
 def supported_lights(
     lights: Iterable[Light], supported_kinds: Container[str], program_name: str
 ) -> list[Light]:
-    """Return lights with unsupported kinds replaced by supported ones; issue a warning for each replacement.
+    """Return the lights, with each unsupported one replaced by a similar supported one; warn of replacements.
 
     supported_kinds : kinds of light that the program supports, at least "point" and "directional"
     program_name : name of the program, for the warnings

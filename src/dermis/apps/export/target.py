@@ -213,9 +213,9 @@ class Target(ABC):
         output : Path
             Path that `write` receives.
         subject : Subject
-            Skin or head to export; the file in a folder is named after it.
+            Skin or head to export; if `output` is a folder, the file is named after it.
         suffix : str
-            Suffix of a file in a folder; by default the first of `suffixes`.
+            Suffix of the file if `output` is a folder; by default the first of `suffixes`.
 
         Returns
         -------

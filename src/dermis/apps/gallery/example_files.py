@@ -39,7 +39,7 @@ class _Surface(NamedTuple):
 
     points_mm : (v, 3) positions of the vertices [mm]
     normals : (v, 3) unit normals of the vertices
-    uv : (v, 2) uv of the vertices
+    uv : (v, 2) texture coordinates of the vertices
     triangles : (f, 3) vertex indices
     """
 
@@ -184,10 +184,13 @@ def _colour_map_srgb(head: Head) -> Bytes:
 
 
 def _hair_cards(hair_paths: Doubles, outward_directions: Doubles, width_mm: float) -> _Surface:
-    """Return hair cards: ribbons along paths, each textured with a random card of `_hair_card_picture`.
+    """Return hair cards: ribbons along paths, each with the texture of a randomly chosen hair card.
+
+    The texture coordinates refer to the picture of cards that `_hair_card_picture` returns.
 
     hair_paths : (n, k, 3) points of each path from root to tip [mm]
     outward_directions : (n, k, 3) outward directions at these points
+    width_mm : width of the ribbons [mm]
     """
     count, knots = hair_paths.shape[:2]
     along = np.gradient(hair_paths, axis=1)

@@ -93,9 +93,9 @@ class Studio:
         return self.renderer.reopening_device.run(draw_view)
 
     def light_map(self, scene: Scene, pyramid_level: int, **settings: Any) -> NDArray[np.float32]:
-        """Return the blurred irradiance (n, n, 3) in the atlas, divided by pi.
+        """Return the irradiance (n, n, 3) in the atlas at one level of blur, divided by pi.
 
-        pyramid_level : 0 for unblurred light; higher levels are blurred more strongly
+        pyramid_level : level of blur: 0 for unblurred light, higher for more strongly blurred light
         settings : fields of `Settings`
         """
         from dermis.gpu import download

@@ -18,7 +18,7 @@ _INSTALL_HINT = (
 
 
 class BlenderTask(NamedTuple):
-    """Words that describe a run of Blender in error messages.
+    """Wording of error messages about a run of Blender.
 
     renderer : name of the renderer, such as "Cycles"
     goal : purpose of the run, such as "to render the head"

@@ -54,7 +54,7 @@ class CyclesPass:
     """Image rendered by Cycles with a given number of paths per pixel, black outside the head.
 
     image : (h, w, 3) radiance, linear Rec. 709
-    coverage : (h, w) fraction of each pixel that the head covers
+    coverage : (h, w) fraction of each pixel's area that is covered by the head
     samples : paths per pixel
     seconds : elapsed time; that of the first pass includes the construction of the scene [s]
     core_seconds : CPU time, summed over all cores [s]
@@ -116,7 +116,7 @@ def cycles_passes(
     medium : material of the skin: a `Lambertian`, `BeckmannSurface` or `PrincipledSkin`, or a medium with a
         single layer. The medium's index of refraction is ignored, because Cycles' random walks cross the
         surface without refraction. Cycles gets the medium's diffuse reflectance as subsurface colour, and
-        4 pi mean free paths as subsurface radius
+        its mean free path times 4 pi as subsurface radius
     samples : paths per pixel of each pass
     settings : settings of the frame, of which only the size is used
     method : subsurface method of Cycles
@@ -197,7 +197,7 @@ class PrincipledSkin:
     the skin. The head's normal map is applied.
 
     colour : (h, w, 3) diffuse reflectance, linear Rec. 709 [-]
-    radius_mm : (3,) subsurface radius of Cycles, 4 pi mean free paths [mm]
+    radius_mm : (3,) subsurface radius of Cycles: the mean free path times 4 pi [mm]
     roughness : GGX roughness m of the surface [-]
     """
 
@@ -271,8 +271,8 @@ def _diffuse_material(colour: Sequence[float]) -> SceneDict:
 def _skin_material(medium: SkinMaterial, subsurface_method: str) -> SceneDict:
     """Return the description of the skin's material for Cycles, with colour and subsurface radius.
 
-    The colour is the diffuse reflectance of the medium, and the radius is 4 pi mean free paths. From these,
-    Cycles' random walk computes the mean free path and, by a fit that is accurate within 1 %, the
+    The colour is the diffuse reflectance of the medium, and the radius is its mean free path times 4 pi.
+    From these, Cycles' random walk computes the mean free path and, by a fit that is accurate within 1 %, the
     single-scattering albedo. The method "burley" uses the profile of [ChristensenBurley2015] for the same
     colour and radius.
 

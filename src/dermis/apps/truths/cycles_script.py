@@ -97,7 +97,12 @@ def make_material(material_description: dict[str, Any], maps: dict[str, Any]) ->
 def principled_shader(
     nodes: Any, links: Any, maps: dict[str, Any], material_description: dict[str, Any]
 ) -> Any:
-    """Return a Principled BSDF node with random-walk subsurface scattering and a colour map."""
+    """Return a new Principled BSDF node with random-walk subsurface scattering and a colour map.
+
+    nodes, links : collections of nodes and links of the material's node tree
+    maps : dictionary from name to image array
+    material_description : parameters of the material
+    """
     shader = nodes.new("ShaderNodeBsdfPrincipled")
     shader.distribution = "GGX"
     shader.subsurface_method = "RANDOM_WALK"
@@ -115,7 +120,11 @@ def principled_shader(
 
 
 def connect_normal_map(nodes: Any, links: Any, maps: dict[str, Any], shader: Any) -> None:
-    """Connect the normal map, if there is one, to a shader node."""
+    """Connect the normal map, if there is one, to a shader node.
+
+    nodes, links : collections of nodes and links of the material's node tree
+    maps : dictionary from name to image array
+    """
     if "normal_map" not in maps:
         return
     texture, node = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeNormalMap")

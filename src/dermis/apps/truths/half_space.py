@@ -20,7 +20,7 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
 
     The integral equation is solved by iteration at Gaussian nodes.
 
-    Source: [Chandrasekhar1960] section 38, in the form of the equation that avoids cancellation of digits.
+    Source: [Chandrasekhar1960] section 38; the equation has the form that avoids loss of significance.
     """
     if not 0.0 <= albedo < 1.0:
         refuse("half-space", "an albedo from 0 to below 1", f"got {albedo:g}", "Correct it")
@@ -52,7 +52,7 @@ def diffuse_albedo(albedo: float) -> float:
 
 
 def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: float) -> Floats:
-    """Return the ratio of the radiance that a half-space reflects to the irradiance of parallel light [1/sr].
+    """Return the reflected radiance of a half-space, divided by its irradiance by parallel light [1/sr].
 
     cosine_in : cosine of the angle between light and normal
     cosine_out : cosine of the angle between view and normal

@@ -65,7 +65,8 @@ def sample_irradiance(
 
     irradiance_at : function that returns the irradiance (n, 3) at `MeshPoints`; called once for each point
     spacing_mm : greatest side length of the small triangles [mm]
-    min_spacing_mm : smallest side length that the further halving may yield; None for no further halving [mm]
+    min_spacing_mm : sides shorter than twice this length are not halved for contrast; None to halve no sides
+        for contrast [mm]
     contrast_threshold : contrast above which a side is halved further [-]
 
     Source: [JensenBuhler2002] for sampling the irradiance on the surface.
@@ -141,9 +142,9 @@ def _edges_with_lengths(subdivision: _Subdivision) -> tuple[Index, Index, Floats
 def _add_longest_sides(
     side_edges: Index, edge_lengths: Floats, halved_edges: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return the mask of edges to halve, extended by the longest edge of each triangle with such an edge.
+    """Return a larger mask: if any edge of a triangle is halved, the triangle's longest edge is halved too.
 
-    Halving the longest edges avoids slivers.
+    This avoids slivers.
 
     side_edges : (m, 3) edge index of each side of the triangles
     edge_lengths : (e,) lengths of the edges [mm]

@@ -45,7 +45,7 @@ def mitsuba_emitter(mi: Mitsuba, light: Light, light_number: int) -> SceneDict:
     """Return Mitsuba's description of a light.
 
     mi : module `mitsuba` with a variant set
-    light_number : position of the light in the scene, from 1, for messages
+    light_number : number of the light in the scene, counted from 1, for error messages
 
     Raises DermisError for a light without shadows, which a path tracer does not support, and for a kind of
     light that this module does not convert.
@@ -57,7 +57,7 @@ def mitsuba_emitter(mi: Mitsuba, light: Light, light_number: int) -> SceneDict:
 def cycles_lamp(light: Light, light_number: int) -> SceneDict:
     """Return Cycles' description of a light, in Cycles' units.
 
-    light_number : position of the light in the scene, from 1, for messages
+    light_number : number of the light in the scene, counted from 1, for error messages
     """
     _check_shadows(light, light_number, "Cycles")
     return CYCLES[light.kind](light)
@@ -121,7 +121,10 @@ def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, light_label: str) 
 
 
 def mitsuba_stripe(mi: Mitsuba, light: StripeLight, light_label: str) -> SceneDict:
-    """Return Mitsuba's description of a stripe light: a distant slide projector whose slide is the stripe."""
+    """Return Mitsuba's description of a stripe light: a distant slide projector whose slide is the stripe.
+
+    light_label : name of the light in error messages
+    """
     width, length = light.width_mm, light.length_mm
     size = np.array([2.0 * _STRIPE_SLIDE_HALF_WIDTHS * width, length])
     texel = min(width / _MIN_STRIPE_SLIDE_TEXELS[0], length / _MIN_STRIPE_SLIDE_TEXELS[1])

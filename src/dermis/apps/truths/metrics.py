@@ -94,11 +94,11 @@ def relative_rmse(
 def energy_ratio(
     image: ArrayLike, reference: ArrayLike, mask: Mask | None = None, variance: ArrayLike | None = None
 ) -> Estimate:
-    """Return the ratio of the sum of the image to the sum of the reference [-].
+    """Return the sum of an image's values, divided by the sum of the reference's values [-].
 
     The parameters are those of `relative_rmse`. The relative standard error of the ratio equals that of the
     reference's sum. In each channel, the variances of the pixels are added; the standard deviations of the
-    channels are then added, because channels may share paths.
+    channels are then added, because all channels may be computed from the same light paths.
     """
     I, T, s2 = _masked_pixels(image, reference, mask, variance)
     total = float(T.sum())

@@ -114,7 +114,7 @@ def mitsuba_scene(
 def coverage_scene(
     mi: Mitsuba, camera: Camera, picture_size: tuple[int, int], shapes: SceneDict
 ) -> MitsubaObject:
-    """Return a Mitsuba scene whose image is the fraction of each pixel that the skin covers.
+    """Return a Mitsuba scene whose image is the fraction of each pixel's area that is covered by skin.
 
     shapes : head whose skin emits radiance 1, see `emissive_skin`
     """
@@ -218,7 +218,7 @@ def layer_interfaces(mi: Mitsuba, head: Head, medium: Medium) -> tuple[SceneDict
 def inner_interfaces(
     mi: Mitsuba, skin_surface: ClosedSurface, medium: Medium, media: Sequence[MitsubaObject], head_name: str
 ) -> tuple[SceneDict, tuple[str, ...]]:
-    """Return the closed surfaces below each layer of finite thickness, and notes on those that fold over.
+    """Return the closed surfaces below each layer of finite thickness, and notes on folded surfaces.
 
     skin_surface : closed skin surface relative to the head's centre
     media : Mitsuba's media of the layers of `medium`
@@ -240,9 +240,9 @@ def inner_interfaces(
 
 
 def interface_gap_mm(mi: Mitsuba, skin_surface: ClosedSurface) -> Doubles:
-    """Return the gap (p,) at each point between the upper and the lower surface of an interface [mm].
+    """Return for each point the distance (p,) between the two surfaces of an interface [mm].
 
-    Each interface between two media consists of two such surfaces, copies of the skin.
+    Each interface between two media consists of an upper and a lower surface, which are copies of the skin.
 
     skin_surface : closed skin surface of p points, relative to the head's centre
     """

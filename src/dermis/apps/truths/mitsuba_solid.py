@@ -119,7 +119,7 @@ def _close_openings(positions: Floats, triangles: Index) -> ClosedSurface:
 def _boundary_edges(triangles: Index, point_count: int) -> NDArray[np.int64]:
     """Return the directed edges (n, 2) of a triangle mesh that lack an edge in the opposite direction.
 
-    An edge with k occurrences more than the opposite edge is listed k times.
+    If an edge occurs n + k times and the opposite edge occurs n times, the edge is listed k times.
 
     point_count : number of points
     """

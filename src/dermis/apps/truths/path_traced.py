@@ -48,7 +48,7 @@ class PathTraced:
 
     image : (h, w, 3) radiance, linear Rec. 709
     variance : (h, w, 3) variance of each value of the image
-    mask : (h, w) fraction of each pixel that visible skin covers
+    mask : (h, w) fraction of each pixel's area that is covered by visible skin
     samples : paths per pixel
     seconds : duration of tracing all paths [s]
     notes : changes that were made to the head
@@ -208,7 +208,7 @@ class PassStatistics:
 
     mean : (h, w, 3) mean of all passes
     spread : (h, w, 3) sum of the passes' squared deviations from the mean
-    mask : (h, w) fraction of each pixel that skin covers
+    mask : (h, w) fraction of each pixel's area that is covered by visible skin
     notes : changes that were made to the head
     count : number of passes
     seconds : duration of all passes [s]

@@ -36,10 +36,10 @@ class LayerStack(NamedTuple):
 
 
 class PhotonTally(NamedTuple):
-    """Numbers of photons by the way in which their walks ended.
+    """Numbers of photons, by how their walks ended.
 
-    reflected : (rings + 1,) photons that left through the top after scattering, counted by the ring around
-        the axis in which they left; the last entry counts those outside all rings
+    reflected : (rings + 1,) photons that left through the top after scattering: one number for each ring
+        around the beam, and the last for the area outside all rings
     transmitted : (rings + 1,) photons that left through the bottom after scattering, counted in the same way
     unscattered : (2,) photons that left through the top and the bottom without scattering
     absorbed : (layers,) photons that were absorbed in each layer

@@ -45,7 +45,10 @@ def mitsuba_rgb(colour: Iterable[float]) -> SceneDict:
 
 
 def mitsuba_look_at(mi: Mitsuba, origin: Vector, target: Vector, up: Vector = _UP_AXIS) -> MitsubaObject:
-    """Return Mitsuba's transform of an object at `origin`, with +Z towards `target` and Y upwards."""
+    """Return Mitsuba's transform of an object at `origin` whose local +Z axis points towards `target`.
+
+    up : direction to which the local Y axis is turned as closely as possible
+    """
     forward = np.subtract(target, origin)
     if np.linalg.norm(np.cross(forward, up)) < 1e-6 * np.linalg.norm(forward) * np.linalg.norm(up):
         up = (1.0, 0.0, 0.0)
@@ -90,7 +93,11 @@ def mitsuba_projector(
 
 
 def cycles_look_at(position: Vector, forward: Vector, up: Vector = _UP_AXIS) -> list[list[float]]:
-    """Return the world matrix, in Cycles' units, of an object whose -Z axis is `forward`, with Y upwards."""
+    """Return the world matrix, in Cycles' units, of an object whose local -Z axis points along `forward`.
+
+    position : position of the object [mm]
+    up : direction to which the local Y axis is turned as closely as possible
+    """
     right, upwards, view_direction = camera_axes(forward, up)
     matrix = np.eye(4)
     matrix[:3] = np.column_stack([right, upwards, -view_direction, np.divide(position, CYCLES_UNIT_MM)])

@@ -156,8 +156,8 @@ def _triangles_in_reach(
     edge_mm : largest edge length after splitting [mm]
 
     Raises DermisError when no triangle is within reach, or when splitting the triangles entirely within reach
-    would result in too many triangles. The number used for this test is that of equilateral triangles, a
-    lower bound of the actual number.
+    would result in too many triangles. Their number is estimated as if all of them were equilateral, which
+    gives a lower bound of the actual number.
     """
     midpoint = corners.mean(axis=1)
     size = np.linalg.norm(corners - midpoint[:, None], axis=2).max(axis=1)

@@ -74,7 +74,7 @@ def tally_exits(
     photon_count : number of photons that enter each strip
     sigma_t, albedo : (2,) extinction coefficient and single-scattering albedo of the two media
     edges_mm : (n + 1,) x coordinates of the strips' edges, evenly spaced [mm]
-    tally : (n, n) number of photons that entered one strip (row) and left from another (column)
+    tally : (n, n) number of photons that entered strip i (row) and left from strip j (column)
     """
     strip_count = len(edges_mm) - 1
     width = (edges_mm[-1] - edges_mm[0]) / strip_count

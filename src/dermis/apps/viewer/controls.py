@@ -120,6 +120,8 @@ class Controls:
         """Move the camera nearer or farther; in the atlas view, scale the atlas around the pointer.
 
         distance_factor : factor by which the visible height is multiplied; a factor below 1 zooms in
+        pointer : position of the pointer in the picture [logical pixel]
+        picture_size : width and height of the picture [logical pixel]
         gesture_name : name of the gesture; all changes by one gesture are undone together
         """
         state = self.history.state

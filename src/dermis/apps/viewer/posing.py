@@ -23,7 +23,10 @@ def target_weight(scene: Scene, target_name: str) -> float:
 
 
 def with_target_weight(scene: Scene, target_name: str, new_weight: float) -> Pose | None:
-    """Return the pose of a scene with a new weight for one morph target; None if this is the rest pose."""
+    """Return the pose of a scene with a new weight for one morph target.
+
+    The result is None if the new pose is the rest pose.
+    """
     weights = dict(_pose_or_rest(scene).weights)
     weights.pop(target_name, None)
     if new_weight != _rest_weight(scene.head, target_name):
@@ -48,7 +51,7 @@ def bone_angles(scene: Scene, bone_name: str) -> Angles:
 
 
 def with_bone_angles(scene: Scene, bone_name: str, angles_degrees: Angles) -> Pose | None:
-    """Return the pose of a scene with new angles for one bone; None if this is the rest pose.
+    """Return the pose of a scene with new angles for one bone; None if the new pose is the rest pose.
 
     angles_degrees : rotation about the head's x, y and z axes [degrees]
     """

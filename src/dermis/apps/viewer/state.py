@@ -58,8 +58,8 @@ class AtlasView:
         """Return the view zoomed around the cursor.
 
         span_factor : factor by which the visible length is multiplied; a factor below 1 zooms in
-        x, y : position of the cursor, to the right of and below the picture's centre, as fractions of the
-            picture's shorter side
+        x, y : position of the cursor relative to the picture's centre, x to the right and y down, as
+            fractions of the picture's shorter side
         """
         span = min(_MAX_ATLAS_SPAN, max(_MIN_ATLAS_SPAN, span_factor * self.span))
         (u, v), reduction = self.centre, self.span - span

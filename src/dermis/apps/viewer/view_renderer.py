@@ -87,7 +87,7 @@ class QualityController:
     def record_frame_time(self, frame_ms: float) -> None:
         """Record the time of a frame of a changing picture; change the quality after slow or fast frames.
 
-        frame_ms : time taken by the frame, without its setup [ms]
+        frame_ms : time from recording the frame's commands to their completion [ms]
         """
         is_slow = frame_ms > _SLOW_FRAME_RATIO * self._budget_ms
         is_fast = frame_ms < _FAST_FRAME_RATIO * self._budget_ms
@@ -358,9 +358,11 @@ class HeadPreparation:
         self._ready_mesh = self._future = self._next_mesh = self._held_image = None
 
     def prepare_head(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:
-        """Return None if the head of a state is ready to be drawn; otherwise prepare the head in a thread.
+        """Prepare the head of a state in a thread, unless the head is ready to be drawn.
 
-        While the head is being prepared, the last image is returned, to be shown in the meantime.
+        The result is None if the head is ready, or else the last image, to be shown during the preparation.
+
+        view_renderer : renderer that prepares the head, and that rendered the last image
 
         Raises the exception, if any, that stopped the preparation.
         """

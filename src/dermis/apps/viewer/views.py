@@ -63,6 +63,7 @@ class IntermediateViews:
     def draw(self, scene: Scene, settings: Settings, view_name: str, divider_side: str = "") -> Texture:
         """Return an image of the head that displays an intermediate result of the last frame, in sRGB bytes.
 
+        scene, settings : scene and settings of the last frame
         view_name : name of the view, one of `VIEW_NAMES`
         divider_side : "before" for the frozen state left of the divider, "" for the live state
 
@@ -89,6 +90,7 @@ class IntermediateViews:
     ) -> Texture:
         """Return an image of sRGB bytes that shows a part of the atlas of the last frame.
 
+        atlas_view : part of the atlas to show
         divider_side : "before" for the frozen state left of the divider, "" for the live state
 
         Raises DermisError if the technique does not compute the displayed map.
@@ -120,8 +122,8 @@ class IntermediateViews:
     ) -> tuple[TextureOrView, float]:
         """Return the texture of an atlas layer, and a scale for displaying it.
 
-        For irradiance and its blurs, the scale is the factor by which texels are multiplied for display. For
-        the layer "stretch", it is the mean number of texels per mm; for other layers, it is 1.
+        For sharp and blurred irradiance, the scale is the factor by which texels are multiplied for display.
+        For the layer "stretch", it is the mean number of texels per mm; for other layers, it is 1.
         """
         if layer_name in BLUR_LEVELS_BY_VIEW:
             level, blur = BLUR_LEVELS_BY_VIEW[layer_name], next(iter(frame_inputs.blurs), None)
@@ -170,15 +172,15 @@ class IntermediateViews:
 
 
 def draw_thickness(device: Device, translucency: Translucency, target_texture: Texture) -> Texture:
-    """Fill a texture with the tissue thickness at each texel of the coarse atlas [mm]; return the texture.
+    """Write the tissue thickness [mm] at each texel of the coarse atlas to a texture; return the texture.
 
-    Light enters the skin at one texel, passes through the tissue and leaves the skin at another texel of the
-    same pair. The thickness at a texel where light leaves is its smallest depth below the tangent planes at
-    the texels where this light enters. It is at most the maximum distance of a pair.
+    Light enters the skin at the first texel of a pair, passes through the tissue, and leaves the skin at the
+    second texel. The thickness at a second texel is its smallest depth below the tangent planes at the first
+    texels from which light arrives. It is at most the largest permitted distance between paired texels.
 
     translucency : pairs of texels, and the points of the skin at these texels
-    target_texture : texture with the size of the coarse atlas; texels at which no such light leaves are left
-        unchanged
+    target_texture : texture with the size of the coarse atlas; texels that are not the second texel of any
+        pair are left unchanged
     """
     pairs, shader = translucency.pairs, program(device, Path(__file__).parent / "thickness.wgsl")
     count = pairs.receivers[1]

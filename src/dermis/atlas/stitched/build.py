@@ -66,7 +66,12 @@ def renumber_pieces(triangle_piece: Index) -> Index:
 
 
 def _merge_small_pieces(surface: FlatSurface, triangle_chart: Index, triangle_piece: Index) -> Index:
-    """Merge pieces (parts of charts) of less than 1 mm2 into the largest piece of their chart."""
+    """Merge pieces (parts of charts) of less than 1 mm2 into the largest piece of their chart.
+
+    Returns the piece of each triangle (f,) after the merger.
+
+    triangle_chart, triangle_piece : (f,) chart of each triangle, and its piece before the merger
+    """
     area = np.bincount(triangle_piece, surface.area_mm2 * surface.valid)
     order = np.argsort(area[triangle_piece], kind="stable")
     largest = np.zeros(int(triangle_chart.max()) + 1, np.int64)
@@ -77,8 +82,8 @@ def _merge_small_pieces(surface: FlatSurface, triangle_chart: Index, triangle_pi
 def _uv_density(surface: FlatSurface, triangle_piece: Index) -> tuple[Doubles, float]:
     """Return the uv density of each triangle's piece (f,), and the mean over all pieces [1/mm].
 
-    The density is the length in uv of 1 mm on the surface, the square root of uv area divided by surface
-    area.
+    The density is the square root of the ratio of uv area to surface area: the average length in uv of 1 mm
+    on the surface.
     """
     inside, index = triangle_piece >= 0, np.maximum(triangle_piece, 0)
     uv = np.bincount(index, np.abs(surface.area_uv) * inside)

@@ -61,6 +61,8 @@ def compute_coverage(
     triangle_piece : (f,) piece of each triangle, -1 if there is none
     member_triangles : (t,) indices of the triangles to rasterise
     border : border of the pieces, see `find_border`
+    packing : positions of the triangles on the texel grid
+    gutter_width : width of the gutters
     grid_shape : height and width of the grid of texels
     """
     owner = rasterise_texel_triangles(
@@ -84,7 +86,7 @@ def compute_coverage(
 def _add_gutters(coverage: Coverage, triangle_piece: Index, texels: GutterTexels) -> None:
     """Add rims and gutters, the texels around chart pieces, to a coverage that contains only the pieces.
 
-    The rim of a piece is the texels outside it that bilinear interpolation within the piece reads.
+    The rim of a piece consists of the texels outside it that are read by bilinear interpolation within it.
 
     triangle_piece : (f,) piece of each triangle, -1 if there is none
     """
@@ -107,7 +109,11 @@ def _add_gutters(coverage: Coverage, triangle_piece: Index, texels: GutterTexels
 
 
 def hidden_triangles(surface: FlatSurface, triangle_piece: Index, packing: Packing, atlas_side: int) -> Mask:
-    """Return the mask (f,) of triangles that other triangles of their piece mostly hide in uv."""
+    """Return the mask (f,) of triangles that are mostly hidden in uv by other triangles of their piece.
+
+    triangle_piece : (f,) piece of each triangle, -1 if there is none
+    packing : positions of the triangles on the texel grid
+    """
     members = np.flatnonzero(triangle_piece >= 0)
     owner = rasterise_texel_triangles(
         packing.corners, _drawing_order(surface, triangle_piece, members), (atlas_side, atlas_side)
@@ -118,7 +124,8 @@ def hidden_triangles(surface: FlatSurface, triangle_piece: Index, packing: Packi
 def _drawing_order(surface: FlatSurface, triangle_piece: Index, member_triangles: Index) -> Index:
     """Return triangle indices sorted so that triangles mirrored within their piece come first.
 
-    Other triangles are drawn later and therefore own the texels that they share with mirrored triangles.
+    Triangles that are drawn later replace earlier ones, so mirrored triangles get only the texels that no
+    unmirrored triangle covers.
 
     triangle_piece : (f,) piece of each triangle, -1 if there is none
     member_triangles : (t,) indices of the triangles to sort
@@ -147,9 +154,10 @@ def _extend_surface_edge(
 
     A blur along the edge then reads the same light from a gutter as from the chart piece beside it.
 
+    coverage : surface points that the texels show, changed in place
     triangle_piece : (f,) piece of each triangle, -1 if there is none
     beyond_end : (h, w) mask of texels beyond the end of the surface
-    y, x : (n,) rows and columns of the gutter texels to fill, all of which are in this mask
+    y, x : (n,) row and column of each gutter texel to fill; `beyond_end` is True at these texels
     """
     last = np.array(beyond_end.shape) - 1
     piece_of_texel, from_y, from_x = triangle_piece[coverage.anchor_triangle[y, x]], y.copy(), x.copy()
@@ -166,6 +174,9 @@ def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> 
     """Return texels per mm along u and v, and the cosine of the angle between u and v, (h, w, 3).
 
     A gutter texel has the metric of its anchor, the nearest point of its chart.
+
+    packing : positions of the triangles on the texel grid
+    coverage : surface points that the texels show
     """
     covered = coverage.anchor_triangle >= 0
     anchor, weights = coverage.anchor_triangle[covered], coverage.anchor_weights[covered]
@@ -181,6 +192,9 @@ def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -
     """Return how far each texel's piece and gutter extend left, right, up and down, (h, w, 4) [texel].
 
     A piece also ends at a gap: between adjacent texels whose surface points are far apart.
+
+    packing : positions of the triangles on the texel grid
+    coverage : surface points that the texels show
     """
     anchor = coverage.anchor_triangle
     owner = np.where(anchor >= 0, np.where(coverage.distance_mm > 0, -1, anchor), -2)
@@ -207,11 +221,13 @@ def _pairs_with_gap(
     second_texels: Index,
     axis: int,
 ) -> Mask:
-    """Return the mask of pairs of adjacent texels whose surface points are not adjacent on the surface.
+    """Return the mask (n,) of pairs of adjacent texels whose surface points are not adjacent.
 
-    There is a gap if `anchors_diverge` is true for a pair, and its surface points are more than
-    `gap_limit_mm` apart.
+    These are the pairs for which `anchors_diverge` is true, and whose surface points are farther apart than
+    `gap_limit_mm`.
 
+    packing : positions of the triangles on the texel grid
+    coverage : surface points that the texels show
     first_texels, second_texels : (n,) flat indices of the texels
     axis : 0 for pairs along x, 1 along y
     """

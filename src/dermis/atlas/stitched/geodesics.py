@@ -109,7 +109,11 @@ def trace_geodesics(
 def _leave_first_triangle(
     adjacency: Adjacency, triangle: Index, start: Complex, target: Complex, ends: GeodesicEnds
 ) -> Geodesics:
-    """Return the geodesics that leave their first triangle; store the ends of all others in `ends`."""
+    """Return the geodesics that leave their first triangle; store the end points of all others in `ends`.
+
+    triangle : (n,) index of the first triangle
+    start, target : (n,) points in the triangle's plane as complex numbers [mm]
+    """
     corners = _as_complex(adjacency.planar_corners[triangle])
     start = start + START_SHIFT_FRACTION * (corners @ np.array(INNER_POINT_WEIGHTS) - start)
     corners, direction = corners - start[:, None], target - start
@@ -127,7 +131,10 @@ def _leave_first_triangle(
 
 
 def _cross_edge(adjacency: Adjacency, rays: Geodesics, ends: GeodesicEnds) -> Geodesics:
-    """Continue geodesics into the next triangle; return those that go on, and store the others in `ends`."""
+    """Continue geodesics into the next triangle, and return those that leave it again.
+
+    The end points of all others are stored in `ends`.
+    """
     neighbour = adjacency.neighbour[rays.triangle, rays.exit_side]
     ended = (neighbour < 0) | ~adjacency.passable[neighbour]
     if ended.any():

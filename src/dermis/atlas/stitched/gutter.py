@@ -1,7 +1,7 @@
 """Borders of packed chart pieces, and gutter texels around them that continue the surface.
 
 A piece is a chart, or a part of a chart that is mirrored or was cut off. The rim of a piece consists of the
-texels outside it that bilinear interpolation within the piece reads.
+texels outside it that are read by bilinear interpolation within it.
 """
 
 from __future__ import annotations
@@ -74,7 +74,12 @@ def find_border(surface: FlatSurface, triangle_piece: Index, member_triangles: I
 def border_sides(
     surface: FlatSurface, border: Border, packing: Packing, gutter_width: GutterWidth
 ) -> BorderSides:
-    """Return the border sides on the texel grid, with surface metric and gutter width."""
+    """Return the border sides on the texel grid, with surface metric and gutter width.
+
+    border : border of the pieces, see `find_border`
+    packing : positions of the triangles on the texel grid
+    gutter_width : width of the gutters
+    """
     triangle, both = border.triangle, (border.side, (border.side + 1) % 3)
     ends = np.stack([packing.corners[triangle, k] for k in both], axis=1)
     steps = np.stack([surface.uv_steps[triangle, k] for k in both], axis=1)
@@ -97,9 +102,12 @@ def needed_texels(
 ) -> Mask:
     """Return the mask (h, w) of texels that chart pieces, their rims and their gutters may need.
 
-    The rim of a piece is the texels outside it that bilinear interpolation within the piece reads.
+    The rim of a piece consists of the texels outside it that are read by bilinear interpolation within it.
 
     member_triangles : (t,) indices of the triangles of the pieces
+    border : border of the pieces, see `find_border`
+    packing : positions of the triangles on the texel grid
+    gutter_width : width of the gutters
     grid_shape : height and width of the grid of texels
     """
     found = np.zeros(grid_shape, np.bool_)
@@ -114,7 +122,7 @@ class GutterTexels(NamedTuple):
     """Gutter and rim texels (n,) outside the triangles of a piece, with the surface points that they show.
 
     y, x : row and column
-    rim : mask of texels that bilinear interpolation within the piece reads
+    rim : mask of texels that are read by bilinear interpolation within the piece
     distance_mm : distance of the texel from the piece, measured on the surface [mm]
     anchor_triangle : index of the triangle with the anchor, the border point nearest to the texel
     anchor_weights : barycentric weights of this triangle's second and third corner at the anchor
@@ -139,6 +147,8 @@ def trace_gutter(
 ) -> GutterTexels:
     """Find the gutter texels of a border, and trace geodesics to the surface points that they show.
 
+    packing : positions of the triangles on the texel grid
+    gutter_width : width of the gutters
     texel_triangle : (h, w) index of the triangle that covers each texel of the pieces, -1 outside
     """
     nearest = nearest_border_points(

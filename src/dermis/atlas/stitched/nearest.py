@@ -35,7 +35,7 @@ class NearestPoints(NamedTuple):
     side : index of the border side
     fraction : position of the point along the side, 0 to 1 [-]
     distance_mm : distance between texel and border point in the surface metric of the side [mm]
-    rim : mask of texels that bilinear interpolation at some point of the border reads
+    rim : mask of texels that are read by bilinear interpolation at border points
     """
 
     texel: Index
@@ -50,8 +50,8 @@ class _SideMetric(NamedTuple):
 
     x, y, down : (k,) coefficients; the length of an offset (dx, dy) on the surface is that of the vector
         (x dx + y dy, down dy) [mm]
-    along : (k, 2) lengths of a texel step in x and of one in y when projected onto the side, as fractions of
-        the side's length
+    along : (k, 2) lengths of a step by one texel along x and of a step by one texel along y, projected onto
+        the side, as fractions of the side's length
     half_extent : (k, 2) margin in x and y around the side's bounding box, wide enough for the gutter [texel]
     """
 
@@ -66,8 +66,9 @@ def nearest_border_points(sides: BorderSides, inside_mask: Mask) -> NearestPoint
     """Return the nearest border point of each texel that is in a gutter or in the rim of a piece.
 
     Distances are measured by the surface metric at each border side. The rim consists of the texels that
-    bilinear interpolation at some point of the border reads.
+    are read by bilinear interpolation at border points.
 
+    sides : border sides on the texel grid
     inside_mask : (h, w) mask of texels that chart pieces cover
     """
     metric = _side_metric(sides)
@@ -110,7 +111,11 @@ def _side_metric(sides: BorderSides) -> _SideMetric:
 def _candidate_texels(
     sides: BorderSides, metric: _SideMetric, grid_shape: tuple[int, ...]
 ) -> tuple[Index, Index, Index]:
-    """Return texels that may be in a gutter, as three arrays (n,): index of the border side, x and y."""
+    """Return texels that may be in a gutter, as three arrays (n,): index of the border side, x and y.
+
+    sides, metric : border sides on the texel grid, and their surface metric
+    grid_shape : height and width of the grid of texels
+    """
     height, width = grid_shape
     low = np.ceil(sides.ends.min(axis=1) - metric.half_extent)
     high = np.floor(sides.ends.max(axis=1) + metric.half_extent)

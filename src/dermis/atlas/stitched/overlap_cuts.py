@@ -75,7 +75,7 @@ class Conflicts(NamedTuple):
 class _PieceGrid(NamedTuple):
     """Texel grid with one chart piece and its gutters.
 
-    owner : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
+    owner : (h, w) triangle to which each texel belongs, -1 in gutters, -2 elsewhere
     row : (h, w) index of each texel in `anchored`
     anchored : texels of the piece, followed by gutter texels, with their anchors
     packing : position of the piece on the grid
@@ -148,7 +148,14 @@ def _draw_piece_grid(
 
 
 def _gap_pairs(surface: FlatSurface, mapped_triangles: Mask, grid: _PieceGrid) -> tuple[Index, Index]:
-    """Return pairs of adjacent texels whose surface points are not adjacent on the surface, (n,) each."""
+    """Return pairs of adjacent texels whose surface points are not adjacent on the surface.
+
+    The two arrays (n,) hold the first and the second texel of each pair, as indices into
+    `_PieceGrid.anchored`.
+
+    mapped_triangles : (f,) mask of triangles that belong to any piece
+    grid : texel grid with the piece and its gutters
+    """
     found = []
     for axis in (0, 1):
         a, b = (grid.row.ravel()[texel] for texel in unconnected_pairs(surface, grid.owner, axis))
@@ -167,8 +174,10 @@ def _texel_points(
 ) -> Doubles:
     """Return the surface points (n, 3) of all texels of the grid, NaN for points that are not computed [mm].
 
-    Points are computed only for the texels in `chosen_texels`, and not for texels beyond the end of the
-    surface.
+    Points are computed for the chosen texels, except for texels beyond the end of the surface.
+
+    mapped_triangles : (f,) mask of triangles that belong to any piece
+    chosen_texels : indices into `_PieceGrid.anchored` of the chosen texels
     """
     owner, texels = grid.owner[grid.owner >= 0], grid.anchored.texels
     points, is_chosen = np.full((len(texels), 3), np.nan), np.zeros(len(texels), np.bool_)
@@ -296,10 +305,11 @@ def _conflict_strip(
 ) -> Mask:
     """Return the mask (t,) of a piece's triangles near conflicts between gutters, on one side of a line.
 
-    The side is chosen so that the selected triangles have the smaller area.
+    The function compares the triangles near conflicts on both sides of the line, and selects those of the
+    side where their total area is smaller.
 
     member_triangles : (t,) indices of the piece's triangles
-    one_side_mask : (t,) mask of the triangles on either of the two sides, not necessarily the chosen one
+    one_side_mask : (t,) True for triangles on one side of the line, False for those on the other side
     gutter_width_texels : gutter width [texel]
     """
     corners = surface.uv[member_triangles] * conflicts.texels_per_uv
@@ -318,10 +328,13 @@ def _conflict_strip(
 
 
 def _best_cut_line(conflicts: Conflicts, gutter_width_texels: float) -> tuple[Doubles, float, int]:
-    """Return the line that separates the most conflicts relative to the length of a cut along the line.
+    """Return the best line along which to cut a chart piece: its normal and offset, and a count.
 
-    A line separates a conflict if the two border points of the conflict are on different sides. Returns the
-    line's normal and offset, and the number of separated conflicts.
+    A line separates a conflict if the two border points of the conflict are on different sides of the line.
+    The best line separates the most conflicts for the length of the cut. The count is the number of conflicts
+    that the line separates.
+
+    gutter_width_texels : gutter width [texel]
     """
     close = conflicts.inside[
         _near_any_target(
@@ -350,6 +363,10 @@ def _connected_parts(
     """Divide the parts of a cut chart into connected parts; merge small parts into their largest neighbour.
 
     Returns the part of each triangle (t,), or None if only one part remains.
+
+    member_triangles : (t,) indices of the piece's triangles
+    part_of_triangle : (t,) part to which each of these triangles belongs
+    gutter_mm : width of the gutters [mm]
     """
     index = np.full(len(surface.uv), -1, np.int64)
     index[member_triangles] = np.arange(len(member_triangles))

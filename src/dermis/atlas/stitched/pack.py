@@ -143,6 +143,7 @@ def pack_pieces(
     uv_scale : (f,) factor by which each triangle's uv is scaled so that all pieces have a similar texel
         density
     map_side : texels along each side of the map
+    gutter_width : width of the gutters
     layout : result of `find_piece_layout` if it is known; None to call this slow function
     """
     groups, pieces = _prepare_pieces(surface, triangle_piece, uv_scale)
@@ -163,14 +164,21 @@ def pack_pieces(
 def find_piece_layout(
     surface: FlatSurface, triangle_piece: Index, uv_scale: Doubles, map_side: int, gutter_width: GutterWidth
 ) -> PieceLayout | None:
-    """Search for a layout of chart pieces, to be passed to `pack_pieces`; return None if they do not fit."""
+    """Search for a layout of chart pieces, to be passed to `pack_pieces`; return None if they do not fit.
+
+    triangle_piece, uv_scale, map_side : as for `pack_pieces`
+    gutter_width : width of the gutters
+    """
     return _search_piece_layout(_prepare_pieces(surface, triangle_piece, uv_scale)[1], map_side, gutter_width)
 
 
 def _prepare_pieces(
     surface: FlatSurface, triangle_piece: Index, uv_scale: Doubles
 ) -> tuple[list[Index], list[_Piece]]:
-    """Return the triangle indices of each chart piece, and the pieces prepared for packing."""
+    """Return the triangle indices of each chart piece, and the pieces prepared for packing.
+
+    triangle_piece, uv_scale : as for `pack_pieces`
+    """
     order = np.argsort(triangle_piece, kind="stable")[np.count_nonzero(triangle_piece < 0) :]
     groups = [
         members
@@ -198,7 +206,12 @@ def _prepare_piece(
 def _search_piece_layout(
     pieces: list[_Piece], map_side: int, gutter_width: GutterWidth
 ) -> PieceLayout | None:
-    """Return the layout with the largest scale that the search finds, or None if no scale fits."""
+    """Return the layout with the largest scale that the search finds, or None if no scale fits.
+
+    pieces : pieces prepared for packing
+    map_side : texels along each side of the map
+    gutter_width : width of the gutters
+    """
     cells = min(map_side, MAX_CELLS_PER_SIDE)
     gutter_width = gutter_width._replace(max_texels=gutter_width.max_texels * cells / map_side)
     area = sum(float(np.abs(one.surface.area_uv).sum()) * one.scale**2 for one in pieces)
@@ -215,6 +228,10 @@ def _find_largest_scale(masks: list[_PieceMask], cells_per_side: int, max_scale:
     """Return the layout with the largest scale up to a maximum, or None if no scale fits.
 
     Several packing orders are compared with coarse cells; only the best order is tried with fine cells.
+
+    masks : cells that each piece occupies
+    cells_per_side : cells along each side of the grid
+    max_scale : largest scale to try, in cells per unit of the pieces' scaled uv
     """
     coarse, best = None, 0
     for order in range(_PACKING_ORDER_COUNT):

@@ -29,11 +29,11 @@ def rasterise_texel_triangles(corners: Doubles, drawn_triangles: Index, grid_sha
 
 
 def mostly_hidden_triangles(corners: Doubles, drawn_triangles: Index, texel_triangle: Ints) -> Mask:
-    """Return the mask (f,) of triangles that own less than half of the texels that they cover.
+    """Return the mask (f,) of triangles to which less than half of the texels that they cover belong.
 
     corners : (f, 3, 2) corners of all triangles [texel]
     drawn_triangles : (t,) indices of the drawn triangles
-    texel_triangle : (h, w) triangle that owns each texel, from `rasterise_texel_triangles`
+    texel_triangle : (h, w) triangle to which each texel belongs, from `rasterise_texel_triangles`
     """
     texel, which = covered_texels(corners[drawn_triangles], texel_triangle.shape, _INNER_MARGIN_TEXELS)
     drawn, count = drawn_triangles[which], len(corners)
@@ -45,7 +45,7 @@ def texel_centre_weights(corners: Doubles, texel_triangle: Ints) -> Floats:
     """Return the barycentric weights (h, w, 2) of the second and third corner at each texel centre.
 
     corners : (f, 3, 2) corners of all triangles [texel]
-    texel_triangle : (h, w) triangle that owns each texel, -1 if there is none
+    texel_triangle : (h, w) triangle to which each texel belongs, -1 if there is none
     """
     y, x = np.nonzero(texel_triangle >= 0)
     weights = np.zeros((*texel_triangle.shape, 2), np.float32)
@@ -73,7 +73,7 @@ class AnchoredTexels(NamedTuple):
 def unconnected_pairs(surface: FlatSurface, texel_triangle: Ints, axis: int) -> tuple[Index, Index]:
     """Find pairs of adjacent texels whose triangles share no side in uv; return flat indices, (n,) for each.
 
-    texel_triangle : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
+    texel_triangle : (h, w) triangle to which each texel belongs, -1 in gutters, -2 elsewhere
     axis : 0 for texels adjacent along x, 1 along y
     """
     step = 1 if axis == 0 else texel_triangle.shape[1]
@@ -93,9 +93,12 @@ def unconnected_pairs(surface: FlatSurface, texel_triangle: Ints, axis: int) -> 
 
 
 def anchors_diverge(first_texels: AnchoredTexels, second_texels: AnchoredTexels) -> Mask:
-    """Return the mask of texel pairs whose anchors are farther apart than each texel is from its own anchor.
+    """Return the mask (n,) of texel pairs whose anchors are far apart.
 
-    The anchor of a texel is the nearest point of its chart.
+    The anchor of a texel is the nearest point of its chart. Two anchors are far apart if the distance between
+    them is larger than the distance from either texel to its anchor.
+
+    first_texels, second_texels : first and second texel of each of n pairs
     """
     distance2 = np.maximum(
         _squared_length(first_texels.texels - first_texels.anchors),
@@ -105,9 +108,11 @@ def anchors_diverge(first_texels: AnchoredTexels, second_texels: AnchoredTexels)
 
 
 def gap_limit_mm(first_texels: AnchoredTexels, second_texels: AnchoredTexels, axis: int) -> Doubles:
-    """Return the largest distance (n,) between the surface points of adjacent texels without a gap [mm].
+    """Return how far apart the surface points of two adjacent texels may be without a gap, (n,) [mm].
 
-    If the points are farther apart, the surface is not continuous between the two texels.
+    If the points are farther apart, the surface does not continue from one texel to the other.
+
+    first_texels, second_texels : first and second texel of each of n adjacent pairs
 
     axis : 0 for texels adjacent along x, 1 along y
     """

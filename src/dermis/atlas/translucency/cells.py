@@ -149,7 +149,11 @@ def _dilate_cells(cell_mask: Mask) -> Mask:
 
 
 def _sort_by_tile(tile_of_entry: NDArray[np.integer], tiles_per_side: int) -> tuple[Index, Index]:
-    """Return the order that sorts entries by tile, and the index (t + 1,) of each tile's first entry."""
+    """Return the order (n,) that sorts entries by tile, and the index (t + 1,) of each tile's first entry.
+
+    tile_of_entry : (n,) index of the tile to which each entry belongs
+    tiles_per_side : tiles along each side of the atlas
+    """
     order = np.argsort(tile_of_entry, kind="stable")
     return order, np.concatenate(
         [[0], np.cumsum(np.bincount(tile_of_entry, minlength=tiles_per_side * tiles_per_side))]
@@ -220,8 +224,8 @@ def _gutter_copies(atlas: Atlas, cells_per_side: int) -> tuple[Index, Words]:
 def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], Floats]:
     """Return the lit texels outside their chart, and the atlas positions of the points that they show.
 
-    Both arrays are (r, 2): x and y of the texels, and positions [texel]. These texels lie at the rim of a
-    chart, and interpolation inside the chart reads them. They show points that other texels show as well.
+    Both arrays are (r, 2): x and y of the texels, and positions [texel]. These texels lie around a chart
+    and are read by interpolation inside the chart. Other texels show the same points as well.
     """
     inner, view = np.pad(atlas.lit, GUTTER_TEXELS), np.lib.stride_tricks.sliding_window_view
     for axis in (0, 1):

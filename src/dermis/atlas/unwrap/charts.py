@@ -16,8 +16,8 @@ _BEND_DISTANCE_FACTOR = (
 def opposite_sides(triangles: Index) -> Index:
     """Return, for each triangle side, the index of the neighbour's side at the same edge, (3 f,).
 
-    Sides are numbered as in `geometry.edges`: all 01, then all 12, then all 20. For a side without exactly
-    one neighbour, the result is the index of the side itself.
+    Sides are numbered as in `geometry.edges`: first the sides 01 of all triangles, then all sides 12, then
+    all sides 20. For a side with no neighbour or several neighbours, the result is the side's own index.
     """
     _, of_side, counts = edges(triangles)
     side = np.argsort(of_side, kind="stable")
@@ -31,7 +31,7 @@ def opposite_sides(triangles: Index) -> Index:
 def neighbour_triangles(triangles: Index) -> Index:
     """Return the index of the triangle across each side 01, 12 and 20, (f, 3).
 
-    Across a side without exactly one neighbour, the index is that of the triangle itself.
+    For a side with no neighbour or several neighbours, the result is the triangle's own index.
     """
     return (opposite_sides(triangles) % len(triangles)).reshape(3, -1).T
 
@@ -131,7 +131,13 @@ def grow_charts(positions: Doubles, triangles: Index, chart_count: int, seed: in
 
 
 def _seed_triangles(corners: Doubles, connected_piece: Index, chart_count: int, seed: int) -> Index:
-    """Return random triangles, drawn in proportion to area, with at least one in each connected piece."""
+    """Return random triangles, drawn in proportion to area, with at least one in each connected piece.
+
+    corners : (f, 3, 3) positions of the corners [mm]
+    connected_piece : (f,) connected piece to which each triangle belongs
+    chart_count : number of triangles to draw, before those for connected pieces without any are added
+    seed : seed of the random choice
+    """
     area = triangle_areas(corners)
     drawn = np.random.default_rng(seed).choice(
         len(area), min(chart_count, len(area)), replace=False, p=area / area.sum()

@@ -166,6 +166,11 @@ def _conformal_map(
     """Return the complex positions (n,) of a least squares conformal map, which changes angles least.
 
     Two points of each connected component are fixed.
+
+    points : (n, 3) vertices [mm]
+    triangles : (f, 3) vertex indices
+    vertex_component : (n,) index of the connected component of each vertex
+    triangle_shapes : (f, 3) shape of each triangle in the plane, as complex numbers
     """
     from scipy.sparse import coo_array
 
@@ -183,7 +188,10 @@ def _conformal_map(
 
 
 def _extreme_points(points: Doubles, vertex_component: Index) -> tuple[Index, Index]:
-    """Return the first and last point (c,) of each component along the axis on which it is longest."""
+    """Return the first and last point (c,) of each component along the axis on which it is longest.
+
+    vertex_component : (n,) index of the connected component of each vertex
+    """
     count = int(vertex_component.max()) + 1
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(low, vertex_component, points)

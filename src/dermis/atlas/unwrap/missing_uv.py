@@ -18,7 +18,7 @@ _LAYOUT_CACHE_VERSION = 1  # increment when `unwrap_mesh` returns other layouts
 
 
 def unwrap_triangles(mesh: Mesh, triangle_mask: Mask) -> tuple[Mesh, Index]:
-    """Unwrap some triangles of a mesh; return the new mesh, and the old vertex of each new vertex.
+    """Unwrap some triangles; return the new mesh, and for each new vertex the index of the old vertex.
 
     The order of the triangles is unchanged; vertices on the new seams are duplicated. The layout is cached on
     disk.

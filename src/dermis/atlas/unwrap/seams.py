@@ -103,7 +103,7 @@ class ChartMesh(NamedTuple):
     triangles: Index
 
     def flatten(self, triangle_chart: Index) -> FlatCharts:
-        """Flatten charts and mark faulty triangles.
+        """Flatten charts, and mark the faulty triangles as described in `FlatCharts`.
 
         triangle_chart : (f,) chart of each triangle
 
@@ -126,7 +126,9 @@ class ChartMesh(NamedTuple):
 
 
 def flatten_charts(mesh: ChartMesh, triangle_chart: Index) -> FlatCharts:
-    """Flatten charts so that no triangle is faulty; change the division into charts where necessary.
+    """Flatten charts, and change the division into charts until no triangle is faulty.
+
+    Faulty triangles are mirrored or collapsed, or the border of their chart crosses itself there.
 
     triangle_chart : (f,) chart of each triangle
     """
@@ -139,7 +141,8 @@ def flatten_charts(mesh: ChartMesh, triangle_chart: Index) -> FlatCharts:
 def _repair_charts(mesh: ChartMesh, flat_charts: FlatCharts, repair_count: int) -> Index:
     """Return the chart of each triangle (f,) after a repair of charts with faulty triangles.
 
-    The first repairs move faulty triangles to adjacent charts; later repairs split the charts.
+    Faulty triangles are those in the mask `FlatCharts.faulty`. The first repairs move them to adjacent
+    charts; later repairs split the charts.
 
     repair_count : number of repairs made so far
     """
@@ -160,7 +163,7 @@ def _repair_charts(mesh: ChartMesh, flat_charts: FlatCharts, repair_count: int) 
 
 
 def _reassign_faulty_triangles(mesh: ChartMesh, flat_charts: FlatCharts) -> Index:
-    """Return charts (f,) in which faulty triangles belong to an adjacent chart, if there is one."""
+    """Return the chart of each triangle (f,) after moving faulty triangles to adjacent charts, if any."""
     adjacent = flat_charts.chart[neighbour_triangles(mesh.triangles)]
     other = np.where(adjacent == flat_charts.chart[:, None], -1, adjacent).max(axis=1)
     return merge_stray_pieces(
@@ -169,7 +172,7 @@ def _reassign_faulty_triangles(mesh: ChartMesh, flat_charts: FlatCharts) -> Inde
 
 
 def _split_faulty_charts(mesh: ChartMesh, flat_charts: FlatCharts) -> Index:
-    """Return charts (f,) in which each chart with faulty triangles is split in two."""
+    """Return the chart of each triangle (f,) after splitting each chart with faulty triangles in two."""
     chart = 2 * flat_charts.chart
     for k in np.unique(flat_charts.chart[flat_charts.faulty]):
         own = np.flatnonzero(flat_charts.chart == k)

@@ -107,6 +107,7 @@ def _column_extents(edges: Doubles, margin_cells: int) -> tuple[Index, Index]:
     """Return the lowest and highest cell of a chart in each column (w,), with a margin of empty cells.
 
     edges : (k, 2, 2) edges of the chart's border [cell]
+    margin_cells : width of the margin [cell]
     """
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
@@ -197,7 +198,11 @@ def _vertex_charts(flat_charts: FlatCharts) -> Index:
 
 
 def _packed_uv(uv_mm: Doubles, flat_charts: FlatCharts, padding: float) -> Doubles:
-    """Pack the charts; return the uv (v, 2) of all vertices, v down."""
+    """Pack the charts; return the uv (v, 2) of all vertices, v down.
+
+    uv_mm : (v, 2) positions of the vertices in the flattened charts [mm]
+    padding : empty space between charts as a fraction of the map's side
+    """
     edges, triangle = border_edges(flat_charts.corners)
     chart = flat_charts.chart[triangle]
     order = np.argsort(chart, kind="stable")

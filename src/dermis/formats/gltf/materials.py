@@ -143,6 +143,9 @@ def part_material(material: Material, part_maps: PartPictures) -> Tree:
     """Return the glTF material of a part that is not skin, with the pictures of `encode_part_pictures`.
 
     The textures of the material reference pictures by name, as {"index": name}.
+
+    material : material of the part
+    part_maps : pictures that all parts share
     """
     roles = part_maps.needed_roles(material)
     surface: Tree = {

@@ -33,7 +33,7 @@ class PrimitiveSource(Protocol):
     """Geometry that can be written as a glTF primitive with morph targets."""
 
     def add_primitive(self, buffer_builder: BufferBuilder) -> Tree:
-        """Append vertices and triangles to the buffer; return the primitive, without material or targets."""
+        """Append vertices and triangles to the buffer; return the primitive (no material, no targets)."""
         ...
 
     def add_target(self, buffer_builder: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
@@ -64,10 +64,10 @@ class SurfacePrimitive:
         return np.unique(self._head.mesh.triangles[self.faces])
 
     def add_primitive(self, buffer_builder: BufferBuilder) -> Tree:
-        """Append vertices and triangles to the buffer; return the primitive, without material or targets.
+        """Append vertices and triangles to the buffer; return the primitive (no material, no targets).
 
-        The extras of the primitive record whether its triangles form quads, and whether no other primitive
-        shares points with it.
+        The extras of the primitive state whether its triangles form quads, and whether it is separate, which
+        means that it has no points in common with other primitives.
         """
         used, mesh = self.used_vertices, self._head.mesh
         index = buffer_builder.add_triangles(np.searchsorted(used, mesh.triangles[self.faces]), len(used))
@@ -125,7 +125,7 @@ class HairPrimitive:
         return replace(self.deformable.head.mesh, positions=self.deformable.positions_mm).points_mm
 
     def add_primitive(self, buffer_builder: BufferBuilder) -> Tree:
-        """Append vertices and triangles to the buffer; return the primitive, without material or targets.
+        """Append vertices and triangles to the buffer; return the primitive (no material, no targets).
 
         The extras of the primitive mark it as hair, so that `read_gltf` skips it.
         """
@@ -202,6 +202,9 @@ class FibreTubes:
 
         If hairs are left out, the tubes are widened to cover the same area in total, and their absorption
         is reduced accordingly.
+
+        strands : all hairs
+        mesh : mesh of the skin on which the hairs grow
         """
         count = min(len(strands), max_hairs)
         width_factor = len(strands) / count

@@ -40,11 +40,11 @@ class SkinInfluences(NamedTuple):
 
 @dataclass(frozen=True)
 class Armature:
-    """Bones of a glTF scene: joints of skins, and animated nodes.
+    """Bones of a glTF scene: the joints that deform meshes, and animated nodes.
 
     bone_of_node : dictionary from node index to bone index
-    static_bone : index of the root bone that was added for meshes that no bone moves; None if there are no
-        such meshes
+    static_bone : index of the additional root bone that carries the meshes that do not move; None if all
+        meshes can move
     """
 
     bones: Bones
@@ -52,7 +52,7 @@ class Armature:
     static_bone: int | None
 
     def bone_for_node(self, nodes: Nodes, node_index: int) -> int | None:
-        """Return the index of the bone that moves a mesh without a skin.
+        """Return the index of the bone that moves a rigid mesh, which has no joints of its own.
 
         It is the bone of the node that carries the mesh, or else of the nearest ancestor that has a bone. If
         no ancestor has a bone, the result is `static_bone`.
@@ -66,7 +66,8 @@ class Armature:
 def read_armature(document: Document, nodes: Nodes) -> Armature | None:
     """Return the bones of a scene, or None if no mesh in the scene can move.
 
-    Bones are joints of skins, animated nodes that carry meshes, and the ancestors of both.
+    Bones are the joints of glTF skins (which deform meshes), animated nodes that carry meshes, and the
+    ancestors of both.
     """
     meshes = [k for k in nodes.scene_nodes or () if "mesh" in document.top_level_array("nodes")[k]]
     skinned = [k for k in meshes if "skin" in document.top_level_array("nodes")[k]]
@@ -90,12 +91,12 @@ def read_armature(document: Document, nodes: Nodes) -> Armature | None:
 
 
 def _with_static_root(bones: Bones) -> Bones:
-    """Return the bones of a scene, preceded by a new root bone for meshes that no bone moves.
+    """Return the bones of a scene, preceded by a new root bone, which carries the meshes that do not move.
 
     The new bone has index 0 and lies at the origin.
 
-    bones : bones of the scene; their parent indices must already be those of the result, where bone k of the
-        scene has the index k + 1
+    bones : bones of the scene, whose parent indices the caller has already adapted to the result: bone k of
+        the scene becomes bone k + 1, and the parent of former roots is bone 0
     """
     name = node_names([{"name": known} for known in (*bones.names, _STATIC_BONE_NAME)])[-1]
     parent = np.concatenate([[-1], bones.parent]).astype(np.int32)
@@ -123,11 +124,13 @@ def _node_skin(document: Document, node_index: int) -> Tree:
 def read_influences(
     document: Document, nodes: Nodes, armature: Armature, mesh_node_index: int, primitive: Tree
 ) -> tuple[SkinInfluences, Doubles]:
-    """Return the bones and weights of a skinned primitive, and the skinning matrix of each vertex at rest.
+    """Return the bones and weights of a primitive, and the skinning matrix of each vertex at rest.
 
     The skinning matrices (v, 4, 4) map mesh space to scene space.
 
-    mesh_node_index : index of the node that carries the mesh and refers to its skin
+    armature : bones of the scene, to which the bone indices refer
+    mesh_node_index : index of the node that carries the mesh and refers to its glTF skin (list of joints)
+    primitive : JSON tree of the primitive
 
     Raises DermisError for invalid weights and joints.
     """
@@ -216,6 +219,7 @@ def read_targets(
 ) -> dict[str, VertexDisplacements]:
     """Return the vertex displacements of a primitive by morph target name, in the mesh's space.
 
+    mesh, primitive : JSON trees of the mesh and of one of its primitives
     all_target_names : names of the morph targets of the mesh
     vertex_count : number of vertices of the primitive
 
@@ -265,6 +269,7 @@ def apply_targets(
 ) -> Doubles:
     """Return positions (v, 3) displaced by morph targets.
 
+    targets : displacements of the morph targets at weight 1, by target name
     weights : weights by target name; missing weights are 0
     """
     result = positions

@@ -94,8 +94,8 @@ _OTHER_EXTENSION_ADVICE = "Export without it"
 def read_gltf(path: Path) -> MeshFile:
     """Read the scene of a .glb or .gltf file in its rest pose.
 
-    Joints have the transforms of their nodes; morph targets have their default weights. A mesh with a skin is
-    transformed by its joints; the transform of its node has no effect.
+    Joints have the transforms of their nodes; morph targets have their default weights. A mesh with joints
+    is transformed by them alone; the transform of its node has no effect.
     """
     document = read_document(path)
     _refuse_extensions(document)
@@ -180,8 +180,9 @@ class _SceneReader:
     def _scene_part(
         self, mesh: Tree, target_names: tuple[str, ...], primitive: Tree, node_index: int | None
     ) -> MeshPart:
-        """Return a primitive as a mesh part in scene space, transformed by its node or by its skin.
+        """Return a primitive as a mesh part in scene space, transformed by its node or by its joints.
 
+        mesh, primitive : JSON trees of the mesh and of one of its primitives
         target_names : names of the morph targets of the mesh
         node_index : index of the node that carries the mesh; None in a file whose meshes have no nodes
         """
@@ -325,6 +326,8 @@ def _skin_part(
 ) -> MeshPart:
     """Return a mesh part and its morph targets with each vertex transformed by its skinning matrix.
 
+    targets : morph targets of the part by name
+    influences : bones and weights of each vertex, which the result contains
     skinning_matrices : (v, 4, 4) skinning matrices at rest
     """
     if len(influences.bone) != len(mesh_part.positions):

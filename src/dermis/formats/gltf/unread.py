@@ -15,8 +15,8 @@ _POINT_AND_LINE_MODES = range(4)  # modes of primitives
 def note_unread(document: Document, nodes: Nodes, read_extensions: Collection[str]) -> Iterator[str]:
     """Yield notes on lights, cameras, points, lines, further scenes and extensions that are not read.
 
-    read_extensions : names of the extensions that other functions read, or on which they issue notes; no note
-        is issued here on these extensions
+    read_extensions : names of the extensions that other functions handle; this function yields no notes on
+        them
     """
     listed_nodes = document.top_level_array("nodes")
     in_scene = [listed_nodes[k] for k in nodes.scene_nodes or ()]

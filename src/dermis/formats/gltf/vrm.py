@@ -65,6 +65,7 @@ class Avatar:
     ) -> dict[str, VertexDisplacements]:
         """Return the morph targets of a primitive, with the expressions added as further morph targets.
 
+        mesh : JSON tree of the mesh that contains the primitive
         target_names : names of the morph targets of the mesh
         targets : morph targets of the primitive, by name
 

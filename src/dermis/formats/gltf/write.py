@@ -102,6 +102,7 @@ def _primitive_sources(
 
     pictures : PNG files by name; this function adds the pictures of eyes, hairs and parts that are not skin
     map_entries : description of the maps for the extras of the skin material, see `encode_skin_maps`
+    roughness, eyes : see `encode_head`
     """
     head = deformable_mesh.head
     eye_materials = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
@@ -145,7 +146,9 @@ def _gltf_mesh(
 ) -> Tree:
     """Return the glTF mesh with its primitives, morph targets and default weights.
 
+    buffer_builder : buffer to which vertices, triangles and morph targets are appended
     primitive_sources : geometry of each primitive; primitive i has material i
+    weights : default weights of morph targets by name
     """
     primitives = [
         source.add_primitive(buffer_builder) | {"material": number}
@@ -170,9 +173,10 @@ def _mesh_name(head: Head) -> str:
 
 
 def _gltf_nodes(head: Head, buffer_builder: BufferBuilder) -> tuple[list[Tree], list[int], list[Tree]]:
-    """Return the glTF nodes, the indices of the root nodes, and the list of skins.
+    """Return the glTF nodes, the indices of the root nodes, and the list of glTF skins.
 
-    The nodes are the bones, then the mesh. There is one skin; a head without bones has no skin.
+    The nodes are the bones, then the mesh. The list contains one glTF skin, which binds the mesh to the
+    bones; it is empty for a head without bones.
     """
     skeleton = head.control.skeleton
     if skeleton is None:

@@ -77,6 +77,7 @@ def capture_clip(culprit: object, clip_name: str, samples: CaptureSamples, head:
 
     culprit : file of the capture, for errors
     clip_name : name of the clip
+    samples : blend shape weights and bone angles of the capture
 
     Raises DermisError when no name matches the head.
     """
@@ -135,8 +136,8 @@ def estimate_frame_rate(times: Doubles) -> float | None:
 def to_seconds(culprit: object, times: Doubles, unit_s: float | None) -> Doubles:
     """Return times (k,) in seconds.
 
-    unit_s : unit of the times [s]; None to guess the largest unit in which frames are at most 2 s apart, and
-        to tell the user of the guess by a note
+    unit_s : unit of the times [s]; None if it is unknown, in which case the largest unit is assumed in which
+        frames are at most 2 s apart, and a note tells the user
     """
     if unit_s is None:
         steps = np.diff(times)

@@ -27,12 +27,11 @@ class _BoneTransforms(NamedTuple):
 
 
 class _MatchedTrack(NamedTuple):
-    """Animation curve of a track, with n of its bones or morph targets: those that the head also has.
+    """Animation curve of a track, and the indices of those n bones or morph targets that the head has.
 
-    path : "translation", "rotation", "scale" or "weights"
-    columns : (n,) indices of these bones or morph targets in the track
-    indices : (n,) indices of their names among all animated bones, or all animated morph targets, that the
-        head has
+    path : property that the track animates: "translation", "rotation", "scale" or "weights"
+    columns : (n,) index of each of the n bones or morph targets in the track
+    indices : (n,) index of each of them in the list that `_matched_names` returns for the whole clip
     """
 
     path: str
@@ -44,7 +43,8 @@ class _MatchedTrack(NamedTuple):
 def load_gltf_clip(path: Path, head: Head, clip_name: str | None) -> Clip:
     """Load a clip of a .glb or .gltf file; bones and morph targets are matched to the head by name.
 
-    Translations, rotations and scales of bones that the clip does not animate keep their rest values.
+    If the clip does not animate the translation, rotation or scale of a bone, this property of the bone keeps
+    its value at rest.
 
     clip_name : name of the clip; required if the file has several
 
@@ -84,7 +84,11 @@ def load_gltf_clip(path: Path, head: Head, clip_name: str | None) -> Clip:
 
 
 def _matched_names(tracks: list[AnimationTrack], head_names: tuple[str, ...]) -> list[str]:
-    """Return the names of animated bones or morph targets that the head has, without duplicates."""
+    """Return the names of animated bones or morph targets that the head has, without duplicates.
+
+    tracks : tracks that all animate bones, or all animate morph targets
+    head_names : names of all bones, or of all morph targets, of the head
+    """
     return [
         name for name in dict.fromkeys(name for track in tracks for name in track.names) if name in head_names
     ]

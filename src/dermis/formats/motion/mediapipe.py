@@ -159,9 +159,9 @@ def _fields_by_plain_key(json_record: object) -> dict[str, object]:
 def _frame_list(json_document: object) -> list[object]:
     """Return the frames in a JSON document.
 
-    A list contains the frames, unless it is the list of blend shapes of a single frame. An object is a single
-    frame if it has blend shapes, a facial transformation or no list; otherwise its longest list contains the
-    frames.
+    A list contains the frames, unless it is the list of blend shapes of a single frame. An object that has
+    blend shapes or a facial transformation is a single frame. In any other object, the longest list contains
+    the frames; if there is no list, the object is a single frame.
     """
     if isinstance(json_document, list):
         is_frame = (
@@ -333,10 +333,10 @@ def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None
 def _head_angles(
     path: Path, frames: Sequence[_CapturedFrame], times: Doubles, bones: RotationBones
 ) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Return the angles (k, 3) of the head and neck bones by bone name [degrees], and what is unused.
+    """Return the angles (k, 3) of the head and neck bones by bone name [degrees], and missing bones.
 
-    The second result is empty, unless the file has head rotations but the head has no bone for them; it then
-    contains a description of the missing bone for a note to the user.
+    If the file has head rotations but the head has no bone for them, the second result contains a description
+    of the missing bone, for a note to the user. Otherwise it is empty.
 
     path : file of the capture, for notes
     times : (k,) times of the frames [s]

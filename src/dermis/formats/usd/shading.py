@@ -172,6 +172,7 @@ class MaterialReader:
         A picture of the opacity is only supported if it is the alpha channel of the colour picture.
 
         material_tree : incomplete result of `read`, with the colour picture
+        surface_shader : UsdPreviewSurface shader of the material
         input_values : constant values of the inputs of `surface_shader`, by name
         """
         source, cutoff = self._connected_source(surface_shader, "opacity"), input_values["opacityThreshold"]

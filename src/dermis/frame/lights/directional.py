@@ -1,4 +1,4 @@
-"""Parallel light from one direction, or from the disc of a sun."""
+"""Directional light: parallel light, or light from a disc at infinity, such as the sun."""
 
 from __future__ import annotations
 

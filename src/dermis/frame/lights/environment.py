@@ -77,7 +77,7 @@ def _upload_panorama_layers(
 
 
 def _with_border(panorama: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return a panorama with a border of one texel for filters.
+    """Return a panorama with a border of one texel, so that bilinear filtering is correct at its edges.
 
     On the left and right, the border wraps around. Beyond a pole, the border continues on the opposite side
     of the sphere.
@@ -104,6 +104,7 @@ def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
     It is the irradiance of a surface that faces all lights and the brightest part of the environment.
 
     scene : scene whose lights include the suns of its environment
+    environment_map : prefiltered panorama of the environment
     """
     environment = environment_map.peak_irradiance * scene.environment.exposure if scene.environment else 0.0
     return environment + sum(max(light.irradiance) for light in scene.lights)
@@ -121,6 +122,7 @@ def environment_record(
     The record holds the rotation and the exposure of the environment, and the albedo and the reflection lobes
     of the skin that the environment lights.
 
+    shading_program : program of the shading pass, which declares the record
     albedo : (3,) albedo of skin where its colour map is white [-]
     has_occlusion : whether the head hides parts of the environment from its own skin
     """

@@ -98,7 +98,7 @@ class Kind(Generic[LightT]):
         Raises
         ------
         DermisError
-            When the light cannot be at its position.
+            When the position is invalid, for example when a spherical light overlaps the head.
         """
 
     def members(self, light: LightT, centre: Triple, distance: float) -> Members:

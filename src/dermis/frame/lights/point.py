@@ -1,4 +1,4 @@
-"""Light from a point, equally in all directions."""
+"""Point light, which emits equally in all directions."""
 
 from __future__ import annotations
 

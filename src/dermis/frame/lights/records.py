@@ -77,9 +77,9 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
 def with_oblique_constant(constants: Constants) -> Constants:
     """Return `constants`, with OBLIQUE added if they contain HALF_SPACE.
 
-    HALF_SPACE makes the response of skin to light depend on direction. OBLIQUE also evaluates oblique light
-    at an offset along the surface; only passes that provide the shape of the surface around a point may use
-    it.
+    HALF_SPACE makes the response of skin to light depend on direction. With OBLIQUE, oblique light is also
+    evaluated at an offset along the surface. Only passes that provide the shape of the surface around a point
+    may use OBLIQUE.
     """
     return (*constants, ("OBLIQUE", 1)) if ("HALF_SPACE", 1) in constants else constants
 
@@ -126,6 +126,7 @@ def light_records(
 ) -> UniformRecord:
     """Return the uniform record `Lights` of all lights of the scene.
 
+    shading_program : program of the shading pass, which declares the record
     shadow_views : result of `light_shadow_views`
     """
     record = shading_program.record("Lights", sample_points=light_sample_points())

@@ -1,4 +1,4 @@
-"""Sphere that emits the same radiance everywhere."""
+"""Spherical area light, with the same radiance at all points and in all directions."""
 
 from __future__ import annotations
 

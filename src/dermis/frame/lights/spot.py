@@ -1,4 +1,4 @@
-"""Light from a point within a cone."""
+"""Spot light, a point light that is limited to a cone."""
 
 from __future__ import annotations
 

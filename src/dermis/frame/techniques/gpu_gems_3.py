@@ -32,7 +32,7 @@ TexturePair = tuple[TextureOrView, TextureOrView]
 
 @dataclass(frozen=True, eq=False)
 class StretchedLevels(PyramidLevels):
-    """Pyramid levels with textures for a stretch map that is blurred together with the light.
+    """Textures of the blur pyramid, and of a stretch map that is blurred together with the light.
 
     The stretch map holds the texel density on the surface along u and along v.
 
@@ -50,7 +50,11 @@ class GpuGems3(AtlasTechnique):
     supports_translucency = True
 
     def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
-        """Create textures for light, its blurred levels and a blurred stretch map."""
+        """Create textures for light, its blurred levels and a blurred stretch map.
+
+        atlas_side : side of the atlas [texels]
+        halvings : for each atlas layout, the number of times that the resolution of each level is halved
+        """
         pyramid = make_levels(device, atlas_side, halvings, HALF_TEXEL_FORMAT)
         first, second = (make_texture(device, (atlas_side, atlas_side), HALF_TEXEL_FORMAT) for _ in range(2))
         return StretchedLevels(
@@ -117,6 +121,7 @@ class GpuGems3(AtlasTechnique):
     ) -> None:
         """Declare one blur pass, which writes blurred light and the blurred stretch map.
 
+        shader : result of `blur_program`
         shader_resources : resources that the shader reads
         target_pair : textures for blurred light and for the blurred stretch map
         atlas_side : side of the atlas [texels]

@@ -35,7 +35,7 @@ class OneBlur(TextureSpace):
         return AtlasTechnique.split(self, profile, normalise_weights)
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
-        """Return False: the Gaussian blurs all light, and no light is evaluated at each pixel instead."""
+        """Return False: all light is blurred by the Gaussian; none is evaluated at each pixel."""
         return False
 
     def stretch(self, settings: Settings) -> str:

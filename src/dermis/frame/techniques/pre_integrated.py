@@ -66,6 +66,7 @@ class PreIntegratedSkin(Technique):
         These are the largest curvature in the tables, the penumbra width, and the widths of the Gaussians
         that smooth the relief.
 
+        view : uniform record of the shading pass
         shade : program of the shading pass
         resources : result of `make`
         """
@@ -102,7 +103,7 @@ def make_pre_integrated_tables(device: Device, profile: GaussianSum) -> PreInteg
 
 
 def sphere_irradiance_table(profile: GaussianSum) -> Floats:
-    """Return the irradiance max(N.L, 0) after scattering on spheres, (n, m, c) [-].
+    """Return a table (n, m, c) of the irradiance max(N.L, 0) after scattering on spheres [-].
 
     N is the normal and L the direction to the light. The n rows are for curvatures from 0 to
     `MAX_CURVATURE_PER_MM`, the m columns for N.L from -1 to 1, and c is the number of colour channels.

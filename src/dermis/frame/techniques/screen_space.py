@@ -142,6 +142,8 @@ def draw(
 ) -> Texture:
     """Declare the passes that diffuse the subsurface light, and return the picture with this light.
 
+    subsurface_layers : textures of the subsurface light, and textures with which it is diffused
+    kernel : diffusion kernel of the profile
     window : rectangle of the image plane that the picture shows
     surface_light : shaded picture without the subsurface light
     """
@@ -163,6 +165,8 @@ def draw_blur(
 ) -> None:
     """Declare the passes that diffuse the subsurface light along rows, then along columns.
 
+    subsurface_layers : textures of the subsurface light, and textures with which it is diffused
+    kernel : diffusion kernel of the profile
     window : rectangle of the image plane that the picture shows
     """
     device, size = graph.device, subsurface_layers.scratch.size[:2]
@@ -185,9 +189,10 @@ def draw_blur(
 
 
 def kernel_integral_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
-    """Return (1, n, 4) integrals of the kernel from 0 to each of n distances, and the largest distance [mm].
+    """Return integrals of a kernel from 0 to each of n distances, and the largest distance [mm].
 
-    The square roots of the distances are evenly spaced.
+    The integrals are one row (1, n, 4) of texels: red, green and blue, and a fourth channel of 0. The square
+    roots of the distances are evenly spaced.
     """
     reach = _kernel_reach_mm(kernel)
     fractions = kernel.half_line_integral(reach * np.linspace(0.0, 1.0, _KERNEL_ENTRY_COUNT) ** 2)

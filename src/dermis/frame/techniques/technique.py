@@ -70,6 +70,8 @@ class Technique(TechniqueTraits):
         Return the new split of the profile, and the indices of the inserted levels. This base class inserts
         none.
 
+        split : Gaussians with which light is blurred
+        atlas : textures of the atlas
         edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
         return split, ()
@@ -77,6 +79,8 @@ class Technique(TechniqueTraits):
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
+        split : Gaussians with which light is blurred
+        atlas : textures of the atlas
         edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
         return (0,) * (1 + len(split.blurred_mm2))
@@ -101,6 +105,7 @@ class Technique(TechniqueTraits):
     ) -> None:
         """Write the members of the shading record that only this technique reads.
 
+        view : uniform record of the shading pass
         shade : program of the shading pass
         resources : result of `make`
         """
@@ -136,7 +141,7 @@ class Technique(TechniqueTraits):
     ) -> Texture:
         """Declare the passes that compute only the light through thin parts of the head, over the atlas.
 
-        Outputs use it to separate this light from the rest of the picture.
+        The result serves outputs that separate this light from the rest of the picture.
 
         Return the texture of the only layout or, if there are two layouts, the texture of their blend.
 
@@ -163,7 +168,7 @@ class AtlasTechnique(Technique):
         """Split a profile into its narrowest Gaussian and the Gaussians with which light is blurred.
 
         Instead of a blur with the narrowest Gaussian, light is evaluated at each pixel. If even this Gaussian
-        is too wide for that, light is blurred with all of them.
+        is too wide for that, light is blurred with all Gaussians of the profile.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
@@ -176,7 +181,11 @@ class AtlasTechnique(Technique):
         return ProfileSplit(np.zeros(3), total, profile.variance_mm2, weight)
 
     def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
-        """Create the textures of the blur pyramid in the format that is fastest on the device."""
+        """Create the textures of the blur pyramid in the format that is fastest on the device.
+
+        atlas_side : side of the atlas [texels]
+        halvings : for each atlas layout, the number of times that the resolution of each level is halved
+        """
         return make_levels(device, atlas_side, halvings, level_format(device))
 
     def texel_bytes(self, blur_count: int) -> float:
@@ -189,13 +198,18 @@ class AtlasTechnique(Technique):
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
+        split : Gaussians with which light is blurred
+        atlas : textures of the atlas
         edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
         max_halvings = len(atlas.mips_for_blurs(edge_mode)) - 1
         return choose_halvings(split.blurred_mm2, atlas.median_texels_per_mm, max_halvings)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
-        """Declare the passes that light, blur and sum each atlas layout, and blend two layouts."""
+        """Declare the passes that light the atlas, blur the light and sum the blurred levels.
+
+        If there are two atlas layouts, a last pass blends them. Return the texture of the exitance.
+        """
         resources = inputs.resources
         levels, layouts, mixture = resources.diffusion.levels, inputs.layouts, resources.diffusion.mixture
         if not inputs.blurs:
@@ -241,9 +255,11 @@ class AtlasTechnique(Technique):
     ) -> None:
         """Declare the passes that sum the blurred levels to the exitance, including light through thin parts.
 
+        levels : textures of the blurred levels
+        blur : Gaussians of the blur, with their weights
         thin_parts : resources of the light through thin parts of the head, None if the scene has no such
             light
-        exitance_texture : texture for the exitance
+        exitance_texture : texture to which the exitance is written
         """
         through = translucency.draw(graph, levels, blur, thin_parts) if thin_parts else None
         combine.draw(
@@ -262,12 +278,15 @@ class AtlasTechnique(Technique):
     ) -> None:
         """Declare the passes that compute the exitance of skin in which a map blends several profiles.
 
-        Between a point where light enters and a point where it leaves, each profile is weighted by the mean
-        of its blend weights at the two points, so that light transport is reciprocal.
+        For light that enters at one point and leaves at another point, each profile is weighted by the mean
+        of its blend weights at the two points. Light transport is therefore reciprocal.
 
+        levels : textures of the blurred levels
+        blur : Gaussians of the blur, with their weights
+        atlas : textures of the atlas
         mixture : resources for the blend, among them the exitance of the first profile alone
         layout_index : index of the atlas layout
-        exitance_texture : texture for the exitance of the blend
+        exitance_texture : texture to which the exitance of the blend is written
         """
         for other, (entering, weight) in enumerate(zip(mixture.entering, blur.weight_changes, strict=True)):
             change = replace(blur, weight=weight)

@@ -28,8 +28,8 @@ class TextureSpace(AtlasTechnique):
         """Split a profile into its narrowest Gaussian and the Gaussians with which light is blurred.
 
         Instead of a blur with the narrowest Gaussian, light is evaluated at each pixel. If even this Gaussian
-        is too wide for that, light is blurred with all of them. The member `fine` of the result corrects
-        light that varies within a texel.
+        is too wide for that, light is blurred with all Gaussians of the profile. The field `fine` of the
+        result corrects light that varies within a texel.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
@@ -45,6 +45,8 @@ class TextureSpace(AtlasTechnique):
 
         Return the new split of the profile, and the indices of the inserted levels.
 
+        split : Gaussians with which light is blurred
+        atlas : textures of the atlas
         edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
         max_halvings = len(atlas.mips_for_blurs(edge_mode)) - 1

@@ -39,8 +39,8 @@ class HairDensity(NamedTuple):
 
     relative : function that returns the relative density (n,), 0 to 1, at n skin points; its argument is an
         array (n, 4) with the columns of `average_points`
-    candidates : (p,) mask of the control points near which hair may grow; quads without such a corner get no
-        hair roots
+    candidates : (p,) mask of the control points near which hair may grow; a quad with no corner among
+        them gets no hair roots
     """
 
     relative: Callable[[Doubles], Doubles]
@@ -86,7 +86,7 @@ def height_above_hairline(points: Doubles, recession: float = 0.0) -> Doubles:
 
 
 def hairline_angle(points: Doubles) -> Doubles:
-    """Return the angle (n,) of points around the axis of the head, 0 in front, 180 behind [degrees]."""
+    """Return the angles (n,) at which points lie around the head's axis: 0 in front, 180 behind [degrees]."""
     return np.degrees(np.arctan2(np.abs(points[:, 0]), points[:, 2] - HEAD_AXIS_Z))
 
 
@@ -166,7 +166,7 @@ def quad_areas_cm2(control_mesh: Mesh, quad_index: Index) -> Doubles:
 
 
 def _sum_zones(amount_name: str, zone_rows: Floats, points: Doubles) -> Doubles:
-    """Return an amount (n,), such as hair density, at points, as a sum of one Gaussian for each face zone.
+    """Return an amount (n,), such as hair density, at points, as a sum of Gaussians, one for each face zone.
 
     amount_name : one of `ZONE_AMOUNTS`, such as "hair"
     zone_rows : (k, 24) parameters of the zones, from `zone_table`

@@ -361,7 +361,7 @@ def _move_off_face(points: Doubles) -> Doubles:
 
 
 def cut_fractions(knots: Doubles, style: Style) -> Doubles:
-    """Return where the style cuts each guide, as a fraction (g,) of the guide's length; 1 for uncut guides.
+    """Return where each guide is cut, as a fraction (g,) of the guide's length; 1 for uncut guides.
 
     knots : (g, k, 3) knots of the guides on the mean person [mm]
     """

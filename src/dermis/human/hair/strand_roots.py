@@ -92,7 +92,10 @@ def _cached_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
 
 
 def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
-    """Return the guides and roots of one style, as arrays by field name of `Guides` and `StrandRoots`."""
+    """Return the guides and roots of one style, as a dictionary from field names to arrays.
+
+    The names are those of the fields of `Guides` and of `StrandRoots`.
+    """
     mesh, rng = root_finder.mesh, np.random.default_rng(_SEED)
     beard = style is BEARD
     where = density.beard_density() if beard else density.scalp_density(0.0)
@@ -145,8 +148,8 @@ def _root_locations(corner_weight: Doubles, corner_points: Doubles) -> Doubles:
     """Return the array `StrandRoots.place` (n, 4), which describes where on the head each root is.
 
     The columns are the angle around the head from the front [degrees], the height above the midpoint of the
-    eyes [mm], how much hair thins there if the crown goes bald, and the position from the nape (0) to the top
-    of the head (1).
+    eyes [mm], how much the hair thins there at the strongest recession, 0 to 1, and the position from the
+    nape (0) to the top of the head (1).
 
     corner_weight : (n, 4) weights of the corners of the quad on which each strand is rooted
     corner_points : (n, 4, 4) rows of `average_points` at these corners

@@ -1,4 +1,4 @@
-"""Table of the classes that the label outputs of a frame distinguish, such as skin, iris and hair."""
+"""Table of label classes, such as skin, iris and hair: what the pixels of a label image can show."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from dermis.base.tables import read_rows
 
 
 class LabelClass(NamedTuple):
-    """Class of the surface that a pixel shows.
+    """Label class, such as "iris", of the surface that a pixel shows.
 
-    number, name : number of the class, which is the pixel value in the output `label`, and name of the class
+    number : number of the class, which is the pixel value in the output `label`
+    name : name of the class
     face_synthetics : number of the class in the data set FaceSynthetics, which is the pixel value in the
         output `label_face_synthetics`
     description : short description of what belongs to the class

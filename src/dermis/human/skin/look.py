@@ -149,11 +149,11 @@ class Demographics(NamedTuple):
     ita: float | None = None
 
     def shape_weighted_mean(self, value_of_ancestry: dict[str, float]) -> float:
-        """Return the mean of one value per ancestry, weighted by the fractions that determine the shape."""
+        """Return the mean of values for three ancestries, weighted by the ancestry fractions of the shape."""
         return _weighted_mean((self.african, self.asian, self.caucasian), value_of_ancestry)
 
     def skin_weighted_mean(self, value_of_ancestry: dict[str, float]) -> float:
-        """Return the mean of one value per ancestry, weighted by the fractions that determine the skin."""
+        """Return the mean of values for three ancestries, weighted by the ancestry fractions of the skin."""
         return _weighted_mean(pigment_ancestry(self.skin_groups), value_of_ancestry)
 
 

@@ -155,8 +155,8 @@ class MeasuredTable(NamedTuple):
     groups : mapping from group name to distribution
     sex, age : (4,) changes of the variables from female to male, and from young to old
     mean_age_term : mean of `age_term` over the ages that `Human.drawn` samples
-    site_slope : (12, 2) change of the difference between each site and the cheek per change of the cheek, for
-        log2 of melanin and for log2 of blood [-]
+    site_slope : (12, 2) slope of the difference between each site and the cheek as a function of the cheek's
+        own value, for log2 of melanin and for log2 of blood [-]
     site_spread : (12, 2) standard deviations of the differences between each site and the cheek among people,
         for log2 of melanin and for log2 of blood [-]
     """
@@ -277,7 +277,10 @@ def _split_union_weight(union_name: str, weight: float) -> dict[str, float]:
 
 
 def pigment_ancestry(weight_of_group: GroupWeights) -> tuple[float, float, float]:
-    """Return the African, Asian and European fractions that determine pigments of hair and eyes."""
+    """Return the African, Asian and European fractions that determine pigments of hair and eyes.
+
+    weight_of_group : weight of each group of measured people; the weights add up to 1
+    """
     african = weight_of_group.get("african", 0.0)
     european = sum(
         weight * _EUROPEAN_FRACTION_OF_GROUP.get(name, 0.0) for name, weight in weight_of_group.items()
@@ -286,11 +289,11 @@ def pigment_ancestry(weight_of_group: GroupWeights) -> tuple[float, float, float
 
 
 def group_probabilities(ita: float) -> dict[str, float]:
-    """Return a dictionary from group to the probability that a person with an ITA belongs to the group.
+    """Return the probabilities that a person with a given skin tone belongs to each group of people.
 
-    The groups are assumed to be equally common.
+    The result is a dictionary by group name. The groups are assumed to be equally common.
 
-    ita : individual typology angle [degrees]
+    ita : skin tone as individual typology angle (ITA) [degrees]
     """
     table = measured_table()
     density = {}
@@ -427,9 +430,11 @@ def with_ita(
 
 
 def _ita_score(ita: float, weight_of_group: GroupWeights) -> float:
-    """Return the standard normal score, limited to -2.9 to 2.9, of an ITA in a mixture of groups of people.
+    """Return the standard normal score of a skin tone among the people of a mixture of groups.
 
-    ita : individual typology angle [degrees]
+    The score is limited to the range from -2.9 to 2.9.
+
+    ita : skin tone as individual typology angle (ITA) [degrees]
     weight_of_group : weight of each group in the mixture
     """
     quantiles = measured_table().group_mean("ita", weight_of_group)
@@ -437,7 +442,13 @@ def _ita_score(ita: float, weight_of_group: GroupWeights) -> float:
 
 
 def _ita_scores(ita: Doubles, quantiles: Doubles) -> Doubles:
-    """Return the standard normal scores of ITAs by interpolation and linear extrapolation of quantiles."""
+    """Return the standard normal scores (n,) of skin tones by interpolation of quantiles.
+
+    Beyond the first and last quantile, the scores are extrapolated linearly.
+
+    ita : (n,) individual typology angles (ITA) [degrees]
+    quantiles : (k,) quantiles of the ITA at `MeasuredTable.probabilities` [degrees]
+    """
     from scipy.special import ndtri
 
     nodes = ndtri(measured_table().probabilities)
@@ -459,7 +470,8 @@ class MeasuredCell(NamedTuple):
     site : name of the site of the body, one of `SITES`
     sex : "F" or "M", or "" for both
     age_group : "1" (under 20), "2" (20 to 29) ... "6" (over 60), or "" for all ages
-    people : number of measured people; 0 if they are too few, so that medians are estimated from all groups
+    people : number of measured people; 0 if too few were measured, in which case the medians are estimates
+        from the measurements of all groups
     cielab : (3,) CIELAB colour under D65, without surface reflection
     pigments : pigments that the package's model infers from the measurements
     """

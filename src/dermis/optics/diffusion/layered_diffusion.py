@@ -1,8 +1,8 @@
 """Diffusion in layered media, with continuous fluence and flux at each interface.
 
 In the Hankel domain, the fluence phi(z) in each layer satisfies D phi'' - D q^2 phi = -S(z). Here, z is the
-depth, D is the diffusion coefficient, q^2 is sigma_tr^2 + s^2 at the frequency s, and S(z) is the power, per
-unit of depth, of the light that scatters for the first time at the depth z.
+depth, D is the diffusion coefficient, and q^2 is sigma_tr^2 + s^2 at the frequency s. The source S(z) is the
+power per unit of depth of light that scatters for the first time at the depth z.
 At each face, the layers below impose the boundary condition D phi' = W - Z phi. A recursion computes Z and W
 of the faces from bottom to top.
 """
@@ -22,7 +22,13 @@ _NEAR_ZERO_FREQUENCY = np.array([1e-8])  # so low that a Hankel transform equals
 
 
 class _Sublayer(NamedTuple):
-    """Layer, or one of the two parts into which a layer is divided."""
+    """Layer, or one of the two parts into which a layer is divided, with its source of light.
+
+    layer : absorption and scattering; its field `thickness_mm` is ignored
+    thickness_mm : thickness of the sublayer [mm]
+    beam : fraction of the beam that reaches the upper face unscattered; 0 for a point source [-]
+    point : power of the point source on the lower face; 0 for a beam [-]
+    """
 
     layer: Layer
     thickness_mm: float | Floats
@@ -49,7 +55,7 @@ class _DownwardTransfer(NamedTuple):
     E : attenuation exp(-q d) across the thickness d of the sublayer, where q is the rate of decay [-]
     rho : ratio of the growing to the decaying solution at the lower face, if there is no source [-]
     common : 1 / (1 + E^2 rho), which sums the reflections between both faces [-]
-    beta : part of the growing solution that the sources cause at the lower face
+    beta : growing solution at the lower face if there is no decaying solution; it is due to the light sources
     lower : particular solution at the lower face
 
     All coefficients are 0 for a semi-infinite sublayer. Only the last sublayer of a medium can be
@@ -141,7 +147,12 @@ def solve_homogeneous_slabs(
 def _solve_sublayers(
     frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, mismatch: float
 ) -> tuple[Floats, Floats]:
-    """Return the Hankel transforms of R(r) and T(r) of a stack of sublayers, topmost first [-]."""
+    """Return the Hankel transforms (n, channel_count) of R(r) and of T(r) of a stack of sublayers [-].
+
+    frequency : (n,) frequencies s > 0 [1/mm]
+    sublayers : the sublayers, topmost first
+    mismatch : boundary mismatch with air [-]
+    """
     fluence, transfers = _solve_upwards(frequency, sublayers, channel_count, mismatch)
     R = fluence / (2.0 * mismatch)
     for transfer in transfers:
@@ -152,7 +163,10 @@ def _solve_sublayers(
 def _solve_upwards(
     frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, mismatch: float
 ) -> tuple[Floats, list[_DownwardTransfer]]:
-    """Return the fluence at the surface, and the `_DownwardTransfer` of each sublayer, topmost first."""
+    """Return the fluence at the surface, and the `_DownwardTransfer` of each sublayer, topmost first.
+
+    The arguments are those of `_solve_sublayers`.
+    """
     s = np.asarray(frequency, dtype=np.float64)[..., None]
     zero = np.zeros((*s.shape[:-1], channel_count))
     face, transfers = _BoundaryCondition(zero + 1.0 / (2.0 * mismatch), zero), list[_DownwardTransfer]()

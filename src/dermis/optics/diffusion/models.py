@@ -86,9 +86,9 @@ def diffusion_rings(
     clamp: Clamp = "layer",
     rgb_weights: Floats | None = None,
 ) -> RingTarget:
-    """Return the light that emerges through rings, as in the result of `diffusion_profile` but faster.
+    """Return the light that emerges through rings, for fits that do not need R(r).
 
-    The parameters are those of `diffusion_profile`.
+    The light and the parameters are those of `diffusion_profile`, but this function is faster.
     """
     grid, values, total = _sampled_profile(medium, model, clamp, rgb_weights)
     edges = ring_edges()
@@ -98,7 +98,10 @@ def diffusion_rings(
 def _sampled_profile(
     medium: Medium, model: DiffusionModel, clamp: Clamp, rgb_weights: Floats | None
 ) -> tuple[Floats, Floats, Floats]:
-    """Return radii r (n,) [mm], the profile R(r) (n, c) [1/mm2] and the total reflectance (c,) [-]."""
+    """Return radii r (n,) [mm], the profile R(r) (n, c) [1/mm2] and the total reflectance (c,) [-].
+
+    The parameters are those of `diffusion_profile`.
+    """
     if model in ("dipole", "better-dipole"):
         _check_half_space(medium, model)
     closed_form = rgb_weights is None and len(medium.layers) == 1 and model in ("dipole", "multipole")
@@ -122,7 +125,11 @@ def _sampled_profile(
 
 
 def hankel_transform(medium: Medium, model: DiffusionModel, clamp: Clamp, frequency: Floats) -> Floats:
-    """Return the Hankel transform (n, c) of a model's R(r) at n frequencies above 0 [1/mm]."""
+    """Return the Hankel transform (n, c) of a model's R(r) [-].
+
+    clamp : whether the multipole's source is kept inside thin layers ("layer") or not ("none"), see `Slab`
+    frequency : (n,) frequencies s > 0 [1/mm]
+    """
     if model in ("layered", "layered-point"):
         A = boundary_mismatch(medium.eta, "exact")
         source: layered_diffusion.SourceKind = "beam" if model == "layered" else "point"
@@ -166,9 +173,10 @@ def _medium_warnings(medium: Medium, model: DiffusionModel, clamp: Clamp) -> lis
 
 
 def _first_event_albedo(medium: Medium) -> Floats:
-    """Return the probability (c,) that light scatters where it first interacts with a medium [-].
+    """Return the probability (c,) that the first interaction of light with a medium is scattering [-].
 
-    Otherwise, the light is absorbed. The probability is a mean over the first mean free path.
+    If it is not scattering, it is absorption. The probability is averaged over the first mean free path
+    below the surface.
     """
     depth, scattered = np.zeros(medium.channels), np.zeros(medium.channels)
     for layer in medium.layers:

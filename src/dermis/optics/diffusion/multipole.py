@@ -1,4 +1,4 @@
-"""Multipole model: light in a slab as a series of point sources mirrored at both faces; stacks of slabs."""
+"""Multipole model: diffusion in slabs, with point sources mirrored at both faces, and in stacks of slabs."""
 
 from __future__ import annotations
 

@@ -64,9 +64,9 @@ def fit_gaussians(
 
     target : samples of R(r), or light through rings
     terms : number of Gaussians in each channel, 1 to 8
-    shared : whether all channels use the same variances, which then minimise the root mean square of the
-        channels' errors. Otherwise, each channel has separate variances, and the weight 0 for the variances
-        of other channels
+    shared : whether the Gaussians of all channels are fitted with the same variances, which then minimise the
+        root mean square of the channels' errors. Otherwise, each channel is fitted separately, and its
+        weights at the variances of other channels are 0
     keep_energy : whether the weights must sum to the target's total reflectance
     similar_fit : fit of a similar profile; the search starts from its variances, which is several times
         faster but may miss the best fit
@@ -154,9 +154,10 @@ def _log_variance_bounds(target: FitTarget) -> tuple[float, float]:
 def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
     """Return the least-squares equations of a target, with an equation for the total reflectance added.
 
-    The results are a function from the variances to the matrix of the equations and its derivatives, and the
-    right-hand sides. The added equation demands that the weights of the Gaussians sum to the total
-    reflectance. It has so large a weight in the fit that it holds almost exactly.
+    The first result is a function from the variances to the matrix of the equations and the derivatives of
+    this matrix. The second result holds the right-hand sides of the equations. The added equation demands
+    that the weights of the Gaussians sum to the total reflectance. Its own weight in the fit is so large that
+    it holds almost exactly.
     """
     width = target.mean_radius_at([0.5]) ** 2 / 2.0
     stiffness = _ENERGY_EQUATION_WEIGHT * float(np.linalg.norm(target.design_and_derivatives(width)[0]))
@@ -204,9 +205,10 @@ def _combine_fits(channel_fits: list[tuple[Floats, Floats]], profile_name: str) 
 
 
 def single_gaussian(profile: GaussianSum) -> GaussianSum:
-    """Fit one Gaussian to a profile by least squares over the plane; keep the total reflectance.
+    """Fit one Gaussian to a profile by least squares, without changing the total reflectance.
 
-    Early skin shading blurred light maps by a single Gaussian [Borshukov2003; Green2004].
+    The squared error is integrated over the surface, and summed over the channels. Early skin shading blurred
+    light maps by a single Gaussian [Borshukov2003; Green2004].
     """
     from scipy.optimize import minimize_scalar
 
@@ -231,6 +233,9 @@ def shared_gaussians(
 
     The total reflectances do not change. Profiles that already have the same variances are returned
     unchanged.
+
+    profiles : the profiles, each a sum of Gaussians
+    gaussian_count : number of Gaussians of each fit
     """
     first = profiles[0].variance_mm2
     if all(np.array_equal(first, one.variance_mm2) for one in profiles):

@@ -15,7 +15,7 @@ from dermis.optics.media import Floats
 
 @dataclass(frozen=True)
 class PointTarget:
-    """Samples of a diffusion profile R(r) as the target of a fit, if the profile is finite at r = 0.
+    """Samples of a diffusion profile R(r) that is finite at r = 0, as the target of a fit.
 
     radius_mm : (n,) radii r, increasing, preferably log-spaced from 1e-4 to 60 [mm]
     reflectance : (n, c) R(r) in c channels [1/mm2]

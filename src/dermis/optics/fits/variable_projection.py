@@ -105,7 +105,11 @@ def _anderson_step(
 
 
 def _optimal_weights(design_function: DesignFunction, samples: Floats, log_variance: Floats) -> WeightedFit:
-    """Return the fit for given variances, with optimal non-negative weights, cost and derivatives."""
+    """Return the fit for given variances, with optimal non-negative weights, cost and derivatives.
+
+    design_function, samples : as in `minimise`
+    log_variance : (k,) logarithms of the variances
+    """
     columns, slopes = design_function(np.exp(log_variance))
     k = len(log_variance)
     size = np.linalg.norm(columns, axis=0)

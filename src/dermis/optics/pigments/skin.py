@@ -73,7 +73,10 @@ def spectral_medium(
 def _build_dj2006(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
 ) -> tuple[Layer, ...]:
-    """Return an epidermis and a dermis after [DonnerJensen2006]."""
+    """Return an epidermis and a dermis after [DonnerJensen2006].
+
+    sigma_s_prime : (n,) reduced scattering coefficient of the epidermis at the n wavelengths [1/mm]
+    """
     return _epidermis_layer(parameters, wavelength_nm, sigma_s_prime), _dermis_layer(
         parameters, wavelength_nm, sigma_s_prime
     )
@@ -82,7 +85,10 @@ def _build_dj2006(
 def _build_donner2008(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
 ) -> tuple[Layer, ...]:
-    """Return an epidermis, a melanin sheet and a dermis after equations 11 and 12 of [Donner2008]."""
+    """Return an epidermis, a melanin sheet and a dermis after equations 11 and 12 of [Donner2008].
+
+    sigma_s_prime : (n,) reduced scattering coefficient of the epidermis at the n wavelengths [1/mm]
+    """
     melanin = parameters.melanin * melanosome_absorption(wavelength_nm, parameters.eumelanin)
     sheet_sigma_a = MELANIN_SHEET_ABSORPTION_RATIO * melanin * parameters.epidermis_mm / _MELANIN_SHEET_MM
     return (
@@ -96,7 +102,12 @@ def _build_donner2008(
 def _build_biospec(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
 ) -> tuple[Layer, ...]:
-    """Return four skin layers after [KrishnaswamyBaranoski2004], with constants from one author's code."""
+    """Return four skin layers after [KrishnaswamyBaranoski2004].
+
+    The constants are from code that one of the paper's authors published.
+
+    sigma_s_prime : (n,) reduced scattering coefficient of the epidermis at the n wavelengths [1/mm]
+    """
     reticular = replace(parameters, blood=_RETICULAR_BLOOD_RATIO * parameters.blood)
     return (
         Layer(
@@ -117,7 +128,10 @@ def _build_biospec(
 def _epidermis_layer(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, blood_fraction: float = 0.0
 ) -> Layer:
-    """Return the epidermis, a mixture of melanosomes, a given fraction of blood, and bloodless tissue."""
+    """Return the epidermis, a mixture of melanosomes, a given fraction of blood, and bloodless tissue.
+
+    sigma_s_prime : (n,) reduced scattering coefficient of the epidermis at the n wavelengths [1/mm]
+    """
     sigma_a = _epidermal_absorption(parameters, parameters.melanin, wavelength_nm, blood_fraction)
     return Layer(sigma_a, sigma_s_prime, parameters.epidermis_mm, "epidermis")
 
@@ -133,7 +147,11 @@ def _epidermal_absorption(
 def _dermis_layer(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, name: str = "dermis"
 ) -> Layer:
-    """Return a semi-infinite dermis, a mixture of blood and bloodless tissue."""
+    """Return a semi-infinite dermis, a mixture of blood and bloodless tissue.
+
+    sigma_s_prime : (n,) reduced scattering coefficient of the epidermis at the n wavelengths, from which that
+        of the dermis is computed [1/mm]
+    """
     sigma_a = _dermal_absorption(parameters, parameters.blood, wavelength_nm)
     return Layer(sigma_a, DERMIS_SCATTERING_RATIO * sigma_s_prime, name=name)
 

@@ -30,7 +30,7 @@ DERMIS_SCATTERING_RATIO: Final = 0.5
 
 
 def visible_wavelengths(wavelength_nm: ArrayLike) -> Floats:
-    """Return wavelengths as an array.
+    """Check that wavelengths are visible, and return them as an array [nm].
 
     Raises DermisError unless all wavelengths are from 380 to 780 nm.
     """

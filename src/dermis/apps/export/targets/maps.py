@@ -221,7 +221,10 @@ def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, map_side: in
 
 
 def map_files(baked_maps: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of each file: OpenEXR and PNG of each map, then the JSON that describes them."""
+    """Yield name and content of each file: OpenEXR and PNG of each map, then the JSON that describes them.
+
+    normal_y : direction of y in the written normal map, see `orient_normal_map`
+    """
     described: dict[str, RangeEntries] = {}
     for name, info in MAP_INFOS.items():
         if name not in baked_maps.maps:
@@ -252,6 +255,7 @@ def _maps_description(
 ) -> dict[str, object]:
     """Return the description of all maps for maps.json: layout, lights, units and ranges.
 
+    normal_y : direction of y in the written normal map, see `orient_normal_map`
     map_entries : dictionary from the name of each map to its unit, meaning, range and PNG encoding
     """
     return {

@@ -361,7 +361,7 @@ def _find_skin(face_renderer: FaceRenderer, photo: Photograph) -> FitPoint:
 
 
 def _start_points(problem: FitProblem, candidate_point: FitPoint, sun_count: int) -> list[FitPoint]:
-    """Return points at which to start fits, found by a coarse search and then a finer one near its suns.
+    """Return points at which to start fits, found by a coarse search for suns and a finer search around them.
 
     There is one point for each minimum of the coarse search, see `InitialGuess.melanin_ranges`.
 

@@ -117,7 +117,7 @@ class FitSubject:
     person : parametric person whose skin maps are painted from pigments; None for other heads
     table : table [head] of the scene file in which the result is saved; empty if the head has neither a name
         nor a file, and the result therefore cannot be saved
-    known : names of the pigments that the scene states; the values of all other pigments are assumed
+    known : names of the skin parameters whose values the scene states; all other values are assumed
     """
 
     scene: Scene
@@ -171,9 +171,9 @@ def _person_of_head(head: Head) -> Human | None:
 
 
 def _scene_without_lights(scene: Scene) -> Scene:
-    """Return the scene without lights, with values for the pigments that a fit keeps fixed.
+    """Return the scene without lights, with values for the skin parameters that a fit keeps fixed.
 
-    The value of each of these pigments is the value that the scene states. If the scene states none, it is
+    The value of each of these parameters is the value that the scene states. If the scene states none, it is
     the value from which the head's maps were painted, or else a default.
     """
     fixed_pigments = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}

@@ -95,10 +95,10 @@ def solve_normal_equations(gram: Floats, right_side: Floats) -> Floats:
 
 
 def lobe_mixing_matrix(sun_count: int) -> Floats:
-    """Return the matrix (9 + k, n + k) from strengths of the n lobes of `lobe_mixtures` to light strengths.
+    """Return the matrix (9 + k, n + k) that converts strengths of n evenly distributed lobes and k suns.
 
-    Light strengths are those of the 9 ambient lobes, followed by those of k suns, which the matrix does not
-    change. If the strengths of the n lobes are not negative, no direction has negative ambient light.
+    The results are the strengths of the 9 ambient lobes, see `lobe_mixtures`, and the unchanged strengths of
+    the suns. If the strengths of the n lobes are not negative, no direction has negative ambient light.
 
     sun_count : number k of suns
     """

@@ -116,7 +116,7 @@ class FitResult:
         }
 
     def _prior_descriptions(self) -> list[str]:
-        """Return sentences that describe the priors of the unknowns and the fixed parameters."""
+        """Return lines of text with the priors of the unknowns, and with the values of fixed parameters."""
         skin = self.subject.scene.skin.pigments
         assert skin is not None
         sun = f"directions of suns: within {np.degrees(SUN_PRIOR_SD):.0f} degrees of the initial guess"

@@ -47,7 +47,8 @@ class FitState:
     basis : (9 + k, p, 3) radiance of the masked pixels under each light alone
     residual : (p, 3) radiance of the photograph minus radiance of the model
     weight : (p, 3) inverse standard deviation of each pixel, lowered for outliers
-    cost : sum of the squared weighted residuals and of the squared deviations from the priors' means
+    cost : sum of the squared weighted residuals, plus the sum of the squared differences of the unknowns from
+        the means of their priors, in standard deviations of the priors
     """
 
     point: FitPoint
@@ -93,7 +94,7 @@ class FitProblem:
         )
 
     def reweighted_state(self, fit_state: FitState) -> FitState:
-        """Return the state with pixel weights for the brightness of the model, lowered for outliers."""
+        """Return the state with weights computed from the model's radiance and lowered for outliers."""
         weights = self.pixel_weights(np.maximum(self.target - fit_state.residual, 0.0))
         scaled = np.abs(fit_state.residual * weights)
         limit = self.robust * max(_MAD_TO_SD * float(np.median(scaled)), 1.0)

@@ -40,7 +40,7 @@ class SkinUnknown:
 def _measured_unknown(
     pigment_name: str, lower_limit: float, upper_limit: float, log_step: float
 ) -> SkinUnknown:
-    """Return a pigment as an unknown, whose prior is the pigment's distribution in measured skin.
+    """Return a pigment as an unknown, with its distribution among measured people as prior.
 
     lower_limit, upper_limit : smallest and largest value
     log_step : step of the logarithm for finite differences
@@ -70,7 +70,7 @@ WHITE_PRIOR_SD = 0.2
 class FitPoint:
     """Values of all unknowns of a fit except the strengths of lights.
 
-    logs : (4,) logarithms of `SKIN_UNKNOWNS`
+    logs : (4,) logarithms of the skin parameters, in the order of `SKIN_UNKNOWNS`
     suns : (k, 3) unit vectors towards the suns
     white : (2,) logarithms of the light's ratios red/green and blue/green, relative to the colour that the
         user gives
@@ -120,9 +120,10 @@ def tangents(directions: Floats) -> Floats:
 def with_skin(scene: Scene, fit_point: FitPoint) -> Scene:
     """Return the scene with the skin that the unknowns of a fit describe.
 
-    If the head's maps are painted from pigments, they are painted with the pigments of `fit_point`. Their
+    If the head's maps are painted from pigments, they are painted with the pigments of `fit_point`, but the
     diffusion profile, which is slow to compute, is that of the nearest pigments of a coarse grid. Other heads
-    get the uniform colour of the pigments in place of their colour map, and the profile of these pigments.
+    get a uniform colour in place of their colour map; this colour and their diffusion profile are those of
+    the pigments of `fit_point`.
     """
     numbers = fit_point.values()
     skin_values: dict[str, object] = {name: numbers[name] for name in ("roughness", "rho_s")}

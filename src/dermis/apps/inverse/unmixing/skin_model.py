@@ -31,11 +31,11 @@ _LOG_SHADE_RANGE = -3.0, 1.5  # limits of the logarithm of the shading
 class SkinModel:
     """Table of skin colours over melanin, blood and a third unknown; colours are unmixed by inverting it.
 
-    log_colours : (k, n, n, 3) logarithms of diffuse reflectance in linear Rec. 709, for k oxygenated
-        fractions, n melanin fractions and n blood fractions. The oxygenated fractions, the square roots of
-        the melanin fractions and those of the blood fractions are evenly spaced from 0 to 1
+    log_colours : (k, n, n, 3) logarithms of diffuse reflectance in linear Rec. 709. The axes are k oxygenated
+        fractions, evenly spaced from 0 to 1 (k is 1 unless oxygen is the third unknown); and n melanin and
+        n blood fractions, whose square roots are evenly spaced from 0 to 1
     third : third unknown: "oxygen" is the oxygenated fraction of haemoglobin; "shade" is the logarithm of a
-        factor common to all channels, such as uneven light in a photograph; "none" is no third unknown
+        factor common to all channels, such as uneven light in a photograph; "none" if there is none
     third_range : smallest and largest value of the third unknown
     prior_mean, prior_sd : mean and standard deviation of the third unknown's prior
     """

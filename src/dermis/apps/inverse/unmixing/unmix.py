@@ -149,11 +149,13 @@ class UnmixResult:
         return named | {name: one for name, one in optional.items() if one is not None}
 
     def summary(self) -> dict[str, Any]:
-        """Return medians of the pigments, colour differences, skin tone, and the fraction of skin texels.
+        """Return statistics of the pigments and of the colour error, the skin tone, and the fraction of skin.
 
-        They are computed from a grid of texels, with about 512 texels along the longer side. Black texels do
-        not count as skin. The entry "sd" is the standard deviation due to noise, and "skin_sd" that due to
-        the values assumed for oxygen and epidermal thickness, which vary among people.
+        The colour error is the CIEDE2000 difference between the picture's colour and the model's colour for
+        the estimated pigments. All results are computed from a grid of texels, with about 512 texels along
+        the longer side. Black texels do not count as skin. The entry "sd" is the standard deviation
+        due to noise, and "skin_sd" is that due to the values assumed for oxygen and epidermal thickness,
+        which vary among people.
         """
         step = max(1, max(self.melanin.shape) // _SUMMARY_SIDE_TEXELS)
         maps = {name: one[::step, ::step].astype(np.float64) for name, one in self.maps().items()}

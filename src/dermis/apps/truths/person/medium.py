@@ -58,8 +58,9 @@ def uniform_skin(colour: ArrayLike, exit_distance_mm: ArrayLike, eta: float) -> 
 def pigmented_skin(parameters: SkinParameters, colour: ArrayLike, eta: float) -> Medium:
     """Return a skin of epidermis and dermis with a given colour, in three channels.
 
-    The spectra of both layers are averaged with the positive part of each channel's sensitivity. The albedo
-    of the dermis is then replaced by the albedo for which the whole skin has the given colour.
+    For each channel, the spectra of both layers are averaged over the wavelengths, weighted by the positive
+    part of the channel's sensitivity. The albedo of the dermis is then replaced by the albedo for which the
+    whole skin has the given colour.
 
     parameters : pigments and thickness of the epidermis
     colour : (3,) reflectance of light at normal incidence [-]
@@ -78,7 +79,7 @@ def pigmented_skin(parameters: SkinParameters, colour: ArrayLike, eta: float) ->
 
 
 def with_deepest_albedo(medium: Medium, albedo: ArrayLike) -> Medium:
-    """Return the medium with another single-scattering albedo (3,) of its last layer, at equal extinction."""
+    """Return the medium with a new single-scattering albedo (3,), but equal extinction, in its last layer."""
     *above, last = medium.layers
     extinction, albedo = last.sigma_t_prime, np.asarray(albedo)
     return replace(
@@ -212,7 +213,7 @@ def _skin_triangles(person: Person) -> NDArray[np.int32]:
 
 
 def colour_grid(person: Person, low_corner: Doubles, high_corner: Doubles, voxels_per_side: int) -> Doubles:
-    """Return the skin's colour (z, y, x, 3) in each voxel of a box: the mean of the nearest skin points.
+    """Return for each voxel of a box the mean colour (z, y, x, 3) of the skin points nearest to it.
 
     Voxels more than about 3 mm from the skin have the mean colour of all points.
 

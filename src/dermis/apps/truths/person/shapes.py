@@ -95,7 +95,7 @@ def refracting_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject
 
 
 def lambertian_skin_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
-    """Return the BSDF of skin with two specular lobes over a Lambertian base, which has the colour map."""
+    """Return the BSDF of skin: two specular lobes over a Lambertian base, whose albedo is the colour map."""
     fraction = 1.0 - COAT_TRANSMITTANCE
     base = {
         "type": "diffuse",

@@ -73,7 +73,7 @@ def blurred_levels(device: Device, mesh: Mesh, irradiance: Array, stretch_mode: 
     """Blur light on the atlas of a mesh; return all pyramid levels (n, n), resampled to full resolution.
 
     irradiance : (n, n) irradiance of the texels of the atlas
-    stretch_mode : stretch map that the blur uses: "full", or "axes", which ignores the angle between u and v
+    stretch_mode : "full" to correct blurs for uv distortion, or "axes" to ignore the angle between u and v
     """
     levels, blur = blur_light(
         device, mesh, build_atlas(mesh, len(irradiance)), irradiance[..., None], stretch_mode
@@ -106,11 +106,11 @@ def lit_texel_row(device: Device, texels_per_mm: float) -> str:
 
 
 def sheared_uv_row(device: Device, shear_degrees: float) -> str:
-    """Return a Markdown row with the widths to which the light of one texel is blurred on a sheared uv map.
+    """Return a Markdown row with the widths of a single texel's light after a blur on a sheared uv map.
 
-    The surface is flat. The width depends on the direction on the surface. The first two cells are the
-    smallest and the largest width with the stretch map "axes"; the next two are the same with "full". All
-    are divided by the exact width.
+    The surface is flat. The width depends on the direction along the surface. After the angle, the row has
+    the smallest and the largest width for a blur with the stretch map "axes", then those for "full". Each
+    width is divided by the exact one.
 
     shear_degrees : angle between the uv axes on the flat surface [degrees]
     """
@@ -180,7 +180,7 @@ def blur_light(
     The light is blurred by each Gaussian of `BLUR_PROFILE` except the narrowest.
 
     irradiance : (n, n, 1) irradiance of the texels of the atlas
-    stretch_mode : stretch map that the blur uses: "full", or "axes", which ignores the angle between u and v
+    stretch_mode : "full" to correct blurs for uv distortion, or "axes" to ignore the angle between u and v
     """
     textures, variance = upload_atlas(device, atlas, stretch_mode), BLUR_PROFILE.variance_mm2[1:]
     max_halvings = len(textures.mips_for_blurs("repeated")) - 1
@@ -200,7 +200,10 @@ def blur_light(
 
 
 def resampled_level(device: Device, levels: PyramidLevels, blur: Blur, level_index: int) -> Array:
-    """Return a pyramid level (n, n), resampled bilinearly to the full resolution of the atlas."""
+    """Return a pyramid level (n, n), resampled bilinearly to the full resolution of the atlas.
+
+    level_index : 0 for the light before blurs, k for the light blurred by the k-th Gaussian that is used
+    """
     halvings = blur.halvings[level_index]
     layer = download(device, levels.stacks[halvings], layer=level_index - levels.first[halvings])[..., 0]
     return np.asarray(zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True))
@@ -281,7 +284,7 @@ def seam_row(
 def seam_side_points(head: Head, point_filter: PointFilter) -> tuple[Points, Points]:
     """Return points on one side of the seams of a head, and the opposite points on the other side.
 
-    Points where the surface faces neither the front nor the back of the head are left out.
+    Only points whose normals point roughly forwards or backwards are returned; the light comes from there.
 
     point_filter : function that returns the mask of the seam points to use, given their positions
     """

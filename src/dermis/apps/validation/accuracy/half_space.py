@@ -76,8 +76,9 @@ def _oblique_to_normal_ratio(albedo: float, eta: float) -> float:
 def _direction_errors(albedo: float) -> tuple[float, float]:
     """Return the relative RMS errors of the directional models "lambertian" and "half-space" [-].
 
-    The errors are averaged over the directions of light and view. The reference adds the surface, with
-    all orders of internal reflection, to the exact solution for a half-space without a reflecting surface.
+    The errors are averaged over the directions of light and view. The reference starts from the exact
+    solution for a half-space without a reflecting surface. It then accounts for refraction and for all
+    orders of internal reflection at the surface.
 
     albedo : single-scattering albedo [-]
     """
@@ -110,7 +111,9 @@ def _direction_errors(albedo: float) -> tuple[float, float]:
 def _monte_carlo_oblique_ratio(albedo: float, mean_cosine: float, eta: float) -> float:
     """Return the ratio of reflectance at 81 degrees of incidence to that at 0 degrees, by Monte Carlo [-].
 
+    albedo : single-scattering albedo [-]
     mean_cosine : mean cosine of the scattering angle [-]
+    eta : index of refraction
     """
     oblique = _reflected_fraction(OBLIQUE_COSINE, albedo, mean_cosine, eta)
     return oblique / _reflected_fraction(1.0, albedo, mean_cosine, eta)
@@ -165,7 +168,8 @@ def _scattered_cosines(downward_cosines: Floats, mean_cosine: float, rng: np.ran
 def _studio_brightness_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
     """Return ratios of the radiance of skin with `direction` "half-space" to that with "lambertian".
 
-    The ratios are the median and the 99th percentile over the pixels of a head in studio light, by channel.
+    The two lists are the medians and the 99th percentiles of red, green and blue, over the pixels that show a
+    head in studio light.
     """
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
 

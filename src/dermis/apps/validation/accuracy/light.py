@@ -252,9 +252,10 @@ def as_point_lights(light: RectangleLight, lights_per_side: int = 8) -> list[Poi
 
 
 def soft_shadow_error(renderer: dermis.Renderer, light_preset: str) -> tuple[float, float]:
-    """Return the bias and the RMS error of an area light's shadows, divided by the mean radiance [-].
+    """Return the mean and the RMS error of a head's radiance under an area light with shadows [-].
 
-    The reference has 64 point lights in place of the area light.
+    The reference has 64 point lights in place of the area light. Both errors are divided by the mean radiance
+    of the reference.
 
     light_preset : name of the light preset
     """

@@ -273,7 +273,7 @@ def baked_occlusion(renderer: Renderer, head: Head, shaped_head: Head, *directio
 
 
 def frame_occlusion(renderer: Renderer, scene: Scene, occlusion_mode: str) -> Floats:
-    """Return the map (n, n) of the visible sky fraction with which a frame of the scene is shaded.
+    """Return the visible sky fractions (n, n) that a frame of the scene uses for shading, in its atlas.
 
     occlusion_mode : occlusion mode of the settings
     """

@@ -84,7 +84,8 @@ def _model_rows(tissue_name: str, tissue: Tissue) -> Iterator[str]:
 def photon_counts_table() -> str:
     """Return Markdown rows with errors of the diffusion models "counted" and "layered", by medium.
 
-    The model "counted" interpolates in tables made by Monte Carlo.
+    The reference is Monte Carlo. The model "counted" interpolates in tables made by Monte Carlo; the model
+    "layered" solves the diffusion equation for layers.
     """
     rows = []
     for name in ("skin1", "skin2"):

@@ -261,7 +261,11 @@ def _panel_key(view_name: str) -> str:
 
 
 def sheet_bytes(panels: Panels, columns: int) -> bytes:
-    """Return a WebP file of at most `MAX_SHEET_BYTES` that shows pictures side by side."""
+    """Return a WebP file of at most `MAX_SHEET_BYTES` that shows pictures in rows.
+
+    panels : pictures by title
+    columns : number of pictures per row
+    """
     picture = np.asarray(panel_sheet(panels, columns))
     for quality in (80, 65, 50, 35, 20):
         data = encode_webp(picture, quality)

@@ -112,8 +112,8 @@ def slab_error_rows(renderer: dermis.Renderer) -> str:
 def forward_scattering_error_rows(renderer: dermis.Renderer) -> str:
     """Return Markdown rows with errors of rendered slabs against references with forward scattering.
 
-    The `direction` of the rendered skin is "half-space". Half of the rows ignore forward scattering; the
-    others account for it by the skin's `anisotropy`.
+    The `direction` of the rendered skin is "half-space". In half of the rows, the `anisotropy` of this skin
+    is 0; in the others, it is the mean cosine of the reference.
     """
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -164,6 +164,8 @@ def _error_cells(slab_response: Array, reference: Array) -> str:
 
     The first cell of each pair has the relative RMS error. The second has the ratio of red light to the
     reference for each angle of incidence.
+
+    slab_response, reference : (2, n, 3) reflectance and transmittance for n angles of incidence
     """
     flux, cells = np.sqrt(np.cos(np.radians(INCIDENT_DEGREES)))[:, None], []
     for side in (1, 0):
@@ -177,7 +179,8 @@ def _error_cells(slab_response: Array, reference: Array) -> str:
 def forward_scattering_rows() -> str:
     """Return Markdown rows with transmittance and reflectance of slabs in red light, by Monte Carlo.
 
-    Each row compares isotropic scattering with forward scattering.
+    Each row has the values for isotropic scattering, then those for forward scattering. The reduced
+    scattering coefficient is the same for both.
     """
     rows = []
     for eta in (1.0, 1.4):

@@ -58,7 +58,10 @@ def albedo_rows() -> str:
 
 
 def beckmann_table_error() -> float:
-    """Return the largest relative error of the interpolated Beckmann table where the lobe is above 0.001."""
+    """Return the largest relative error of the Beckmann distribution when it is interpolated in its table.
+
+    Values of the distribution below 0.001 are not compared.
+    """
     m, c = np.meshgrid(np.linspace(0.1, 0.5, 23), np.linspace(0.05, 1.0, 61), indexing="ij")
     rows, columns = beckmann_table().shape
     axes = [(np.arange(rows) + 0.5) / rows, np.arange(columns) / (columns - 1)]

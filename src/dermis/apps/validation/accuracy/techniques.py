@@ -145,10 +145,11 @@ def _error_and_energy_cells(comparison: Comparison, comparison_row: ComparisonRo
 
 
 def lambertian_limit_text(head: Head, medium: str, path_traced_comparison: Comparison, adapter: str) -> str:
-    """Return text with the relative RMSE and energy ratio of an ideal Lambertian skin under the front light.
+    """Return text with the errors of an ideal Lambertian skin against path tracing, under the front light.
 
-    The ideal skin reflects as much light as a half-space does for the same angle of incidence. It shows how
-    small the error of Lambertian skin can become.
+    The errors are the relative RMSE and the energy ratio. The ideal skin reflects as much light as a
+    half-space does for the same angle of incidence. Its errors show how small those of Lambertian skin can
+    become.
 
     path_traced_comparison : comparison with path tracing under the front light
     """

@@ -112,10 +112,10 @@ def slab_rows(renderer: dermis.Renderer) -> str:
 
 
 def light_across_air(mesh: Mesh, light_direction: Array, points: Array, normals: Array) -> Array:
-    """Return the red light (n,) in the surface integral that would have to cross air to reach the points.
+    """Return the red light (n,) that the surface integral wrongly carries through air to the points.
 
-    This light is an error of the integral. It enters the skin where the straight line to the point would
-    leave the body.
+    The integral depends on straight distances only. It therefore also includes light between parts of the
+    surface that are separated by air, not by skin.
 
     light_direction : (3,) direction of the light
     points : (n, 3) positions

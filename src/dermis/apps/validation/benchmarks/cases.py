@@ -41,7 +41,8 @@ class BenchmarkCase:
     subdivide : subdivision level of the head; each level has four times the triangles of the previous level
     targets : number of morph targets that move in each frame, together with four bones; 0 for a static head
     samples : samples per pixel
-    technique : scattering technique of `Settings`, or `FRAGMENT_TECHNIQUE`
+    technique : scattering technique of `Settings`; or `FRAGMENT_TECHNIQUE`, for the passes of GPU Gems 3 in
+        the graphics pipeline
     varies : name of the parameter whose value differs from that of the base frame; "" for the base frame
     """
 

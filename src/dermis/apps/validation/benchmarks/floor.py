@@ -142,7 +142,12 @@ def _translucency_bytes(translucency: Translucency, levels: PyramidLevels, blur:
 
 
 def _map_bytes(inputs: FrameInputs, point_count: int) -> int:
-    """Return the bytes read from the maps of a head to shade points, at one texel per map and point."""
+    """Return the bytes read from the maps of a head to shade points: one texel per map and point.
+
+    No texel is counted twice.
+
+    point_count : number of points to shade
+    """
     textures = [cast(Texture, inputs.bindings[name]) for name in _MAP_BINDINGS]
     return sum(texel_bytes(one) * min(point_count, one.size[0] * one.size[1]) for one in textures)
 

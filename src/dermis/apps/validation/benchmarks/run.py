@@ -87,6 +87,7 @@ def run_benchmark(
     """Measure benchmark cases one after another.
 
     head : name or file of the head
+    adapter : graphics device that draws the frames, such as "auto" or "cpu"
     options : options of `load_head`, except the subdivision level
     progress : function called with the number of finished cases and the number of all cases
 

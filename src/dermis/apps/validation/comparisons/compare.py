@@ -96,10 +96,13 @@ def compare(
 
     The skin has the colour of its diffusion profile, and no surface reflection.
 
+    head : head to render
     against : name of the reference in `references.REFERENCES`
+    techniques : names of scattering techniques
     light : name of the light in `scenes.LIGHTS`
     region : name of the visible region in `scenes.REGIONS`
     medium : name of a medium, which is made index-matched
+    settings : frame settings; None for 256 x 256 pixels and an atlas of 1024 x 1024 texels
     direction : angular distribution of the light that leaves the rendered skin; None for the same
         distribution as in the reference
     model : scattering model of the medium's profile; see `medium_gaussians` for the default

@@ -167,8 +167,8 @@ def render_subject_frame(
 ) -> Floats:
     """Render a person with dermis, and return the linear radiance (h, w, 3).
 
-    For skin that does not refract light, two frames are added. One shows the scattered light of skin without
-    surface reflection, the other only surface reflection.
+    For skin that does not refract light, the result is the sum of two frames. One shows the scattered light
+    of skin without surface reflection; the other shows only surface reflection.
 
     skin : skin of the path-traced reference; None for the skin of the scene
     """
@@ -315,9 +315,9 @@ def mean_distance_mm(profile: GaussianSum) -> Floats:
 
 
 def normal_incidence_reflectance(diffuse_reflectance: ArrayLike) -> Floats:
-    """Convert reflectances in uniform light to reflectances at normal incidence [-].
+    """Convert reflectances of index-matched half-spaces from uniform light to normal incidence [-].
 
-    Both are of the same index-matched half-spaces.
+    diffuse_reflectance : reflectances in uniform light
     """
     albedo = 1.0 - np.linspace(1.0, 0.01, 48) ** 2
     uniform, normal = (
@@ -373,7 +373,7 @@ class IrisErrors(NamedTuple):
 
 
 def iris_errors(comparison: PersonComparison, view_height_mm: float) -> IrisErrors:
-    """Return the errors of the iris in a comparison whose pictures show an eye from the front, at the centre.
+    """Return the errors of the iris in a comparison whose pictures show an eye from the front, in the middle.
 
     view_height_mm : height of the visible area [mm]
     """

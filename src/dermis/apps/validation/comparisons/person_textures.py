@@ -91,7 +91,7 @@ def _detail_heights_mm(pores: Floats, furrows: Floats, log2_mm_per_uv: Floats) -
 def _sample_tile(periodic_pattern: Floats, u: Any, v: Any) -> Floats:
     """Return a periodic pattern at coordinates u, v (n, n), interpolated bilinearly.
 
-    periodic_pattern : one period of the pattern
+    periodic_pattern : (rows, columns) one period of the pattern
     u, v : coordinates in units of the period
     """
     from scipy.ndimage import map_coordinates
@@ -105,6 +105,7 @@ def _part_texture(renderer: Renderer, scene: Scene, part_index: int, iris_radius
     """Return the painted texture (n, n, 3) of a part of the head, such as the iris or the upper teeth.
 
     part_index : index of the part in person_textures.wgsl
+    iris_radius_mm : radius of the iris [mm]
     """
     inputs, device = renderer.prepare(scene, _SETTINGS), renderer.device
     shader = program(device, Path(__file__).parent / "person_textures.wgsl")

@@ -107,7 +107,8 @@ def surface_heat_around(
 ) -> ReferenceImage:
     """Return the reference image in which light diffuses according to the heat equation, in a round patch.
 
-    Each Gaussian of the profile becomes diffusion along the surface, for a time proportional to the variance.
+    For each Gaussian of the profile, light diffuses along the surface for a time proportional to the variance
+    of the Gaussian. The results are added with the weights of the Gaussians.
 
     target_mm : point relative to the head's centre; the nearest visible point is the centre of the patch [mm]
     radius_mm : radius of the patch in which pixels are compared [mm]

@@ -120,6 +120,7 @@ def pass_noise(
 
     first_pass, second_pass : (h, w, 3) images
     mean_image : mean of all images; the noise is relative to its RMS
+    mask : (h, w) mask of the pixels to compare
     """
     difference = np.subtract(first_pass, second_pass, dtype=np.float64)[mask]
     return float(np.sqrt(0.5 * (difference**2).sum() / _signal_energy(mean_image, mask)))
@@ -183,6 +184,8 @@ def _cycles_rows(
     """Return the rows for a Cycles method: one for each number of paths, and one for the mean image.
 
     The errors of the mean image are corrected for its noise.
+
+    subsurface_method : method of Cycles, a key of `PeerRenders.cycles`
     """
     reference, rows = peer_renders.reference, []
     for level in zip(*peer_renders.cycles[subsurface_method], strict=True):
@@ -209,10 +212,12 @@ def _cycles_rows(
 def _equal_error_costs(
     peer_renders: PeerRenders, mean_image: MeanImage, dermis_row: RendererRow, mask: Mask
 ) -> JsonObject:
-    """Return the times in which the random walk of Cycles reaches the error of dermis, and a low noise.
+    """Return the times that random walks in Cycles need to match the error of dermis, and to reach low noise.
 
-    The keys of the result are "same_error" and "clean". The first is missing if Cycles never reaches the
-    error of dermis, because of bias.
+    The keys of the result are "same_error" and "clean". The key "same_error" is missing if the bias of Cycles
+    alone is as large as the error of dermis.
+
+    mean_image : mean of all images rendered by Cycles with random walks
 
     dermis_row : row of dermis; its error against the reference is the target for Cycles
     """
@@ -237,7 +242,9 @@ def _equal_error_costs(
 def _cycles_cost(
     paths_per_pixel: float, measured_passes: Sequence[CyclesPass], dermis_row: RendererRow
 ) -> dict[str, float]:
-    """Return the time of Cycles for a number of paths per pixel, and its ratio to the time of dermis.
+    """Return the elapsed time of Cycles for a number of paths per pixel, and ratios to the times of dermis.
+
+    Ratios are given for elapsed and for CPU times.
 
     measured_passes : images rendered by Cycles, from which the mean time per path is taken
     """

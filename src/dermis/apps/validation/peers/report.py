@@ -213,7 +213,8 @@ def _time_ratio_text(ratio: float) -> str:
 def _burley_sentence(scene_report: JsonObject) -> str:
     """Return a sentence that compares the error of Burley's profile with that of dermis.
 
-    The error of Burley's profile is relative to Cycles' random walk, the error of dermis to path tracing.
+    The error of Burley's profile in Cycles is relative to a random walk in Cycles. The error of dermis is
+    relative to path tracing by Mitsuba.
     """
     burley_error, error = scene_report["burley_against_random_walk"]
     verdicts = []

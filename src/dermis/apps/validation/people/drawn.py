@@ -45,10 +45,12 @@ class DrawnPeople(NamedTuple):
 
 
 def site_skin_variables(look: SkinLook) -> Doubles:
-    """Return the skin variables (7, 4) of a skin look, one row for each of `HEAD_SITES`.
+    """Return the skin variables (7, 4) of a person, one row for each of `HEAD_SITES`.
 
     The columns are melanin, blood, oxygenation and thickness of the epidermis, in the units of
     `model_spectra`.
+
+    look : pigments and texture of the person's skin
     """
     differences = np.vstack([np.zeros(3), look.sites.as_array()])
     cheek = np.log2([look.melanin, look.blood])
@@ -150,10 +152,10 @@ def two_sample_distance(first_sample: Doubles, second_sample: Doubles) -> tuple[
 def site_differences(
     archive: Archive, drawn_people: Mapping[str, DrawnPeople]
 ) -> Iterator[tuple[str, str, int, Doubles, Doubles]]:
-    """Yield median colours in the archive, and their differences from drawn people, by group and site.
+    """Yield median colours of measured people, and differences of drawn people from these, by group and site.
 
-    Each tuple has the group, the site, the number of measured people, their median colour (3,), and the
-    median colour of drawn people minus that (3,).
+    Each tuple has the group, the site, the number of measured people, their median CIELAB colour (3,), and
+    the difference (3,): the median colour of drawn people minus that of measured people.
     """
     for code, group in GROUP_OF_CODE.items():
         for k, site in enumerate(HEAD_SITES):
@@ -165,7 +167,7 @@ def site_differences(
 
 
 def sites_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> str:
-    """Return a Markdown table with the results of `site_differences`."""
+    """Return a Markdown table of median colours of measured and drawn people, by group and site."""
     lines = [
         "| group | site | people | archive: L*, a*, b* | drawn minus archive | |",
         "|---|---|---|---|---|---|",

@@ -146,7 +146,8 @@ def _group_masks(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
 def _sex_age_effects(cheek: Archive, skin_variables: Doubles) -> tuple[Doubles, Doubles]:
     """Return two arrays (4,): the effects of sex and of `age_term` on the skin variables of `model_spectra`.
 
-    The effects are fitted by least squares, with an intercept for each group.
+    The effects are fitted by least squares, with an intercept for each group. `age_term` rises from 0 for
+    young adults to 1 for old people.
 
     cheek : n measurements at the cheek
     skin_variables : (n, 4) skin variables of these measurements
@@ -160,9 +161,10 @@ def _sex_age_effects(cheek: Archive, skin_variables: Doubles) -> tuple[Doubles, 
 
 
 def _centred_sex_age_effects(cheek: Archive, sex_effect: Doubles, age_effect: Doubles) -> Doubles:
-    """Return how much sex and age change the four skin variables of n people, (n, 4).
+    """Return the changes (n, 4) of the four skin variables of n people that are due to sex and age.
 
-    Each change is relative to the mean sex and the mean `age_term` of the person's group.
+    Each change is relative to the mean sex and the mean `age_term` of the person's group. `age_term` rises
+    from 0 for young adults to 1 for old people.
 
     cheek : measurements of n people at the cheek
     sex_effect, age_effect : (4,) effects of sex and of `age_term` on the variables
@@ -307,7 +309,11 @@ def _calibrate_group(
 def _drawn_cheek_variables(
     table_document: dict[str, Any], group: str, random_people: _Population
 ) -> tuple[MeasuredTable, Doubles]:
-    """Return the parsed statistics, and skin variables (n, 4) at the cheek of people drawn from a group."""
+    """Return the parsed statistics, and skin variables (n, 4) at the cheek of people drawn from a group.
+
+    table_document : statistics to parse, as returned by `build_measured_table`
+    random_people : random numbers, ages and sexes of n people
+    """
     found, weights = parse_measured_table(table_document), {group: 1.0}
     scores = random_people.normals @ symmetric_square_root(found.group_mean("correlation", weights)[:4, :4])
     return found, found.cheek_variables(weights, random_people.sexes, random_people.ages, scores)
@@ -421,7 +427,11 @@ def _cell_row(
 
 
 def _pooled_cell_texts(measured_table: MeasuredTable, group: str, site_index: int) -> list[str]:
-    """Return texts with the predicted median colour and pigments of a site without measurements."""
+    """Return CSV cells with the predicted median colour and skin variables of a site without measurements.
+
+    group : group of people
+    site_index : index of the site in `SITES`
+    """
     y = measured_table.cheek_variables({group: 1.0}, 0.5, 30.0, np.zeros((1, 4)))
     y[:, :3] += measured_table.site_differences({group: 1.0}, y, np.zeros((1, len(SITES), 2)))[:, site_index]
     colour, (melanin, blood, oxygen, thickness) = model_lab(y)[0], y[0]

@@ -102,7 +102,12 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
             super()._maybe_draw()
 
     def _encode_frame(self, pixels: NDArray[np.uint8], is_lossless_redraw: bool = False) -> None:
-        """Encode a frame in a thread: as JPEG, or as PNG when the picture has stopped changing."""
+        """Encode a frame in a thread, and send the result to the pages.
+
+        pixels : (h, w, 4) image of the frame
+        is_lossless_redraw : whether to encode the frame as PNG, because the picture has stopped changing,
+            instead of as JPEG
+        """
         self._cancel_lossless_draw()
         self._drawn_number += 1
         if is_lossless_redraw:

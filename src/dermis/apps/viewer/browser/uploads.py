@@ -35,7 +35,8 @@ class Uploads:
     """ASGI middleware that receives files at upload/NAME from the page that controls the viewer.
 
     asgi_app : application that handles all other requests
-    canvas : canvas of the page; it issues the ticket required for an upload, and opens each received file
+    canvas : canvas of the page; it gives the page the secret that an upload must contain, and opens each
+        received file
     upload_folder : folder for the received files; the file names that pages send are only displayed, and not
         used in paths
     """

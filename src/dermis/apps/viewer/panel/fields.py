@@ -161,7 +161,11 @@ def _draw_keywords(
 ) -> None:
     """Draw a drop-down list of the keywords that a field accepts instead of a number or colour.
 
+    label : label of the field
+    current_value : current value of the field: a keyword, a number or a colour
+    keywords : keywords to choose from
     state_with_value : function that returns a state, given the new value
+    field_style : presentation of the field
     """
     custom_value = field_style.custom_value
 
@@ -246,6 +250,7 @@ def apply_edited_value(
 ) -> None:
     """Apply the new value of a control to the state; all changes of one drag are undone together.
 
+    label : label of the control, by which changes are attributed to one drag
     change_and_value : whether the control has changed, and its value
     state_with_value : function that returns a state, given the new value
     """

@@ -121,7 +121,10 @@ class ImguiFrames:
 
 @contextmanager
 def recover_imgui(report_error: ReportError) -> Iterator[None]:
-    """Close all windows, tables, styles and ids that an exception inside the with block left open."""
+    """Catch an exception of the with block, and close the windows, tables, styles and ids left open by it.
+
+    report_error : function called with the exception
+    """
     state = imgui.internal.ErrorRecoveryState()
     imgui.internal.error_recovery_store_state(state)
     try:
@@ -160,7 +163,7 @@ def feed_pointer(event: Event, lay_out_frame: Callable[[], None]) -> None:
 def feed_key(event: Event, lay_out_frame: Callable[[], None]) -> None:
     """Pass a key or character event to Dear ImGui, and lay out the panel immediately.
 
-    Otherwise the press and the release of a key between the same two frames would cancel each other.
+    Without this layout, a key that is pressed and released between two frames would have no effect.
 
     lay_out_frame : function that lays out the panel, using all events received so far
     """

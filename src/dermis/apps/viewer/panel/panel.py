@@ -243,9 +243,9 @@ class Panel:
         return True
 
     def _close_topmost(self) -> bool:
-        """Close the popup or the help, or clear the search text; return False if there was none of these.
+        """Close the popup; without a popup, close the help; without help, clear the search text.
 
-        Only the first of these that exists is closed.
+        The result is False if there was neither a popup nor help nor search text.
         """
         if self._has_popup:
             imgui.internal.close_popup_to_level(0, False)

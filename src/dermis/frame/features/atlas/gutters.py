@@ -34,7 +34,8 @@ class GutterTracing:
     starts : buffer of the point at which each path starts, for gutter_trace.wgsl
     sides : buffer of the neighbouring triangle across each edge of each triangle, for gutter_trace.wgsl
     halvings : for each coarser resolution of the atlas, a dictionary from names in gutter_halve.wgsl to
-        buffers. The buffers list the finer gutter texels that each coarser gutter texel averages
+        buffers. They list the coarser gutter texels and, for each of these, the finer gutter texels whose
+        positions to copy from are averaged
     """
 
     starts: Buffer
@@ -101,7 +102,10 @@ def _neighbour_words(mesh: Mesh) -> Words:
 def _halving_buffers(
     device: Device, finer_textures: AtlasTextures, coarser_textures: AtlasTextures
 ) -> Bindings:
-    """Upload, for each gutter texel of the coarser atlas, the list of finer gutter texels to average."""
+    """Upload, for each gutter texel of the coarser atlas, the list of the finer gutter texels inside it.
+
+    The position from which the coarser texel copies light is the mean of the positions for these texels.
+    """
     width = int(finer_textures.gutter_texels.max()) + 1
 
     def texel_index(texels: NDArray[np.integer]) -> NDArray[np.int64]:

@@ -76,9 +76,10 @@ def draw_gutters(
 def draw_blend(
     graph: Recorder, first_layout: LitAtlas, second_layout: LitAtlas, blended_light: Texture
 ) -> None:
-    """Declare the pass that replaces the light near the seams of an atlas layout by that of another layout.
+    """Declare the pass that blends the scattered light of two atlas layouts, to hide their seams.
 
-    The seams of the two layouts are in different places. The transition between the two lights is smooth.
+    The seams of the two layouts are in different places. Towards the seams of the first layout, its light
+    fades smoothly into the light of the second layout.
 
     first_layout : layout whose light is used away from its seams
     second_layout : layout whose light is used near the seams of the first layout

@@ -84,7 +84,7 @@ def _axis_program(
     texel_format : texture format of the levels
     axis : 0 for u, 1 for v
     sheared : whether to account for an angle between u and v that is not a right angle
-    edge_mode : filter mode at the edges of charts
+    edge_mode : how blurs treat texels beyond a chart, see `Blur.edge`
     """
     table = (("ROWS_PER_UNIT", ROWS_PER_UNIT_VARIANCE), ("MAX_TABLE_VARIANCE", MAX_TABLE_VARIANCE))
     constants = (("AXIS", axis), *table, ("SHEARED", sheared), ("EDGE", CHART_EDGE_MODES.index(edge_mode)))

@@ -33,7 +33,7 @@ def draw(
     summed_light : texture for the sum
     transmitted_light : texture of the light transmitted by thin parts, which is added to the sum; None if no
         light is transmitted
-    lost_fraction : texture of the fraction of the blurred light that is lost because a part is thin; None if
+    lost_fraction : texture of the fraction of the blurred light that is lost where the head is thin; None if
         the head has no thin parts
     """
     device, halvings = graph.device, blur.halvings[1 : len(blur.weight) + 1]

@@ -85,7 +85,7 @@ def add_intermediate_levels(
     level is computed by blurring the previous level; level 0 is the unblurred light. An inserted level is
     blurred just enough for `choose_halvings` to halve the resolution of the next level.
 
-    variance_mm2 : (k,) increasing variances of the profile's levels [mm^2]
+    variance_mm2 : (k,) increasing variances of the profile's Gaussians, one level for each [mm^2]
     texels_per_mm : texel density of the atlas at full resolution
     max_halvings : largest number of times that the resolution may be halved
     """

@@ -32,8 +32,9 @@ class Mixture:
         by the blend weight of the profile
     atlas_weights : for each atlas layout, a texture over the atlas of the same blend weights
     sums : texture array. Layer 0 is the exitance of skin that has the first profile everywhere. Two layers
-        follow for each other profile: the light diffused by this profile minus the light diffused by the
-        first profile, in one layer for all entering light, in the next for the weighted light of `entering`
+        follow for each other profile. Both hold the light diffused by this profile minus the light diffused
+        by the first profile: the first of the two layers is computed from all light that enters the skin, the
+        second from the weighted light in `entering`
     """
 
     uv_weights: Texture

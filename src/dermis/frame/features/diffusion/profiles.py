@@ -36,7 +36,7 @@ class SkinProfiles:
     def profile(self, skin: Skin) -> GaussianSum:
         """Return the diffusion profile of a skin; if a map blends several profiles, return the first of them.
 
-        A profile file is read again for another skin, but not for each frame of the same skin.
+        A file that holds the profile is read when the skin changes, not in every frame.
 
         Raises DermisError if the skin has pigments or layers, but names a profile that cannot be computed
         from them.

@@ -30,15 +30,17 @@ class BlurScheme(Protocol):
 
         Return a copy of `split` with the inserted levels, and their indices.
 
-        split : division of a profile into Gaussians with which the atlas is blurred, and a narrow one
-        edge_mode : how blurs treat texels beyond the edge of a chart
+        split : division of a profile into Gaussians with which the atlas is blurred, and a narrower Gaussian
+            that is evaluated at each pixel
+        edge_mode : how blurs treat texels beyond a chart, see `Blur.edge`
         """
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
-        split : division of a profile into Gaussians with which the atlas is blurred, and a narrow one
-        edge_mode : how blurs treat texels beyond the edge of a chart
+        split : division of a profile into Gaussians with which the atlas is blurred, and a narrower Gaussian
+            that is evaluated at each pixel
+        edge_mode : how blurs treat texels beyond a chart, see `Blur.edge`
         """
 
 

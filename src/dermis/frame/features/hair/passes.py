@@ -192,8 +192,8 @@ def _pixel_footprint_mm(
 def _max_segments_in_tile(strand_tables: StrandTables, segment_count: int, pixel_mm: float) -> int:
     """Estimate the number of strand segments in a crowded tile of the picture.
 
-    The estimate assumes that this tile contains all segments of brows and lashes. Of scalp hair and beard, it
-    is assumed to contain several times as many segments as the mean tile.
+    The tile is assumed to contain all segments of brows and lashes, and several times as many segments of
+    scalp hair and beard as the average tile.
 
     segment_count : number of segments of all strands that are drawn
     pixel_mm : side of the square that a pixel covers at the depth of the strands [mm]
@@ -208,8 +208,9 @@ def rows_per_invocation(device: Device, segment_count: int) -> int:
 
     segment_count : estimate of the largest number of segments in a tile
 
-    The result is 1 on GPUs. Software adapters skip pixels without hair faster in a loop over several pixels.
-    They end a shader's loops after 65,535 iterations in total, which limits the number of pixels.
+    The result is 1 on GPUs. On software adapters, pixels without hair are skipped faster if each invocation
+    loops over several pixels. The result is limited there, because these adapters end the loops of an
+    invocation after 65,535 iterations in total.
     """
     if device.adapter.kind != "CPU":
         return 1

@@ -55,10 +55,10 @@ _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _HAIR_COUNT_MEMBERS), ("widt
 
 
 class StrandDetail(NamedTuple):
-    """Limits of the detail of coarse strands (scalp hair and beard) on one kind of adapter.
+    """Limits of the detail of coarse strands (scalp hair and beard), for GPUs or for software adapters.
 
     drawn_knots : largest total number of knots of the drawn strands
-    casters : largest number of strands that are drawn into shadow maps to represent all strands
+    casters : largest number of strands that are drawn into shadow maps in place of all coarse strands
     caster_knots : largest number of knots of a strand in shadow maps
     width_px : least width of drawn strands [pixel]
     segment_px : least length of the segments of drawn strands [pixel]
@@ -108,7 +108,7 @@ class StrandCapacity(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StrandBuffers:
-    """Buffers that each frame fills: strands that cast shadows, drawn strands, and projected knots."""
+    """Buffers filled in each frame: strands that cast shadows, drawn strands, and projected knots."""
 
     casters: Buffer
     drawn: Buffer
@@ -217,7 +217,7 @@ def make_deep_opacity_maps(device: Device, light_count: int) -> Buffer:
 
 
 def placeholder_strand_shadows(device: Device) -> Buffer:
-    """Return the buffer that heads without hair bind in place of the deep opacity maps."""
+    """Return the buffer that is bound in place of the deep opacity maps for heads without hair."""
     return device.cached("no strand shadows", lambda: _make_word_buffer(device, DEEP_OPACITY_HEADER_WORDS))
 
 
@@ -254,7 +254,7 @@ class StrandTables:
 
     strands : buffer of the fine strands at rest, see strands_pose.wgsl
     knots : buffer of the knots of the fine strands at rest, see strands_pose.wgsl
-    buffers : buffers that each frame fills
+    buffers : buffers of posed strands and projected knots, which are filled in each frame
     fine : number of fine strands, and number of knots of each
     coarse : largest number of coarse strands to draw, and largest number of knots of each
     casters : number of strands that represent all coarse strands in shadow maps, and number of knots of each
@@ -263,9 +263,9 @@ class StrandTables:
     possible : total number of coarse strands of the person
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
     length_mm : length of the scalp hair or the beard, whichever is longer [mm]
-    shortest_mm : length of the shorter of the two [mm]
-    width_mm : width of a strand of the longer of the two [mm]
-    cover : projected area of hair per area of skin, for the longer of the two [-]
+    shortest_mm : length of the scalp hair or the beard, whichever is shorter, and at least 1 [mm]
+    width_mm : width of the strands of scalp hair or beard, whichever is longer [mm]
+    cover : projected area of hair per area of skin, for scalp hair or beard, whichever is longer [-]
     """
 
     strands: Buffer
@@ -328,20 +328,20 @@ def shader_constants() -> dict[str, float]:
 
 
 def has_strands(head: Head, settings: Settings) -> bool:
-    """Return whether a head has strands and the settings show strands."""
+    """Return whether a head has strands of hair, and `settings` asks to draw them."""
     return settings.strands and any(part is not None and len(part) > 0 for part in (head.strands, head.hair))
 
 
 def strand_shadow_constants(head: Head, settings: Settings) -> Constants:
-    """Return the pipeline constant that makes lighting read strand shadows; () if no strands are drawn."""
+    """Return the pipeline constant that enables strand shadows; an empty tuple if no strands are drawn."""
     return (("STRANDS", 1),) if has_strands(head, settings) else ()
 
 
 def drawn_strand_counts(strand_tables: StrandTables, pixel_mm: float) -> StrandCounts:
     """Return the number of strands of scalp hair and beard to draw, and the number of knots of each.
 
-    Where strands are thinner than a pixel, fewer strands are drawn. They are wider, so that they cover the
-    same area. More strands are drawn of short hair, because few short strands look like dots.
+    If strands are thinner than a pixel, fewer but wider strands are drawn, which cover the same area. For
+    short hair, the number is increased again, because a small number of short strands looks like dots.
 
     pixel_mm : side of the square that a pixel covers at the depth of the strands [mm]
     """
@@ -363,7 +363,7 @@ def make_strand_tables(
     """Upload the brows and lashes of a head, and collect the buffers of its scalp hair and beard.
 
     coarse_counts : result of `max_coarse_counts`
-    buffers : buffers that each frame fills
+    buffers : buffers of posed strands and projected knots, which are filled in each frame
     groom : buffers from which scalp hair and beard are interpolated, None if there are none
 
     Raises DermisError for strands whose roots do not lie on the head's mesh.

@@ -183,7 +183,10 @@ def draw(
 
 
 def _draw_bounces(graph: Recorder, buffers: InterreflectionBuffers) -> None:
-    """Declare the passes that compute the light bounced between patches, and then the light at the atlas."""
+    """Declare the passes that bounce light between patches, and then compute the light at the cells.
+
+    Patches and cells are described in `InterreflectionBuffers`.
+    """
     device = graph.device
     team = (
         1 if device.adapter.kind == "CPU" else _INVOCATIONS_PER_PATCH

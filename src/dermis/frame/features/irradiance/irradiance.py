@@ -28,8 +28,8 @@ def fine_light_members(
 
     variance_mm2 : (k,) variances of the Gaussians with which the atlas is blurred [mm^2]
     weight : (k, 3) weights of these Gaussians for red, green and blue [-]
-    relit_mm2 : variance of the narrowest Gaussian of the profile [mm^2]. It is too narrow for a blur; light
-        is evaluated at each pixel instead
+    relit_mm2 : variance of the narrowest Gaussian of the profile [mm^2]. This Gaussian is too narrow
+        for a blur over the atlas; its light is evaluated at each pixel instead
     """
     count = min(len(variance_mm2), MAX_FINE_GAUSSIANS)
     level = np.zeros((MAX_FINE_GAUSSIANS, 4), np.float32)
@@ -62,8 +62,9 @@ def draw(
     atlas_side : side of the atlas [texels]
     texel_format : format of the texture
     irradiance_scale : factor by which irradiance is multiplied before it is stored
-    filter_sigma_texels : standard deviation of the filter for light that varies within a texel [texels]. 0
-        samples light only at texel centres. Use 0 where adjacent texels may not be adjacent on the surface
+    filter_sigma_texels : standard deviation of the filter for light that varies within a texel [texels]; 0 to
+        sample light only at texel centres, which is necessary if adjacent texels can be far apart on the
+        surface
     """
     if filter_sigma_texels:  # neighbouring texels are neighbours on the surface
         constants = with_oblique_constant(constants)

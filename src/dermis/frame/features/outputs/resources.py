@@ -45,7 +45,7 @@ class Resources:
         return [*(planes.buffer for planes in self.planes), *landmarks]
 
     def planes_of_output(self, output_name: str) -> Planes:
-        """Return the buffer that holds an output, of the shader that computes this output."""
+        """Return the buffer that holds an output and the other outputs of the same shader."""
         return next(planes for planes in self.planes if output_name in planes.channels)
 
 

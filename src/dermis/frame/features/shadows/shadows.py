@@ -20,8 +20,8 @@ class ShadowMaps:
     """Shadow maps of all lights.
 
     layers : depth map of each light
-    bounds : texture of the nearest depth in each square block of a map, for several block sizes; area lights
-        use it to skip blocks without occluders
+    bounds : texture of the nearest depth in each square block of a map, for several block sizes; with
+        it, the shadows of area lights are computed without searching blocks that hold no occluders
     """
 
     layers: ViewLayers
@@ -50,7 +50,7 @@ def draw(
 ) -> None:
     """Declare the passes that draw the depth of the head as seen from each light.
 
-    with_depth_bounds : whether the scene has area lights, which read `ShadowMaps.bounds`
+    with_depth_bounds : whether to fill `ShadowMaps.bounds` too, which is needed only for area lights
     """
     if not len(views.clips):
         return

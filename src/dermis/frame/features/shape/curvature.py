@@ -31,8 +31,8 @@ class Curvature:
     smoothed : buffer of the smoothed curvature, one float per vertex
     scratch : buffer for intermediate results of the smoothing
     tables : dictionary from names in the shaders to buffers of the triangles and neighbours of each vertex
-    steps : number of smoothing steps; all steps together have the standard deviation `SMOOTHING_SIGMA_MM` on
-        the head at rest
+    steps : number of smoothing steps. On the head at rest, all steps together smooth with the standard
+        deviation `SMOOTHING_SIGMA_MM`
     vertices : number of vertices
     """
 

@@ -36,7 +36,7 @@ class HeadGeometry:
 
     @property
     def cutout_constants(self) -> Constants:
-        """Return the pipeline constants that passes need to find the nearest surface of this head."""
+        """Return the pipeline constants that make passes cut holes into parts, none if there are no holes."""
         return (("CUTOUTS", 1),) if self.has_cutouts else ()
 
     def with_shape(self, shape: Shape) -> HeadGeometry:

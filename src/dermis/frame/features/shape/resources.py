@@ -12,7 +12,7 @@ from dermis.gpu import Device, Memo
 
 @dataclass(frozen=True, eq=False)
 class Resources:
-    """Shape of a head, which each frame poses.
+    """Buffers of a head's shape, which is posed anew in each frame.
 
     shape : buffers of the posed shape
     tables : buffers that are constant for a mesh

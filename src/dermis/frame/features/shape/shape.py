@@ -142,7 +142,9 @@ def _upload_tables(device: Device, named_tables: dict[str, NDArray[np.generic]])
 def _vertex_resources(device: Device, vertex_count: int) -> dict[str, Texture | Buffer]:
     """Create the texture and the buffer of vertices, and the buffer of tangent lengths.
 
-    Software adapters store vertices in the texture, GPUs in the buffer; the unused one is minimal."""
+    Software adapters store vertices in the texture, GPUs store them in the buffer. The resource that is not
+    used has the smallest possible size.
+    """
     rows, software = -(-vertex_count // VERTICES_PER_ROW), device.adapter.kind == "CPU"
     table = make_texture(device, (4 * VERTICES_PER_ROW, rows if software else 1), "rgba32float")
     words = np.zeros((1 if software else rows * VERTICES_PER_ROW, 4, 4), np.float32)
@@ -238,7 +240,11 @@ def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
 
 
 def run_bounds(sorted_values: NDArray[np.integer], searched_values: NDArray[np.integer]) -> Words:
-    """Return (n, 2) bounds: where the run of each of n values starts and ends in a sorted array."""
+    """Return (n, 2) bounds: where the elements equal to each searched value start and end in a sorted array.
+
+    sorted_values : sorted array
+    searched_values : (n,) values; for a value that is not in the array, start and end are equal
+    """
     ends = [np.searchsorted(sorted_values, searched_values, side) for side in ("left", "right")]
     return np.stack(ends, axis=1).astype(np.uint32)
 
@@ -261,9 +267,13 @@ def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
 
 
 def _run_offsets(sorted_index: NDArray[np.integer], run_count: int) -> Words:
-    """Return the (run_count + 1,) offsets at which the runs of 0, 1, ... start and end in a sorted array.
+    """Return the offset in a sorted array where each integer from 0 to run_count - 1 first occurs.
+
+    The result has the shape (run_count + 1,); its last element is the length of the array. For an integer
+    that does not occur, the offset is that of the next larger integer.
 
     sorted_index : sorted integers from 0 to run_count - 1
+    run_count : number of different integers that can occur
     """
     return np.concatenate([[0], np.cumsum(np.bincount(sorted_index, minlength=run_count))]).astype(np.uint32)
 
@@ -285,7 +295,7 @@ class MotionBytes(NamedTuple):
 
     @property
     def at_rest(self) -> MotionBytes:
-        """Return the control points of this pose at rest, with neither morph weights nor bone matrices."""
+        """Return the pose at rest: only the control points, with neither morph weights nor bone matrices."""
         return MotionBytes(self.positions)
 
 

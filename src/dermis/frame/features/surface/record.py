@@ -64,7 +64,7 @@ def fill_eye(eye_records: UniformRecord, look: EyeLook) -> None:
 
 
 def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
-    """Return the pipeline constants of lobe.wgsl for a skin, except constants that equal their default 0."""
+    """Return the pipeline constants of lobe.wgsl for a skin; those with the default value 0 are left out."""
     numbers = {"MODEL": MODELS.names.index(lobe_name(skin)), "EXACT_FRESNEL": int(skin.fresnel == "exact")}
     return tuple((name, number) for name, number in numbers.items() if number)
 

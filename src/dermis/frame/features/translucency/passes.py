@@ -70,7 +70,7 @@ def draw(
 ) -> Texture:
     """Declare the passes that sum, in each receiver cell, the light from all source cells; return the sums.
 
-    levels : blurred light over the atlas; light enters the sources from one of the levels
+    levels : blurred light over the atlas; the light that enters each source is read from one of the levels
     blur : Gaussian blurs of the levels
     constants : pipeline constants that replace the defaults of translucency.wgsl
 
@@ -163,7 +163,8 @@ def draw_weights(graph: Recorder, translucency: Translucency) -> None:
     """Declare the passes that compute, for the current shape, the weights of all pairs of cells.
 
     A weight is the fraction of the light of the source cell that leaves in the receiver cell. The passes also
-    sum the fraction of the blurred light that each receiver cell loses because its tissue is thin.
+    compute, for each receiver cell, the total fraction of the blurred light that is lost because the tissue
+    is thin.
     """
     pairs, cells = translucency.pairs, translucency.pairs.cells
     draw_cell_points(
@@ -208,7 +209,7 @@ def pair_weight_bindings(
     thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
         compute the weights of pairs from the Gaussians
     transmittance : (THICKNESS_ROWS, k, 3) table to use: `thickness_tables.transmitted` or
-        `thickness_tables.lost`
+        `thickness_tables.lost`; ignored without `thickness_tables`
     """
     gaussian = np.zeros((MAX_GAUSSIANS, 4), np.float32)
     gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2

@@ -53,7 +53,8 @@ class ViewLayers:
     size : (width, height) of each layer [pixels]
     count : number of layers in use
     triangles : whether layers store triangle indices instead of depth
-    depth : depth attachments of the rasteriser: one for each layer, or a single one if `triangles`
+    depth : depth attachments of the rasteriser: one for each layer, or a single attachment if
+        `triangles`
     targets : colour targets of the rasteriser, one for each layer; None for layers of depth
     nearness : buffer of the compute pass: depth at each sample, in some modes packed with the triangle index
     triangle_ids : buffer of the compute pass: triangle index at each sample, allocated on first use
@@ -84,8 +85,8 @@ def make_layers(
     If the layers do not fit in a buffer, they are filled by the rasteriser.
 
     store_triangles : whether the layers store triangle indices instead of depth
-    use_compute_pass : whether to use the compute pass instead of the rasteriser; None selects the faster one
-        for the adapter
+    use_compute_pass : whether to use the compute pass instead of the rasteriser; None selects
+        whichever is faster on the adapter
     """
     use_compute_pass = device.adapter.kind != "CPU" if use_compute_pass is None else use_compute_pass
     fits = 4 * layer_size[0] * layer_size[1] * layer_count <= device.max_storage_bytes
@@ -96,7 +97,7 @@ def make_layers(
 def draw_layers(
     graph: Recorder, stage_name: str, layers: ViewLayers, views: Views, head: HeadGeometry
 ) -> None:
-    """Declare the passes that fill the layers: one for each view and each of its sample positions.
+    """Declare the passes that fill the layers, one layer for each sample position of each view.
 
     stage_name : name of the stage in timings
     """

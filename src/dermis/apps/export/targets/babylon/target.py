@@ -129,9 +129,10 @@ def spiral_samples(
 
 
 def burley_radii(enclosed_fraction: ArrayLike) -> tuple[Floats, Floats]:
-    """Return the radii r within which given fractions of a Burley profile of width 1 lie, and 1 / (r p(r)).
+    """Return the radii r that enclose given fractions of a Burley profile of width 1, and 1 / (r p(r)).
 
-    p(r) is the probability density of r. The weight of a sample at radius r is proportional to 1 / (r p(r)).
+    p(r) is the probability density of r. The shader's weight of a sample at radius r is proportional to
+    1 / (r p(r)).
     """
     u = 1.0 - np.asarray(enclosed_fraction, np.float64)
     g = 1.0 + 4.0 * u * (2.0 * u + np.sqrt(1.0 + 4.0 * u * u))

@@ -118,8 +118,9 @@ def random_walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> 
 
     radius : radii [mean free paths]
     albedo : single-scattering albedo [-]
-    walk_entry : how a walk enters the medium: "straight" (along the normal) for RANDOM_WALK, "skin" for
-        RANDOM_WALK_SKIN
+    walk_entry : distribution of the directions in which walks enter the medium: "straight" (along the
+        normal, as in RANDOM_WALK), or "skin" (diffuse or refracted at a rough surface, as in
+        RANDOM_WALK_SKIN)
     """
     walk_albedo = max(albedo, MIN_ALBEDO)
     radii, fraction_within = _interpolate_random_walk_table(round(walk_albedo, 7), walk_entry)
@@ -133,7 +134,7 @@ def random_walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> 
 def _interpolate_random_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Floats, Floats]:
     """Return radii [mean free paths] and the fraction of light within each radius [-], for one albedo.
 
-    The fractions are interpolated from a table, at eight times as many radii as in the table.
+    The fractions are interpolated from a table that has an eighth of the returned number of radii.
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -147,9 +148,9 @@ def _interpolate_random_walk_table(albedo: float, walk_entry: WalkEntry) -> tupl
 
 @cache
 def _load_random_walk_tables() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
-    """Return a table of Cycles' random walks for each way in which a walk enters the medium.
+    """Return tabulated results of Cycles' random walks for each value of `WalkEntry`.
 
-    A table consists of three arrays: values of sqrt(1 - albedo) (n,) [-], radii (m,) [mean free paths], and
+    The results are three arrays: values of sqrt(1 - albedo) (n,) [-], radii (m,) [mean free paths], and
     the fraction of light (n, m) that leaves the medium within each radius [-].
     """
     by_entry: dict[str, list[list[float]]] = {}
@@ -168,7 +169,7 @@ class RandomWalk(NamedTuple):
     """Random walk of Cycles for one channel of a base colour.
 
     albedo : single-scattering albedo [-]
-    entry : how a walk enters the medium: "straight" (along the normal), or "skin" for RANDOM_WALK_SKIN
+    entry : distribution of the directions in which walks enter the medium, see `random_walk_cdf`
     """
 
     albedo: float
@@ -183,7 +184,7 @@ class RandomWalk(NamedTuple):
 
     @property
     def emerging_fraction(self) -> float:
-        """Return the reflectance of the skin, as seen along its normal, that the random walk gives [-]."""
+        """Return the reflectance that the random walk gives for skin seen along its normal [-]."""
         return float(random_walk_cdf(np.array([_EFFECTIVELY_INFINITE_RADIUS]), self.albedo, self.entry)[0])
 
 
@@ -215,7 +216,7 @@ class Blender(Target):
         return self._material_parameters(JENSEN_DMFP_MM, version)
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile, predicted by the formulas of Cycles' kernel and EEVEE's shader."""
+        """Return the cumulative profile that is predicted by the formulas of Cycles or EEVEE."""
         metres = np.array(get_numbers(parameters, _RADIUS_NAME)) * get_numbers(parameters, _SCALE_NAME)[0]
         lengths = np.maximum(metres / _METRES_PER_MM * self._lengths_per_unit_radius(subject, version), 1e-9)
         units = self._unit_cdf_by_channel(subject, version)

@@ -47,8 +47,8 @@ def _skin_additions(
 ) -> SkinAdditions:
     """Return the extensions and base colour of the skin material, and an additional map if needed.
 
-    If the head has a colour map and the export uses KHR_materials_scatter, a draft extension, a map of
-    multiscatter colours replaces the uniform multiscatter colour.
+    If the head has a colour map and the export uses the draft extension KHR_materials_scatter, the uniform
+    multiscatter colour is replaced by a map.
 
     material_extensions, draft_notice : see `encode_glb`
     """

@@ -64,7 +64,7 @@ class SubdividedTriangles(NamedTuple):
 def subdivide_triangles(
     triangles: NDArray[np.integer], segments_per_edge: int = _SEGMENTS_PER_EDGE
 ) -> SubdividedTriangles:
-    """Divide each triangle evenly into `segments_per_edge` squared smaller triangles.
+    """Divide triangles of a mesh, each evenly into `segments_per_edge` ** 2 smaller triangles.
 
     Neighbouring original triangles share no new vertices.
 

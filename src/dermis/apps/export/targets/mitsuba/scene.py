@@ -121,7 +121,8 @@ def scene_files(
 def medium_description(medium: IsotropicMedium) -> SceneDict:
     """Return Mitsuba's description of a homogeneous medium, in mm.
 
-    The largest extinction coefficient is the medium's scale, by which Mitsuba multiplies the coefficients.
+    The extinction coefficients are divided by the largest of them, which is written as the medium's scale.
+    Mitsuba multiplies the coefficients by this scale.
     """
     extinction = np.asarray(medium.sigma_t)
     return {

@@ -135,12 +135,12 @@ class Mitsuba(Target):
 def fit_medium(
     reference_profile: CumulativeProfile, colours: SkinColours, surface_model: Boundary
 ) -> IsotropicMedium:
-    """Return the medium that has the skin's lightest colour and the profile closest to the reference.
+    """Return the medium with the colour `SkinColours.medium_colour` and the profile closest to the reference.
 
     The colour is matched for light from all directions, as heads are lit from all sides. The profile is
     matched for light incident along the normal.
 
-    colours : mean and lightest colour of the skin
+    colours : mean and brightest colour of the skin
     surface_model : model of the surface above the medium
     """
     energy = colours.medium_colour(surface_model) / _boundary_transmittance(surface_model)
@@ -155,9 +155,9 @@ def _half_space_kind(surface_model: Boundary) -> HalfSpaceKind:
 
 
 def _boundary_transmittance(surface_model: Boundary) -> float:
-    """Return the transmittance of the reflecting layer on an index-matched medium; 1 without this layer.
+    """Return the transmittance of the skin's reflecting layer; 1 for a surface model without this layer.
 
-    Only the surface model "matched" has the layer.
+    Only the surface model "matched" has the layer, which lies on an index-matched medium.
     """
     return 1.0 - MATCHED_REFLECTANCE if surface_model == "matched" else 1.0
 
@@ -197,7 +197,7 @@ def _encode_opaque_meshes(scene: Scene, adapter: str, textured_materials: Contai
 class SkinColours:
     """Mean and brightest colour of the colour map of a skin.
 
-    The medium has the brightest colour. Where the map is darker, a texture dims the light of the medium.
+    The medium is as bright as the brightest texels. Where the map is darker, a texture dims its light.
 
     mean, brightest : (3,) mean and brightest colour, linear Rec. 709; equal for uniform skin
     lightness_ratio : luminance of the lightest texels divided by the mean luminance [-]

@@ -33,7 +33,7 @@ _KIND_BY_PLUGIN = {plugin: kind for kind, plugins in _PLUGINS_BY_KIND.items() fo
 
 
 class Transform:
-    """Affine transformation; each method returns a new transformation followed by this one."""
+    """Affine transformation; the result of each method applies a new transformation, and then this one."""
 
     def __init__(self, matrix: ArrayLike | None = None) -> None:
         self.matrix = np.eye(4) if matrix is None else np.asarray(matrix, np.float64).reshape(4, 4)
@@ -66,7 +66,7 @@ class Bitmap:
 
 @dataclass
 class XmlBackend:
-    """Substitute for the module `mitsuba` in functions that describe scenes; needs no installed Mitsuba.
+    """Substitute for the module `mitsuba` in functions that describe scenes; Mitsuba need not be installed.
 
     bitmaps : images of all elements created so far, in the order of their file names
     """

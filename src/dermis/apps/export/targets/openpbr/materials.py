@@ -127,7 +127,7 @@ def skin_material(
     """Return the OpenPBR material of skin.
 
     radius_m : (3,) mean free paths [m]
-    uniform_colour : (3,) uniform colour, used without a colour map; linear Rec. 709 [-]
+    uniform_colour : (3,) colour of the skin if it has no colour map; linear Rec. 709 [-]
     map_roles : roles of the maps that replace uniform values
     """
     longest = max(radius_m)
@@ -188,7 +188,7 @@ def eye_material(material_name: str) -> OpenPbrMaterial:
 def hair_material(absorption_per_mm: Floats, radius_mm: float) -> OpenPbrMaterial:
     """Return the OpenPBR material of hairs: an opaque surface with the mean colour of the hairs.
 
-    absorption_per_mm : (n, 3) absorption coefficient inside the hairs [1/mm]
+    absorption_per_mm : (n, 3) absorption coefficient inside each of n hairs [1/mm]
     radius_mm : radius of the hairs [mm]
 
     Source: [Chiang2016] eq. 9 for the colour, at a roughness of 0.3.
@@ -201,7 +201,8 @@ def hair_material(absorption_per_mm: Floats, radius_mm: float) -> OpenPbrMateria
 def open_pbr_maps(head_maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
     """Return the maps of the skin by role, converted to the values that OpenPBR expects.
 
-    slopes : (n, n, 2) slopes of the relief, used if `head_maps` has no normals
+    slopes : (n, n, 2) slopes of the height map, from which normals are computed if `head_maps` has no
+        normals
     """
     arrays: dict[str, Floats] = {}
     if head_maps.colour is not None and skin.albedo == "map":
@@ -256,7 +257,7 @@ def write_maps(subject: Subject, output_folder: Path, file_name_prefix: str) -> 
 def write_part_pictures(
     subject: Subject, output_folder: Path, file_name_prefix: str, additional_roles: Iterable[PartRole] = ()
 ) -> list[Path]:
-    """Write the texture images of parts that are not skin as PNG files, and return their paths.
+    """Write PNG files of the texture images of the head's parts that are not skin; return the paths.
 
     file_name_prefix : prefix of the file names
     additional_roles : roles of additional images to write, which OpenPBR does not use

@@ -70,7 +70,7 @@ class OpenPbr(Target):
 
     @property
     def shader(self) -> str:
-        """Return the node category of the surface: OpenPBR or Standard Surface."""
+        """Return the MaterialX node category of the surface shader: OpenPBR or Standard Surface."""
         return _SHADER_BY_VARIANT[self.variant or "open-pbr"]
 
     @property
@@ -121,9 +121,9 @@ class OpenPbr(Target):
 def surface_parameters(
     subject: Subject, shader_category: str, radius_mm: Floats, radius_meaning: str
 ) -> Parameters:
-    """Return the parameters of a surface with given subsurface radii.
+    """Return the parameters of a surface shader with given subsurface radii.
 
-    shader_category : node category of the surface, `OPEN_PBR` or `STANDARD_SURFACE`
+    shader_category : MaterialX node category of the shader, `OPEN_PBR` or `STANDARD_SURFACE`
     radius_mm : (3,) subsurface radii [mm]
     radius_meaning : explanation of subsurface_radius for the report
     """
@@ -152,7 +152,7 @@ def profile_error_text(mfp_mm: Floats, subject: Subject) -> str:
 
 
 def get_radii_mm(parameters: Parameters, shader_category: str) -> Floats:
-    """Return the subsurface radii (3,) in a surface's parameters [mm]."""
+    """Return the subsurface radii (3,) from the parameters of a surface shader [mm]."""
     longest = get_numbers(parameters, input_name(shader_category, "subsurface_radius"))[0] / _METRES_PER_MM
     return longest * np.array(get_numbers(parameters, input_name(shader_category, "subsurface_radius_scale")))
 

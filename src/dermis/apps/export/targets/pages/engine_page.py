@@ -186,7 +186,10 @@ def page_camera_json(scene: Scene, centre_mm: Sequence[float]) -> Json:
 
 
 def page_light_json(light: Light) -> Json:
-    """Return as JSON a directional light with the direction and irradiance that a light has at its target."""
+    """Return a light as JSON of a directional light.
+
+    Its direction and irradiance are those of the given light at the point at which this light is aimed.
+    """
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction, np.float64)
     else:

@@ -27,7 +27,7 @@ def render_page(
     """Return the HTML of a page from the template page.html and the style page.css of a folder.
 
     title, note : plain texts, which are escaped
-    script : script from `escape_script`
+    script : JavaScript of the page, already escaped by `escape_script`
     policy : directives of the Content-Security-Policy except script-src and style-src
     script_sources : sources that script-src allows in addition to the embedded script
     placeholder_texts : HTML or data for each of the template's other placeholders

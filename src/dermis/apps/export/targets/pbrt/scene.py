@@ -79,7 +79,7 @@ def camera_directives(camera: Camera, picture_name: str) -> Lines:
 
 
 def light_directives(lights: Iterable[Light], environment: Environment | None) -> Lines:
-    """Return the directives of lights and environment, and warn if pbrt does not support one of them.
+    """Return the directives of lights and environment, and warn of those that pbrt does not support.
 
     Unsupported lights are replaced or omitted. A panorama is omitted.
     """

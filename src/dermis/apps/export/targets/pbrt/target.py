@@ -1,4 +1,4 @@
-"""Export to pbrt, with parameters of the material `subsurface` that are fitted by pbrt's diffusion model."""
+"""Export to pbrt, with parameters of the material `subsurface`, fitted with pbrt's diffusion model."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class DiffusionTable(NamedTuple):
     albedo : (n,) single-scattering albedos
     radius : (m,) radii [mean free paths]
     reflectance : (n,) diffuse reflectance at each albedo
-    reflectance_within : (n, m) diffuse reflectance if only the light that leaves within each radius counts
+    reflectance_within : (n, m) part of the reflectance due to light that leaves within each radius
     """
 
     albedo: Floats
@@ -73,10 +73,10 @@ class DiffusionTable(NamedTuple):
     reflectance_within: Floats
 
     def interpolate_reflectance_within(self, radius: ArrayLike, reflectance: float) -> Floats:
-        """Return the diffuse reflectance if only the light that leaves within given radii counts [-].
+        """Return the part of the diffuse reflectance due to light that leaves within given radii [-].
 
         radius : radii [mean free paths]
-        reflectance : diffuse reflectance if all light counts [-]
+        reflectance : total diffuse reflectance, from light that leaves at any radius [-]
         """
         row = np.interp(reflectance, self.reflectance, np.arange(_TABLE_ALBEDO_COUNT))
         low = int(min(row, _TABLE_ALBEDO_COUNT - 2))
@@ -301,8 +301,8 @@ def _part_material_directives(
     """Return the material directives for a part of the head that is not skin.
 
     image_roles : roles of the texture images that the part uses, such as "colour"
-    material_name : for a part with a map of metalness, prefix of the names of the two materials that the map
-        mixes
+    material_name : prefix of the names of the two materials that a metalness map mixes; unused for a part
+        without such a map
     file_prefix : prefix of the names of the image files
     """
     values: dict[str, ArrayLike | Sequence[str]] = {"rgb reflectance": material.colour}

@@ -1,4 +1,4 @@
-"""Export to Unreal Engine: an editor script that creates a SubsurfaceProfile, and the maps of a head.
+"""Export to Unreal Engine: the maps of a head, and an editor script that creates a SubsurfaceProfile.
 
 In SubsurfaceProfile.cpp and BurleyNormalizedSSS.cpp, the width d of the Burley profile is the mean free path
 divided by 0.6 s(A). Here A is the albedo, and s is Burley's factor for light at normal incidence.

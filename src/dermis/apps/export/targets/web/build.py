@@ -94,7 +94,9 @@ class PageRequest:
     interactive: dict[str, tuple[int, int, int]] = field(default_factory=dict)
 
     def frame_settings(self, adapter_kind: str) -> Iterator[tuple[Settings, int]]:
-        """Yield the settings of each frame, and the number of hairs drawn as one hair (0 at full quality).
+        """Yield the settings of each frame, and how many hairs are merged into one.
+
+        At full quality, no hairs are merged, and the number is 0.
 
         adapter_kind : kind of adapter, "gpu" or "software"
         """
@@ -119,10 +121,10 @@ class PageRequest:
 def build_page_content(
     page_request: PageRequest, on_frames_captured: OnFramesCaptured = lambda *_: None
 ) -> PageContent:
-    """Capture the frames of all kinds of adapter, and return the data that the page embeds.
+    """Capture the frames for every requested kind of adapter, and return the data that the page embeds.
 
-    on_frames_captured : function called for each kind of adapter after its frames were captured, with the
-        renderer (which then uses the maps of the page), the scene and the settings
+    on_frames_captured : function called after the frames for a kind of adapter were captured; its arguments
+        are the renderer (which then uses the maps of the page), the scene and the settings
     """
     content = PageContent()
     for adapter_kind in (one for one in ADAPTER_KINDS if page_request.sizes.get(one)):

@@ -110,6 +110,8 @@ def _triangle_column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], in
 def _mip_bytes(frame_capture: FrameCapture, resource_index: int) -> list[Bytes]:
     """Return the bytes of each mip level of a texture, with all layers of the level joined.
 
+    The bytes of a buffer are returned as a single level.
+
     resource_index : index of the texture or buffer in the capture
     """
     parts, layers = (
@@ -137,7 +139,9 @@ def _frame_json(named_frame: NamedFrame, picture_entry: list[int], byte_runs: By
 
 
 def _view_record_index(captured_frame: CapturedFrame, stage_name: str) -> int:
-    """Return the index in `captured_frame.records` of a stage's view matrices; -1 if there are none.
+    """Return the index of the uniform record with a stage's view matrices; -1 if there are none.
+
+    It is an index in `captured_frame.records`.
 
     stage_name : "visibility" or "shadows"
     """
@@ -147,7 +151,7 @@ def _view_record_index(captured_frame: CapturedFrame, stage_name: str) -> int:
 
 
 def _passes_json(captured_frame: CapturedFrame, byte_runs: ByteRunCollector) -> list[Json]:
-    """Return the JSON of a frame's passes; add the data that the host writes to buffers to `byte_runs`."""
+    """Return the JSON of a frame's passes; data that the host writes to buffers is added to `byte_runs`."""
     writes = ((one, one.written) for one in captured_frame.passes)
     return [{**vars(one), "written": data and (data[0], byte_runs.add(data[1]))} for one, data in writes]
 

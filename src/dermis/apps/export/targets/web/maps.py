@@ -123,7 +123,7 @@ class MapPictures:
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, map_role: str, texels: NDArray[np.float16]) -> bool:
-        """Return whether texels equal those from which the first image of a map was encoded.
+        """Return whether texels equal those of the first layer of a map at full resolution, before encoding.
 
         map_role : role of that map
         """

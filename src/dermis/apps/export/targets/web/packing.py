@@ -31,7 +31,8 @@ _UNSIGNED_TYPE_BY_WORD_BYTES = {1: np.uint8, 2: np.uint16, 4: np.uint32}
 class ByteRunCollector:
     """Collector of byte runs for one compressed file, in which equal runs are stored once.
 
-    A byte run is the data of a buffer, texture or record. `runs` has the position and encoding of each run.
+    A byte run is the data of a buffer, a texture or a uniform struct. `runs` has the position and encoding of
+    each run.
     """
 
     def __init__(self) -> None:
@@ -58,10 +59,10 @@ class ByteRunCollector:
         return len(self.runs) - 1
 
     def add_floats(self, floats: NDArray[np.float32], column_steps: tuple[float, ...]) -> int:
-        """Add floats as a run of integer multiples of one step per column; return the run's index in `runs`.
+        """Add a run of floats, stored as integer multiples of the steps; return the run's index in `runs`.
 
         floats : (n, c) floats that are multiples of the steps
-        column_steps : (c,) steps, powers of two
+        column_steps : (c,) step of each column, a power of two
         """
         words = np.rint(floats / np.array(column_steps)).astype(np.int32)
         layouts = [(4, len(column_steps), order) for order in _DIFFERENCE_ORDERS]
@@ -105,7 +106,9 @@ def encode_seven_bits(raw_bytes: bytes) -> str:
 
 
 def byte_planes(raw_bytes: Bytes, bytes_per_word: int, words_per_row: int, difference_order: int) -> bytes:
-    """Return the bytes of a table of words, reordered column by column to improve compression.
+    """Return the bytes of a table of words, with rows replaced by differences and the bytes transposed.
+
+    The result compresses better, as it contains the first byte of all rows, then the second, and so on.
 
     raw_bytes : bytes of the table, row by row
     bytes_per_word, words_per_row : number of bytes per word, and number of words per row

@@ -68,9 +68,10 @@ def slider_frame_changes(
 ) -> Json:
     """Return as JSON how the frame at one value of a slider differs from the frame at the default value.
 
-    Compared are the floats in uniform records (structs that shaders read as uniforms), and the data that
-    passes write from the host to buffers. Each change consists of three indices: of the record or pass, of
-    its first 4-byte word that differs, and of the differences in `byte_runs`.
+    The comparison covers the floats in uniform records (structs that shaders read as uniforms), and the data
+    that passes write from the host to buffers. Each change is stored as three indices: the index of the
+    record or pass, the index of its first 4-byte word that differs, and the index of the byte run with the
+    differences.
 
     default_frame, moved_frame : captured frames at the default value and at the other value
 
@@ -99,7 +100,7 @@ def _record_floats(uniform_record: UniformRecord) -> Floats:
 
 
 def _float_word_mask(dtype: np.dtype[Any]) -> NDArray[np.bool_]:
-    """Return a mask that is true for each 4-byte word of a record that holds a float."""
+    """Return a mask of the 4-byte words of a uniform record: true for words that are floats."""
     is_float = np.zeros(dtype.itemsize // 4, np.bool_)
     for member, offset, *_ in (dtype.fields or {}).values():
         words = slice(offset // 4, (offset + member.itemsize) // 4)

@@ -26,7 +26,7 @@ BIOSKIN_UNKNOWN_SETS = (("melanin", "blood"), ("melanin", "blood", "oxygen"), _D
 
 
 def bioskin_model(weights_path: Path) -> SpectralModel:
-    """Return the decoder as a spectral model.
+    """Return BioSkin's decoder as a function from skin parameters to reflectance spectra.
 
     weights_path : the published file pretrained_models/BioSkin.pt
 

@@ -132,10 +132,10 @@ def _blood_absorption_by_band(oxygen: float, half_width_nm: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class SharedFit:
-    """Result of a fit of a skin model to spectra: shared constants, and unknowns of each spectrum.
+    """Result of a fit of a skin model to spectra: shared constants, and values for each spectrum.
 
     constants : values of the constants that all spectra share, by name
-    fit : unknowns of each spectrum
+    fit : fitted values of the unknowns, separate for each spectrum
     confounded : for each pair of constants with strongly correlated errors, both names and the correlation
     """
 

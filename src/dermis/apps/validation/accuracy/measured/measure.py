@@ -176,8 +176,9 @@ def _smooth_surface_errors(archive: Archive) -> JsonObject:
     """Return percentiles of the distances of measured colours from a smooth surface in colour space.
 
     The surface near a person's colour is fitted to the colours of other people. The colours that a skin model
-    with two unknowns can produce also form a surface; its errors can therefore hardly be smaller than these
-    distances. For the key "each site", a separate surface is fitted for each site of the body.
+    with two unknowns can produce also form a surface. The errors of such a model can therefore hardly be
+    smaller than these distances. For the key "each site", a separate surface is fitted for each site of the
+    body.
     """
     face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
     sites = [_surface_distances(archive.select_rows(archive.site == site)) for site in range(len(SITES))]
@@ -259,10 +260,10 @@ def _illuminant_errors(fits_by_unknown_count: dict[str, SpectralFit]) -> JsonObj
 
 
 def _fold_errors(archive: Archive) -> list[JsonObject]:
-    """Return cross-validated results: one object with constants and errors for each fold.
+    """Return one object for each fold of the cross-validation, with fitted constants and median errors.
 
-    The constants are fitted to the other folds. The errors are those of the fitted and of the default
-    constants, in the fold itself.
+    A fold is one part of the people. The constants are fitted to the spectra of all other people. The errors
+    are for the spectra of the fold, first with the fitted and then with the default constants.
     """
     rows = []
     for fold in range(FOLD_COUNT):
@@ -287,7 +288,10 @@ def _fold_errors(archive: Archive) -> list[JsonObject]:
 
 
 def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObject:
-    """Return fit errors of published models of skin, with two, three and five unknowns per spectrum."""
+    """Return fit errors of published models of skin, with two, three and five unknowns per spectrum.
+
+    bioskin : file of BioSkin's weights, see `bioskin_model`; None to leave out this model
+    """
     sets = (TWO_UNKNOWNS, THREE_UNKNOWNS, FIVE_UNKNOWNS)
 
     def model_errors(
@@ -418,9 +422,11 @@ def _site_fold_errors(archive: Archive) -> JsonObject:
 
 
 def _edge_loss_errors(archive_sample: Archive) -> JsonObject:
-    """Return the edge loss of each aperture, and constants fitted to spectra corrected for it.
+    """Return the edge loss of each aperture, and skin constants fitted to spectra without edge loss.
 
-    The edge loss is the fraction of the reflected light that an aperture of a spectrophotometer misses.
+    The edge loss is the fraction of the reflected light that an aperture of a spectrophotometer misses. The
+    spectra are divided by the remaining fraction before the fit. The key "uncorrected" has the constants
+    fitted to the spectra as measured.
     """
     skins = [replace(DEFAULT_SKIN, melanin=m, blood=0.008) for m in _EDGE_LOSS_MELANIN]
     losses = [edge_loss(one, _EDGE_LOSS_WAVELENGTHS_NM) for one in skins]

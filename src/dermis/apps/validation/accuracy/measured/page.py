@@ -142,9 +142,9 @@ def _folds_table(fold_results: Sequence[JsonObject]) -> str:
 def _confounded_constant_texts(results: JsonObject) -> dict[str, str]:
     """Return texts on strongly correlated constants and on corrected spectra, keyed by placeholder.
 
-    The text "confounded" lists pairs of constants with strongly correlated errors. The numbers "wide_factor"
-    and "small_factor" multiply the absorption of bloodless tissue. They are fitted to spectra that are
-    corrected for the light that a wide or a small aperture misses.
+    The text "confounded" lists pairs of constants with strongly correlated errors. The texts "wide_factor"
+    and "small_factor" contain fitted factors of the absorption by bloodless tissue: the first for spectra
+    corrected for the light that a wide aperture misses, the second for spectra corrected for a small one.
     """
     pairs = {}
     for row in results["additions"]:
@@ -181,7 +181,7 @@ def _constants_text(constants: dict[str, float]) -> str:
 
 
 def _residual_table(errors_by_model: JsonObject) -> str:
-    """Return the table of mean residuals, measured minus model, by wavelength."""
+    """Return a Markdown table of the mean difference of reflectance, measured minus fitted, by wavelength."""
     shown = range(0, 31, 2)
     heads = ("mean residual, 1e-4", *(f"{400 + 10 * k}" for k in shown))
     rows = [

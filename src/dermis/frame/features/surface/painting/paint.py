@@ -325,7 +325,8 @@ class RawPaintedArrays(NamedTuple):
     """Painted texels in the channels that the painting shader skin.wgsl writes.
 
     colour : (n, n, 4) linear Rec. 709 albedo [-], and a channel of ones
-    specular : (n, n, 4) specular factor, amount of pores, log2 of the mm per unit of uv, and zeros
+    specular : (n, n, 4) specular factor, amount of pores, base-2 logarithm of the surface length in mm per
+        unit of uv, and zeros
     roughness : (n, n, 4) roughness factor, amount of furrows, and fractions of melanin and blood
     height_mm : (n, n) heights of the relief [mm]
     """

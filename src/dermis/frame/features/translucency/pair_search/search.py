@@ -234,8 +234,9 @@ def compute_positions(
 def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple[Bindings, int]:
     """Upload the ranges of source cells that hits.wgsl tests for each receiver cell.
 
-    Also return the number of words that hits.wgsl writes: one for each receiver and each tile that is tested
-    for it. A word has one bit for each source in the tile.
+    Return a dictionary from names in hits.wgsl to the buffers of the ranges, and the number of words that
+    hits.wgsl writes: one word for each receiver and each tile that is tested for it. A word has one bit for
+    each source in the tile.
     """
     word = list_offsets(candidates.end - candidates.first)
     unused = np.zeros(len(candidates.receiver), np.int64)
@@ -248,9 +249,10 @@ def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple
 
 
 def list_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, bindings: Bindings) -> Buffer:
-    """Add the pass that lists, for each source cell, the positions in gutters that copy light near this cell.
+    """Add the pass that lists, for each source cell, the gutter positions to which its light is copied.
 
-    Return the buffer of these positions.
+    The positions to which light of neighbouring cells is copied are included. Return the buffer of all
+    these positions.
 
     source_cells : (n,) indices of cells that emit light
     bindings : further resources of gutter_copies.wgsl
