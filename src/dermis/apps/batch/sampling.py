@@ -56,16 +56,16 @@ def table_numbers(parameters: Mapping[str, float | int | str], table_name: str) 
     }
 
 
-def hashed_uniform(seed: int, image_or_person: int, parameter: str) -> float:
+def hashed_uniform(seed: int, item_number: int, parameter: str) -> float:
     """Return a uniform random number in (0, 1) that depends only on a seed, an image and a parameter.
 
     The random number is a BLAKE2b hash of the three arguments as text. Random numbers for different arguments
     are therefore independent.
 
-    image_or_person : number of the image, or of the person for parameters of people
+    item_number : number of the image, or of the person for parameters of people
     parameter : name of the parameter
     """
-    digest = hashlib.blake2b(f"{seed} {image_or_person} {parameter}".encode(), digest_size=8).digest()
+    digest = hashlib.blake2b(f"{seed} {item_number} {parameter}".encode(), digest_size=8).digest()
     step = int.from_bytes(digest, "little") >> (64 - _UNIFORM_NUMBER_BITS)
     return (step + 0.5) / float(1 << _UNIFORM_NUMBER_BITS)
 
