@@ -15,8 +15,8 @@ from dermis.apps.gallery.script import draw_script
 
 def draw(studio):
     panels = {}
-    for name in dict.fromkeys((studio.name, "human")):
-        head = studio.head(name)
+    bald = dermis.Human(hair=dermis.HairLook()).head()
+    for name, head in ((studio.name, studio.head()), ("human", bald)):
         positions = head.mesh.positions - head.centre_mm
         upper = positions[abs(positions[:, 1]) < 60]
         x, y, z = (float(part) for part in upper[upper[:, 0].argmax()])
