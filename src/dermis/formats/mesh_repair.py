@@ -81,7 +81,13 @@ class RawMesh:
     file_vertex: Index
 
     def build_mesh(self, materials: tuple[Material, ...]) -> Mesh:
-        """Build the `Mesh`, with points and normals."""
+        """Build a `Mesh` from these arrays.
+
+        The indices in `point` are kept. Normals that are not unit vectors, such as NaN, are replaced by
+        computed ones.
+
+        materials : materials to which the indices in `material` refer
+        """
         arrays = self.positions, self.uv, self.triangles, self.material
         return build_mesh(*arrays, materials, self.normals, self.point, self.quads)
 

@@ -172,7 +172,15 @@ def _join_and_strip_lines(obj_text: str) -> str:
 def _split_statements(
     path: Path, plain_text: str
 ) -> tuple[dict[str, _StatementRows], list[_Statement], dict[str, None]]:
-    """Return numeric statements by first word, other statements, and first words of unknown statements."""
+    """Split the text of an OBJ file into its statements.
+
+    Returns the `v`, `vt`, `vn` and `f` statements by first word; all other statements that are read, such as
+    `usemtl`, in the order of the file; and, as keys of a dictionary, the first words of the statements that
+    are not read.
+
+    path : path of the file, for errors
+    plain_text : text of the file, as `_join_and_strip_lines` returns it
+    """
     data = np.frombuffer(f"{plain_text}\n".encode("utf-8", "replace"), np.uint8)
     end = np.flatnonzero(data == _LINE_FEED)
     start = np.concatenate([[0], end[:-1] + 1])

@@ -1,4 +1,8 @@
-"""Reading of mesh files by format."""
+"""Reading of mesh files of all formats.
+
+The reader for the format of a file returns mesh parts; the functions here choose this reader, check and clean
+the parts, and join them.
+"""
 
 from __future__ import annotations
 

@@ -170,7 +170,10 @@ class _DownloadProgress:
         self._bars.reset(self._task)
 
     def close(self) -> None:
-        """Do nothing: pooch calls `close` only after success, so `stop` removes the bar instead."""
+        """Do nothing; pooch requires this method.
+
+        `stop` removes the progress bar instead, because pooch does not call `close` if a download fails.
+        """
 
     def stop(self) -> None:
         if self._bars.live.is_started:

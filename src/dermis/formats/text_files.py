@@ -1,4 +1,4 @@
-"""Text of mesh files: its encoding, and the numbers in it as arrays."""
+"""Decoding of mesh files that are text, parsing of their numbers into arrays, and lists of names."""
 
 from __future__ import annotations
 

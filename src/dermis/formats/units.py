@@ -37,13 +37,13 @@ _USUAL_SIZE_RANGE_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}
 def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, culprit: object) -> RiggedMesh:
     """Return the mesh of a file in millimetres, with a note if its unit was guessed or its size is unusual.
 
-    A guessed unit scales only the mesh, because the unit is only guessed for OBJ, PLY and STL, which have no
-    rigs.
+    The unit is guessed for OBJ, PLY and STL if the user states none. A guessed unit scales only the mesh,
+    because files of these formats have no rigs.
 
-    rigged : mesh and rig, in millimetres according to `unit_mm`, or else to the unit of the file or format
+    rigged : mesh and rig of the file, already converted to millimetres: from `unit_mm` if the user states it,
+        otherwise from the unit that the file states, or else from the default unit of its format
     path : path of the file, whose suffix tells the format
-    unit_mm : unit of the file as the user states it [mm]; None to use the unit of the file or its format, or
-        to guess it for OBJ, PLY and STL
+    unit_mm : unit of the file as the user states it [mm]; None if the user states none
     culprit : source of the mesh, for errors
 
     Raises DermisError for a mesh that is smaller than a millimetre or larger than three metres.

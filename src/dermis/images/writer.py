@@ -106,8 +106,11 @@ class ImageWriter:
 class FrameFiles:
     """Numbered picture files of a sequence, named by a pattern such as frames/%05d.png.
 
-    The content key of a sequence is a text that is equal for sequences with equal frames. A hidden file next
-    to the pictures stores the content key of the sequence to which the existing pictures belong.
+    The content key of a sequence is a text that is equal for sequences with equal frames, such as a hash of
+    everything that determines the frames. A hidden file next to the pictures stores the content key of the
+    sequence that was started last, so that this sequence can be continued.
+
+    pattern : path of the pictures, with a placeholder such as %05d for the number of the frame
     """
 
     pattern: Path
@@ -139,12 +142,13 @@ class FrameFiles:
         check_output(self.path(0))
 
     def start_sequence(self, content_key: str, *, force: bool = False) -> None:
-        """Start a sequence, or continue it if its stored content key is equal to `content_key`.
+        """Start a sequence, or continue the previous one if it has the same content key.
 
-        A sequence that is continued keeps its existing pictures.
+        A sequence that is continued keeps its pictures on disk; for a new sequence, `missing_frames` treats
+        them as missing.
 
         content_key : text that is equal for sequences with equal frames
-        force : whether to discard existing pictures even if the content keys are equal
+        force : whether to start a new sequence even if the content keys are equal
         """
         if force or not self._record_matches(content_key):
             with atomic_file(self._record_path) as temporary:
@@ -162,7 +166,10 @@ class FrameFiles:
         ]
 
     def _record_matches(self, content_key: str) -> bool:
-        """Return whether the stored content key of the existing pictures is equal to `content_key`."""
+        """Return whether the hidden file stores the same content key as `content_key`.
+
+        If it does, the pictures on disk belong to a sequence with equal frames.
+        """
         text = content_key.encode()
         try:
             return read_file(self._record_path, "a record of frames", len(text)) == text

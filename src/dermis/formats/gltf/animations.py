@@ -137,10 +137,10 @@ def _weight_track(
 
 
 def _merge_tracks(animated_property: str, keyframes_by_name: list[tuple[str, _Keyframes]]) -> AnimationTrack:
-    """Merge the keyframes of nodes or morph targets with equal key times into one track.
+    """Merge the keyframes of one property of several nodes, which have equal key times, into one track.
 
     animated_property : `path` of the track, see `AnimationTrack`
-    keyframes_by_name : name and keyframes of each node or morph target
+    keyframes_by_name : name and keyframes of each node
     """
     keys = keyframes_by_name[0][1]
     values = np.stack([own.values for _, own in keyframes_by_name], axis=-2)
@@ -179,7 +179,8 @@ def _read_keyframes(document: Document, sampler: Tree, component_count: int, cul
 class AnimationCurve:
     """Animated property of m nodes as a function of time, with n components for each node.
 
-    All nodes have the same key times. For weights of n morph targets, m is 1.
+    The property is a translation, rotation or scale, whose keys are at the same times for all nodes, or the
+    weights of the n morph targets of a mesh; then m is 1.
 
     times_s : (k,) times of the keys, not decreasing [s]
     values : (k, m, n) values at the keys; for a cubic spline (k, 3, m, n): in-tangent, value, out-tangent
@@ -195,9 +196,9 @@ class AnimationCurve:
     is_rotation: bool = False
 
     def sample(self, seconds: float) -> Doubles:
-        """Return the values (m, n) at a time [s].
+        """Return the value of the property at a time [s]: n components for each of the m nodes, (m, n).
 
-        Before the first key and after the last key, the values are constant.
+        Before the first key and after the last key, the value is constant.
         """
         index = int(np.searchsorted(self.times_s, seconds, side="right")) - 1
         keys = self.values[:, _SPLINE_VALUE] if self.kind == "CUBICSPLINE" else self.values

@@ -32,8 +32,8 @@ _DEFAULT_ROUGHNESS = 0.8
 class SkinAdditions:
     """Properties that an export adds to the glTF material of skin.
 
-    surface : members to add to the material's `pbrMetallicRoughness`; if there are any, the material's base
-        colour texture moves from there to its `extras`
+    surface : members to add to the material's `pbrMetallicRoughness`, such as a `baseColorFactor`; if there
+        are any, they replace the base colour texture, which moves to the material's `extras`
     extensions : members to add to the material's `extensions`
     extras : members to add to the material's `extras`
     pictures : dictionary from name to PNG file; textures reference a picture as {"index": name}
@@ -45,9 +45,11 @@ class SkinAdditions:
     pictures: Mapping[str, bytes] = field(default_factory=dict)
 
     def add_to_material(self, material: FrozenTree) -> Tree:
-        """Return a copy of a glTF material with these properties added.
+        """Return a copy of a glTF material, extended by the properties of this object.
 
-        If `surface` is not empty, the base colour texture moves to the extras.
+        If `surface` is not empty, the material's base colour texture moves to the entry "colour" of its
+        "dermis" extras. There, other programs ignore the texture, but this package finds it when it reads the
+        file.
         """
         extended = dict(material) | {"extensions": {**material.get("extensions", {}), **self.extensions}}
         surface = dict(material["pbrMetallicRoughness"])

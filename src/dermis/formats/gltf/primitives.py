@@ -33,11 +33,17 @@ class PrimitiveSource(Protocol):
     """Geometry that can be written as a glTF primitive with morph targets."""
 
     def add_primitive(self, buffer_builder: BufferBuilder) -> Tree:
-        """Append vertices and triangles to the buffer; return the primitive (no material, no targets)."""
+        """Append the vertices and triangles of this geometry to the buffer, and return a glTF primitive.
+
+        The caller adds the material and the morph targets to the primitive.
+        """
         ...
 
     def add_target(self, buffer_builder: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
-        """Append a morph target to the buffer, and return its accessor indices by attribute name."""
+        """Append to the buffer how a morph target changes the vertices of this geometry.
+
+        Returns a dictionary from attribute name to accessor index.
+        """
         ...
 
 
@@ -64,10 +70,11 @@ class SurfacePrimitive:
         return np.unique(self._head.mesh.triangles[self.faces])
 
     def add_primitive(self, buffer_builder: BufferBuilder) -> Tree:
-        """Append vertices and triangles to the buffer; return the primitive (no material, no targets).
+        """Append these triangles and their vertices to the buffer, and return a glTF primitive.
 
-        The extras of the primitive state whether its triangles form quads, and whether it is separate, which
-        means that it has no points in common with other primitives.
+        The caller adds the material and the morph targets to the primitive. The extras of the primitive say
+        "quads" if its successive pairs of triangles are the halves of quads, and "alone" if it has no points
+        in common with other primitives.
         """
         used, mesh = self.used_vertices, self._head.mesh
         index = buffer_builder.add_triangles(np.searchsorted(used, mesh.triangles[self.faces]), len(used))
@@ -82,7 +89,7 @@ class SurfacePrimitive:
         return primitive | ({"extras": {"dermis": extras}} if extras else {})
 
     def add_target(self, buffer_builder: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
-        """Append changes of positions and normals to the buffer.
+        """Append to the buffer how a morph target changes positions and normals of these vertices.
 
         Returns a dictionary from attribute name to accessor index.
         """
@@ -115,7 +122,11 @@ class SurfacePrimitive:
 
 @dataclass(frozen=True, eq=False)
 class HairPrimitive:
-    """Hairs as tubes, coloured by a picture with one row of texels."""
+    """Hairs on a head, written as thin tubes that are coloured by a texture with a single row of texels.
+
+    deformable : mesh of the head with its deformation
+    fibres : tubes around the hairs
+    """
 
     deformable: DeformableMesh
     fibres: FibreTubes
@@ -125,9 +136,10 @@ class HairPrimitive:
         return replace(self.deformable.head.mesh, positions=self.deformable.positions_mm).points_mm
 
     def add_primitive(self, buffer_builder: BufferBuilder) -> Tree:
-        """Append vertices and triangles to the buffer; return the primitive (no material, no targets).
+        """Append the vertices and triangles of the hair tubes to the buffer, and return a glTF primitive.
 
-        The extras of the primitive mark it as hair, so that `read_gltf` skips it.
+        The caller adds the material and the morph targets to the primitive. The extras of the primitive mark
+        it as hair, so that `read_gltf` skips it.
         """
         positions, normals = self.fibres.pose_vertices(self._rest_points)
         _, uv = self.fibres.palette_and_uv()
@@ -141,7 +153,10 @@ class HairPrimitive:
         return {"attributes": attributes, "indices": index, "extras": {"dermis": {"hair": True}}}
 
     def add_target(self, buffer_builder: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
-        """Append displacements of positions to the buffer; return {"POSITION": index of their accessor}."""
+        """Append to the buffer how a morph target displaces the vertices of the hair tubes.
+
+        Returns {"POSITION": index of the accessor of the displacements}.
+        """
         delta, mesh = np.zeros_like(self._rest_points), self.deformable.head.mesh
         delta[mesh.point[vertex_target.vertex]] = vertex_target.delta_mm
         vertex, displacement = self.fibres.tube_displacements(self._rest_points, delta)
@@ -186,10 +201,11 @@ def _bone_attributes(
 
 @dataclass(frozen=True, eq=False)
 class FibreTubes:
-    """Tubes around n hairs, with m vertices for each hair.
+    """Thin three-sided tubes that represent n hairs, with m vertices in each tube.
 
-    Each tube is rigid and moves with the skin at its root.
+    Each tube is rigid and moves with the skin at the root of its hair.
 
+    strands : the n hairs
     mesh : mesh of the skin on which the hairs grow
     """
 
@@ -198,7 +214,7 @@ class FibreTubes:
 
     @classmethod
     def from_strands(cls, strands: Strands, mesh: Mesh, max_hairs: int, knot_count: int) -> FibreTubes:
-        """Return tubes for the first `max_hairs` hairs, through `knot_count` points along each hair.
+        """Return tubes around the first `max_hairs` hairs, through `knot_count` points along each hair.
 
         If hairs are left out, the tubes are widened to cover the same area in total, and their absorption
         is reduced accordingly.
@@ -226,17 +242,17 @@ class FibreTubes:
 
     @property
     def vertices_per_hair(self) -> int:
-        """Return the number of vertices of a tube: rings along the hair, and one vertex at the tip."""
+        """Return the number m of vertices of a tube: three in each ring along it, and one at its tip."""
         return _TUBE_SIDES * (self._knot_count - 1) + 1
 
     @property
     def vertex_count(self) -> int:
-        """Return the total number of vertices of all tubes."""
+        """Return the number of vertices of the tubes of all hairs, n * m."""
         return self.vertices_per_hair * len(self.strands)
 
     @property
     def root_vertices(self) -> Intp:
-        """Return the index of the mesh vertex nearest to each root, (n,)."""
+        """Return the index of the skin vertex nearest to the root of each hair, (n,)."""
         nearest = quad_weights(self.strands.roots.position).argmax(axis=1)
         first, second = self.mesh.quads[self.strands.roots.quad].T
         corners = np.column_stack([self.mesh.triangles[first], self.mesh.triangles[second, 1]])
@@ -244,7 +260,10 @@ class FibreTubes:
 
     @cached_property
     def _tube_rings(self) -> tuple[Doubles, Doubles]:
-        """Return the vertices [mm] and normals of the tubes, (n, m, 3) each, in local axes at each root."""
+        """Return the vertices [mm] and normals of the tubes, in the frame at the root of each hair.
+
+        Both arrays are (n, m, 3): m vertices for each of the n hairs. The frames are those of `root_frames`.
+        """
         knots = self.strands.knots_mm.astype(np.float64)
         tangent = np.gradient(knots, axis=1)
         tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), _MIN_VECTOR_LENGTH)
@@ -263,20 +282,22 @@ class FibreTubes:
         return all_positions, np.concatenate([*normals, tangent[:, -1:]], axis=1)
 
     def pose_vertices(self, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
-        """Return the tube vertices [mm] and their normals, (n m, 3) each, on a posed skin.
+        """Return the vertices [mm] and normals of the tubes on the posed skin, (n * m, 3) each.
 
-        points_mm : (p, 3) points of the posed mesh
+        The m vertices of the first hair come first, then those of the second hair, and so on.
+
+        points_mm : (p, 3) points of the skin mesh in this pose
         """
         root, frame = root_frames(self.mesh, self.strands.roots, points_mm)
         offsets, normals = (np.einsum("nic,nki->nkc", frame, part) for part in self._tube_rings)
         return (root[:, None] + offsets).reshape(-1, 3), normals.reshape(-1, 3)
 
     def tube_displacements(self, points_mm: Doubles, delta_mm: Doubles) -> tuple[Index, Doubles]:
-        """Return the tube vertices that move when the skin is displaced.
+        """Return the k tube vertices that move when the skin is displaced.
 
-        Returns vertex indices (k,) and displacements (k, 3) [mm].
+        Returns their indices (k,) and displacements (k, 3) [mm].
 
-        points_mm : (p, 3) points of the mesh at rest
+        points_mm : (p, 3) points of the skin mesh at rest
         delta_mm : (p, 3) displacements of these points
         """
         first, second = self.mesh.quads[self.strands.roots.quad].T
@@ -293,7 +314,7 @@ class FibreTubes:
         return vertex.ravel(), delta[moving].reshape(-1, 3)
 
     def triangles(self) -> Index:
-        """Return the vertex indices of the tubes' triangles, (f, 3)."""
+        """Return the vertex indices of the f triangles of all tubes, (f, 3)."""
         side, following = np.arange(_TUBE_SIDES), (np.arange(_TUBE_SIDES) + 1) % _TUBE_SIDES
         faces = list[Index]()
         for k in range(self._knot_count - 2):
@@ -309,7 +330,10 @@ class FibreTubes:
         return np.asarray((start[:, None, None] + np.concatenate(faces)).reshape(-1, 3), np.int64)
 
     def palette_and_uv(self) -> tuple[Floats, Floats]:
-        """Return a palette (1, c, 3) of c linear hair colours, and the uv (n m, 2) of tube vertices in it."""
+        """Return a palette of hair colours as a texture, and the uv of all tube vertices in this texture.
+
+        The texture (1, c, 3) is a row of c linear colours; each hair has one of them. The uv are (n * m, 2).
+        """
         absorbance = self.strands.absorption * self.strands.radius_mm.max(axis=1, keepdims=True)
         albedo = np.exp(-_HAIR_ALBEDO_EXPONENT * np.sqrt(absorbance.astype(np.float64)))
         order = np.argsort(albedo.sum(axis=1), kind="stable")

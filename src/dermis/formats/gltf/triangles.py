@@ -327,8 +327,8 @@ def _skin_part(
     """Return a mesh part and its morph targets with each vertex transformed by its skinning matrix.
 
     targets : morph targets of the part by name
-    influences : bones and weights of each vertex, which the result contains
-    skinning_matrices : (v, 4, 4) skinning matrices at rest
+    influences : bones and weights of each vertex; they become `bone` and `weight` of the returned part
+    skinning_matrices : (v, 4, 4) skinning matrix of each vertex in the rest pose
     """
     if len(influences.bone) != len(mesh_part.positions):
         raise ValueError(f"{len(mesh_part.positions)} vertices have {len(influences.bone)} joints")

@@ -136,8 +136,11 @@ def estimate_frame_rate(times: Doubles) -> float | None:
 def to_seconds(culprit: object, times: Doubles, unit_s: float | None) -> Doubles:
     """Return times (k,) in seconds.
 
-    unit_s : unit of the times [s]; None if it is unknown, in which case the largest unit is assumed in which
-        frames are at most 2 s apart, and a note tells the user
+    If the unit is unknown, it is guessed, and a note tells the user. The guess is the first of seconds,
+    milliseconds, microseconds and nanoseconds for which the median interval between frames is at most 2 s.
+
+    culprit : source of the times, for the note
+    unit_s : unit of the times [s]; None if it is unknown
     """
     if unit_s is None:
         steps = np.diff(times)
@@ -150,7 +153,12 @@ def to_seconds(culprit: object, times: Doubles, unit_s: float | None) -> Doubles
 
 
 def frame_rate_or_default(culprit: object, fps: float | None, default_fps: float) -> float:
-    """Return the frame rate of a capture without times: `fps`, or `default_fps` with a note to the user."""
+    """Return the frame rate to use for a capture whose frames have no times.
+
+    This is `fps`. If `fps` is None, it is `default_fps`, and a note tells the user.
+
+    culprit : source of the capture, for the note
+    """
     if fps is None:
         assumed = f"{default_fps:g} frames per second are assumed"
         notify(f"{culprit}: it has no times; {assumed}, which fps (--motion-fps) changes")
@@ -244,9 +252,10 @@ def match_targets(shape_names: Iterable[str], target_names: Sequence[str]) -> di
 
 
 def _plain_shape_name(shape_name: str) -> str:
-    """Normalise a blend shape name for comparison.
+    """Return a form of a blend shape name that is equal for the spellings of different programs.
 
-    The result is in lower case, without a prefix, and with "left" or "right" for L or R.
+    The form is in lower case and has only letters and digits. The part up to the last period, such as
+    "blendShape1.", is removed, and a final L or R after a separator becomes "left" or "right".
     """
     last = shape_name.rpartition(".")[2]
     side = re.fullmatch(r"(.+)[_\-. ]([lrLR])", last)

@@ -284,9 +284,10 @@ def _parse_time(culprit: str, time_cell: str) -> float:
 
 
 def _timecode_rate(timecodes: Sequence[_Timecode]) -> float:
-    """Estimate the frame rate of timecodes: the lowest common rate above the largest frame number.
+    """Estimate the frame rate of timecodes from the largest number of a frame within its second.
 
-    If the recording lasts less than a second, the result is at least 60, the frame rate of Live Link Face.
+    The estimate is the lowest standard rate (24, 25, 30, 48, 50, 60, ...) above this number. If all timecodes
+    are in the same second, the estimate is at least 60, the frame rate of Live Link Face.
     """
     largest = max(int(code.frames) for code in timecodes)
     seconds_advance = any(after.seconds > before.seconds for before, after in pairwise(timecodes))

@@ -220,8 +220,8 @@ def _parse_frame(
 def _first_face(json_faces: object) -> tuple[object, int]:
     """Return the blend shapes of the first face, and the number of faces.
 
-    json_faces : blend shapes of one face, or an object that contains their list, or a list of such values for
-        several faces; None without a face
+    json_faces : blend shapes as {name: score} or as a list of names and scores, or an object that contains
+        this list; for several faces, a list with one of these for each face; None if there is no face
     """
     faces = 1
     while True:
@@ -269,8 +269,10 @@ def _shape_scores(culprit: str, json_shapes: object) -> dict[str, float]:
 def _facial_transformation(culprit: str, json_matrix: object) -> Doubles | None:
     """Return the facial transformation (4, 4) of the first face; None if the frame has none.
 
-    The translation is in the last column of the result. A flat list without a translation is taken to be in
-    column-major order, as MediaPipe's APIs return it.
+    The translation is in the last column of the result, whether the file lists the matrix by rows or by
+    columns; the place of the translation in the file tells which. If the translation is 0, a flat list inside
+    an object or inside another list is taken to be in column-major order, as MediaPipe's APIs return it, and
+    any other matrix in row-major order.
 
     json_matrix : matrix as a nested or flat list, or an object that contains such a list, or a list of
         several matrices or objects, one for each face

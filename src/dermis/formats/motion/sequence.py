@@ -231,11 +231,14 @@ class FrameVertices(NamedTuple):
 
 
 class _ObjFingerprint(NamedTuple):
-    """Fingerprint of an OBJ file that does not depend on its positions and normals.
+    """Fingerprint of an OBJ file: equal for files that differ only in positions and normals.
+
+    It also says which `v` line contains the position of each vertex, so that the positions of another file
+    with this fingerprint can be read without parsing the rest of the file.
 
     digest : hash of all lines except `v` and `vn`
     line_count : number of `v` lines
-    line_of_vertex : (v,) index of the `v` line of each vertex
+    line_of_vertex : (v,) number of the `v` line of each vertex, counted from 0 among the `v` lines
     """
 
     digest: bytes
@@ -316,8 +319,9 @@ def _split_vertex_lines(obj_bytes: bytes) -> tuple[list[tuple[bytes, bytes, byte
 def _obj_fingerprint(path: Path, obj_bytes: bytes) -> _ObjFingerprint:
     """Return the fingerprint of an OBJ file.
 
-    Before the file is parsed, the x coordinate in each `v` line is replaced by the index of that line. The
-    parsed x coordinate of a vertex is then the index of its line.
+    The parser does not tell from which `v` line it made each vertex. Therefore, it gets a copy of the file in
+    which the x coordinate in each `v` line is the number of that line. The parsed x coordinate of a vertex is
+    then its `_ObjFingerprint.line_of_vertex`.
 
     path : path of the file, for errors
     obj_bytes : text of the file in UTF-8
@@ -332,7 +336,9 @@ def _obj_fingerprint(path: Path, obj_bytes: bytes) -> _ObjFingerprint:
 
 
 def _parse_positions(obj_bytes: bytes, fingerprint: _ObjFingerprint) -> Doubles | None:
-    """Return the vertex positions (v, 3) of an OBJ file in file units; None if it has another fingerprint.
+    """Return the vertex positions (v, 3) of an OBJ file in file units.
+
+    Returns None if the file has another fingerprint, or positions that are not finite numbers.
 
     obj_bytes : bytes of the file
     fingerprint : fingerprint of the first file of the sequence, which all files should have
