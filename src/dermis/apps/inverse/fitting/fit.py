@@ -162,7 +162,10 @@ class InitialGuess:
         return trials, np.array([self._squared_residual(one, sun_indices) for one in trials])
 
     def _select_suns(self, log_skin: Floats, sun_count: int) -> list[int]:
-        """Return the indices of `sun_count` suns, chosen greedily: each lowers the residual the most.
+        """Return the indices of `sun_count` candidate suns, chosen greedily one after the other.
+
+        Each of them is the candidate that lowers the residual more than any other candidate would, together
+        with the suns that are already chosen.
 
         log_skin : (4,) logarithms of the skin parameters, see `FitPoint`
         """
@@ -343,9 +346,9 @@ def warn_of_poor_fit(photo_source: object, median_residual: float) -> None:
 
 
 def _find_skin(face_renderer: FaceRenderer, photo: Photograph) -> FitPoint:
-    """Set the renderer's mask to the pixels of lit skin; return the point where the coarse search starts.
+    """Set the renderer's mask to the pixels of lit skin; return the unknowns with which the search starts.
 
-    This point has the median skin parameters of the prior, and all candidate suns.
+    They are the median skin parameters of the priors, and the directions of all candidate suns.
     """
     camera = face_renderer.scene.camera
     view_direction = np.subtract(camera.position, camera.target)
@@ -363,10 +366,11 @@ def _find_skin(face_renderer: FaceRenderer, photo: Photograph) -> FitPoint:
 def _start_points(problem: FitProblem, candidate_point: FitPoint, sun_count: int) -> list[FitPoint]:
     """Return points at which to start fits, found by a coarse search for suns and a finer search around them.
 
-    There is one point for each minimum of the coarse search, see `InitialGuess.melanin_ranges`.
+    There is one point for each melanin fraction at which the residual of the coarse search has a local
+    minimum, see `InitialGuess.melanin_ranges`.
 
-    candidate_point : point with the skin parameters and all suns for the coarse search
-    sun_count : number of suns to choose from these
+    candidate_point : skin parameters and all candidate suns of the coarse search
+    sun_count : number of these candidate suns that each start point keeps
     """
     frames, target, weight = problem.frames, problem.target, problem.initial_weights()
     coarse = InitialGuess(frames, candidate_point, target, weight)

@@ -61,7 +61,7 @@ class FaceRenderer:
         self.mask = _erode(skin) & (unclipped_pixels > _FULL_COVERAGE)
 
     def single_light_radiance(self, fit_point: FitPoint) -> Floats:
-        """Render the face under each light alone; return the radiance (9 + k, p, 3) of the p masked pixels.
+        """Render the face under each light alone; return the radiance (9 + k, p, 3) of p pixels in the mask.
 
         The first nine lights are wide lobes of ambient light, see `lobe_directions`, with radiance 1 along
         their axes. The other k lights are suns with irradiance 1.
@@ -80,7 +80,7 @@ class FaceRenderer:
         return both[:, 0], both[:, 1]
 
     def combined_radiance(self, fit_point: FitPoint, light_strengths: Floats, frame_name: str) -> Floats:
-        """Render the face under all lights together; return the radiance (p, 3) of the masked pixels.
+        """Render the face under all lights together; return the radiance (p, 3) of the p pixels in the mask.
 
         light_strengths : (9 + k,) strengths of ambient lobes and suns
         frame_name : file name of the ambient light's panorama, without suffix

@@ -171,10 +171,10 @@ def _person_of_head(head: Head) -> Human | None:
 
 
 def _scene_without_lights(scene: Scene) -> Scene:
-    """Return the scene without lights, with values for the skin parameters that a fit keeps fixed.
+    """Return the scene without lights, and with explicit values of the skin parameters that are not fitted.
 
-    The value of each of these parameters is the value that the scene states. If the scene states none, it is
-    the value from which the head's maps were painted, or else a default.
+    These are epidermal thickness, eumelanin and oxygen. Each gets the value in the scene's skin; if it has
+    none there, the value with which the head's skin maps were painted; for other heads, a default.
     """
     fixed_pigments = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
     if isinstance(scene.head.maps, PaintedMaps):

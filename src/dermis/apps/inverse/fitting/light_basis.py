@@ -95,10 +95,11 @@ def solve_normal_equations(gram: Floats, right_side: Floats) -> Floats:
 
 
 def lobe_mixing_matrix(sun_count: int) -> Floats:
-    """Return the matrix (9 + k, n + k) that converts strengths of n evenly distributed lobes and k suns.
+    """Return the matrix (9 + k, n + k) that converts strengths of n lobes to those of the 9 ambient lobes.
 
-    The results are the strengths of the 9 ambient lobes, see `lobe_mixtures`, and the unchanged strengths of
-    the suns. If the strengths of the n lobes are not negative, no direction has negative ambient light.
+    The n lobes are evenly distributed over the sphere, see `lobe_mixtures`. As long as their strengths are
+    not negative, ambient light is not negative in any direction. The strengths of k suns, which follow those
+    of the lobes, stay unchanged.
 
     sun_count : number k of suns
     """

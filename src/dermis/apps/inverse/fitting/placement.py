@@ -1,4 +1,4 @@
-"""Fit of the camera and of a person's identity to landmarks in a photograph, by least squares."""
+"""Fit of the camera and of a person's shape to landmarks in a photograph, by least squares."""
 
 from __future__ import annotations
 
@@ -69,14 +69,15 @@ def align_to_landmarks(
 
 @dataclass(frozen=True, eq=False)
 class _LandmarkModel:
-    """Linear model of landmark positions on a head, as a function of the identity of a person.
+    """Linear model of landmark positions on a head, as a function of a person's shape parameters.
 
     names : names of the n landmarks
     positions : (n, 3) positions for the mean of the priors, relative to the head's centre [mm]
-    derivatives : (u, n, 3) derivatives of the positions with respect to the u unknowns; each unknown is
-        measured in standard deviations of its prior [mm]
+    derivatives : (u, n, 3) derivatives of the positions with respect to the u shape parameters, each of which
+        is measured in standard deviations of its prior [mm]
     prior : person at the mean of the priors; None for heads of fixed shape
-    details : names of the MakeHuman targets that are unknowns
+    details : names of the MakeHuman targets of the face; their weights are the last shape parameters, after
+        ancestry, sex, age, weight and muscle
     """
 
     names: tuple[str, ...]
@@ -120,13 +121,14 @@ class _LandmarkModel:
 
     @property
     def unknown_count(self) -> int:
-        """Return the number of unknowns of the identity, which is 0 for heads of fixed shape."""
+        """Return the number of shape parameters that the fit determines; 0 for heads of fixed shape."""
         return len(self.derivatives)
 
     def person_with_identity(self, identity: Floats) -> Human:
-        """Return the person with a given identity.
+        """Return the person of `prior` with changed shape parameters, which are clipped to their limits.
 
-        identity : (u,) differences of the unknowns from their values in `prior`, in standard deviations
+        identity : (u,) differences of the shape parameters from their values in `prior`, in standard
+            deviations of their priors
         """
         assert self.prior is not None
         macro: dict[str, Any] = {
@@ -144,10 +146,11 @@ class _LandmarkModel:
 def _landmark_derivative(
     model: _LandmarkModel, person_landmarks: Callable[[Human], Floats], unknown_index: int
 ) -> Floats:
-    """Return the derivative (n, 3) of landmark positions with respect to one unknown of the identity.
+    """Return the derivative (n, 3) of landmark positions with respect to one shape parameter of the person.
 
-    The step of the finite difference is upwards, or downwards if the unknown is at its upper limit.
+    It is a one-sided finite difference: the parameter is increased, or decreased if it is at its upper limit.
 
+    unknown_index : index of the shape parameter
     person_landmarks : function that returns the landmark positions (n, 3) of a person [mm]
     """
     for step in _IDENTITY_STEP, -_IDENTITY_STEP:
@@ -192,10 +195,10 @@ def _landmark_positions(
 def _fit_camera_and_identity(
     model: _LandmarkModel, landmark_pixels: Floats, photo_size: tuple[int, int], start_unknowns: Floats
 ) -> Floats:
-    """Fit camera and identity to landmarks; return the unknowns (7 + u,).
+    """Fit the camera and the person's shape to landmarks; return the unknowns (7 + u,).
 
     They are a rotation vector (3), a translation (3) [mm], the logarithm of the focal length in pixels, and
-    the u unknowns of the identity.
+    the u shape parameters, as differences from the means of their priors in standard deviations.
 
     landmark_pixels : (n, 2) landmarks in the photograph
     photo_size : width and height of the photograph [pixel]

@@ -43,7 +43,7 @@ class FitResult:
     """Light and skin of a photograph, as found by `dermis.fit`.
 
     subject : head, person, camera and pose
-    point : skin unknowns and directions towards the suns
+    point : fitted values of the skin parameters, of the directions towards the suns and of the light's colour
     strengths : (9 + k,) strengths of the ambient lobes and of the suns
     white : (3,) colour of the light in linear Rec. 709, scaled to green 1
     exposure : ratio of the photograph's linear values to the radiance [-]

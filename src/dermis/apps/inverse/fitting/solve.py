@@ -44,7 +44,7 @@ class FitState:
 
     point : skin, directions of the suns, and colour of the light
     strengths : (9 + k,) strengths of the ambient lobes and of the suns
-    basis : (9 + k, p, 3) radiance of the masked pixels under each light alone
+    basis : (9 + k, p, 3) radiance of the p fitted pixels under each light alone
     residual : (p, 3) radiance of the photograph minus radiance of the model
     weight : (p, 3) inverse standard deviation of each pixel, lowered for outliers
     cost : sum of the squared weighted residuals, plus the sum of the squared differences of the unknowns from
@@ -64,8 +64,8 @@ class FitProblem:
     """Photograph to fit, with its noise, and the renderer of the face.
 
     frames : renderer of the face
-    target : (p, 3) values of the photograph's masked pixels, divided by the exposure and by the light colour
-        that the user gives
+    target : (p, 3) values of the p pixels of the photograph that are fitted (those in the mask of `frames`),
+        divided by the exposure and by the light colour that the user gives
     noise : relative standard deviation of a pixel [-]
     free_white : whether the colour of the light is an unknown
     robust : number of standard deviations beyond which residuals have less weight
@@ -84,7 +84,10 @@ class FitProblem:
         )
 
     def initial_weights(self) -> Floats:
-        """Return the inverse standard deviations (p, 3) of pixels from their brightness in the photograph."""
+        """Return the weights (p, 3) of the pixels at the start of a fit, before any frame is rendered.
+
+        They are inverse standard deviations, estimated from the brightness of the photograph's pixels.
+        """
         return self.pixel_weights(self.target.mean(axis=1, keepdims=True) * np.ones(3))
 
     def render_state(self, fit_point: FitPoint, pixel_weight: Floats) -> FitState:
@@ -94,7 +97,11 @@ class FitProblem:
         )
 
     def reweighted_state(self, fit_state: FitState) -> FitState:
-        """Return the state with weights computed from the model's radiance and lowered for outliers."""
+        """Return the state with new weights of the pixels, and with the best light strengths for them.
+
+        The weights are inverse standard deviations of pixels with the radiance of the model; pixels that
+        differ much from the model get less weight.
+        """
         weights = self.pixel_weights(np.maximum(self.target - fit_state.residual, 0.0))
         scaled = np.abs(fit_state.residual * weights)
         limit = self.robust * max(_MAD_TO_SD * float(np.median(scaled)), 1.0)
@@ -148,7 +155,10 @@ class FitProblem:
         )
 
     def prior_offsets(self, fit_point: FitPoint) -> Floats:
-        """Return the difference (u,) of each unknown from the mean of its prior, 0 for suns."""
+        """Return the difference (u,) of each unknown from the mean of its prior.
+
+        It is 0 for the angles that describe the directions of suns, because no direction is preferred.
+        """
         skin = fit_point.logs - np.log([one.prior_median for one in SKIN_UNKNOWNS])
         return np.concatenate([skin, np.zeros(2 * len(fit_point.suns)), fit_point.white])
 
@@ -163,7 +173,9 @@ def solve_fit(
 ) -> tuple[FitState, Floats]:
     """Minimise the cost from a start point; return the best state and derivatives of the radiance.
 
-    The derivatives (p, 3, u) with respect to the u unknowns are taken at the best state or one step before.
+    The derivatives (p, 3, u) are with respect to the u unknowns. They belong to the best state if the search
+    ended because no step improved it; otherwise, to the state before the last step.
+
     Light strengths are eliminated by variable projection [GolubPereyra1973] with Kaufman's derivative
     [Kaufman1975].
 
@@ -217,9 +229,11 @@ def _normal_equations(problem: FitProblem, fit_state: FitState, derivatives: Flo
 
 
 def _eliminate_lights(fit_state: FitState, weighted_derivatives: Floats) -> tuple[Floats, Floats]:
-    """Return derivatives (3 p, u) with changes of the lights projected out, and weighted residuals (3 p,).
+    """Return derivatives (3 p, u) without the part that lights can compensate, and weighted residuals (3 p,).
 
-    A sun of strength 0 keeps this strength, because it cannot decrease further.
+    There are p pixels of three channels, and u unknowns. The removed part is the change of the picture that a
+    change of light strengths could cancel. Suns of strength 0 count as fixed: the best fit would give them a
+    negative strength, which is not allowed.
 
     weighted_derivatives : (3 p, u) derivatives of the radiance, multiplied by the weights
     """
@@ -318,7 +332,10 @@ def block_residual(problem: FitProblem, fit_state: FitState) -> float:
 
 
 def _pixel_blocks(face_renderer: FaceRenderer) -> NDArray[np.int64]:
-    """Return for each masked pixel the index (p,) of the block of the picture that contains the pixel."""
+    """Divide the picture into square blocks; return the index (p,) of the block of each fitted pixel.
+
+    The p fitted pixels are those in the renderer's mask.
+    """
     rows, columns = np.nonzero(face_renderer.mask)
     side = max(1, max(face_renderer.mask.shape) // _BLOCKS_PER_SIDE)
     return np.asarray(rows // side * (_BLOCKS_PER_SIDE * 2) + columns // side, np.int64)

@@ -1,4 +1,7 @@
-"""Unknowns of a fit with their priors, and how they change the skin and the suns of a scene."""
+"""Unknowns of a fit with their priors, and how they change the skin and lights of a scene.
+
+A "sun" is a directional light of unknown direction and strength; a fit has up to two.
+"""
 
 from __future__ import annotations
 
@@ -87,8 +90,8 @@ class FitPoint:
     def stepped(self, unknowns_step: Floats) -> FitPoint:
         """Return the point after a step, with the skin parameters clipped to their limits.
 
-        unknowns_step : (4 + 2 k + 2,) steps of the logarithms of 4 skin parameters, of each of k suns along
-            2 tangents of its direction, and of the 2 logarithms of the light's colour
+        unknowns_step : (4 + 2 k + 2,) steps: first of the logarithms of the 4 skin parameters; then of each
+            of the k suns' directions, along its two `tangents`; last of the 2 logarithms `white`
         """
         skin, count = len(SKIN_UNKNOWNS), len(self.suns)
         low, high = np.log([one.low for one in SKIN_UNKNOWNS]), np.log([one.high for one in SKIN_UNKNOWNS])

@@ -39,8 +39,9 @@ class ProfileMixture:
 
     profiles : profiles of pale skin without blood, of pale skin with blood, and of dark skin with blood
     weights : (h, w, 2) weights of the second and the third profile; all weights sum to 1 [-]
-    error : (3,) relative root-mean-square error of the mixture, by channel. The error compares the energies
-        that emerge through rings, for all skins of a grid of pigments [-]
+    error : (3,) relative root-mean-square error of the mixture over the skins of a grid of pigments, by
+        channel. It is the error of the fractions of light that leave the skin through concentric rings around
+        the point where the light enters [-]
     single_error : (3,) the same error if the profile from the middle of the grid is used for all skins [-]
     """
 
@@ -50,7 +51,10 @@ class ProfileMixture:
     single_error: Floats
 
     def summary(self) -> dict[str, list[float]]:
-        """Return the errors of the mixture and of a single profile, for a JSON file."""
+        """Return the errors by channel of the mixture ("mixed") and of a single profile ("one_profile").
+
+        The result is a dictionary of lists for a JSON file; see the fields `error` and `single_error`.
+        """
         return {"mixed": self.error.tolist(), "one_profile": self.single_error.tolist()}
 
 

@@ -1,4 +1,7 @@
-"""Model of skin colour as a function of melanin, blood and a third unknown, and its inversion in float64."""
+"""Model of skin colour as a function of melanin, blood and a third unknown, and its inversion in float64.
+
+The third unknown is the oxygenated fraction of haemoglobin or the shading; a model can also do without it.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +55,8 @@ class SkinModel:
         The second axis of the derivatives is the channel, and the third axis is the unknown. The table is
         interpolated linearly.
 
-        unknowns : (t, 3) square roots of the melanin and blood fractions, and the third unknown
+        unknowns : (t, 3) for each colour, the square root of the melanin fraction, the square root of the
+            blood fraction, and the quantity that the field `third` names (ignored if that is "none")
         """
         third_count, nodes = len(self.log_colours), self.log_colours.shape[1]
         low, high = self.third_range
@@ -79,7 +83,8 @@ class SkinModel:
         """Return the diffuse reflectance (t, 3) of t skins, linear Rec. 709 [-].
 
         melanin, blood : (t,) volume fractions [-]
-        third_unknown : value of the third unknown; by default the mean of its prior
+        third_unknown : value of the quantity that the field `third` names: an oxygenated fraction, or the
+            logarithm of a shading; by default the mean of its prior [-]
         """
         last = np.broadcast_to(self.prior_mean if third_unknown is None else third_unknown, np.shape(melanin))
         x = np.stack([np.sqrt(melanin), np.sqrt(blood), last], axis=-1)
@@ -150,7 +155,8 @@ class PigmentEstimate:
     """Pigments estimated from t colours.
 
     melanin, blood : (t,) volume fractions [-]
-    third : (t,) third unknown of the model
+    third : (t,) quantity that `SkinModel.third` names: the oxygenated fraction of haemoglobin, or the
+        logarithm of the shading; without meaning if that is "none" [-]
     melanin_sd, blood_sd : (t,) lower bounds of the standard deviations due to noise: the Cramér-Rao bound,
         which includes the priors of blood and of the third unknown [-]
     residual : (t, 3) colour divided by the model's colour [-]
@@ -176,9 +182,9 @@ def inverse_variances(colours: Floats, relative_noise: float) -> Floats:
 def solve_pigments(
     model: SkinModel, colours: Floats, relative_noise: float = 0.01, start: Floats | None = None
 ) -> PigmentEstimate:
-    """Return the most probable melanin, blood and third unknown of each colour, computed in float64.
+    """Return the most probable melanin and blood of each colour, computed in float64.
 
-    The cost is a sum of squares, each divided by its variance: the difference between the logarithms of the
+    If the model has a third unknown (oxygen or shading, see `SkinModel`), it is estimated too. The cost is a sum of squares, each divided by its variance: the difference between the logarithms of the
     given and the model's colour in each channel, and the deviations of blood and of the third unknown from
     their prior means. It is minimised by Gauss-Newton steps with Levenberg's damping. An unknown at a limit
     stays fixed if the step would cross the limit.

@@ -31,7 +31,7 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 
 UNKNOWN_NAMES_BY_SET = {"none": TWO_UNKNOWNS, "oxygen": THREE_UNKNOWNS, "all": FIVE_UNKNOWNS}
-"""Names of the unknown parameters, by the name of those that are fitted besides melanin and blood."""
+"""Names of all fitted parameters, by the value of `find` that selects those besides melanin and blood."""
 _EXPECTED_TABLE = "a table of reflectance spectra (CSV), a spectrum in each row or in each column"
 _WAVELENGTH_PATTERN = re.compile(r"[^\d.]{0,20}?(\d{3,4}(?:\.\d+)?)\s*(?:nm)?", re.IGNORECASE)
 _MAX_FILE_BYTES = 32 << 20
@@ -161,7 +161,7 @@ class UnmixedSpectra:
     labels : for each spectrum, a dictionary from heading to text, for all cells that are not reflectances
     names : names of the parameters that were estimated
     fit : parameters fitted to the spectra that have no missing values
-    complete : indices of these spectra in the table
+    complete : indices in the table of the spectra that have no missing values
     """
 
     labels: list[dict[str, str]]
@@ -205,7 +205,8 @@ def unmix_spectra(
     """Estimate the pigments of each reflectance spectrum of a table.
 
     path : file with the table, see `read_spectra`
-    find : parameters to estimate, as a key of `UNKNOWN_NAMES_BY_SET`
+    find : parameters to estimate besides melanin and blood: "none", "oxygen", or "all" for oxygen, scattering
+        and epidermal thickness
     skin : values of all other parameters
     surface : surface reflection that is subtracted from the spectra; 0 if they do not include it [-]
 

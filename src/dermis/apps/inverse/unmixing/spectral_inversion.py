@@ -37,8 +37,8 @@ class SpectralUnknown:
     name : name of the parameter
     low, high : smallest and largest value
     start : value from which a fit starts
-    scale : coordinate in which the fit varies the parameter: its square root ("root"), its logarithm ("log"),
-        or the value itself ("linear")
+    scale : function of the parameter that the fit varies, here called the coordinate of the parameter: its
+        square root ("root"), its logarithm ("log"), or the value itself ("linear")
     """
 
     name: str
@@ -48,17 +48,20 @@ class SpectralUnknown:
     scale: Literal["root", "log", "linear"] = "linear"
 
     def coordinates(self, parameter_values: Floats | np.float64) -> Floats:
-        """Return the coordinates, on this parameter's scale, of given parameter values."""
+        """Convert parameter values to coordinates: their square roots, logarithms, or the values themselves.
+
+        The field `scale` decides which of the three.
+        """
         if self.scale == "log":
             return np.asarray(np.log(parameter_values))
         return np.asarray(np.sqrt(parameter_values) if self.scale == "root" else parameter_values)
 
     def coordinate(self, parameter_value: float) -> float:
-        """Return the coordinate, on this parameter's scale, of a parameter value."""
+        """Convert one parameter value to its coordinate, which is what a fit varies, see `scale`."""
         return float(self.coordinates(np.float64(parameter_value)))
 
     def parameter_values(self, coordinates: Floats) -> Floats:
-        """Return the parameter values (n,) at given coordinates (n,), the inverse of `coordinates`."""
+        """Convert coordinates (n,) on this parameter's `scale` back to parameter values (n,)."""
         if self.scale == "log":
             return np.exp(coordinates)
         return np.asarray(coordinates**2 if self.scale == "root" else coordinates)
@@ -247,7 +250,15 @@ def least_squares(
 def _derivatives(
     residual_function: Callable[[Floats], Floats], unknowns: Floats, residuals: Floats, upper_limits: Floats
 ) -> Floats:
-    """Return the derivatives (n, r, u) of residuals, by finite differences that stay within the limits."""
+    """Return the derivatives (n, r, u) of the residuals of n problems with respect to their u unknowns.
+
+    They are one-sided finite differences: an unknown is increased, or decreased if it is at its upper limit.
+
+    residual_function : function from the unknowns (n, u) to the residuals (n, r)
+    unknowns : (n, u) unknowns
+    residuals : (n, r) residuals for these unknowns
+    upper_limits : (u,) largest values of the unknowns
+    """
     columns = []
     for i in range(unknowns.shape[1]):
         step = np.where(

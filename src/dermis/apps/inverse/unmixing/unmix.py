@@ -55,7 +55,10 @@ class FractionChange:
     median: float | None = None
 
     def scale_and_offset(self, map_median: float) -> tuple[float, float]:
-        """Return the factor by which a map with a given median is multiplied, and the constant then added."""
+        """Return the factor and the constant of this change: the new map is factor * map + constant.
+
+        map_median : median of the map before the change [-]
+        """
         if self.median is None:
             return self.factor, 0.0
         if self.median < map_median:
@@ -67,7 +70,7 @@ class FractionChange:
 class PigmentChange:
     """Change of a skin's pigments, for recolouring.
 
-    melanin, blood : changes of the maps of melanin and blood
+    melanin, blood : factor or new median of the map of each pigment, see `FractionChange`
     oxygen, eumelanin : new values of these parameters of `SkinParameters`; None for no change [-]
     """
 
@@ -82,9 +85,10 @@ class PigmentChange:
         return replace(skin, **{name: one for name, one in changed.items() if one is not None})
 
     def scales_and_offsets(self, melanin: float, blood: float) -> tuple[Floats, Floats]:
-        """Return factors (3,) and added constants (3,) for the maps of three unknowns.
+        """Return the factors (3,) and constants (3,) of this change: each new map is factor * map + constant.
 
-        These are melanin, blood and the third unknown of the `SkinModel`, which is not changed.
+        The maps are those of melanin, of blood and of the third unknown of a `SkinModel`, such as oxygen. The
+        third map keeps its values, so its factor is 1 and its constant is 0.
 
         melanin, blood : medians of the maps of melanin and blood before the change [-]
         """
