@@ -66,7 +66,7 @@ class _CapturedFrame(NamedTuple):
     number : number of the frame
     time : time of the frame, in the unit `unit`; NaN if the frame has none
     unit : unit of the time [s]; None if it is not stated
-    columns : (n,) indices of the frame's blend shapes among those of all frames; empty without a face
+    columns : (n,) indices of the frame's blend shapes among those of all frames; empty if there is no face
     weights : (n,) weights of these blend shapes
     matrix : (4, 4) facial transformation; None if the frame has none
     faces : number of faces in the frame
@@ -271,8 +271,9 @@ def _facial_transformation(culprit: str, json_matrix: object) -> Doubles | None:
 
     The translation is in the last column of the result, whether the file lists the matrix by rows or by
     columns; the place of the translation in the file tells which. If the translation is 0, a flat list inside
-    an object or inside another list is taken to be in column-major order, as MediaPipe's APIs return it, and
-    any other matrix in row-major order.
+    an object or inside another list is taken to be in column-major order, as MediaPipe's APIs return it,
+    unless the object states the layout "ROW_MAJOR". Any other matrix without a translation is taken to be in
+    row-major order.
 
     json_matrix : matrix as a nested or flat list, or an object that contains such a list, or a list of
         several matrices or objects, one for each face
