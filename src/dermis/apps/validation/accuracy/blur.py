@@ -106,11 +106,11 @@ def lit_texel_row(device: Device, texels_per_mm: float) -> str:
 
 
 def sheared_uv_row(device: Device, shear_degrees: float) -> str:
-    """Return a Markdown row with the widths of a single texel's light after a blur on a sheared uv map.
+    """Return a Markdown row with errors of the blur on a flat surface whose uv axes are sheared.
 
-    The surface is flat. The width depends on the direction along the surface. After the angle, the row has
-    the smallest and the largest width for a blur with the stretch map "axes", then those for "full". Each
-    width is divided by the exact one.
+    One texel is lit, and the width of the blurred spot is measured along the surface, relative to the exact
+    width. The cells have `shear_degrees`, then the smallest and the largest width over all directions for a
+    blur that ignores the angle between the uv axes, then the same for a blur that corrects for this angle.
 
     shear_degrees : angle between the uv axes on the flat surface [degrees]
     """
@@ -284,7 +284,8 @@ def seam_row(
 def seam_side_points(head: Head, point_filter: PointFilter) -> tuple[Points, Points]:
     """Return points on one side of the seams of a head, and the opposite points on the other side.
 
-    Only points whose normals point roughly forwards or backwards are returned; the light comes from there.
+    Only points whose normals point roughly forwards or backwards are returned, because the light of
+    `striped_scene` comes from the front and from the back.
 
     point_filter : function that returns the mask of the seam points to use, given their positions
     """
@@ -305,9 +306,9 @@ def seam_side_points(head: Head, point_filter: PointFilter) -> tuple[Points, Poi
 
 
 def striped_scene(head: Head) -> Scene:
-    """Return a scene with a head lit by sharp stripes of light and by weak uniform light.
+    """Return a scene with a head that is lit from the front and from the back.
 
-    Both come from the front and from the back.
+    From each of these directions come sharp stripes of light and weak uniform light.
     """
     x = head.mesh.positions[:, 0] - head.centre_mm[0]
     positions = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), STRIPE_SPACING_MM)

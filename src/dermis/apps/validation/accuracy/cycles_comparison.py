@@ -119,7 +119,7 @@ def cycles_comparison_texts() -> dict[str, object]:
 
 
 def scan_with_normal_map() -> Head:
-    """Return the scanned head with a normal map made from its height map, and without other maps."""
+    """Return the head "lee_perry_smith" with only one map: a normal map made from its height map."""
     head = dermis.load_head("lee_perry_smith", subdivide=1, regions="none")
     assert head.maps.height is not None
     return replace(head, maps=Maps(normal=relief_slopes(head.mesh, head.maps.height)))
@@ -185,7 +185,10 @@ def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[Hig
 
 
 def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
-    """Render a scene with dermis, and again without scattered light to find the reflected fraction."""
+    """Render a scene with dermis; return the picture and the fraction of its light due to surface reflection.
+
+    This fraction is found by a second rendering without scattered light.
+    """
     options = {"size": (LOOK_SIDE, LOOK_SIDE), "atlas": 1024, "strands": False}
     settings = Settings.model_validate(options), Settings.model_validate(options | {"parts": "specular"})
     picture, surface_pass = (renderer.draw(scene, one).linear() for one in settings)
@@ -193,7 +196,10 @@ def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
 
 
 def render_cycles_skin(scene: Scene, skin: PrincipledSkin) -> SkinRender:
-    """Render a scene with Cycles, and again with black skin to find the reflected fraction."""
+    """Render a scene with Cycles; return the picture and the fraction of its light due to surface reflection.
+
+    This fraction is found by a second rendering with black skin, which only reflects light at its surface.
+    """
     settings = Settings(size=(LOOK_SIDE, LOOK_SIDE))
     black = replace(skin, colour=np.zeros_like(skin.colour))
     (image_pass,) = cycles_passes(scene, skin, [HIGHLIGHT_PATH_COUNT], settings)

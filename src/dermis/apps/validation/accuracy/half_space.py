@@ -166,10 +166,11 @@ def _scattered_cosines(downward_cosines: Floats, mean_cosine: float, rng: np.ran
 
 
 def _studio_brightness_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
-    """Return ratios of the radiance of skin with `direction` "half-space" to that with "lambertian".
+    """Return the factors by which skin is brighter if `Skin.direction` is "half-space", not "lambertian".
 
-    The two lists are the medians and the 99th percentiles of red, green and blue, over the pixels that show a
-    head in studio light.
+    `Skin.direction` sets how diffuse light depends on the directions of light and view. The two lists are the
+    medians and the 99th percentiles of the factors in red, green and blue, over the pixels that show a head
+    in studio light.
     """
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
 

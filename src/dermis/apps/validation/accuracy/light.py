@@ -273,9 +273,10 @@ def soft_shadow_error(renderer: dermis.Renderer, light_preset: str) -> tuple[flo
 
 
 def occlusion_error(renderer: dermis.Renderer) -> float:
-    """Return the RMS error of the visible sky fraction on the scanned head [-].
+    """Return the RMS error of ambient occlusion on the head "lee_perry_smith" [-].
 
-    The reference is computed with 1024 directions.
+    Ambient occlusion is the fraction of the sky that a point of the surface sees. The reference is computed
+    with 1024 directions.
     """
     head = dermis.load_head("lee_perry_smith", subdivide=0)
     inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
@@ -288,7 +289,7 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
 
 
 def light_error_tables(adapter: str = "auto") -> dict[str, str]:
-    """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
+    """Return texts on errors of lighting, keyed by placeholder of docs/templates/accuracy.md."""
     renderer = dermis.Renderer(adapter)
     shadows = [(rig, *soft_shadow_error(renderer, rig)) for rig in ("window", "top", "rim")]
     return {

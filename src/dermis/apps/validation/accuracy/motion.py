@@ -1,4 +1,7 @@
-"""Pictures of posed heads, compared with pictures of heads loaded in the same shape, for docs/motion.md."""
+"""Errors of posed heads, for docs/motion.md.
+
+The reference for a posed head is a rebuilt head: one whose mesh has the posed shape at rest, without a pose.
+"""
 
 from __future__ import annotations
 
@@ -64,7 +67,7 @@ _MIN_VISIBILITY_CHANGE = 0.02
 
 
 def motion(adapter: str = "auto") -> None:
-    """Compare posed heads with heads loaded in the posed shape, and write docs/motion.md.
+    """Compare posed heads with heads whose meshes have the posed shape at rest, and write docs/motion.md.
 
     Takes some minutes. Needs the published heads of MakeHuman in DERMIS_DATA, and a checkout with its folder
     `tests`.
@@ -86,7 +89,7 @@ def motion(adapter: str = "auto") -> None:
 
 
 def rebuilt_head(head: Head, point_positions: Points) -> Head:
-    """Return the head that results from loading the mesh with its points at given positions.
+    """Return a head whose mesh has its points at given positions at rest, as if it was loaded in this shape.
 
     point_positions : (p, 3) positions [mm]
     """
@@ -108,7 +111,7 @@ def posed_points(head: Head, person_points: Points, target_weights: Mapping[str,
 def picture_error(
     renderer: Renderer, head: Head, person_points: Points, target_weights: Mapping[str, float], view_name: str
 ) -> float:
-    """Return the relative RMSE between pictures of a posed head and of a head loaded in the posed shape.
+    """Return the relative RMSE between pictures of a posed head and of a head that has this shape at rest.
 
     person_points : (p, 3) positions in the rest pose [mm]
     target_weights : morph target weights of the expression
@@ -167,7 +170,7 @@ def deformation_rows(renderer: Renderer, head: Head) -> Iterator[str]:
 
 
 def _with_thinner_ears(point_positions: Points, thickness_fraction: float) -> Points:
-    """Return the points (p, 3) of the scanned head with thinner ears, made by scaling the ears along z.
+    """Return the points (p, 3) of the head "lee_perry_smith" with ears made thinner by scaling them along z.
 
     thickness_fraction : fraction of the thickness of the ears that is removed
     """
@@ -196,7 +199,7 @@ def seam_rows(renderer: Renderer, head: Head, person_points_by_name: Mapping[str
 def _seam_row(renderer: Renderer, row_title: str, head: Head, shaped_head: Head, pose: Pose | None) -> str:
     """Return a Markdown row with the discontinuity of scattered light across the seams of a posed head.
 
-    shaped_head : head loaded in the shape of the pose; used to find the points beside seams
+    shaped_head : head whose shape at rest is the posed shape of `head`; tells which points lie beside seams
     """
     cells = []
     for where in (blur.neck_mask, blur.back_of_head_mask):
@@ -227,7 +230,8 @@ def occlusion_rows(
 
     Each cell has the error over all texels, and over those where the pose changes the fraction.
 
-    poses_and_shaped_heads : dictionary from the name of a pose to the pose and the head loaded in its shape
+    poses_and_shaped_heads : dictionary from the name of a pose to the pose and a head whose shape at rest is
+        the shape of `head` in this pose
     """
     scene, fine = (
         Scene(head, environment=Environment(name="uniform")),
@@ -250,8 +254,8 @@ def occlusion_rows(
 def baked_occlusion(renderer: Renderer, head: Head, shaped_head: Head, *directions_and_side: int) -> Floats:
     """Return the visible sky fraction of a posed head, baked in an atlas (n, n); NaN outside the charts.
 
-    head : the head in its rest pose; determines the atlas
-    shaped_head : the head loaded in the shape of the pose
+    head : head without a pose, which determines the atlas
+    shaped_head : head whose shape at rest is the posed shape of `head`
     directions_and_side : number of directions, and side of the depth maps [texel]; by default, the values
         that frames use
     """

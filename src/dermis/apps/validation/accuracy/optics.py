@@ -185,7 +185,7 @@ def published_profile_errors_text() -> str:
 
 
 def optics_error_tables() -> dict[str, str]:
-    """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
+    """Return texts on errors of diffusion models, keyed by placeholder of docs/templates/accuracy.md."""
     return {
         "models": diffusion_models_table(),
         "counted": photon_counts_table(),

@@ -96,7 +96,7 @@ def furnace_rows() -> str:
 
 
 def specular_error_tables() -> dict[str, str]:
-    """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
+    """Return texts on errors of surface reflection, keyed by placeholder of docs/templates/accuracy.md."""
     below = (np.arange(4000) + 0.5) / 4000
     kelemen = float((directional_albedo(below, 0.3) * below).sum() / below.sum())
     return {

@@ -121,10 +121,11 @@ def measured_page() -> None:
 
 
 def _default_skin_errors(archive: Archive) -> JsonObject:
-    """Return the errors of fits with two, three and five unknowns, for each of four skins.
+    """Return the errors of fits with two, three and five unknowns, for four choices of the fixed parameters.
 
-    The parameters that are not fitted are taken from each of four skins in turn: the former default skin, the
-    present one, and two that are the former default with less absorption by bloodless tissue.
+    Fixed parameters are those that are not fitted. The keys name their values: "present" for those of the
+    default skin, "former" for those of `FORMER_SKIN`, the default skin of earlier versions; "half" and
+    "quarter" for those of `FORMER_SKIN` with a half and a quarter of the absorption by bloodless tissue.
     """
     skins = {
         "former": FORMER_SKIN,
@@ -237,8 +238,8 @@ def _category_errors(
 ) -> list[list[float]]:
     """Return the number of spectra and three median errors for each group of people or each site.
 
-    The first two are colour errors of fits of two and of three unknowns. The third is the RMS difference
-    between measured and fitted spectra for five unknowns.
+    The median errors are the colour error of the fit with two unknowns, the colour error of the fit with
+    three unknowns, and the RMS difference between measured and fitted spectra of the fit with five unknowns.
 
     categories : all groups or all sites
     category_by_spectrum : (n,) group or site of each spectrum
@@ -262,8 +263,9 @@ def _illuminant_errors(fits_by_unknown_count: dict[str, SpectralFit]) -> JsonObj
 def _fold_errors(archive: Archive) -> list[JsonObject]:
     """Return one object for each fold of the cross-validation, with fitted constants and median errors.
 
-    A fold is one part of the people. The constants are fitted to the spectra of all other people. The errors
-    are for the spectra of the fold, first with the fitted and then with the default constants.
+    The measured people are divided into folds. For each fold, the constants are fitted to the spectra of the
+    people outside it. The errors are those of the people in the fold, under the key "fitted" with these
+    constants and under the key "default" with the constants of the default skin.
     """
     rows = []
     for fold in range(FOLD_COUNT):
@@ -326,7 +328,8 @@ def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObjec
 def _jacques_model(parameter_values: ParameterValues) -> Floats:
     """Return the reflectance (n, 31) of skins whose tissue scatters and absorbs as in [Jacques1998].
 
-    The formulae are for scattering and for absorption by tissue without blood and melanin.
+    Two formulae of the source are used: the one for scattering, and the one for the absorption by tissue
+    without blood and melanin. Melanin and blood absorb as in the package's skin model.
 
     parameter_values : parameters of the skins by name
     """
@@ -353,7 +356,12 @@ def _jacques_model(parameter_values: ParameterValues) -> Floats:
 
 
 def _additional_constant_errors(archive_sample: Archive) -> list[JsonObject]:
-    """Return fit errors of the skin model with each additional constant, for three and for five unknowns."""
+    """Return errors of fits in which one more constant of the skin model is fitted, such as carotene.
+
+    Each of the fits has a constant of `_CONSTANTS_BY_ADDITION`, which all spectra share. The fit named "none"
+    has none of these constants. The key "three" has the errors for three unknowns per spectrum, "five" those
+    for five.
+    """
     rows = []
     for name, free in _CONSTANTS_BY_ADDITION.items():
         row: JsonObject = {"name": name}
@@ -422,11 +430,11 @@ def _site_fold_errors(archive: Archive) -> JsonObject:
 
 
 def _edge_loss_errors(archive_sample: Archive) -> JsonObject:
-    """Return the edge loss of each aperture, and skin constants fitted to spectra without edge loss.
+    """Return the edge loss of each aperture, and skin constants fitted to spectra corrected for this loss.
 
-    The edge loss is the fraction of the reflected light that an aperture of a spectrophotometer misses. The
-    spectra are divided by the remaining fraction before the fit. The key "uncorrected" has the constants
-    fitted to the spectra as measured.
+    The edge loss is the fraction of the reflected light that an aperture of a spectrophotometer misses. To
+    correct them, the measured spectra are divided by the fraction that the aperture receives. The key
+    "uncorrected" has the constants fitted to the spectra as measured.
     """
     skins = [replace(DEFAULT_SKIN, melanin=m, blood=0.008) for m in _EDGE_LOSS_MELANIN]
     losses = [edge_loss(one, _EDGE_LOSS_WAVELENGTHS_NM) for one in skins]

@@ -143,8 +143,9 @@ def _confounded_constant_texts(results: JsonObject) -> dict[str, str]:
     """Return texts on strongly correlated constants and on corrected spectra, keyed by placeholder.
 
     The text "confounded" lists pairs of constants with strongly correlated errors. The texts "wide_factor"
-    and "small_factor" contain fitted factors of the absorption by bloodless tissue: the first for spectra
-    corrected for the light that a wide aperture misses, the second for spectra corrected for a small one.
+    and "small_factor" contain fitted factors of the absorption by bloodless tissue. Before these fits, the
+    spectra were corrected for the light that the aperture of the instrument misses: a wide aperture is
+    assumed for "wide_factor", a small aperture for "small_factor".
     """
     pairs = {}
     for row in results["additions"]:

@@ -51,9 +51,11 @@ def prior_csv(prior: SkinPrior) -> str:
 def fit_mixture(points: Floats, component_count: int) -> SkinPrior:
     """Fit a mixture of normal distributions by expectation maximisation.
 
+    At the start, the points are sorted by their first coordinate and divided into groups of equal size, and
+    one distribution is fitted to each group.
+
     points : (n, d) points
-    component_count : number of distributions; at the start, each is fitted to an equal share of the points,
-        sorted by their first coordinate
+    component_count : number of distributions
     """
     count, dimensions = points.shape
     parts = np.argsort(np.argsort(points[:, 0])) * component_count // count
