@@ -104,7 +104,10 @@ def _legendre_table(height: int, degree: int) -> list[Floats]:
 
 @lru_cache(maxsize=1)
 def _kernel_polynomials(degree: int) -> Floats:
-    """Return the Legendre polynomials (degree + 1, n) at the angles over which kernels are integrated."""
+    """Return the Legendre polynomials of degree 0 to `degree` at the n angles of `_kernel_angles`.
+
+    The result has the shape (degree + 1, n); the polynomials are evaluated at the cosines of the angles.
+    """
     (functions,) = legendre_functions(np.cos(_kernel_angles()), degree, order_count=1)
     return np.asarray(functions * np.sqrt(4.0 * np.pi / (2.0 * np.arange(degree + 1) + 1.0))[:, None])
 

@@ -204,8 +204,8 @@ def _fit_parameters(
 
         A QR factorisation reduces the rows. The residuals are the last column.
 
-        parameter_bytes : coordinates of the lobe parameters along the directions of `_free_directions`, as
-            bytes of a float64 array, so that results can be cached
+        parameter_bytes : unknowns of the fit, as the bytes of a float64 array, because the cache cannot use
+            an array as its key. There is one unknown for each direction that `_free_directions` returns
         """
         x = np.frombuffer(parameter_bytes)
         parameters = (fixed + free @ x).reshape(4, LOBE_COUNT)

@@ -103,9 +103,12 @@ def lobe_target(lobe: Lobe, view_cosine: float, roughness: float) -> LobeTarget:
 def harmonic_terms(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
     """Return degree, order and weight of the n harmonics that are symmetric about the plane of incidence.
 
-    The weights serve to compare two lobes. If the differences of their coefficients are multiplied by the
-    weights, squared and summed, the result is the expected squared difference between the light that both
-    lobes reflect from a randomly rotated environment.
+    The weights serve to compare two lobes by the light that each of them reflects from a randomly rotated
+    environment. The expected squared difference between their reflections is a sum over the harmonics: of the
+    squares of the weight times the difference of the two lobes' coefficients. The weight of degree 1 is
+    larger than this rule requires, because degree 1 determines the mean direction of a lobe.
+
+    degree : highest degree of the harmonics
     """
     pairs = [(l, m) for m in range(degree + 1) for l in range(m, degree + 1, 2)]
     degrees, orders = np.array(pairs, np.intp).T
@@ -162,7 +165,12 @@ def _legendre_at_quadrature_angles(roughness: float, degree: int) -> Floats:
 
 @cache
 def _legendre_table(degree: int) -> Floats:
-    """Return the associated Legendre functions (k, n) at k angles from the plane of incidence to the pole."""
+    """Return the associated Legendre functions (k, n) at k angles from the plane of incidence.
+
+    The angles increase from 0 to 90 degrees, where the pole of the harmonics is: the normal of the plane.
+
+    degree : highest degree of the harmonics
+    """
     return _symmetric_legendre_functions(
         np.sin(np.append(np.arange(0.0, 0.5 * np.pi, _LEGENDRE_TABLE_STEP_RADIANS), 0.5 * np.pi)), degree
     ).T.copy()
@@ -200,10 +208,11 @@ def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
 
 @cache
 def _layer_factor_table() -> Floats:
-    """Return the convolution factors of the reflection layers of a prefiltered panorama, (layers, degrees).
+    """Return the factors (layers, degrees) by which prefiltering scales the harmonics of a panorama.
 
-    The reflection layers are convolved with lobes of several roughnesses. The lobe of each layer has a factor
-    for each degree of the spherical harmonics; above the highest degree of the panorama, the factors are 0.
+    Each layer of a prefiltered panorama is the panorama convolved with a lobe of one of the roughnesses
+    `LAYER_ROUGHNESSES`. This convolution multiplies all spherical harmonics of a degree by one factor. Above
+    the highest degree of the prefiltered panorama, the factors are 0.
     """
     kernels = np.stack([isotropic_lobe_factors(float(m)) for m in LAYER_ROUGHNESSES])
     return np.pad(kernels, ((0, 0), (0, max(_FIT_DEGREES[-1] + 1 - kernels.shape[1], 0))))

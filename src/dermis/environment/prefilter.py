@@ -15,7 +15,10 @@ from dermis.specular.beckmann import beckmann
 Floats = NDArray[np.float64]
 MIN_LAYER_ROUGHNESS, MAX_LAYER_ROUGHNESS = 0.018, 1.0
 LAYER_ROUGHNESSES = np.geomspace(MIN_LAYER_ROUGHNESS, MAX_LAYER_ROUGHNESS, 13)
-"""Roughnesses of the reflection layers, uniform in the logarithm; the shader interpolates between them."""
+"""Roughnesses for which reflected radiance is stored, evenly spaced in their logarithm.
+
+The shader interpolates between them.
+"""
 LAYER_HEIGHT = 192
 _MAX_HARMONIC_DEGREE = 160  # the factor of the smoothest lobe is 2e-4 here, so there is little ringing
 
@@ -53,7 +56,8 @@ class PrefilteredPanorama:
 
     layers : (14, h, 2 h, 3) panoramas: first the irradiance by normal direction, then, for each of
         `LAYER_ROUGHNESSES`, the weighted mean radiance by mirror direction
-    suns : suns that were removed from the panorama before the convolution
+    suns : directional lights that replace the small, very bright areas of the panorama, such as the sun;
+        these areas were removed before the convolution
     """
 
     layers: NDArray[np.float32]
@@ -62,7 +66,9 @@ class PrefilteredPanorama:
 
 @logged_step("filtering the environment")
 def prefilter(panorama_name: str) -> PrefilteredPanorama:
-    """Load a panorama, separate its suns, and convolve the remainder with isotropic kernels.
+    """Load a panorama, separate its brightest areas, and convolve the remainder with isotropic kernels.
+
+    The brightest areas, such as the sun, become directional lights, the field `suns` of the result.
 
     panorama_name : see `load_panorama`
 

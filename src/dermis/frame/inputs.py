@@ -59,5 +59,9 @@ class FrameInputs:
 
     @property
     def bindings(self) -> Bindings:
-        """Return the shader resources of the first atlas layout, from which the picture is shaded."""
+        """Return the shader resources of the first atlas layout.
+
+        Shading reads this layout alone, even if light is also diffused in a second one (the seam method
+        "multi-uv" uses two).
+        """
         return self.layouts[0].bindings

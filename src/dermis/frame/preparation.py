@@ -269,7 +269,7 @@ def _scaled_blurs(blurs: tuple[Blur, ...], irradiance_scale: float) -> tuple[Blu
 def _light_resources(
     _: Head, __: Lights, outline: Outline, map_side: int, device: Device, scene: Scene
 ) -> tuple[UniformRecord, Views, tuple[int, ...]]:
-    """Return the record of the lights, the views of shadow maps, and the number of parts of each light.
+    """Return the record of the lights, the views of shadow maps, and the `light_part_counts` of the scene.
 
     The first two parameters only serve as cache keys.
     """

@@ -170,10 +170,11 @@ def device_constants(device: Device) -> Constants:
 
 
 def pixel_column_constants(device: Device, sample_count: int) -> Constants:
-    """Return the pipeline constant that shortens the column of pixels that a shader invocation shades.
+    """Return the pipeline constant STRIP if a shader invocation must shade a shorter column than usual.
 
-    It is needed on software adapters for many samples per pixel, because the driver limits the number of loop
-    iterations per invocation. The result is empty if this limit is not reached.
+    On software adapters, an invocation shades a column of 16 pixels. With many samples per pixel, its loops
+    would exceed the number of iterations that the driver allows; STRIP then sets a smaller number of pixels.
+    In all other cases the result is empty.
     """
     strip = max(1, _MAX_SAMPLES_PER_INVOCATION // sample_count)
     return (("STRIP", strip),) if device.adapter.kind == "CPU" and strip < _PIXELS_PER_COLUMN else ()

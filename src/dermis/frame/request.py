@@ -24,16 +24,20 @@ from dermis.scene.skin import Skin
 class FrameRequest:
     """Everything that determines the cached resources of a frame.
 
-    profile : diffusion profile of the skin; if a map blends several profiles, the first of them
-    rest_positions_mm : (p, 3) positions of the person's control points in the rest pose [mm], None if they
-        are those of the shared mesh
-    environment_map : prefiltered map of `environment`
-    light_part_counts : number of parts into which each light is divided, suns of the environment last
+    profile : diffusion profile of the skin; the first profile if the skin has several (`other_profiles`)
+    rest_positions_mm : (p, 3) positions of the person's control points in the rest pose [mm]; None if they
+        are the control points of `topology`, the template whose mesh several people can share
+    environment : light from all directions around the head, None if there is none
+    environment_map : prefiltered panorama of `environment`
+    light_part_counts : number of parts into which each light is divided. The last lights are those that
+        replace the brightest areas of the panorama, such as the sun
     shadow_layers : number of shadow maps
     posed : whether the scene has a pose
     view_name : cache key of the scene, for callers that draw several scenes in turn
-    other_profiles : profiles that a map blends with `profile`; all have the same Gaussians
-    blend_weights : (h, w, 2) map of the weights of the other profiles [-], None for a single profile
+    other_profiles : further diffusion profiles of the skin, which `blend_weights` blends with `profile`; all
+        profiles have the same variances
+    blend_weights : (h, w, 2) map over the skin of the weights of the other profiles [-], None for a single
+        profile
     outputs : names of the requested outputs besides the picture
     landmarks : names of the requested landmark sets
     """
@@ -79,8 +83,9 @@ class FrameRequest:
     def split(self) -> ProfileSplit:
         """Return the profile, split into a narrow Gaussian and the Gaussians with which light is blurred.
 
-        Instead of a blur with the narrow Gaussian, light is evaluated at each pixel. The result
-        includes the splits of any other profiles that a map blends.
+        The narrow Gaussian is not blurred: its share of the light leaves the skin where it enters, and is
+        computed at each pixel. If the skin has several profiles, the field `others` of the result contains
+        the splits of the other profiles.
         """
         profiles = self.profile, *self.other_profiles
         first, *others = (self.technique.split(profile, self.albedo_from_map) for profile in profiles)
@@ -89,17 +94,23 @@ class FrameRequest:
 
     @property
     def mixes_profiles(self) -> bool:
-        """Return whether a map blends several profiles."""
+        """Return whether the skin has several diffusion profiles, which `blend_weights` blends."""
         return bool(self.other_profiles)
 
     @cached_property
     def has_occlusion(self) -> bool:
-        """Return whether the head hides parts of the environment from its own skin."""
+        """Return whether the frame computes which parts of the environment the head hides from its own skin.
+
+        It does if there is an environment and the setting `occlusion` is not "none".
+        """
         return self.environment is not None and self.settings.occlusion != "none"
 
     @property
     def has_interreflection(self) -> bool:
-        """Return whether interreflection is computed; with an environment, it requires occlusion."""
+        """Return whether the frame includes light that one part of the skin reflects to another.
+
+        The settings must request it. In a scene with an environment, `has_occlusion` must be true as well.
+        """
         return self.settings.interreflection and (self.has_occlusion or self.environment is None)
 
     @property

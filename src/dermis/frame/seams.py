@@ -56,9 +56,11 @@ class AtlasPlan(NamedTuple):
 
 
 def plan_atlases(method: SeamMethod, settings: Settings, blur_count: int, has_occlusion: bool) -> AtlasPlan:
-    """Return the layouts and the side of the atlases; if the atlas is not used, it has the smallest side.
+    """Return the names of the atlas layouts, and the side of the atlases.
 
-    method : method of treating seams, which has the names of the layouts
+    If no light is blurred over an atlas and none stores occlusion, the result is one atlas of minimum size.
+
+    method : method of treating seams; its field `layouts` has the names of the layouts
     blur_count : number of Gaussians that blur light over the atlas
     has_occlusion : whether the atlas stores occlusion of the environment
     """

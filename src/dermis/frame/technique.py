@@ -17,17 +17,19 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ProfileSplit:
-    """Split of a profile into a narrow Gaussian that is relit, and Gaussians with which the atlas is blurred.
+    """Split of a profile into a narrow Gaussian, and wider Gaussians with which light is blurred.
 
-    The relit Gaussian is so narrow that light is not blurred with it, but evaluated at each pixel.
+    The narrow Gaussian spreads light over so short a distance that no blur is needed: its share of the light
+    leaves where it enters. Instead of being read from the atlas, this share is computed again at each pixel
+    of the picture, so the narrow Gaussian is called the relit Gaussian.
 
-    relit : (3,) weights of the relit Gaussian [-]
+    relit : (3,) weights of the relit Gaussian in red, green and blue; 0 if all Gaussians are blurred [-]
     total : (3,) sums of the weights of all Gaussians [-]
-    blurred_mm2 : (k,) variances of the blurred Gaussians [mm^2]
-    weight : (k, 3) weights of the blurred Gaussians [-]
-    others : splits of the other profiles that a map blends with this profile; all have the same Gaussians
-    fine : members of the shader struct Fine, which corrects light that varies within a texel; empty for no
-        correction
+    blurred_mm2 : (k,) variances of the Gaussians with which light is blurred [mm^2]
+    weight : (k, 3) weights of these Gaussians [-]
+    others : splits of the other profiles, if the skin is a blend of several; their variances are the same
+    fine : members of the shader struct Fine, with which the shader corrects light that varies within a texel;
+        empty for no correction
     """
 
     relit: Floats
@@ -39,15 +41,15 @@ class ProfileSplit:
 
     @property
     def relit_changes(self) -> Floats:
-        """Return the (n, 3) weights of the relit Gaussian in `others` minus those in this profile [-].
+        """Return, for each of the n profiles in `others`, its field `relit` minus that of this profile [-].
 
-        The relit Gaussian is so narrow that light is not blurred with it, but evaluated at each pixel.
+        The result has the shape (n, 3).
         """
         return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
 
     @property
     def weight_changes(self) -> tuple[Floats, ...]:
-        """Return, for each profile in `others`, its (k, 3) blur weights minus those of this profile [-]."""
+        """Return, for each profile in `others`, its field `weight` minus that of this profile, (k, 3) [-]."""
         return tuple(one.weight - self.weight for one in self.others)
 
 
@@ -60,7 +62,7 @@ class TechniqueTraits:
 
     sources : publications of the technique, as keys of the bibliography
     uses_atlas : whether light is diffused over the atlas
-    mixes_profiles : whether a map can blend several profiles
+    mixes_profiles : whether a skin can have several diffusion profiles, blended by a map over the skin
     stitches_seams : whether light can cross the seams of the atlas
     supports_translucency : whether light can pass through thin parts of the head
     needs_curvature : whether the shading pass reads the curvature of the surface
@@ -82,8 +84,9 @@ class TechniqueTraits:
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
         """Split a profile into a narrow Gaussian and the Gaussians with which light is blurred.
 
-        Instead of a blur with the narrow Gaussian, light is evaluated at each pixel. In this class, no light
-        is blurred, and the narrow Gaussian has all the weight.
+        The narrow Gaussian is not blurred: its share of the light leaves the skin where it enters, and is
+        computed at each pixel. In this class, no light is blurred, and the narrow Gaussian has all the
+        weight.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
@@ -96,9 +99,12 @@ class TechniqueTraits:
         return settings.stretch
 
     def texel_bytes(self, blur_count: int) -> float:
-        """Return the memory per atlas texel on a software adapter, including temporary textures [bytes].
+        """Return the memory that blurs need per texel of the atlas, including temporary textures [bytes].
 
-        blur_count : number of Gaussians that blur light
+        The estimate is for software adapters, which store blurred light in full precision. This base class
+        blurs no light and needs no memory.
+
+        blur_count : number of Gaussians with which light is blurred
         """
         return 0.0
 

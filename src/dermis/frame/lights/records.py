@@ -77,15 +77,20 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
 def with_oblique_constant(constants: Constants) -> Constants:
     """Return `constants`, with OBLIQUE added if they contain HALF_SPACE.
 
-    HALF_SPACE makes the response of skin to light depend on direction. With OBLIQUE, oblique light is also
-    evaluated at an offset along the surface. Only passes that provide the shape of the surface around a point
-    may use OBLIQUE.
+    HALF_SPACE makes the response of skin to light depend on direction. OBLIQUE adds a further effect: the
+    light that leaves around a point has entered the skin a short distance away, towards the light source.
+    With OBLIQUE, the incident light is therefore evaluated where it enters instead of at the point.
+    Only passes that provide the shape of the surface around a point may use OBLIQUE.
     """
     return (*constants, ("OBLIQUE", 1)) if ("HALF_SPACE", 1) in constants else constants
 
 
 def light_part_counts(scene: Scene) -> tuple[int, ...]:
-    """Return the number of parts into which each light is divided, 1 for most lights."""
+    """Return the number of parts into which each light is divided.
+
+    Large rectangular lights are divided into several parts, each with its own shadow map; for all other
+    lights the number is 1.
+    """
     return tuple(len(KINDS[light.kind].parts(light)) for light in scene.lights)
 
 

@@ -27,7 +27,7 @@ class OneBlur(TextureSpace):
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
         """Return the split of a profile: a single Gaussian with which light is blurred.
 
-        The result does not correct light that varies within a texel.
+        Unlike that of the base class, the split has no correction for light that varies within a texel.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
@@ -35,7 +35,7 @@ class OneBlur(TextureSpace):
         return AtlasTechnique.split(self, profile, normalise_weights)
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
-        """Return False: all light is blurred by the Gaussian; none is evaluated at each pixel."""
+        """Return False: even if the only Gaussian is very narrow, light is blurred with it."""
         return False
 
     def stretch(self, settings: Settings) -> str:

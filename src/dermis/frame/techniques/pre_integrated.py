@@ -79,7 +79,11 @@ class PreIntegratedSkin(Technique):
         view["pre"] = shade.record("PreIntegrated", **scales)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
-        """Declare the passes that compute curvature, and return the tables instead of light on an atlas."""
+        """Declare the passes that compute curvature, and return the texture of the tables.
+
+        This texture, `PreIntegratedTables.table`, takes the place of the scattered light on an atlas, which
+        this technique does not compute.
+        """
         resources, tables = inputs.resources, inputs.resources.technique
         assert resources.shape.curvature is not None and isinstance(tables, PreIntegratedTables)
         graph.repeat(curvature.draw, resources.head, resources.shape.curvature)

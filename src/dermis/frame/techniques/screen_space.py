@@ -38,13 +38,14 @@ _KERNEL_ENTRY_COUNT = 256
 
 @dataclass(frozen=True, eq=False)
 class SubsurfaceLayers(TechniqueResources):
-    """Textures of the subsurface light in the picture, and textures with which this light is diffused.
+    """Textures of the subsurface light in the picture, and textures for the results of its diffusion.
 
     layers : texture of two layers. The first holds subsurface light, with the depth of the surface [mm] as
         alpha; the second holds the fraction of this light that leaves the skin towards the camera
     subsurface : view of the first layer
     transmittance : view of the second layer
-    scratch : texture for light that is diffused along rows, but not yet along columns
+    scratch : texture for light that is diffused along rows, but not yet along columns; light that is diffused
+        along both replaces the first layer of `layers`
     result : texture for the picture with diffused light, None if only the subsurface light is needed
     kernel : diffusion kernel of the profile, None if the caller provides the kernel
     """
@@ -82,7 +83,10 @@ class ScreenSpace(Technique):
         return replace(layers, kernel=memo.get(make_kernel, device, profile))
 
     def make_subsurface_layers(self, memo: Memo, device: Device, settings: Settings) -> SubsurfaceLayers:
-        """Return the textures in which subsurface light is diffused for the outputs besides the picture."""
+        """Return textures for subsurface light that is diffused separately from that of the picture.
+
+        The output "diffuse" needs them. They have neither a texture for a finished picture nor a kernel.
+        """
         return memo.get(make_subsurface_layers, device, settings.size, False, caller_name="outputs")
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
@@ -98,7 +102,7 @@ class ScreenSpace(Technique):
     def blur_subsurface_layers(
         self, graph: Graph, inputs: FrameInputs
     ) -> tuple[TextureOrView, TextureOrView]:
-        """Declare the passes that diffuse the subsurface light for the outputs besides the picture.
+        """Declare the passes that diffuse the subsurface light of the output "diffuse".
 
         Return texture views of the diffused light, and of the fraction of this light that leaves the skin
         towards the camera.
@@ -116,7 +120,9 @@ TECHNIQUE = ScreenSpace()
 def make_subsurface_layers(
     device: Device, picture_size: tuple[int, int], with_result: bool = True
 ) -> SubsurfaceLayers:
-    """Create the textures of `SubsurfaceLayers` for a picture of size (width, height), without a kernel.
+    """Create the textures of `SubsurfaceLayers` for a picture of size (width, height).
+
+    The field `kernel` of the result is None; the caller provides the diffusion kernel of the skin.
 
     with_result : whether to create the texture for the picture with diffused light
     """
@@ -142,7 +148,7 @@ def draw(
 ) -> Texture:
     """Declare the passes that diffuse the subsurface light, and return the picture with this light.
 
-    subsurface_layers : textures of the subsurface light, and textures with which it is diffused
+    subsurface_layers : textures that hold the subsurface light, and textures for the results of the passes
     kernel : diffusion kernel of the profile
     window : rectangle of the image plane that the picture shows
     surface_light : shaded picture without the subsurface light
@@ -165,7 +171,8 @@ def draw_blur(
 ) -> None:
     """Declare the passes that diffuse the subsurface light along rows, then along columns.
 
-    subsurface_layers : textures of the subsurface light, and textures with which it is diffused
+    subsurface_layers : texture of the subsurface light, which the second pass overwrites with the diffused
+        light; and the texture to which the first pass, along rows, writes
     kernel : diffusion kernel of the profile
     window : rectangle of the image plane that the picture shows
     """

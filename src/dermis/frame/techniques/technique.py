@@ -94,9 +94,10 @@ class Technique(TechniqueTraits):
     def make_subsurface_layers(
         self, memo: Memo, device: Device, settings: Settings
     ) -> TechniqueResources | None:
-        """Return textures in which subsurface light is diffused for the outputs besides the picture.
+        """Return textures for subsurface light that is diffused separately from that of the picture.
 
-        The result is None if the technique needs no such textures.
+        The output "diffuse" needs them if the technique diffuses light over the pixels of the picture. The
+        result is None for all other techniques.
         """
         return None
 
@@ -161,14 +162,18 @@ class AtlasTechnique(Technique):
         return profile
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
-        """Return whether light evaluated at each pixel replaces the blur with the narrowest Gaussian."""
+        """Return whether the narrowest Gaussian is so narrow that light need not be blurred with it.
+
+        Its share of the light is then computed at each pixel of the picture instead.
+        """
         return bool(profile.variance_mm2[0] <= _MAX_RELIT_VARIANCE_MM2)
 
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
         """Split a profile into its narrowest Gaussian and the Gaussians with which light is blurred.
 
-        Instead of a blur with the narrowest Gaussian, light is evaluated at each pixel. If even this Gaussian
-        is too wide for that, light is blurred with all Gaussians of the profile.
+        The narrowest Gaussian is not blurred: its share of the light leaves the skin where it enters, and is
+        computed at each pixel. If even this Gaussian is too wide for that, light is blurred with all
+        Gaussians of the profile.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
@@ -189,7 +194,12 @@ class AtlasTechnique(Technique):
         return make_levels(device, atlas_side, halvings, level_format(device))
 
     def texel_bytes(self, blur_count: int) -> float:
-        """Return the peak memory per texel on a software adapter, including temporary textures [bytes]."""
+        """Return the peak memory of blurs per texel of the atlas, including temporary textures [bytes].
+
+        The estimate is for software adapters, which store blurred light in full precision.
+
+        blur_count : number of Gaussians with which light is blurred
+        """
         mips = sum(0.25**halving for halving in range(MAX_ATLAS_HALVINGS + 1))
         return TEXEL_FORMAT_BYTES[FLOAT_TEXEL_FORMAT] * (
             blur_count + 2 * mips
@@ -253,7 +263,9 @@ class AtlasTechnique(Technique):
         thin_parts: Translucency | None,
         exitance_texture: TextureOrView,
     ) -> None:
-        """Declare the passes that sum the blurred levels to the exitance, including light through thin parts.
+        """Declare the passes that compute the exitance: the weighted sum of the blurred levels.
+
+        Light through thin parts of the head is added to the sum.
 
         levels : textures of the blurred levels
         blur : Gaussians of the blur, with their weights

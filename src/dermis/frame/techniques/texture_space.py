@@ -27,9 +27,10 @@ class TextureSpace(AtlasTechnique):
     def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
         """Split a profile into its narrowest Gaussian and the Gaussians with which light is blurred.
 
-        Instead of a blur with the narrowest Gaussian, light is evaluated at each pixel. If even this Gaussian
-        is too wide for that, light is blurred with all Gaussians of the profile. The field `fine` of the
-        result corrects light that varies within a texel.
+        The narrowest Gaussian is not blurred: its share of the light leaves the skin where it enters, and is
+        computed at each pixel. If even this Gaussian is too wide for that, light is blurred with all
+        Gaussians of the profile. From the field `fine` of the result, the shader corrects light that varies
+        within a texel.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
