@@ -27,15 +27,16 @@ _NO_NEIGHBOUR_WORD = 0xFFFFFFFF  # word of a triangle edge without skin across i
 
 @dataclass(frozen=True, eq=False)
 class GutterTracing:
-    """Constant inputs of the passes that determine from where on the surface each gutter texel copies light.
+    """Constant inputs of the passes that find the position from which each gutter texel copies light.
 
-    The passes trace a path from the edge of the chart across the seam.
+    For each gutter texel, the passes trace a path over the surface, from the edge of its chart across the
+    seam. The position where the path ends is the source of the texel.
 
     starts : buffer of the point at which each path starts, for gutter_trace.wgsl
     sides : buffer of the neighbouring triangle across each edge of each triangle, for gutter_trace.wgsl
     halvings : for each coarser resolution of the atlas, a dictionary from names in gutter_halve.wgsl to
-        buffers. They list the coarser gutter texels and, for each of these, the finer gutter texels whose
-        positions to copy from are averaged
+        buffers. The buffers list the coarser gutter texels and, for each of them, the finer gutter texels
+        inside it; its source is the mean of their sources
     """
 
     starts: Buffer
@@ -104,7 +105,7 @@ def _halving_buffers(
 ) -> Bindings:
     """Upload, for each gutter texel of the coarser atlas, the list of the finer gutter texels inside it.
 
-    The position from which the coarser texel copies light is the mean of the positions for these texels.
+    The source of the coarser texel, from which it copies light, is the mean of the sources of these texels.
     """
     width = int(finer_textures.gutter_texels.max()) + 1
 

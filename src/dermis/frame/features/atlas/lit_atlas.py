@@ -12,9 +12,9 @@ from dermis.gpu import MutableBindings, Texture
 
 @dataclass(frozen=True, eq=False)
 class GutterUpdate:
-    """Inputs of the passes that determine, for each person, from where gutter texels copy light.
+    """Inputs of the passes that find, for each person, the positions from which gutter texels copy light.
 
-    tracing : inputs that are the same for all people
+    tracing : inputs of these passes that are the same for all people who share the atlas
     head : surface of the person at rest
     """
 
@@ -31,8 +31,8 @@ class LitAtlas:
     bindings : dictionary from names in the shaders to resources: geometry, maps, lights, shadows, environment
     surfaces : texture of the surface properties at each texel, packed by surface_texels.wgsl
     scattered : texture of the exitance by subsurface scattering at each texel
-    gutter_update : inputs of the passes that trace the gutters for each person, None if the gutters are
-        constant
+    gutter_update : inputs of the passes that find from where gutter texels copy light; None if these
+        positions are the same for all people
     """
 
     atlas: AtlasTextures

@@ -30,7 +30,10 @@ MAX_SAME_SOURCE_DISTANCE_TEXELS = 4.0
 
 
 def atlas_constants() -> dict[str, int | float]:
-    """Return the named values that `//#fill` lines insert into shaders of the atlas."""
+    """Return the named values that the shader preprocessor inserts into shaders that read the atlas.
+
+    It inserts them at `//#fill` directives.
+    """
     _, inner_b, inner_c = INNER_POINT_WEIGHTS
     tracing = {
         "inward": START_SHIFT_FRACTION,
@@ -260,11 +263,13 @@ def _split_squares(image: NDArray[np.generic]) -> NDArray[np.generic]:
 
 
 def _halved_reach(reach: NDArray[np.uint16], counted_texels: NDArray[np.bool_]) -> NDArray[np.uint16]:
-    """Return the reach of each 2 x 2 square of texels, (n/2, n/2, 4) [squares].
+    """Return the reach map at half the resolution, (n/2, n/2, 4), counted in squares of 2 x 2 texels.
 
-    The reach of a square is the smallest reach of its texels; texels outside `counted_texels` do not count.
+    The reach of a texel is the number of texels to its left, to its right, above it and below it until its
+    chart ends. The reach of a square is the smallest reach of its texels, counted from the border of the
+    square; texels outside `counted_texels` are ignored.
 
-    reach : (n, n, 4) reach of each texel, see `AtlasMip` [texels]
+    reach : (n, n, 4) reach of each texel [texels]
     counted_texels : (4, n/2, n/2) mask of texels, as split by `_split_squares`
     """
     squares = np.zeros((*counted_texels.shape[1:], 4), np.uint16)

@@ -56,7 +56,8 @@ def make_mixture(
     """Allocate the textures of a mixture of profiles.
 
     uv_weights : texture over uv of the blend weights
-    entering_pyramids : for each profile but the first, the blur pyramid of entering light times blend weight
+    entering_pyramids : for each profile but the first, the pyramid in which the light that enters the skin is
+        blurred, after it is multiplied by the blend weight of the profile
     layout_count : number of atlas layouts
     """
     side, texel = entering_pyramids[0].size, entering_pyramids[0].texel
@@ -132,9 +133,11 @@ def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, layo
 def draw_entering_light(
     graph: Recorder, levels: PyramidLevels, mixture: Mixture, layout_index: int, profile_index: int
 ) -> None:
-    """Declare the pass that fills level 0 of a profile's pyramid with entering light times the blend weight.
+    """Declare the pass that multiplies the light that enters the skin by the blend weight of a profile.
 
-    levels : pyramid whose level 0 holds all light that enters the skin
+    The product is stored in level 0 of that profile's own blur pyramid, in `Mixture.entering`.
+
+    levels : blur pyramid whose level 0 is read; it holds all light that enters the skin
     layout_index : index of the atlas layout
     profile_index : index of the profile among all profiles but the first
     """

@@ -45,14 +45,21 @@ class PyramidLevels:
     _views: dict[tuple[int, int], TextureView] = field(default_factory=dict)
 
     def layer(self, level_index: int, halvings: int = 0) -> TextureView:
-        """Return a view of a level, from the texture array whose resolution is halved `halvings` times."""
+        """Return a view of one level, which is a layer of one of the texture arrays in `stacks`.
+
+        level_index : index of the level in the pyramid
+        halvings : index of the texture array in `stacks`: how often its resolution is halved
+        """
         if (level_index, halvings) not in self._views:
             layer = level_index - self.first[halvings]
             self._views[level_index, halvings] = make_view(self.stacks[halvings], layer=layer)
         return self._views[level_index, halvings]
 
     def scratch_view(self, halvings: int = 0) -> TextureView:
-        """Return a view of the scratch texture at the full resolution halved `halvings` times."""
+        """Return a view of the scratch texture at one resolution.
+
+        halvings : how often the full resolution is halved
+        """
         if (-1, halvings) not in self._views:
             self._views[-1, halvings] = make_view(self.scratch, mip=halvings)
         return self._views[-1, halvings]
@@ -83,7 +90,10 @@ class Blur:
 
     @property
     def profile_levels(self) -> tuple[int, ...]:
-        """Return the indices of level 0 and of the levels that are not intermediate."""
+        """Return the indices of the unblurred level 0, and of the blurred levels that the profile sums.
+
+        The other levels are only intermediate steps towards wider blurs.
+        """
         return tuple(k for k in range(len(self.halvings)) if k not in self.intermediate_levels)
 
 
@@ -121,8 +131,8 @@ def make_levels(device: Device, atlas_side: int, halvings: Halvings, texel_forma
 def levels_by_resolution(halvings: Halvings) -> tuple[range, ...]:
     """Return the range of level indices that each resolution stores, finest resolution first.
 
-    A range covers the levels of all atlas layouts. At all resolutions but the finest, the first index is that
-    of a copy: the last level of the next finer resolution, stored at half its resolution.
+    A range covers the levels of all atlas layouts. Each range except that of the finest resolution starts
+    with the last level of the next finer resolution, of which a downsampled copy is stored too.
 
     halvings : for each atlas layout, the number of times that the resolution of each level is halved
     """

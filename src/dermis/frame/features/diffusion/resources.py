@@ -1,4 +1,8 @@
-"""Resources of the diffusion: the blur pyramid, the blurs of each atlas layout, and blended profiles."""
+"""Resources of the passes that diffuse light over the atlas.
+
+They are the textures of the blur pyramid, the parameters of the Gaussian blurs of each atlas layout, and
+textures to blend several diffusion profiles.
+"""
 
 from __future__ import annotations
 
@@ -21,14 +25,20 @@ class BlurScheme(Protocol):
     """Interface through which a rendering technique chooses the format and the resolutions of its blurs."""
 
     def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
-        """Allocate the blur pyramid for a square atlas with a side of `atlas_side` texels."""
+        """Allocate the blur pyramid for a square atlas.
+
+        atlas_side : side of the atlas at full resolution [texels]
+        halvings : for each atlas layout, the number of times that the resolution of each level is halved
+        """
 
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert blurred levels of weight 0, which make the chain of blurs cheaper.
+        """Insert blurred levels of weight 0 that make the chain of blurs cheaper.
 
-        Return a copy of `split` with the inserted levels, and their indices.
+        Each level is computed by blurring the previous level. After an inserted level, light is smooth enough
+        for the next level to be computed at a lower resolution. Return a copy of `split` with the inserted
+        levels, and their indices.
 
         split : division of a profile into Gaussians with which the atlas is blurred, and a narrower Gaussian
             that is evaluated at each pixel
@@ -46,10 +56,11 @@ class BlurScheme(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Resources:
-    """Resources of the diffusion.
+    """Resources of the passes that diffuse light over the atlas.
 
-    levels : textures of the blur pyramid, which the atlas layouts use one after another
-    blurs : Gaussian blurs of each atlas layout, empty when no light is blurred
+    levels : textures of the blur pyramid, shared by the atlas layouts, whose light is blurred one after
+        another
+    blurs : parameters of the Gaussian blurs of each atlas layout, empty when no light is blurred
     mixture : textures of profiles that are blended by a map, None for a single profile
     """
 

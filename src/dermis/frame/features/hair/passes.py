@@ -1,4 +1,8 @@
-"""Passes of hair: pose the strands, render their shadows, shade their knots, draw them over the picture."""
+"""Passes of hair, which draw the strands over the picture of the head without hair.
+
+The passes pose the strands, render shadow maps of them, compute the light at their knots (the end points of
+their segments), and draw the segments.
+"""
 
 from __future__ import annotations
 

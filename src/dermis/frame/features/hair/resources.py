@@ -165,7 +165,11 @@ def adapter_strand_detail(device: Device) -> StrandDetail:
 
 
 def strand_capacity(fine_counts: StrandCounts, coarse_counts: StrandCounts) -> StrandCapacity:
-    """Return the capacity that buffers of strands need, rounded up so that most heads can share buffers."""
+    """Return the capacity that buffers of strands need, rounded up so that most heads can share buffers.
+
+    fine_counts : number of strands of brows and lashes, and number of knots of each strand
+    coarse_counts : largest number of strands of scalp hair and beard, and largest number of knots of each
+    """
     knots = fine_counts.all_knots() + coarse_counts.all_knots()
     step = _KNOT_CAPACITY_STEP if coarse_counts.hairs else _FINE_CAPACITY_STEP
     return StrandCapacity(_round_up(fine_counts.hairs, _FINE_CAPACITY_STEP), _round_up(knots, step))
@@ -178,7 +182,11 @@ def _round_up(count: int, step: int) -> int:
 def make_strand_buffers(
     device: Device, capacity: StrandCapacity, caster_capacity: StrandCapacity
 ) -> StrandBuffers:
-    """Allocate the buffers of posed strands and of projected knots."""
+    """Allocate the buffers of posed strands and of projected knots.
+
+    capacity : largest numbers of strands and knots that are drawn into the picture
+    caster_capacity : largest numbers of strands and knots that are drawn into shadow maps
+    """
     first, second = (
         _make_word_buffer(device, 4 * (one.knots + 2 * (one.knots // 2)))
         for one in (caster_capacity, capacity)
@@ -262,10 +270,10 @@ class StrandTables:
     groom : buffers from which coarse strands are interpolated, None if there are no coarse strands
     possible : total number of coarse strands of the person
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
-    length_mm : length of the scalp hair or the beard, whichever is longer [mm]
-    shortest_mm : length of the scalp hair or the beard, whichever is shorter, and at least 1 [mm]
-    width_mm : width of the strands of scalp hair or beard, whichever is longer [mm]
-    cover : projected area of hair per area of skin, for scalp hair or beard, whichever is longer [-]
+    length_mm : length of the longer of scalp hair and beard [mm]
+    shortest_mm : length of the shorter of the two, at least 1 [mm]
+    width_mm : width of one strand of the longer of the two [mm]
+    cover : projected area of hair per area of skin, where the longer of the two grows [-]
     """
 
     strands: Buffer
@@ -317,7 +325,7 @@ class Resources:
 
 
 def shader_constants() -> dict[str, float]:
-    """Return the named values that `//#fill` lines insert into the hair shaders."""
+    """Return the named values that the shader preprocessor inserts at `//#fill` in the hair shaders."""
     opacity = {"strand_window": DEEP_OPACITY_WIDTH, "strand_layers": DEEP_OPACITY_LAYERS}
     words = {
         "strand_window_words": DEEP_OPACITY_HEADER_WORDS,
@@ -328,7 +336,7 @@ def shader_constants() -> dict[str, float]:
 
 
 def has_strands(head: Head, settings: Settings) -> bool:
-    """Return whether a head has strands of hair, and `settings` asks to draw them."""
+    """Return whether a head has strands of hair that the settings do not switch off."""
     return settings.strands and any(part is not None and len(part) > 0 for part in (head.strands, head.hair))
 
 

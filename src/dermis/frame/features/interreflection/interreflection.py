@@ -23,7 +23,10 @@ _INVOCATIONS_PER_PATCH = 16  # shader invocations per patch or cell
 
 
 def shader_constants() -> dict[str, int]:
-    """Return the named values that `//#fill` lines insert into the interreflection shaders."""
+    """Return the named values that the shader preprocessor inserts into the interreflection shaders.
+
+    It inserts them at `//#fill` directives.
+    """
     return {"linked_side": CELLS_PER_SIDE, "linked_samples": SAMPLES_PER_PATCH}
 
 

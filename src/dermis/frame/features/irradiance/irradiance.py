@@ -17,7 +17,7 @@ LIGHT_FILTER_SIGMA_TEXELS = 0.5
 
 
 def fine_light_constants() -> dict[str, float]:
-    """Return the named values that `//#fill` lines insert into fine_light.wgsl."""
+    """Return the named values that the shader preprocessor inserts at `//#fill` in fine_light.wgsl."""
     return {"fine_levels": MAX_FINE_GAUSSIANS}
 
 

@@ -117,8 +117,9 @@ def _depth_views_as_lights(shader: ComputeProgram, shadow_views: list[ShadowView
 def fill_occlusion_gaps(baked_occlusion: NDArray[np.float32], result_side: int) -> NDArray[np.float32]:
     """Return a baked occlusion map whose empty texels have the value of the nearest texel on the surface.
 
-    The last row of texels is repeated before the rows of vertices, so that texture filtering at the edge of
-    the atlas does not mix in values of vertices.
+    The map consists of rows of atlas texels, followed by rows with one value for each vertex of the mesh. The
+    last row of texels is repeated between the two, so that texture filtering at the edge of the atlas does
+    not mix in values of vertices.
 
     baked_occlusion : (rows, result_side) result of `bake_occlusion`, NaN where there is no surface
     result_side : side of the atlas in the result [texels]

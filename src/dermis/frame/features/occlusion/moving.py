@@ -61,7 +61,8 @@ class RotationAnchors:
     points : (s,) indices of the control points
     offsets : (s, 3) vectors from the weighted mean position to each point at rest, times the point's weight
         [mm]
-    outline : positions of the control points at rest, and the bones that move them
+    outline : the same control points in a form that can be posed: their positions at rest, and the bones that
+        move them
     """
 
     points: NDArray[np.intp]
@@ -97,7 +98,10 @@ def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
 
 @lru_cache(maxsize=1)
 def _sky_view_axes() -> Floats:
-    """Return the right, up and forward axes of all views of a head at rest, (k, 3, 3) unit vectors."""
+    """Return the axes of views of a head at rest from k directions spread evenly around it, (k, 3, 3).
+
+    The axes of a view are unit vectors to its right, upwards and forward.
+    """
     up = np.array([0.0, 1.0, 0.0])
     return np.array([view_axes_array(-to_sky, up) for to_sky in fibonacci_sphere(SKY_VIEW_COUNT)])
 
@@ -162,7 +166,9 @@ class VertexSkyVisibility:
 def make_vertex_sky_visibility(
     device: Device, head: Head, rest_geometry: HeadGeometry
 ) -> VertexSkyVisibility:
-    """Create the resources of `VertexSkyVisibility`, and compute the visible fractions for the head at rest.
+    """Create the resources of `VertexSkyVisibility`, and fill in the values for the head at rest.
+
+    The values are the fraction of the sky that is visible from each vertex.
 
     rest_geometry : the triangles of the head at rest
     """
@@ -212,9 +218,11 @@ def draw(
 def _draw_occlusion_map(
     graph: Recorder, vertex_visibility: VertexSkyVisibility, layout: LitAtlas, occlusion: MovingOcclusion
 ) -> None:
-    """Declare the passes that update the occlusion map of an atlas layout from the fractions at the vertices.
+    """Declare the passes that update the occlusion map of an atlas layout.
 
-    The pass that finds the vertices around each texel runs only once, because its inputs are constant.
+    The map is updated from the fractions of the sky that are visible from each vertex: in the current shape,
+    and at rest. The pass that finds the vertices around each texel runs only once, because its inputs are
+    constant.
     """
     moving_map = cast(Texture, layout.bindings["occlusion_map"])
     bindings: Bindings = {
@@ -234,7 +242,9 @@ def _draw_occlusion_map(
 
 
 def sky_views_record(device: Device, views: SkyViews, vertex_count: int) -> UniformRecord:
-    """Return the uniform record of the sky views for moving_occlusion_vertices.wgsl.
+    """Return the uniform record of the orthographic views `SkyViews` for moving_occlusion_vertices.wgsl.
+
+    With it, the shader looks up vertices in the depth maps that are drawn from these views.
 
     vertex_count : number of vertices of the mesh
     """

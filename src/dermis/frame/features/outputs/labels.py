@@ -66,7 +66,7 @@ def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> Lab
 
 
 def shader_constants() -> dict[str, int]:
-    """Return the named values that `//#fill` lines insert into the label shaders."""
+    """Return the named values that the shader preprocessor inserts at `//#fill` in the label shaders."""
     names = "right_brow", "left_brow", "hair", "beard", "lashes"
     return {f"class_{name}": class_number(name) for name in names} | {"class_count": len(label_classes())}
 

@@ -137,9 +137,10 @@ def draw_thickness(
 
 
 def make_thickness_map(device: Device, pair_buffers: PairBuffers) -> Texture:
-    """Return a texture of tissue thickness, filled with the largest measurable thickness [mm].
+    """Return a texture for tissue thickness [mm], filled with the upper limit of measured thicknesses.
 
-    The texture has one texel for each cell of the atlas.
+    The texture has one texel for each cell of the atlas. The limit is the largest distance between the cells
+    of a pair, because thickness is measured between these cells.
 
     pair_buffers : pairs of cells between which light crosses the head
     """
@@ -171,7 +172,7 @@ def measure_thickness(graph: Recorder, translucency: Translucency, thickness_map
 
 
 def _shading_bindings(shader: ComputeProgram, inputs: StageInputs) -> MutableBindings:
-    """Return the resources of the shading, set such that subsurface and reflected light are both included."""
+    """Return the resources of a shader that shades, with subsurface and reflected light both switched on."""
     shade: UniformRecord = np.ndarray((), inputs.view.dtype, bytearray(inputs.view.tobytes()))
     shade["light_factors"] = 1.0
     return inputs.bindings(shader) | {"shade": shade, "scattered": inputs.scattered}

@@ -52,7 +52,10 @@ class PictureDiffusion:
 class StageInputs:
     """Inputs of the shaders that compute outputs.
 
-    lighting : resources of the lighting for the first layout
+    Some methods of treating seams use atlases with several uv layouts. Inputs that depend on the layout are
+    those of the first layout.
+
+    lighting : dictionary from names in shaders to the resources that light the skin, for the first layout
     view : uniform record of the struct Shade
     centre_mm : centre of the head, the origin of positions of the scene [mm]
     constants : pipeline constants of the lights, the surface and the technique
@@ -91,6 +94,9 @@ class StageInputs:
     sum_transmitted: Callable[[tuple[Texture, ...]], Texture]
 
     def bindings(self, shader: ComputeProgram) -> MutableBindings:
-        """Return the resources of the lighting, with the camera and triangles that surface_hit.wgsl reads."""
+        """Return the resources of `lighting`, with the camera and triangles that surface_hit.wgsl reads.
+
+        shader : shader whose struct OutputCamera determines the format of the camera's uniform record
+        """
         camera = shader.record("OutputCamera", rays=ray_record(shader, self.view), centre=self.centre_mm)
         return {**self.lighting, "camera": camera, "centres": self.centres.texture}

@@ -118,7 +118,10 @@ DRAW_STAGES: Registry[DrawStage] = Registry(
 
 
 def shader_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
-    """Return a list of outputs for each stage, over which `//#each` lines in STAGE.wgsl loop."""
+    """Return, for each stage, the list of outputs over which the shader preprocessor loops in STAGE.wgsl.
+
+    It loops at `//#each` directives.
+    """
     stages = {one.stage for one in OUTPUTS.values()}
     return {f"{stage}_outputs": partial(_stage_members, stage) for stage in sorted(stages)}
 

@@ -22,7 +22,7 @@ MIN_HIGHLIGHT_FACTOR = 0.5
 
 
 def shader_constants() -> dict[str, float]:
-    """Return the named values that `//#fill` lines insert into the shaders of the exposure meter."""
+    """Return the named values that the shader preprocessor inserts at `//#fill` in shaders of the meter."""
     highlights = {"meter_clipping": MAX_CLIPPED_FRACTION, "meter_stopped_down": MIN_HIGHLIGHT_FACTOR}
     return {"meter_side": METER_GRID_SIDE, "meter_key": METERED_IRRADIANCE, **highlights}
 

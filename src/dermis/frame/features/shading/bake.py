@@ -32,7 +32,7 @@ BAKED_CHANNEL_COUNT = sum(BAKED_CHANNELS.values())
 
 
 def shader_constants() -> dict[str, int]:
-    """Return the named values that `//#fill` lines insert into bake.wgsl."""
+    """Return the named values that the shader preprocessor inserts at `//#fill` in bake.wgsl."""
     return {"baked_numbers": BAKED_CHANNEL_COUNT}
 
 

@@ -1,4 +1,4 @@
-"""Uniform record of the shading pass, which holds camera rays, samples, materials and poses of the eyes."""
+"""Uniform record of the shading pass: camera rays, sample positions, all materials, and poses of the eyes."""
 
 from __future__ import annotations
 

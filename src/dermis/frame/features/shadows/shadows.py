@@ -29,7 +29,10 @@ class ShadowMaps:
 
     @property
     def texture(self) -> Texture:
-        """Return the texture of z-buffer depths seen from each light, 1 near and 0 empty."""
+        """Return the texture array of shadow maps: z-buffer depths as seen from each light.
+
+        A depth is 1 at the near plane, and 0 at the far plane and where there is no surface.
+        """
         return self.layers.texture
 
 

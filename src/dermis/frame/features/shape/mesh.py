@@ -36,7 +36,10 @@ class HeadGeometry:
 
     @property
     def cutout_constants(self) -> Constants:
-        """Return the pipeline constants that make passes cut holes into parts, none if there are no holes."""
+        """Return the pipeline constants with which passes leave out the holes in parts of the head.
+
+        The result is empty if no part has holes.
+        """
         return (("CUTOUTS", 1),) if self.has_cutouts else ()
 
     def with_shape(self, shape: Shape) -> HeadGeometry:

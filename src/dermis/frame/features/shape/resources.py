@@ -1,4 +1,4 @@
-"""Resources of the shape of a head."""
+"""Resources of the shape of a head: buffers of its mesh and rig, its posed vertices, and its curvature."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class Resources:
 
     shape : buffers of the posed shape
     tables : buffers that are constant for a mesh
-    rest_shape : buffers of the person's shape at rest; None if the control points of the mesh are already
-        those of the person
+    rest_shape : buffers of the shape at rest of a person whose control points differ from those of the mesh,
+        which several people may share; else None
     curvature : buffers of the surface's curvature, None unless the technique reads it
     """
 

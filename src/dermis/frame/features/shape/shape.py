@@ -158,7 +158,11 @@ def _vertex_resources(device: Device, vertex_count: int) -> dict[str, Texture | 
 
 
 def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
-    """Return the tables of shape_pose.wgsl: each point's displacements, bone weights and eyeball contact."""
+    """Return the tables that shape_pose.wgsl reads, by name.
+
+    They hold, for each control point, its displacements by morph targets, its bone weights and, for points of
+    the eyelids, the eyeball over which they slide.
+    """
     count = len(rig.positions_mm)
     return {
         "first": _run_offsets(rig.targets.point, count),
@@ -195,10 +199,14 @@ def _bone_influences(skeleton: Skeleton | None, point_count: int) -> Words:
 
 
 def _contact_words(lid_contact: LidContact | None, point_count: int) -> Words:
-    """Return (p, 3) words with which the shader keeps points outside the eyeballs.
+    """Return (p, 3) words by which shape_pose.wgsl keeps points of the eyelids outside the eyeballs.
 
-    The words are the indices of the front and back point of the eyeball, and the bits of a float: the least
-    distance from the eyeball [mm]. They are 0 for points that may be anywhere.
+    The words of an eyelid point are the indices of the frontmost and the rearmost point of its eyeball, and
+    the bits of a float: the least distance that it keeps from the eyeball, for an eye of adult size [mm]. The
+    words of all other points are 0.
+
+    lid_contact : eyelid points and the eyeballs over which they slide; None gives one row of zeros
+    point_count : number of points
     """
     if lid_contact is None:
         return np.zeros((1, 3), np.uint32)
@@ -356,9 +364,11 @@ def _dispatch_shape(
     invocation_count: int,
     constants: Constants = (),
 ) -> None:
-    """Declare a pass of the shape with one shader invocation for each of `invocation_count` elements.
+    """Declare a pass that computes a step of the posed shape.
 
+    shader_name : path of the shader
     bindings : resources of the shader
+    invocation_count : number of shader invocations, one for each point or vertex
     """
     graph.dispatch(
         "shape",

@@ -8,10 +8,16 @@ from dermis.gpu.wgsl_source import ShaderListMember
 
 
 def shader_constants() -> Mapping[str, float]:
-    """Return the values that `//#fill` lines insert into shaders of lobes, eyes, mouths and painted skin."""
+    """Return the named values that the shader preprocessor inserts into shaders of the surface.
+
+    It inserts them at `//#fill` directives in shaders of specular lobes, eyes, mouths and painted skin.
+    """
     return {**lobe_constants(), **eye_constants(), **painting_constants()}
 
 
 def shader_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
-    """Return the lists over which `//#each` lines in shaders loop, such as the list of specular lobes."""
+    """Return the lists over which the shader preprocessor loops, such as the list of specular lobes.
+
+    It loops at `//#each` directives.
+    """
     return {"lobes": lobe_shaders, **painting_lists()}

@@ -102,7 +102,10 @@ def _paint_maps(
 
 
 def _painted_surface(head: Head) -> PaintedSurface:
-    """Return the mesh over which skin is painted: the mesh that a person shares with the template."""
+    """Return the mesh over which the skin of a head is painted.
+
+    For people who are made from a template, it is the mesh of the template, without their own shape.
+    """
     return painted_surface(head.topology.mesh, head.topology.control.stencils)
 
 

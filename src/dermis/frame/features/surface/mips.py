@@ -140,9 +140,9 @@ def relief_from_buffers(
 
 
 def fill_relief(recorder: Recorder, relief_texture: MippedTexture, height_buffer: Buffer) -> None:
-    """Declare the passes that fill a relief texture of even size from the heights in one buffer.
+    """Declare the passes that fill a relief texture from the heights in one buffer.
 
-    relief_texture : texture for slopes and squared slopes
+    relief_texture : texture for slopes and squared slopes; its width and height are even numbers of texels
     height_buffer : buffer of heights with a border of one texel on all sides [mm]
     """
     _draw_slopes(recorder, relief_texture, height_buffer, 0, relief_texture.size[1])

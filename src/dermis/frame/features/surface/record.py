@@ -35,13 +35,19 @@ def lobe_shaders() -> list[ShaderListMember]:
 
 
 def lobe_constants() -> dict[str, float]:
-    """Return the named values that `//#fill` lines insert into lobe.wgsl and the shaders of the lobes."""
+    """Return the named values that the shader preprocessor inserts into lobe.wgsl and the lobes' shaders.
+
+    It inserts them at `//#fill` directives.
+    """
     model_numbers = {name: number for model in MODELS.values() for name, number in model.numbers.items()}
     return {"root_of_first_row": MIN_ROUGHNESS_ROOT, **model_numbers}
 
 
 def eye_constants() -> dict[str, float]:
-    """Return the named values that `//#fill` lines insert into eye.wgsl and mouth.wgsl."""
+    """Return the named values that the shader preprocessor inserts into eye.wgsl and mouth.wgsl.
+
+    It inserts them at `//#fill` directives.
+    """
     return {
         "cornea_at": cornea_centre_mm(),
         "limbus_mm": LIMBUS_MM,

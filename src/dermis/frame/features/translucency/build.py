@@ -49,7 +49,11 @@ _CELL_COARSENING_FACTOR = 1.5  # factor of the cell side when memory does not ho
 
 
 def thin_part_tables(memo: Memo, request: FrameRequest) -> ThinParts | None:
-    """Return tables of the light that thin tissue transmits and loses, None for Lambertian skin."""
+    """Return tables of the light that thin tissue transmits, and of the light that it fails to reflect.
+
+    Both are functions of the thickness. The light that thin tissue fails to reflect is the reflectance of
+    thick tissue minus that of the thin tissue. The result is None for Lambertian skin.
+    """
     if request.skin.direction != "half-space":
         return None
     split, maps = request.split, request.head.maps
@@ -68,17 +72,19 @@ def _thin_part_weights(
     variance_mm2: Floats,
     level_weight: Floats,
 ) -> ThinParts:
-    """Return tables of the light that thin tissue transmits and loses, as functions of its thickness.
+    """Return tables of the light that thin tissue transmits, and of the light that it fails to reflect.
 
-    For each thickness, the tables hold one weight for each blurred level of the diffusion. The weights are
-    scaled so that no level loses more light than it has.
+    Both are functions of the thickness. The light that thin tissue fails to reflect is the reflectance of
+    thick tissue minus that of the thin tissue. For each thickness, each table holds the weights of the
+    Gaussians with which light is blurred. The weights are limited so that thin tissue does not fail to
+    reflect more light than is blurred.
 
     colour : (3,) diffuse reflectance of thick skin [-]
     eta : index of refraction of skin [-]
     anisotropy : anisotropy of scattering [-]
     total_weight : (3,) sums of the weights of all Gaussians of the profile [-]
-    variance_mm2 : (k,) variances of the blurred levels [mm^2]
-    level_weight : (k, 3) weights of the blurred levels [-]
+    variance_mm2 : (k,) variances of the Gaussians with which light is blurred [mm^2]
+    level_weight : (k, 3) weights of these Gaussians for red, green and blue [-]
     """
     reach = min(_MAX_THICKNESS_SIGMAS * float(np.sqrt(variance_mm2[-1])), _MAX_THICKNESS_MM)
     tables = solve_thin_parts(equivalent_medium(profile, colour, eta), variance_mm2, reach, anisotropy)
@@ -106,10 +112,11 @@ def make_translucency(
 
     surface_bindings : resources of geometry.wgsl and of the atlas, for the current shape
     rest_surface_bindings : the same resources for the shape in which pairs are searched
-    variance_mm2 : (k,) variances of the blurred levels [mm^2]
-    weight : (k, 3) weights of the blurred levels [-]
-    thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
-        compute the weight of a pair from the Gaussians, at the straight-line distance between its cells
+    variance_mm2 : (k,) variances of the Gaussians with which light is blurred [mm^2]
+    weight : (k, 3) weights of these Gaussians for red, green and blue [-]
+    thickness_tables : transmittance of thin tissue, and how much less it reflects than thick tissue, as
+        functions of its thickness; None to compute the weight of a pair from the Gaussians, at the
+        straight-line distance between its cells
     shares_pairs : whether skins with similar profiles use the same pairs; true for skins that may change
         between frames
     layout_key : name of the atlas layout in the cache
@@ -147,7 +154,12 @@ class PairCache:
         self._cache: dict[Cells, PairBuffers] = {}
 
     def pairs_for_cells(self, cells: Cells) -> PairBuffers:
-        """Return the pairs for a division of the atlas into cells, from the cache or by a new search."""
+        """Return the pairs of cells between which light crosses thin parts of the head.
+
+        The pairs come from the cache or from a new search.
+
+        cells : division of the atlas into cells
+        """
         pairs = self._cache.pop(cells, None)
         if pairs is None:
             while len(self._cache) >= _CACHED_PAIR_SEARCH_COUNT:
@@ -202,11 +214,11 @@ def make_pair_buffers(device: Device, cells: Cells, pair_table: PairTable) -> Pa
 
 
 def _receiver_ranges(cells: Cells, pair_table: PairTable) -> NDArray[np.uint32]:
-    """Return (m, 3) words, one row for each cell where light leaves (receiver).
+    """Return a table (m, 3) of the receivers, which are the cells where transmitted light leaves the skin.
 
-    A row holds the packed position of the cell, and the first and end index of its pairs. If there are no
-    receivers, the result is one row of zeros. Receivers with many pairs come first, so that invocations of
-    the same workgroup take similar time.
+    Each row holds the packed position of a receiver, and the start and end of the range of its pairs in the
+    buffer of pairs. If there are no receivers, the result is one row of zeros. Receivers with many pairs come
+    first, so that invocations of the same workgroup take similar time.
     """
     first, end = pair_table.first[:-1], pair_table.first[1:]
     order = np.argsort(first - end, kind="stable")
@@ -234,10 +246,11 @@ def with_profile_weights(
 
     Each pair of cells, one where light enters and one where it leaves, has one weight.
 
-    variance_mm2 : (k,) variances of the blurred levels [mm^2]
-    weight : (k, 3) weights of the blurred levels [-]
-    thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
-        compute the weight of a pair from the Gaussians, at the straight-line distance between its cells
+    variance_mm2 : (k,) variances of the Gaussians with which light is blurred [mm^2]
+    weight : (k, 3) weights of these Gaussians for red, green and blue [-]
+    thickness_tables : transmittance of thin tissue, and how much less it reflects than thick tissue, as
+        functions of its thickness; None to compute the weight of a pair from the Gaussians, at the
+        straight-line distance between its cells
     """
     fraction = weight / np.maximum(weight.sum(axis=0), MIN_WEIGHT_SUM)
     transmitted = weight if thickness_tables is None else thickness_tables.transmitted

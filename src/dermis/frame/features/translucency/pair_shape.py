@@ -1,4 +1,7 @@
-"""Choice of the shape, at rest or deformed, in which the cell pairs of translucency are searched."""
+"""Choice of the head shape, at rest or deformed, in which pairs for translucency are searched.
+
+A pair is two cells of the skin between which light crosses a thin part of the head.
+"""
 
 from __future__ import annotations
 

@@ -162,9 +162,9 @@ def sum_pair_light(
 def draw_weights(graph: Recorder, translucency: Translucency) -> None:
     """Declare the passes that compute, for the current shape, the weights of all pairs of cells.
 
-    A weight is the fraction of the light of the source cell that leaves in the receiver cell. The passes also
-    compute, for each receiver cell, the total fraction of the blurred light that is lost because the tissue
-    is thin.
+    A weight is the fraction of the light of the source cell that leaves in the receiver cell. For each
+    receiver cell, the passes also compute a fraction of the diffused light that must be subtracted. Light is
+    diffused as if all tissue were thick, but thin tissue returns less of it.
     """
     pairs, cells = translucency.pairs, translucency.pairs.cells
     draw_cell_points(
@@ -185,10 +185,13 @@ def draw_weights(graph: Recorder, translucency: Translucency) -> None:
 
 
 def choose_source_level(source_spacing_mm: float, variance_mm2: Floats) -> int:
-    """Return the index of the narrowest blurred level that is smooth enough to be sampled once per source.
+    """Return the index of the Gaussian whose blurred light is used as the light that enters the source cells.
 
-    source_spacing_mm : distance between neighbouring sources, the cells where light enters [mm]
-    variance_mm2 : (k,) variances of the blurred levels [mm^2]
+    It is the narrowest Gaussian that blurs light enough for one value per source cell. If all are too narrow,
+    it is the widest.
+
+    source_spacing_mm : distance between neighbouring source cells [mm]
+    variance_mm2 : (k,) increasing variances of the Gaussians with which light is blurred [mm^2]
     """
     smooth = np.flatnonzero(variance_mm2 >= (_MIN_SOURCE_SMOOTHNESS * source_spacing_mm) ** 2)
     return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
@@ -204,10 +207,10 @@ def pair_weight_bindings(
 ) -> Bindings:
     """Return the uniform record and the transmittance table of a profile for translucency_weights.wgsl.
 
-    variance_mm2 : (k,) variances of the blurred levels [mm^2]
-    weight : (k, 3) weights of the blurred levels [-]
-    thickness_tables : light that thin tissue transmits and loses, as functions of its thickness; None to
-        compute the weights of pairs from the Gaussians
+    variance_mm2 : (k,) variances of the Gaussians with which light is blurred [mm^2]
+    weight : (k, 3) weights of these Gaussians for red, green and blue [-]
+    thickness_tables : transmittance of thin tissue, and how much less it reflects than thick tissue, as
+        functions of its thickness; None to compute the weights of the pairs of cells from the Gaussians
     transmittance : (THICKNESS_ROWS, k, 3) table to use: `thickness_tables.transmitted` or
         `thickness_tables.lost`; ignored without `thickness_tables`
     """

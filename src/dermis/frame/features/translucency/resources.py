@@ -21,8 +21,8 @@ class PairBuffers:
     count : number of pairs
     receiver_ranges : buffer of each receiver cell and the range of its pairs, see translucency.wgsl
     transmitted : texture of transmitted light, one texel per cell; alpha is 1 where there is surface
-    lost : texture of the fraction of blurred light that is lost because the tissue is thin, one texel per
-        cell; alpha is 1 where there is surface
+    lost : texture of the fraction of the diffused light that thin tissue does not return, relative to thick
+        tissue, one texel per cell; alpha is 1 where there is surface
     """
 
     cells: Cells
@@ -49,10 +49,12 @@ class Translucency:
     direction_factors : buffer of one factor per source, by which the directions of its incident light change
         the transmission; filled by `passes.draw_direction_factors`
     weight_bindings : resources of translucency_weights.wgsl for transmitted light
-    loss_bindings : resources of translucency_weights.wgsl for light that is lost because the tissue is thin
+    loss_bindings : resources of translucency_weights.wgsl for the diffused light that thin tissue does not
+        return
     gaussian_count : number of Gaussians that blur light
     uses_tables : whether transmittance is read from tables as a function of thickness
-    source_level : index of the blurred level whose light enters at sources; 0 is the narrowest blur
+    source_level : index of the Gaussian whose blurred light is used as the light that enters the sources; 0
+        is the narrowest
     """
 
     pairs: PairBuffers

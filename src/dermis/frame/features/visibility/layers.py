@@ -303,6 +303,7 @@ def _divide_triangles_into_workgroups(
 def _tile_counts(picture_size: tuple[int, int]) -> tuple[int, int]:
     """Return the number of tiles, across and down, of a picture of size (width, height).
 
-    The compute pass draws the picture in these tiles.
+    The compute pass of visibility_buffer.wgsl marks the tiles into which it draws, so that empty tiles can be
+    skipped when the result is copied to a texture.
     """
     return -(-picture_size[0] // _TILE_PIXELS[0]), -(-picture_size[1] // _TILE_PIXELS[1])

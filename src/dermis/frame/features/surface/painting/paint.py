@@ -67,12 +67,15 @@ _FOLDING_VALUE_COUNT = FOLD_MOVEMENT_COUNT + 1  # numbers in `folding` of the sh
 
 
 def painting_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
-    """Return the lists over which `//#each` lines in painting shaders loop, such as the list of noises."""
+    """Return the lists over which the shader preprocessor loops, such as the list of noises.
+
+    It loops at `//#each` directives in painting shaders.
+    """
     return {name: _as_shader_list(names) for name, names in _PAINTING_LISTS.items()}
 
 
 def painting_constants() -> dict[str, float]:
-    """Return the named values that `//#fill` lines insert into the painting shaders."""
+    """Return the named values that the shader preprocessor inserts at `//#fill` in painting shaders."""
     counts = {name: len(names) for name, names in _PAINTING_LISTS.items()} | paint_table_sizes()
     rows = {"noise_rows": len(noise_table()), "amount_rows": len(ZONE_AMOUNTS) // 4}
     sizes = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM}
@@ -87,7 +90,8 @@ class PaintInputs(NamedTuple):
     """Inputs of the shader that paints skin.
 
     paint : uniform record of the skin's appearance, such as pigments, gloss and age
-    tables : tables of procedural noises and dots, facial zones, folds of the skin, and the hairline
+    tables : tables of procedural noises, layers of dots on the skin (such as freckles, moles and stubble),
+        facial zones, folds of the skin, and the hairline
     colours : (3, n, n, 3) colour tables, linear Rec. 709 [-]. Table 0 is for skin with the lowest oxygen
         saturation, table 1 for skin with the highest, and table 2 for lips. The rows of a table are for
         evenly spaced square roots of the melanin fraction, the columns for those of the blood fraction
@@ -101,7 +105,7 @@ class PaintInputs(NamedTuple):
 
 
 def paint_inputs(surface: PaintedSurface, look: SkinLook, map_side: int) -> PaintInputs:
-    """Return the inputs of the shader that paints skin with a given look.
+    """Return the inputs of the shader that paints a skin that has the given look.
 
     map_side : side of the maps [texels]
 
@@ -132,7 +136,10 @@ def _shader_text(shader_path: str) -> str:
 
 
 def _face_tables(hairline_recession: float, site_differences: SiteDifferences) -> bytes:
-    """Return the tables that spot.wgsl reads: procedural noises and dots, facial zones, skin folds, hairline.
+    """Return the bytes of the tables that spot.wgsl reads.
+
+    They describe procedural noises, layers of dots on the skin (such as freckles, moles and stubble), facial
+    zones, folds of the skin, and the hairline.
 
     hairline_recession : recession of the hairline [-]
     site_differences : differences of pigments between measured sites of the face, such as forehead and cheek
@@ -306,7 +313,10 @@ def draw_expression(
 
 
 def _fill_expression_maps(graph: Recorder, expression_maps: ExpressionMaps) -> None:
-    """Declare the passes that compute the mip levels of the colour, and the relief from the heights."""
+    """Declare the passes that compute the coarser mip levels of the colour map, and the whole relief map.
+
+    The relief map, with all its mip levels, is computed from the buffer of heights.
+    """
     map_mips.fill_mips(graph, expression_maps.colour)
     map_mips.fill_relief(graph, expression_maps.relief, expression_maps.heights)
 
@@ -340,7 +350,7 @@ class RawPaintedArrays(NamedTuple):
 def paint_textures(
     device: Device, surface: PaintedSurface, look: SkinLook, map_side: int, with_expressions: bool = False
 ) -> PaintedTextures:
-    """Paint the maps of skin with a given look as textures.
+    """Paint the maps of a skin that has the given look, and return them as textures.
 
     map_side : side of the maps [texels]
     with_expressions : whether expressions change colour and relief; if so, `draw_expression` fills these maps
@@ -368,7 +378,7 @@ def paint_textures(
 
 
 def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, map_side: int) -> Maps:
-    """Paint the maps of skin with a given look as arrays.
+    """Paint the maps of a skin that has the given look, and return them as arrays.
 
     Pores and furrows are left out, because they are too fine for maps. Heights fade to 0 outside the charts
     of the uv layout.
@@ -386,7 +396,7 @@ def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, map_si
 def paint_raw_arrays(
     device: Device, surface: PaintedSurface, look: SkinLook, map_side: int
 ) -> RawPaintedArrays:
-    """Paint the maps of skin with a given look as arrays, with all channels that the shader writes."""
+    """Paint the maps of a skin that has the given look, and return all channels that the shader writes."""
     maps = paint_rest_maps(device, paint_inputs(surface, look, map_side), map_side)
     textures = maps.colour, maps.specular, maps.roughness
     colour, specular, roughness = (download(device, one.texture).astype(np.float32) for one in textures)

@@ -235,8 +235,8 @@ def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple
     """Upload the ranges of source cells that hits.wgsl tests for each receiver cell.
 
     Return a dictionary from names in hits.wgsl to the buffers of the ranges, and the number of words that
-    hits.wgsl writes: one word for each receiver and each tile that is tested for it. A word has one bit for
-    each source in the tile.
+    hits.wgsl writes. A tile is a square of cells. There is one word for each receiver cell and each tile that
+    is tested for it, and a word has one bit for each source cell in the tile.
     """
     word = list_offsets(candidates.end - candidates.first)
     unused = np.zeros(len(candidates.receiver), np.int64)
