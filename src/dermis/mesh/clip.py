@@ -116,7 +116,10 @@ class Clip(ShortRepr):
 
     @property
     def note(self) -> str:
-        """Return a sentence about targets and bones of the file that the head lacks; empty if none."""
+        """Return a sentence that names the targets and bones in `left_out`; empty if there are none.
+
+        The motion file moves them, but the head does not have them.
+        """
         if not self.left_out:
             return ""
         names = ", ".join(self.left_out[:_MAX_LISTED_NAMES])

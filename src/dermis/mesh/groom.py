@@ -101,5 +101,8 @@ class Groom(ShortRepr):
         return replace(self, roots=roots)
 
     def __len__(self) -> int:
-        """Return the number of roots in use; low density or baldness may leave some without a strand."""
+        """Return the number of roots at which a strand may grow.
+
+        Where hair density is low or the person is bald, some of these roots grow no strand.
+        """
         return self.strands

@@ -103,9 +103,11 @@ class Head:
 
     @property
     def topology(self) -> Head:
-        """Return the head for which the uv atlas and other shared data are computed: the template or `bare`.
+        """Return the head from which the uv atlas and other data that depend on topology are computed.
 
-        It is the template if the rig of the head refers to the rig of the template, see `Rig.template`.
+        Heads with the same `template` share these data: for them, it is the template. It is `bare`, this head
+        without maps, if there is no template, or if the template's rig is not the `Rig.template` of this
+        head's rig.
         """
         template = self.template
         if template is None or self.rig is None or self.rig.template is not template.rig:
@@ -134,9 +136,10 @@ class Head:
 
     @cached_property
     def skull_mm(self) -> Point | None:
-        """Return the centre of the skull, without neck and shoulders; None for a mesh without a head [mm].
+        """Return the centre of the skull [mm]; None for a mesh without a head.
 
-        The skull of a body is at the head bone, if the skeleton has a head bone.
+        Neck, shoulders and body do not shift this centre. If the mesh is a whole body whose skeleton has a
+        head bone, it is the centre of the points that follow this bone.
         """
         skeleton = None if self.mesh.is_head_sized or self.rig is None else self.rig.skeleton
         bone = None if skeleton is None else head_bone(skeleton.names)
@@ -153,8 +156,7 @@ class Head:
 
     @cached_property
     def axes(self) -> Doubles:
-        """Return the directions to the right, upwards and to the front, as rows (3, 3).
-
+        """Return unit vectors to the viewer's right, upwards and to the front, as rows (3, 3).
         For a head the directions are x, y and z. The front of a flat patch of skin is the side to which its
         normals point.
         """
@@ -162,7 +164,10 @@ class Head:
 
     @property
     def seen_positions_mm(self) -> Floats:
-        """Return the right, up and front components (v, 3) of the vertices, relative to the centre [mm]."""
+        """Return the positions (v, 3) of the vertices along the directions `axes`, relative to the centre [mm].
+
+        For somebody who looks at the front, x is to the right and y is up; z points to the front.
+        """
         positions = self.mesh.positions - np.array(self.centre_mm, dtype=np.float32)
         return positions if self.skull_mm is not None else positions @ self.axes.T.astype(np.float32)
 
@@ -177,7 +182,7 @@ class Head:
 
         The position is relative to the head's centre.
 
-        x_mm, y_mm : position to the right and upwards, relative to the head's centre [mm]
+        x_mm, y_mm : position to the viewer's right and upwards, relative to the head's centre [mm]
         """
         p = self.seen_positions_mm
         distance = np.hypot(p[:, 0] - x_mm, p[:, 1] - y_mm)

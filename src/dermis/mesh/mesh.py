@@ -56,10 +56,10 @@ class Mesh(ShortRepr):
     Y is up and the face looks towards +Z; seen from outside, the corners of a triangle are counter-clockwise.
     A point on a uv seam has several vertices, one for each uv; all of them have the same `point`.
 
-    positions : (v, 3) [mm]
-    normals : (v, 3) unit vectors
+    positions : (v, 3) positions of the vertices [mm]
+    normals : (v, 3) normals of the vertices, unit vectors
     uv : (v, 2) u to the right, v DOWN: (0, 0) is the top-left corner of every map, in [0, 1]
-    point : (v,) index of the unique position
+    point : (v,) index of the point at which each vertex lies
     triangles : (f, 3) vertex indices
     material : (f,) index into `materials`
     materials : materials of the triangles
@@ -78,7 +78,7 @@ class Mesh(ShortRepr):
 
     @property
     def points_mm(self) -> Doubles:
-        """Return the unique positions (p, 3), one for each point [mm]."""
+        """Return the positions (p, 3) of the points, each of which can have several vertices [mm]."""
         points = np.zeros((int(self.point.max()) + 1, 3))
         points[self.point] = self.positions
         return points
@@ -105,7 +105,10 @@ class Mesh(ShortRepr):
 
     @cached_property
     def skull_mm(self) -> Point | None:
-        """Return the centre of the skull, without neck and shoulders; None for a mesh without a head [mm]."""
+        """Return the centre of the skull [mm]; None for a mesh without a head.
+
+        Neck, shoulders and body do not shift this centre.
+        """
         if self.is_head_sized:
             return skull_centre_below(self.positions, float(self.positions[:, 1].max()))
         is_eye = np.array([one.eye for one in self.materials])[self.material]
@@ -162,13 +165,14 @@ def build_mesh(
 ) -> Mesh:
     """Build a `Mesh` from arrays.
 
-    positions : (v, 3) finite [mm]
-    uv : (v, 2) v down
+    positions : (v, 3) positions of the vertices, all finite [mm]
+    uv : (v, 2) texture coordinates of the vertices, with v downwards, see `Mesh`
     triangles : (f, 3) vertex indices, at least one triangle
     material : (f,) index into `materials`
     materials : materials of the triangles
     normals : (v, 3) unit normals; computed instead where they are invalid, or everywhere if None
-    point : (v,) index of the unique position; if None, equal positions are welded
+    point : (v,) index of the point at which each vertex lies; the vertices at a uv seam share a point. If
+        None, vertices at equal positions share a point
     quads : (q, 2) pairs of triangles that are a quad, see `Mesh`
     """
     positions = np.ascontiguousarray(positions, dtype=np.float32)

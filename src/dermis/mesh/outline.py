@@ -38,8 +38,8 @@ class Outline(ShortRepr):
     """Points that bound a shape in every direction.
 
     points_mm : (n, 3) positions
-    margin_mm : largest distance by which the shape exceeds the bounds of these points; depth ranges are
-        extended by this distance
+    margin_mm : largest distance by which the shape exceeds the bounds of these points. The ranges of depth
+        that cameras and shadow maps cover are extended by this distance
     """
 
     points_mm: NDArray[np.floating]
@@ -75,7 +75,7 @@ def hull_vertices(positions: NDArray[np.floating]) -> Intp:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RigOutline(ShortRepr):
-    """Outline points of a rig, with the morph targets and bones that move them.
+    """Outline of a rig: points that bound its mesh in every pose, with the targets and bones that move them.
 
     rest_mm : (4, s) s points at rest as homogeneous columns
     delta_mm : (t, 3 s) displacements by each target at weight 1: all x, then all y, then all z
@@ -91,7 +91,7 @@ class RigOutline(ShortRepr):
     def pose(self, target_weights: Floats, bone_matrices: Floats) -> Floats:
         """Return the outline points (s, 3) in a pose [mm].
 
-        target_weights : (t,) weights of the targets, relative to the rest pose
+        target_weights : (t,) weights of the targets, minus their weights in the rest pose
         bone_matrices : (b, 3, 4) matrices of all bones of the rig
         """
         columns, active = self.rest_mm, target_weights.nonzero()[0]

@@ -76,7 +76,7 @@ class Pose(ShortRepr):
         return cls(weights=value)
 
     def motion(self, rig: Rig, culprit: object = "pose") -> Motion:
-        """Return the pose as arrays for a rig: weights, bone matrices and positions.
+        """Return the pose as arrays for a rig: target weights, bone matrices and rest positions of points.
 
         Parameters
         ----------
@@ -88,7 +88,7 @@ class Pose(ShortRepr):
         Returns
         -------
         Motion
-            Weights, matrices and rest positions.
+            Weights of the morph targets, matrices of the bones, and rest positions of the control points.
 
         Raises
         ------

@@ -35,7 +35,7 @@ _CACHE_VERSION = "outline 6"  # change it when the search returns other points
 class Motion(NamedTuple):
     """Pose of a rig as arrays for the GPU.
 
-    weights : (t,) weights of the targets, relative to the rest pose
+    weights : (t,) weights of the targets, minus their weights in the rest pose
     matrices : (b, 3, 4) bone matrices, which transform points at rest [mm]
     positions_mm : (p, 3) points at rest
     """
@@ -80,8 +80,8 @@ class BoneRotation(NamedTuple):
 class RigidFollowers(NamedTuple):
     """Points that follow other points as one rigid body, such as the points of a fitted eyeball.
 
-    leaders : (n,) indices of the points that are followed; these points are in the file
-    points : (m,) indices of the points that follow the leaders
+    leaders : (n,) indices of the points that are followed; all of them come from the mesh file
+    points : (m,) indices of the points that follow the leaders; dermis added them to those of the file
     """
 
     leaders: Ints
@@ -96,10 +96,11 @@ class Rig(ShortRepr):
     targets, skeleton : morph targets and bones; `skeleton` is None without bones
     stencils : subdivision from control points to mesh points; None without subdivision
     bone_rotations : rotations of bones by morph targets
-    rigid_followers : points that are not in the file, such as fitted eyeballs; they follow the file's points
+    rigid_followers : points that dermis added to those of the file, such as fitted eyeballs; they follow
+        points of the file
     contact : lids that must stay outside the eyeballs; None if lids may intersect eyeballs
-    template : rig with corresponding points, targets and bones, whose outline points this rig reuses to avoid
-        a search for its own; None if there is no such rig
+    template : rig with corresponding points, targets and bones, from which this rig takes the points of its
+        `outline`, to avoid a search for its own; None if there is no such rig
     """
 
     positions_mm: Floats
@@ -141,7 +142,11 @@ class Rig(ShortRepr):
 
     @cached_property
     def outline(self) -> RigOutline:
-        """Return the outline of the rig; the search for outline points is done once and cached on disk."""
+        """Return points that bound the mesh in every pose, with the targets and bones that move them.
+
+        They are the control points that are outermost in some direction in some pose. The search for them is
+        done once and cached on disk.
+        """
         return rig_outline(self.positions_mm, self.targets, self.skeleton, self._outline_points)
 
     def outline_mm(self, motion: Motion) -> Floats:
@@ -154,10 +159,9 @@ class Rig(ShortRepr):
         return self._outline_for(motion.positions_mm).pose(motion.weights, motion.matrices)
 
     def _outline_for(self, rest_positions: Floats) -> RigOutline:
-        """Return the outline of this rig with its control points at other rest positions.
+        """Return the points that bound the mesh in every pose, for other rest positions of the control points.
 
-        The last outline is cached, and returned again if the outline points have the same positions.
-
+        The last result is cached. It is returned again if its points have the same rest positions.
         rest_positions : (p, 3) rest positions of all control points [mm]
         """
         points, outline = self._last_outline
@@ -250,7 +254,7 @@ class Rig(ShortRepr):
     def pose(self, target_weights: Doubles, bone_matrices: Doubles | None = None) -> Doubles:
         """Return all control points (p, 3) in a pose, computed on the CPU [mm].
 
-        target_weights : (t,) weights of the targets, relative to the rest pose
+        target_weights : (t,) weights of the targets, minus their weights in the rest pose
         bone_matrices : (b, 3, 4) matrices of the bones, from `Skeleton.matrices`; None for the rest pose
         """
         targets, points = self.targets, self.positions_mm.astype(np.float64)

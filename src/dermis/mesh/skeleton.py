@@ -85,8 +85,9 @@ class Skeleton(ShortRepr):
     def pose_matrices(self, bones: Sequence[int], bone_changes: Doubles) -> Floats:
         """Return the bone matrices (b, 3, 4) of a pose in which n bones and their descendants move.
 
-        bones : (n,) indices, parents before children
-        bone_changes : (n, 4, 4) head-space transform of each bone relative to its rest pose [mm]
+        bones : (n,) indices of the n bones, parents before children
+        bone_changes : (n, 4, 4) head-space transform of each of these bones relative to its rest pose,
+            without the motion of its parent [mm]
         """
         transforms = (
             self._accumulate_in_order if len(bones) <= _MAX_SEQUENTIAL_BONES else self._accumulate_by_depth
@@ -100,10 +101,11 @@ class Skeleton(ShortRepr):
         return matrices.astype(np.float32)
 
     def _accumulate_in_order(self, bones: Sequence[int], bone_changes: Doubles) -> Doubles:
-        """Multiply transforms of n bones down the hierarchy, bone by bone.
+        """Return the head-space transform (b, 4, 4) of every bone of the skeleton, relative to its rest pose.
 
-        Used for few bones. The result (b, 4, 4) is the head-space transform of every bone of the skeleton,
-        relative to its rest pose.
+        It is the product of the changes of the bone's moved ancestors, topmost first, and of its own change.
+        The moved bones are handled one after the other, which is fast if there are few of them. The
+        parameters are those of `pose_matrices`.
         """
         nearest, transform = np.zeros(len(self.names), np.intp), np.empty((len(bones) + 1, 4, 4))
         transform[0] = _IDENTITY_MATRIX
@@ -113,10 +115,9 @@ class Skeleton(ShortRepr):
         return transform[nearest]
 
     def _accumulate_by_depth(self, bones: Sequence[int], bone_changes: Doubles) -> Doubles:
-        """Multiply transforms of n bones down the hierarchy, level by level.
+        """Return the same transforms (b, 4, 4) as `_accumulate_in_order`, from the same parameters.
 
-        Used for many bones. The result (b, 4, 4) is the head-space transform of every bone of the skeleton,
-        relative to its rest pose.
+        All bones at the same level of the hierarchy are handled at once, which is fast if many bones move.
         """
         transform = np.tile(_IDENTITY_MATRIX, (len(self.names), 1, 1))
         transform[list(bones)] = bone_changes

@@ -112,8 +112,9 @@ def quad_weights(bilinear_position: NDArray[np.floating]) -> Doubles:
 def hair_cover_of_points(mesh: Mesh, roots: Roots, area_mm2: Doubles) -> Doubles:
     """Return the projected area of the strands rooted around each mesh point (p,), per area of skin [-].
 
-    Because hair is inclined, half the area of a strand seen from the side counts as its projected area. The
-    whole projected area counts as cover of the skin at the root.
+    The projected area is that seen from above the skin. Because hair is inclined, it is taken as half the
+    area seen from the side. All of it is assigned to the corners of the root's quad, although the strand also
+    covers other skin.
 
     area_mm2 : (n,) area of each strand seen from the side [mm2]
     """

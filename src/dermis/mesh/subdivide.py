@@ -105,7 +105,7 @@ def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
     point stay together, so that the surface has no cracks or creases at uv seams. Open borders are smoothed
     as curves. Normals are computed from the subdivided mesh; normals of the file are dropped.
 
-    levels : 0 to 3, each of which multiplies the number of triangles by four
+    levels : number of subdivisions, 0 to 3; each subdivision multiplies the number of triangles by about four
     """
     if _check_levels(levels) == 0:
         return SubdividedMesh(mesh, None)
@@ -114,9 +114,11 @@ def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
 
 
 def refinement(mesh: Mesh, levels: int) -> Refinement:
-    """Return the subdivision of meshes with the triangles and uv of this mesh; see `subdivide` for the rules.
+    """Return the weights and arrays by which `subdivide` computes the finer mesh.
 
-    levels : 1 to 3
+    They do not depend on positions, so they also apply to other meshes with the same triangles, quads and uv.
+
+    levels : number of subdivisions, 1 to 3
     """
     from scipy.sparse import csr_array
 
@@ -137,7 +139,7 @@ def refinement(mesh: Mesh, levels: int) -> Refinement:
 
 
 def _cached_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
-    """Return the arrays of a subdivision, cached on disk for large meshes.
+    """Return the arrays of `_compute_refinement`, cached on disk for large meshes.
 
     by_quads : whether to use Catmull and Clark's rules instead of Loop's
     """
@@ -152,7 +154,10 @@ def _cached_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
 
 @logged_step("subdividing the mesh")
 def _compute_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
-    """Return the arrays of a subdivision by name, such as the corners of the finer faces.
+    """Return the connectivity of the subdivided mesh and the weights of its points, as a dictionary of arrays.
+
+    The weights "weight" of control points "control" start at index "first" for each point. The vertices have
+    "uv" and "point"; the faces have vertices "corner" and "material".
 
     by_quads : whether to use Catmull and Clark's rules instead of Loop's
     """
@@ -219,7 +224,10 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
 def _coarsen_triangles(
     triangles: Ints, positions_mm: Floats, dropped_levels: int, tolerance_mm: float
 ) -> Ints:
-    """Return triangles (t, 3) of a mesh after Loop subdivision, with fewer levels in flat regions.
+    """Return triangles (t, 3) of a mesh after Loop subdivision, coarser in flat regions.
+
+    There, the faces of an earlier level of subdivision replace the finest faces. Elsewhere, the finest faces
+    are kept.
 
     triangles : (f, 3) triangles of the finest level; Loop's rules divide a triangle into four, of which the
         first three are at its corners
@@ -240,7 +248,10 @@ def _coarsen_triangles(
 def _coarsen_quads(
     quads: CornerIndices, positions_mm: Floats, dropped_levels: int, tolerance_mm: float
 ) -> Ints:
-    """Return triangles (t, 3) of a mesh after Catmull-Clark subdivision, with fewer levels in flat regions.
+    """Return triangles (t, 3) of a mesh after Catmull-Clark subdivision, coarser in flat regions.
+
+    There, the faces of an earlier level of subdivision replace the finest faces. Elsewhere, the finest faces
+    are kept.
 
     quads : (q, 4) quads of the finest level; Catmull and Clark's rules divide a polygon with k corners into
         k quads, which meet at its centre

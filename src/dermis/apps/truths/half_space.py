@@ -18,9 +18,10 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
     cosine : cosines of angles to the normal, an array of any shape
     albedo : single-scattering albedo, below 1 [-]
 
-    The integral equation is solved by iteration at Gaussian nodes.
+    The integral equation of H is solved by iteration at Gaussian nodes. It is written as an equation for
+    1 / H, a sum of positive terms, so that no digits are lost for albedos near 1.
 
-    Source: [Chandrasekhar1960] section 38; the equation has the form that avoids loss of significance.
+    Source: [Chandrasekhar1960] section 38.
     """
     if not 0.0 <= albedo < 1.0:
         refuse("half-space", "an albedo from 0 to below 1", f"got {albedo:g}", "Correct it")

@@ -22,7 +22,10 @@ ZERO_DIFFERENCE_GREY = 0.5
 
 
 class Estimate(NamedTuple):
-    """Estimated value with its standard error, which is 0 if the reference has no noise."""
+    """Number that compares an image with a reference, and the number's standard error due to noise.
+
+    The standard error is 0 if no variance of the noise is given.
+    """
 
     value: float
     standard_error: float

@@ -267,7 +267,7 @@ def homogeneous_medium(layer: Layer) -> SceneDict:
 def interface_mesh(mi: Mitsuba, closed_surface: ClosedSurface, media: SceneDict) -> MitsubaObject:
     """Return a closed surface as an invisible Mitsuba mesh between two media.
 
-    media : dictionary with the "exterior" and the "interior" medium; None for vacuum
+    media : dictionary with the media on the two sides, "exterior" and "interior"; the value None is vacuum
     """
     non_vacuum = {side: medium for side, medium in media.items() if medium is not None}
     invisible = mi.load_dict({"type": "null"})

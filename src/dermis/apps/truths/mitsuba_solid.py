@@ -133,9 +133,11 @@ def _boundary_edges(triangles: Index, point_count: int) -> NDArray[np.int64]:
 
 
 def _edge_components(edges: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return for each edge the index (n,) of its connected component, the outline of one opening.
+    """Return for each boundary edge of a mesh the index (n,) of the opening that the edge borders.
 
-    edges : (n, 2) point indices of the edges
+    Edges that share points, directly or through other edges, border the same opening.
+
+    edges : (n, 2) point indices at the ends of the edges
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

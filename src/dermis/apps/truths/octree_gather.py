@@ -1,4 +1,6 @@
-"""Gathering of light from an octree of triangles, compiled by numba: import this inside functions.
+"""Gathering of light from an octree of triangles, compiled by numba.
+
+Importing this module loads numba, which takes time, so callers import it inside the function that needs it.
 
 Light is gathered at a point of the surface. A node, a triangle or a sub-triangle that is far enough from this
 point is replaced by three points with the same flux and nearly the same centroid and second moments. The
@@ -165,9 +167,14 @@ def _add_side_midpoints(
     profile_table: ProfileTable,
     exitance: Floats,
 ) -> None:
-    """Add the light of one sub-triangle of the stack, with its flux split among the midpoints of its sides.
+    """Add to `exitance` the light that reaches a point from one sub-triangle of the stack.
 
-    This quadrature is exact if the product of irradiance and profile is a polynomial of second order.
+    The flux of the sub-triangle is concentrated at the midpoints of its three sides. This quadrature is exact
+    if the product of irradiance and profile is a polynomial of second order.
+
+    point : (3,) position where the light leaves the skin [mm]
+    stack_index : index of the sub-triangle in the stack
+    exitance : (3,) exitance at the point by channel
     """
     corners, irradiance, scale = (
         triangle_stack.corners[stack_index],

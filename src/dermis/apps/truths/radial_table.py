@@ -104,8 +104,9 @@ class ProfileTable(NamedTuple):
 def tabulate_profile(profile: Profile) -> ProfileTable:
     """Return the table of a profile, with bounds of its derivatives and the permitted error at each radius.
 
-    Most of the permitted error is distributed over the radii in proportion to the square root of the
-    curvature. A surface integral then needs few surface patches for the same total error.
+    The error of a surface integral is a sum over surface patches. Most of the permitted error is distributed
+    over the radii in proportion to the square root of the profile's second derivative, with which few patches
+    are needed for a given total error. The rest is spread widely, so that distant patches can be large.
     """
     end = profile.end_mm
     root = np.linspace(0.0, np.sqrt(end), PROFILE_TABLE_ROWS)

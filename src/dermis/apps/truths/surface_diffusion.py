@@ -84,8 +84,9 @@ def longest_edge_mm(positions: ArrayLike, triangles: ArrayLike) -> float:
 def resolved_levels(variances_mm2: ArrayLike, edge_mm: float) -> NDArray[np.bool_]:
     """Return the mask (k,) of Gaussian blurs that a mesh with edges of a given length resolves.
 
-    Each blur starts from the result of the next smaller blur that is resolved. It is resolved if it adds a
-    standard deviation of at least two edge lengths.
+    Each blur is computed from the next smaller blur that is resolved, by an additional blur whose variance is
+    the difference of their variances. It is resolved if the standard deviation of this additional blur is at
+    least two edge lengths.
 
     variances_mm2 : (k,) increasing variances of the blurs, above 0 [mm2]
     edge_mm : length of the longest edge, see `longest_edge_mm` [mm]
@@ -100,7 +101,8 @@ def resolved_levels(variances_mm2: ArrayLike, edge_mm: float) -> NDArray[np.bool
 def max_edge_mm(variances_mm2: ArrayLike) -> float:
     """Return the largest edge length at which a mesh resolves all given Gaussian blurs [mm].
 
-    This length is half the smallest standard deviation that a blur adds to the next smaller blur.
+    Each blur is computed from the next smaller one by an additional blur, whose variance is the difference of
+    their variances. The length is half the smallest standard deviation of these additional blurs.
 
     variances_mm2 : (k,) increasing variances of the blurs, above 0 [mm2]
     """

@@ -27,9 +27,10 @@ def integrate_exitance(
 ) -> Floats:
     """Return the radiant exitance (n, 3) at points x: the integral of R(|x - y|) E(y) dA over the surface.
 
-    Irradiance is gathered from an octree. A node or triangle is replaced by three points if the remainder of
-    Taylor's theorem is below a limit, and is divided otherwise. Most of these errors cancel in the sum, so
-    the limit is computed from `relative_error` by an empirical formula.
+    Irradiance is gathered from an octree. A node or triangle is replaced by three points if the error that
+    this causes is below a limit, and is divided otherwise. The error is bounded by the remainder of Taylor's
+    theorem. Because the errors of different nodes mostly cancel in the sum, the limit is not `relative_error`
+    itself; it is computed from it by an empirical formula.
 
     points : (n, 3) positions x on the surface [mm]
     samples : irradiance E, linear on triangles that must be small enough for shadows and other details
@@ -69,12 +70,14 @@ def integrate_exitance(
 
 
 def _weight_error_bounds(octree: Octree, error_weight: float) -> Octree:
-    """Return the octree with larger bounds for errors that hardly cancel in the sum over nodes.
+    """Return the octree with changed error bounds, in which errors that hardly cancel have more weight.
 
-    `centroid_error` is multiplied by a weight, and `moment_error` times this weight is added to
-    `second_moment`.
+    The three points that replace a node have the centroid and second moments of its light, summed over the
+    channels, but not exactly those of each channel. The errors that this causes hardly cancel in the sum over
+    nodes. Therefore the bound `centroid_error` is multiplied by a weight, and the bound `second_moment` is
+    increased by `moment_error` times this weight.
 
-    error_weight : weight of both bounds
+    error_weight : the weight
     """
     second_moment = octree.second_moment + error_weight * octree.moment_error
     return octree._replace(second_moment=second_moment, centroid_error=error_weight * octree.centroid_error)

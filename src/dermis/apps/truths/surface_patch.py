@@ -19,12 +19,12 @@ _BARYCENTRIC_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class SurfacePatch:
-    """Patch of a surface as small triangles, with the mesh triangles that they subdivide.
+    """Patch of a mesh whose triangles are subdivided into smaller ones, here called patch triangles.
 
     positions : (n, 3) vertex positions [mm]
-    triangles : (f, 3) vertex indices of the small triangles
-    parent : (f,) index of the mesh triangle that contains each small triangle
-    weights : (f, 3, 3) barycentric weights of each small triangle's corners in its mesh triangle
+    triangles : (f, 3) vertex indices of the patch triangles
+    parent : (f,) index of the mesh triangle that contains each patch triangle
+    weights : (f, 3, 3) barycentric weights of each patch triangle's corners in its mesh triangle
     centre_mm, radius_mm : ball inside which results are valid; the patch extends beyond it [mm]
     """
 
@@ -49,9 +49,10 @@ class SurfacePatch:
         return triangle, weights
 
     def locate(self, triangle: Index, barycentric: Floats) -> tuple[Index, Floats]:
-        """Return the small triangle (m,) of each point and the point's barycentric weights (m, 3) in it.
+        """Return the patch triangle (m,) that contains each point, and the point's weights (m, 3) in it.
 
-        The index of the triangle is -1 outside the patch.
+        Patch triangles are given as rows of `triangles`, and as -1 for points outside the patch. The weights
+        are barycentric.
 
         triangle : (m,) mesh triangle that contains each point
         barycentric : (m, 3) barycentric weights of each point in its mesh triangle
@@ -78,8 +79,8 @@ class SurfacePatch:
         """Return vertex values interpolated at m points, (..., m, c).
 
         vertex_values : (..., n, c) values at the vertices of the patch
-        small_triangles : (m,) small triangle of each point, from `locate`
-        barycentric : (m, 3) barycentric weights of each point in its small triangle
+        small_triangles : (m,) index of the patch triangle that contains each point, from `locate`
+        barycentric : (m, 3) barycentric weights of each point in its patch triangle
         """
         corners = self.triangles[small_triangles]
         return sum(
@@ -149,15 +150,15 @@ def refine_patch(
 def _triangles_in_reach(
     corners: Floats, centre: Floats, reach_mm: float, edge_mm: float
 ) -> NDArray[np.bool_]:
-    """Return the mask (f,) of triangles whose bounding balls are within reach of the centre.
+    """Return the mask (f,) of triangles whose bounding balls are at least partly within reach of the centre.
 
     corners : (f, 3, 3) corner positions [mm]
     reach_mm : largest distance from the centre [mm]
-    edge_mm : largest edge length after splitting [mm]
+    edge_mm : length to which `refine_patch` shortens all longer edges, by splitting triangles [mm]
 
-    Raises DermisError when no triangle is within reach, or when splitting the triangles entirely within reach
-    would result in too many triangles. Their number is estimated as if all of them were equilateral, which
-    gives a lower bound of the actual number.
+    Raises DermisError when no triangle is within reach, or when the splitting would result in too many
+    triangles. Their number is estimated from below: the area of the triangles that lie entirely within reach
+    is divided by the area of an equilateral triangle with sides of `edge_mm`.
     """
     midpoint = corners.mean(axis=1)
     size = np.linalg.norm(corners - midpoint[:, None], axis=2).max(axis=1)

@@ -1,4 +1,7 @@
-"""Lids in front of an eyeball, which suggest the direction of gaze and limit the cornea's position."""
+"""Lids in front of an eyeball that is fitted to a head.
+
+The opening between the lids shows where the eye looks, and the lids limit how far forward the cornea can be.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,10 @@ class Lids:
 
     @cached_property
     def ray_positions(self) -> Doubles:
-        """Return x (to the side) and y (up) of each ray (n, 2), relative to the ball's centre [mm]."""
+        """Return the positions (n, 2) of the rays, relative to the ball's centre: x to the side, y up [mm].
+
+        The rays are parallel to the third axis, the direction of gaze, so x and y are constant along a ray.
+        """
         line = np.linspace(-_HALF_SIDE_RADII, _HALF_SIDE_RADII, _RAYS_PER_SIDE) * self.ball.radius
         x, y = np.meshgrid(line, line)
         return np.stack([x.ravel(), y.ravel()], axis=1)

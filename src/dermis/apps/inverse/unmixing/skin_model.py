@@ -184,7 +184,9 @@ def solve_pigments(
 ) -> PigmentEstimate:
     """Return the most probable melanin and blood of each colour, computed in float64.
 
-    If the model has a third unknown (oxygen or shading, see `SkinModel`), it is estimated too. The cost is a sum of squares, each divided by its variance: the difference between the logarithms of the
+    If the model has a third unknown (oxygen or shading, see `SkinModel`), it is estimated too.
+
+    The cost is a sum of squares, each divided by its variance: the difference between the logarithms of the
     given and the model's colour in each channel, and the deviations of blood and of the third unknown from
     their prior means. It is minimised by Gauss-Newton steps with Levenberg's damping. An unknown at a limit
     stays fixed if the step would cross the limit.

@@ -174,8 +174,8 @@ def _mean_exit_distance(albedo: float, eta: float) -> float:
 def skin_media(mi: Mitsuba, person: Person, camera: Camera, medium: Medium) -> list[MitsubaObject]:
     """Return Mitsuba's media of the layers of a skin, topmost first.
 
-    The deepest layer has a grid of albedos around the camera's target. These albedos give the skin the
-    colours of its colour map.
+    The albedo of the deepest layer varies in space, so that the skin has the colours of its colour map. It is
+    given by a voxel grid in a box around the part of the skin that the camera shows.
 
     medium : layers of a skin that has the mean colour of the colour map
     """
