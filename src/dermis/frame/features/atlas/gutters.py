@@ -36,7 +36,8 @@ class GutterTracing:
     sides : buffer of the neighbouring triangle across each edge of each triangle, for gutter_trace.wgsl
     halvings : for each coarser resolution of the atlas, a dictionary from names in gutter_halve.wgsl to
         buffers. The buffers list the coarser gutter texels and, for each of them, the finer gutter texels
-        inside it; its source is the mean of their sources
+        inside it. The source of the coarser texel is the mean of the sources of the finer ones, without
+        outliers
     """
 
     starts: Buffer
@@ -105,7 +106,8 @@ def _halving_buffers(
 ) -> Bindings:
     """Upload, for each gutter texel of the coarser atlas, the list of the finer gutter texels inside it.
 
-    The source of the coarser texel, from which it copies light, is the mean of the sources of these texels.
+    The source of the coarser texel, from which it copies light, is the mean of the sources of these texels,
+    without outliers.
     """
     width = int(finer_textures.gutter_texels.max()) + 1
 

@@ -166,9 +166,9 @@ class VertexSkyVisibility:
 def make_vertex_sky_visibility(
     device: Device, head: Head, rest_geometry: HeadGeometry
 ) -> VertexSkyVisibility:
-    """Create the resources of `VertexSkyVisibility`, and fill in the values for the head at rest.
+    """Create the resources of `VertexSkyVisibility`, and compute the visibility for the head at rest.
 
-    The values are the fraction of the sky that is visible from each vertex.
+    The visibility of a vertex is the fraction of the sky that is visible from it.
 
     rest_geometry : the triangles of the head at rest
     """

@@ -364,7 +364,7 @@ def _dispatch_shape(
     invocation_count: int,
     constants: Constants = (),
 ) -> None:
-    """Declare a pass that computes a step of the posed shape.
+    """Declare a pass that computes one step from the control points at rest to the posed surface.
 
     shader_name : path of the shader
     bindings : resources of the shader

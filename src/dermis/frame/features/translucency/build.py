@@ -76,8 +76,8 @@ def _thin_part_weights(
 
     Both are functions of the thickness. The light that thin tissue fails to reflect is the reflectance of
     thick tissue minus that of the thin tissue. For each thickness, each table holds the weights of the
-    Gaussians with which light is blurred. The weights are limited so that thin tissue does not fail to
-    reflect more light than is blurred.
+    Gaussians with which light is blurred. The weights are scaled down where the light that thin tissue fails
+    to reflect would exceed the light that is blurred.
 
     colour : (3,) diffuse reflectance of thick skin [-]
     eta : index of refraction of skin [-]
