@@ -115,7 +115,7 @@ def directional_reflectance(cosine: ArrayLike, albedo: float, eta: float) -> Flo
 
 
 def mean_single_scattering_kernel(cosine: ArrayLike, eta: float) -> Floats:
-    """Return the mean of 1/(a + b) over exit directions [-].
+    """Return the mean of 1/(a + b) over exit directions, weighted by their cosines in air [-].
 
     Here, a and b are the cosines of the incident and the exit direction below the surface.
 
@@ -207,7 +207,13 @@ def _response_column(eta: float, total_reflectance: float) -> Floats:
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
 def _mean_kernel(eta: float) -> float:
-    """Return the mean of 1/(a + b) over the cosines a and b of incident and exit directions [-]."""
+    """Return the mean of 1/(a + b) over all pairs of an incident and an exit direction [-].
+
+    Here, a and b are the cosines of the two directions below the surface. Each direction is weighted by its
+    cosine in air, as for light from a uniform sky.
+
+    eta : index of refraction relative to air [-]
+    """
     mu, weight = gauss_legendre(0.0, 1.0)
     return float((2.0 * weight * mu * mean_single_scattering_kernel(mu, eta)).sum())
 

@@ -83,7 +83,7 @@ class CumulativeProfile:
         return np.array([np.interp(light_fraction, self.fraction[:, i], self.radii_mm) for i in range(3)])
 
     def with_energy(self, energy: ArrayLike) -> CumulativeProfile:
-        """Return a profile with another total reflectance and the same fractions of light within radii.
+        """Return the profile scaled to another total reflectance; the field `fraction` stays the same.
 
         energy : (3,) new total reflectance [-]
         """

@@ -53,7 +53,7 @@ def _half_space_column(eta: float, from_photons: bool, total_reflectance: float)
     path].
 
     eta : index of refraction relative to air [-]
-    from_photons : whether R(r) comes from a table of photon counts, if one exists, instead of layered
+    from_photons : whether R(r) comes from a table of Monte Carlo results, if one exists, instead of layered
         diffusion
     total_reflectance : reflectance for light at normal incidence [-]
     """
@@ -72,7 +72,8 @@ def albedo_for_total(total_reflectance: float, eta: float, from_photons: bool = 
 
     total_reflectance : reflectance for light at normal incidence [-]
     eta : index of refraction relative to air [-]
-    from_photons : whether to invert a table of photon counts, if one exists, instead of layered diffusion
+    from_photons : whether to invert a table of Monte Carlo results, if one exists, instead of layered
+        diffusion
     """
     from scipy.optimize import brentq
 

@@ -28,7 +28,8 @@ class GaussianSum:
     variance_mm2 : (k,) variances v, increasing [mm2]
     weight : (k, c) weights w, the light that each Gaussian spreads in c channels; the renderer needs three
         channels, in linear Rec. 709 [-]
-    from_photons : whether the sum was fitted to Monte Carlo photon counts instead of a diffusion model
+    from_photons : whether the sum was fitted to the result of a Monte Carlo simulation instead of a diffusion
+        model
 
     Source: [dEonLuebke2007] section 14.4.
 
@@ -84,7 +85,10 @@ class GaussianSum:
         return np.asarray(gaussians @ self.weight)
 
     def energy_within(self, radius_mm: ArrayLike) -> Floats:
-        """Return the light (..., c) that emerges within distances r of the beam [-]."""
+        """Return the light (..., c) of a narrow beam of unit power that emerges within distances from it [-].
+
+        radius_mm : distances from the beam [mm]
+        """
         r = np.asarray(radius_mm, dtype=np.float64)[..., None]
         return np.asarray(-np.expm1(-(r**2) / (2 * self.variance_mm2)) @ self.weight)
 

@@ -1,4 +1,7 @@
-"""Diffusion profiles of homogeneous half-spaces, from tables of Monte Carlo photon counts."""
+"""Diffusion profiles of homogeneous half-spaces, from tables of Monte Carlo results.
+
+The tables hold the fractions of simulated photons that leave the half-space within several radii.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ TABULATED_ALBEDO_RANGE = 0.02, 0.99999
 _HALF_SPACE_COLUMNS = ("kind", "albedo", "total")
 CountedModel = Literal["counted"]
 COUNTED_MODEL: CountedModel = "counted"
-"""Name of the profile model that uses tabulated photon counts."""
+"""Name of the profile model that uses the Monte Carlo tables of this module."""
 _MIN_LOG_RADIUS_STEP, _MAX_LOG_RADIUS_STEP = (
     0.05,
     0.4,
@@ -36,7 +39,7 @@ _RELATIVE_LOG_RADIUS_STEP = 0.02  # step of log r, divided by the square root of
 
 
 class _PhotonTable(NamedTuple):
-    """Monte Carlo photon counts of half-spaces as functions of a = sqrt(1 - albedo), interpolated by splines.
+    """Monte Carlo results for half-spaces as functions of a = sqrt(1 - albedo), interpolated by splines.
 
     root_absorption : (m,) values of a in the table, increasing [-]
     edges : (k,) radii of the ring edges [mean free path]
@@ -51,9 +54,11 @@ class _PhotonTable(NamedTuple):
 
 
 def tabulated_kind_for_index(eta: float) -> HalfSpaceKind | None:
-    """Return the name of the photon-count table for an index of refraction, or None if there is none.
+    """Return the name of the Monte Carlo table for an index of refraction, or None if there is none.
 
-    The half-spaces in these tables are lit at normal incidence.
+    Only tables of half-spaces that are lit at normal incidence are considered.
+
+    eta : index of refraction relative to air [-]
     """
     return "skin" if eta == SKIN_ETA else "matched" if eta == 1.0 else None
 
@@ -61,7 +66,7 @@ def tabulated_kind_for_index(eta: float) -> HalfSpaceKind | None:
 def half_space(
     half_space_kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayLike
 ) -> CumulativeProfile:
-    """Return the cumulative profile of a half-space in three channels from a photon-count table.
+    """Return the cumulative profile of a half-space in three channels from a Monte Carlo table.
 
     half_space_kind : surface and illumination of the half-space
     albedo : (3,) single-scattering albedo, clamped to the range of the table [-]
@@ -138,7 +143,7 @@ def _photon_table(half_space_kind: HalfSpaceKind) -> _PhotonTable:
 
 
 def has_photon_table(medium: Medium) -> bool:
-    """Return whether a photon-count table covers a medium.
+    """Return whether a Monte Carlo table covers a medium.
 
     The medium must be a half-space with three channels. There must be a table for its index of refraction,
     and its reduced albedos must be in the range of the table.
@@ -151,7 +156,7 @@ def has_photon_table(medium: Medium) -> bool:
 
 
 def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
-    """Return the cumulative profile of a medium from a photon-count table, or None if no table covers it.
+    """Return the cumulative profile of a medium from a Monte Carlo table, or None if no table covers it.
 
     The medium is taken to scatter isotropically, with its reduced coefficients.
     """
@@ -162,7 +167,7 @@ def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
 
 
 def tabulated_profile(medium: Medium) -> RadialProfile | None:
-    """Return the radial profile of a medium from a photon-count table, or None if no table covers it.
+    """Return the radial profile of a medium from a Monte Carlo table, or None if no table covers it.
 
     The medium is taken to scatter isotropically, with its reduced coefficients.
     """

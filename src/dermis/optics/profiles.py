@@ -28,7 +28,7 @@ from dermis.optics.tissue import Tissue, load_tissue, tissue_names
 PUBLISHED_PRESET = "gpu-gems-3"
 GAUSSIAN_TERMS = 6
 PHOTON_MODELS = "counted", "montecarlo"
-"""Models whose profiles come from photon counts."""
+"""Models whose profiles are results of Monte Carlo simulation, which counts the photons that leave."""
 _PROFILE_CSV_HEADER = ["variance_mm2", "red", "green", "blue"]
 _PROFILE_CSV_FORMAT = "a CSV file with the columns " + ",".join(_PROFILE_CSV_HEADER)
 _MAX_CACHED_FILES = 16
@@ -47,7 +47,7 @@ def load_profile(
     """Return the diffusion profile of a preset or a file as a sum of Gaussians.
 
     If the preset or file describes a tissue, six Gaussians are fitted to the diffusion profile of the tissue.
-    This profile comes from tables of photon counts if they cover the tissue, and from layered diffusion
+    This profile comes from tables of Monte Carlo results if they cover the tissue, and from layered diffusion
     otherwise.
 
     Parameters
@@ -171,8 +171,9 @@ def fit_profile(
 ) -> GaussianSum:
     """Fit six Gaussians to the diffusion profile of a tissue, computed by the tissue's default model.
 
-    The fit keeps the total reflectance if the profile comes from photon counts. Such profiles are so steep at
-    the centre that a fit without this constraint would lose up to 2 % of the light.
+    If the profile comes from Monte Carlo simulation (a model of `PHOTON_MODELS`), the fit is constrained to
+    the total reflectance of the profile. Such profiles are so steep at the centre that a fit without this
+    constraint would lose up to 2 % of the light.
 
     profile_name : preset or file, from which the name of the fitted profile is made
     similar_fit : fit of a similar tissue, as start of the new fit, which is then several times faster
@@ -185,7 +186,10 @@ def fit_profile(
 def fit_radial(
     radial_profile: RadialProfile, profile_name: str, similar_fit: GaussianSum | None = None
 ) -> GaussianSum:
-    """Fit six Gaussians to a radial profile; fits to photon counts keep the total reflectance.
+    """Fit six Gaussians to a radial profile.
+
+    If the profile comes from Monte Carlo simulation (a model of `PHOTON_MODELS`), the fit is constrained to
+    the total reflectance of the profile; otherwise the two may differ slightly.
 
     profile_name : name of the fitted profile
     similar_fit : fit of a similar profile, as start of the new fit, which is then several times faster

@@ -26,8 +26,8 @@ class RadialProfile:
     total : (c,) total reflectance, the integral of 2 pi r R(r) [-]
     edges_mm : (k + 1,) radii of the ring edges, starting at 0 [mm]
     ring_energy : (k, c) light that emerges through each ring [-]
-    standard_error : (n, c) standard error of R(r) if it is from photon counts, else None [1/mm2]
-    total_error : (c,) standard error of the total if it is from photon counts, else None [-]
+    standard_error : (n, c) standard error of R(r) from a Monte Carlo simulation, None if unknown [1/mm2]
+    total_error : (c,) standard error of the total from a Monte Carlo simulation, None if unknown [-]
     incident : whether R(r) is relative to the incident power instead of the power that enters; in both cases,
         R(r) excludes surface reflection
     warnings : known inaccuracies of the profile, shown to the user
@@ -49,7 +49,7 @@ class RadialProfile:
 
     @property
     def finite_at_centre(self) -> bool:
-        """Return whether R(r) is finite at r = 0; otherwise, only its ring energies can be fitted."""
+        """Return whether R(r) is finite at r = 0; otherwise, fits must use the light through rings."""
         return self.model not in ("layered", "montecarlo", "counted")
 
     def points(self) -> PointTarget:
@@ -57,7 +57,10 @@ class RadialProfile:
         return PointTarget(self.radius_mm, self.reflectance, self.total)
 
     def rings(self) -> RingTarget:
-        """Return the ring energies as the target of a fit; R(r) may be infinite at r = 0."""
+        """Return the light that emerges through each ring, as the target of a fit.
+
+        The light through a ring is finite even if R(r) is infinite at r = 0.
+        """
         return RingTarget(self.edges_mm, self.ring_energy, self.total)
 
 

@@ -181,10 +181,11 @@ def half_space_radiance(
 
 @dataclass(frozen=True, eq=False)
 class _Transport:
-    """Discrete directions in a medium, with internal reflection at its faces and scattering between them.
+    """Discrete directions in a medium, scattering from one direction to another, and reflection at the faces.
 
-    mu : (m,) cosines from the normal [-]
-    flux : (m,) share of each direction in the flux of uniform light inside the medium [-]
+    mu : (m,) cosines of the angles between the directions and the normal [-]
+    flux : (m,) share of each direction in the flux through a face, if the radiance inside the medium is the
+        same in all directions [-]
     internal : (m,) reflectance of the faces from inside [-]
     escapes : (m,) mask of the directions that are not totally reflected at a face
     phase : phase function between the directions
@@ -303,17 +304,19 @@ def _add_faces(
     reflection: Floats,
     transmission: Floats,
 ) -> tuple[Floats, Floats]:
-    """Return the scattered light that meets the faces of slabs, including internal reflections.
+    """Return the scattered light that arrives at the faces of reflecting slabs from inside.
 
-    The results (n, m, m) are pi times the radiance at the upper face and at the lower face, for unit power
-    from each direction.
+    The light has been scattered at least once, and may have been reflected by the faces any number of times.
+    The results (n, m, m) are pi times the radiance at the upper face and at the lower face, with a column for
+    each direction in which unit power enters.
 
-    reflection_operator, transmission_operator : (n, m, m) `reflection` and `transmission`, each column
-        multiplied by the flux of its direction
+    reflection_operator, transmission_operator : (n, m, m) matrices that convert the radiance of light inside
+        a face to the reflected and transmitted radiance: `reflection` and `transmission` below, with each
+        column multiplied by the flux of its direction
     unscattered_fraction : (n, m) fraction of light that crosses the slab without scattering [-]
     face_reflectance : (m,) reflectance of a face from inside [-]
-    reflection, transmission : (n, m, m) reflection and transmission of the slabs with index-matched faces, as
-        pi times the radiance
+    reflection, transmission : (n, m, m) reflection and transmission of the slabs if their faces did not
+        reflect, as pi times the radiance for unit power from each direction
     """
     if not face_reflectance.any():
         return reflection, transmission

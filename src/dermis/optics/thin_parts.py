@@ -65,11 +65,14 @@ class ThinParts:
 def solve_thin_parts(
     medium: Medium, variance_mm2: Floats, max_thickness_mm: float, g: float = 0.0
 ) -> ThinParts:
-    """Return transmitted and lost light of slabs of a medium with one layer, for a range of thicknesses.
+    """Return the light that slabs transmit, and the light that they reflect less than a half-space would.
 
+    The slabs consist of a medium with one layer; their thicknesses range from 0 to `max_thickness_mm`.
+
+    medium : the medium, with reduced coefficients: scattering is already multiplied by 1 - g
     variance_mm2 : (k,) variances of the Gaussians that spread light [mm2]
     max_thickness_mm : largest thickness [mm]
-    g : mean cosine of the scattering angle; the medium's coefficients are reduced [-]
+    g : mean cosine of the scattering angle [-]
 
     The transmitted power is exact for uniform light. The spread of the light is that of layered diffusion at
     normal incidence.
@@ -102,8 +105,8 @@ def oblique_transmittance(
 
     total_reflectance : (c,) reflectance of the half-space for light at normal incidence [-]
     eta : index of refraction relative to air [-]
-    from_photons : whether the albedo for this reflectance comes from a table of photon counts, if one exists,
-        instead of layered diffusion
+    from_photons : whether the albedo for this reflectance comes from a table of Monte Carlo results, if one
+        exists, instead of layered diffusion
     g : mean cosine of the scattering angle [-]
     """
     return interpolate_columns(partial(_oblique_column, eta, from_photons, g), total_reflectance)
@@ -157,7 +160,16 @@ class _SlabTotals(NamedTuple):
 
 
 def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> Iterator[_SlabTotals]:
-    """Yield the `_SlabTotals` of each channel, interpolated by cubic splines between cached depths."""
+    """Yield the `_SlabTotals` of each channel for slabs of n thicknesses.
+
+    They are interpolated by cubic splines between the optical thicknesses `_OPTICAL_DEPTHS`, for which they
+    are solved once.
+
+    layer : medium of the slabs, with reduced coefficients; its field `thickness_mm` is ignored
+    thickness_mm : (n,) thicknesses of the slabs [mm]
+    eta : index of refraction relative to air [-]
+    g : mean cosine of the scattering angle [-]
+    """
     from scipy.interpolate import CubicSpline
 
     roots = np.sqrt(1.0 - layer.alpha_prime).tolist()

@@ -35,7 +35,7 @@ from dermis.optics.radial import RadialProfile
 from dermis.optics.reduced_scattering import MCML_SUFFIXES, refuse_mcml
 
 ProfileModel = DiffusionModel | Literal["counted"]
-"""Diffusion model, or "counted": tabulated photon counts for half-spaces of one medium."""
+"""Diffusion model, or "counted": tabulated Monte Carlo results for half-spaces of one medium."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,11 @@ class Tissue:
 
     @property
     def default_model(self) -> ProfileModel:
-        """Return the default profile model: "counted" if photon counts cover the medium, else "layered"."""
+        """Return the default profile model: "counted" or "layered".
+
+        "counted" uses tables of Monte Carlo results. It is the default for media whose channels are colours
+        and which the tables cover, see `half_space.has_photon_table`.
+        """
         return COUNTED_MODEL if self.rgb is None and has_photon_table(self.medium) else "layered"
 
     def profile(self, model: ProfileModel | None = None, clamp: Clamp = "layer") -> RadialProfile:

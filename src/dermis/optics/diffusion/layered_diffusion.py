@@ -3,8 +3,9 @@
 In the Hankel domain, the fluence phi(z) in each layer satisfies D phi'' - D q^2 phi = -S(z). Here, z is the
 depth, D is the diffusion coefficient, and q^2 is sigma_tr^2 + s^2 at the frequency s. The source S(z) is the
 power per unit of depth of light that scatters for the first time at the depth z.
-At each face, the layers below impose the boundary condition D phi' = W - Z phi. A recursion computes Z and W
-of the faces from bottom to top.
+For the light above an interface, all layers below this interface are equivalent to the boundary condition
+D phi' = W - Z phi at the interface. Z and W are computed for one interface after another, from the lowest up
+to the surface.
 """
 
 from __future__ import annotations
@@ -55,7 +56,8 @@ class _DownwardTransfer(NamedTuple):
     E : attenuation exp(-q d) across the thickness d of the sublayer, where q is the rate of decay [-]
     rho : ratio of the growing to the decaying solution at the lower face, if there is no source [-]
     common : 1 / (1 + E^2 rho), which sums the reflections between both faces [-]
-    beta : growing solution at the lower face if there is no decaying solution; it is due to the light sources
+    beta : part of the growing solution at the lower face that the light sources cause; the other part is due
+        to the decaying solution
     lower : particular solution at the lower face
 
     All coefficients are 0 for a semi-infinite sublayer. Only the last sublayer of a medium can be

@@ -86,9 +86,10 @@ def diffusion_rings(
     clamp: Clamp = "layer",
     rgb_weights: Floats | None = None,
 ) -> RingTarget:
-    """Return the light that emerges through rings, for fits that do not need R(r).
+    """Return the light of a narrow beam that emerges through concentric rings around the beam.
 
-    The light and the parameters are those of `diffusion_profile`, but this function is faster.
+    The result is a target for fits. It holds the field `ring_energy` of the profile that `diffusion_profile`
+    returns for the same arguments, but not the profile R(r) itself, and is computed faster.
     """
     grid, values, total = _sampled_profile(medium, model, clamp, rgb_weights)
     edges = ring_edges()
@@ -186,7 +187,11 @@ def _first_event_albedo(medium: Medium) -> Floats:
 
 
 def _profile_warnings(total_reflectance: Floats, ring_energy: Floats) -> Sequence[str]:
-    """Return warnings about negative reflectances, and about ring energies that do not sum to the total."""
+    """Return warnings about negative reflectances, and about rings whose light does not sum to the total.
+
+    total_reflectance : (c,) total reflectance [-]
+    ring_energy : (k, c) light that emerges through each ring around a narrow beam [-]
+    """
     warnings = missing_light_warnings(total_reflectance, ring_energy)
     if (total_reflectance < 0.0).any():
         warnings.append(f"a total reflectance is negative: {np.round(total_reflectance, 4).tolist()}")
@@ -264,9 +269,13 @@ def truncated_medium(medium: Medium, thickness_mm: float) -> Medium:
 
 @dataclass(frozen=True)
 class ModelError:
-    """Relative error of a diffusion model's ring energies, with Monte Carlo as the reference.
+    """Relative error of a diffusion model, with Monte Carlo simulation as the reference.
 
-    smallest, largest : (3,) smallest and largest error among the tissues, in red, green and blue [-]
+    The compared values are the amounts of light that emerge through concentric rings around a narrow beam.
+    The error is the root-mean-square difference over the rings, relative to the root mean square of the
+    reference.
+
+    smallest, largest : (3,) smallest and largest error among `tissues`, in red, green and blue [-]
     tissues : names of the tissues for which the error was measured
     """
 
@@ -292,7 +301,7 @@ def measured_model_error(model_name: str, tissue_name: str = "") -> ModelError |
 
 
 def error_against_photons(model_profile: RadialProfile, photon_profile: RadialProfile) -> ModelError:
-    """Return the error of a model's ring energies, relative to a Monte Carlo profile of the same tissue."""
+    """Return the error of a model's profile, relative to a Monte Carlo profile of the same tissue."""
     squares = ((model_profile.ring_energy - photon_profile.ring_energy) ** 2).sum(axis=0)
     error = np.sqrt(squares / (photon_profile.ring_energy**2).sum(axis=0))
     return ModelError(error, error, (model_profile.name,))

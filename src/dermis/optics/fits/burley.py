@@ -37,7 +37,10 @@ class BurleyProfile:
         return np.asarray(self.albedo * self.shape * (np.exp(-sr) + np.exp(-sr / 3.0)) / (8.0 * np.pi * r))
 
     def energy_within(self, radius_mm: ArrayLike) -> Floats:
-        """Return the light (..., c) that emerges within distances r of the beam [-]."""
+        """Return the light (..., c) of a narrow beam of unit power that emerges within distances from it [-].
+
+        radius_mm : distances from the beam [mm]
+        """
         sr = self.shape * np.asarray(radius_mm, dtype=np.float64)[..., None]
         return np.asarray(-self.albedo * (np.expm1(-sr) + 3.0 * np.expm1(-sr / 3.0)) / 4.0)
 
@@ -59,7 +62,10 @@ class BurleyProfile:
 
 
 def shape_factor(albedo: ArrayLike) -> Floats:
-    """Return Burley's shape s, multiplied by the mean free path, for a narrow beam at normal incidence [-].
+    """Return the ratio of the mean free path to the scattering distance of Burley's profile [-].
+
+    The scattering distance is 1 / `BurleyProfile.shape`. The ratio depends only on the total reflectance, and
+    is a fit to light from a narrow beam at normal incidence.
 
     albedo : total reflectance A [-]
 
@@ -70,7 +76,9 @@ def shape_factor(albedo: ArrayLike) -> Floats:
 
 
 def shape_factor_diffuse(albedo: ArrayLike) -> Floats:
-    """Return Burley's shape s, multiplied by the diffuse mean free path 1 / sigma_tr [-].
+    """Return the ratio of the diffuse mean free path to the scattering distance of Burley's profile [-].
+
+    The diffuse mean free path is 1 / sigma_tr; the scattering distance is 1 / `BurleyProfile.shape`.
 
     albedo : total reflectance A [-]
 
@@ -82,10 +90,10 @@ def shape_factor_diffuse(albedo: ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class BurleyFit:
-    """Burley's profile fitted to ring energies, with the errors of the fit.
+    """Burley's profile fitted to the light through concentric rings, with the errors of the fit.
 
     profile : fitted profile
-    error : (c,) relative root-mean-square error of the ring energies [-]
+    error : (c,) relative root-mean-square error of the light through the rings [-]
     energy_error : (c,) relative error of the total reflectance [-]
     """
 
@@ -95,7 +103,10 @@ class BurleyFit:
 
 
 def fit_burley(target: RingTarget) -> BurleyFit:
-    """Fit Burley's profile to ring energies, without changing the total reflectance of any channel."""
+    """Fit Burley's profile to the light that emerges through concentric rings around a narrow beam.
+
+    The total reflectance of each channel is that of `target`; only the shape is fitted.
+    """
     shape = np.array([_fit_shape(target.channel(i)) for i in range(len(target.total))])
     profile = BurleyProfile(target.total, shape)
     return BurleyFit(
@@ -172,10 +183,10 @@ class UnrealParameters:
 def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
     """Return the subsurface profile settings of Unreal Engine that reproduce a fitted Burley profile.
 
-    The engine computes the shape s = 0.6 `shape_factor` / l, where l is the mean free path (colour times
-    distance). It converts millimetres to scene units by dividing them by ten, so a scene in centimetres is
-    life-size at scale 1. Both facts are from public copies of its source code (SubsurfaceProfile.cpp,
-    BurleyNormalizedSSS.cpp).
+    The engine computes the mean free path l as the product of its settings for colour and distance, and from
+    it the shape s = 0.6 `shape_factor` / l. It converts millimetres to scene units by dividing them by ten,
+    so a scene in centimetres is life-size at scale 1. All this is taken from public copies of the engine's
+    source files SubsurfaceProfile.cpp and BurleyNormalizedSSS.cpp.
     """
     _check_three_channels(profile)
     mean_free_path = 0.1 * UNREAL_SHAPE_RATIO * shape_factor(profile.albedo) / profile.shape

@@ -37,9 +37,10 @@ class GaussianFit:
     """Sum of Gaussians fitted to a diffusion profile, with the errors of the fit.
 
     profile : fitted sum of Gaussians
-    error : (c,) relative root-mean-square error of the samples of R(r), or of the ring energies [-]
+    error : (c,) relative root-mean-square error of the samples of R(r), or of the light through rings [-]
     energy_error : (c,) relative error of the total reflectance [-]
-    kind : "pointwise" if the fit was to samples of R(r), "annulus" if it was to ring energies
+    kind : "pointwise" if the fit was to samples of R(r), "annulus" if it was to the light that emerges
+        through concentric rings
     shared : whether all channels use the same variances
     """
 
@@ -267,6 +268,6 @@ def _hashable_sum(profile: GaussianSum) -> _HashableSum:
 
 
 def _combined_ring_target(profiles: Sequence[GaussianSum]) -> RingTarget:
-    """Return the ring energies of several profiles as one target with the channels of all profiles."""
+    """Return the light of several profiles through rings, as one target with the channels of all profiles."""
     within = np.hstack([one.energy_within(_RING_EDGES_MM) for one in profiles])
     return RingTarget(_RING_EDGES_MM, np.diff(within, axis=0), np.hstack([one.albedo for one in profiles]))

@@ -82,13 +82,18 @@ def preintegrated_kernel(profile: GaussianSum) -> SeparableKernel:
 
 
 def evaluate_kernel(kernel: SeparableKernel, target: RingTarget) -> SeparableFit:
-    """Return a separable kernel together with its errors relative to the ring energies of a profile."""
+    """Return a separable kernel together with its errors relative to a diffusion profile.
+
+    target : light of the profile that emerges through concentric rings around a narrow beam
+    """
     error = ring_error(target, kernel.sector_energy(target.edges_mm))
     return SeparableFit(kernel, error, kernel.albedo / target.total - 1.0)
 
 
 def fit_separable(target: RingTarget) -> SeparableFit:
-    """Fit a separable kernel of two Gaussians to ring energies, without changing the total reflectance.
+    """Fit a separable kernel of two Gaussians to the light through concentric rings around a narrow beam.
+
+    The total reflectance of each channel is that of `target`; only the variances and weights are fitted.
 
     Source: [Jimenez2015], the artist-friendly model.
     """
@@ -127,10 +132,12 @@ def _fit_channel_kernel(target: RingTarget) -> Floats:
 
 
 def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Floats:
-    """Return the fraction (n, SECTORS_PER_QUADRANT) of one channel's light in each ring and sector [-].
+    """Return the fraction (n, SECTORS_PER_QUADRANT) of a kernel a(x) a(y) in each sector of n rings [-].
+
+    The kernel has one channel and the integral 1. Sectors are those of `SeparableKernel.sector_energy`.
 
     edges_mm : (n + 1,) radii of the ring edges [mm]
-    variance, weight : (k,) variances [mm2] and weights of the Gaussians of a(x)
+    variance, weight : (k,) variances [mm2] and weights of the Gaussians whose sum is a(x)
     """
     cells = np.zeros((len(edges_mm) - 1, SECTORS_PER_QUADRANT))
     for i in range(len(variance)):
@@ -142,7 +149,9 @@ def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Flo
 
 
 def _elliptic_sector_fractions(edges_mm: Floats, variance_x_mm2: float, variance_y_mm2: float) -> Floats:
-    """Return the fraction (n, SECTORS_PER_QUADRANT) of an elliptic Gaussian in each ring and sector [-].
+    """Return the fraction (n, SECTORS_PER_QUADRANT) of an elliptic Gaussian in each sector of n rings [-].
+
+    Sectors are those of `SeparableKernel.sector_energy`.
 
     edges_mm : (n + 1,) radii of the ring edges [mm]
     variance_x_mm2, variance_y_mm2 : variances along x and y [mm2]

@@ -47,9 +47,10 @@ class PointTarget:
         return self._sqrt_quadrature_weights[:, None] * self.reflectance
 
     def design_and_derivatives(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
-        """Return weighted samples (n, k) of k unit Gaussians, and their derivatives (n, k).
+        """Return samples (n, k) of k Gaussians at the n radii of the target, and their derivatives (n, k).
 
-        The derivatives are those with respect to the logarithm of the variance.
+        The integral of each Gaussian over the plane is 1. The samples are weighted like `samples`. The
+        derivatives are those with respect to the logarithm of the variance.
 
         variance_mm2 : (k,) variances of the Gaussians [mm2]
         """
@@ -106,13 +107,14 @@ class RingTarget:
 
     @property
     def samples(self) -> Floats:
-        """Return the ring energies (n, c); a fit minimises the sum of their squared errors [-]."""
+        """Return the light (n, c) through each ring; a fit minimises the sum of its squared errors [-]."""
         return self.energy
 
     def design_and_derivatives(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
-        """Return ring energies (n, k) of k unit Gaussians, and their derivatives (n, k).
+        """Return the light (n, k) of k Gaussians through each of the n rings, and its derivatives (n, k).
 
-        The derivatives are those with respect to the logarithm of the variance.
+        The integral of each Gaussian over the plane is 1. The derivatives are those with respect to the
+        logarithm of the variance.
 
         variance_mm2 : (k,) variances of the Gaussians [mm2]
         """
@@ -138,7 +140,9 @@ class RingTarget:
 
 
 def ring_error(target: RingTarget, fitted_energy: Floats) -> Floats:
-    """Return the relative error (c,) of ring energies, sqrt(sum of (fit - target)^2 / sum of target^2) [-].
+    """Return the relative error (c,) of the light through rings [-].
+
+    It is sqrt(sum of (fit - target)^2 / sum of target^2), summed over all rings.
 
     fitted_energy : (n, c) light of the fit through each ring; or (n, m, c) light through m equal sectors of
         each ring, for kernels that are not radially symmetric

@@ -67,7 +67,8 @@ def _option_name(field_name: str) -> str:
 def _donner_jensen_skin(melanin: float, eumelanin: float, blood: float) -> SkinParameters:
     """Return a skin of [DonnerJensen2006a] with the given pigment fractions.
 
-    Its oxygenation and epidermal thickness are from public code.
+    Its oxygenation and epidermal thickness are taken from public source code that quotes the formulae of the
+    paper; it is not known whether the authors of the paper used the same values.
     """
     return SkinParameters(melanin, eumelanin, blood, oxygen=0.75, epidermis_mm=0.25, baseline=1.0)
 
