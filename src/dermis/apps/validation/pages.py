@@ -1,4 +1,4 @@
-"""Helpers for documentation pages with measured tables, for files of results, and for pages in Chromium."""
+"""Helpers for documentation pages with measured tables, files of results, and web pages in Chromium."""
 
 from __future__ import annotations
 
@@ -48,7 +48,9 @@ def add_tests_to_path() -> None:
 
 
 def data_file(file_name: str) -> Path:
-    """Return the path of a published data file in the folder DERMIS_DATA.
+    """Return the path of a file of data that others have published, such as measured spectra or a head.
+
+    The file is in the folder that the environment variable DERMIS_DATA names; the default is ../shared.
 
     Raises DermisError when the file is missing.
     """
@@ -119,7 +121,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def chromium_page(page_side: int, flags: Sequence[str] = SOFTWARE_WEBGL) -> Iterator[Page]:
-    """Open an empty page in headless Chromium without a network, for the duration of a context.
+    """Open an empty web page in headless Chromium without a network, for the duration of a context.
 
     page_side : side of the square page [pixel]
     flags : command-line flags of Chromium

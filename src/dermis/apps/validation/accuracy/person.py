@@ -95,7 +95,8 @@ class Measurement:
     person : key of `_PEOPLE`
     view : key of `ALL_VIEWS`
     truth : model of the skin that both renderers use, one of `comparisons.person.TRUTHS`
-    cause : cause of error that both renderers leave out, such as "hair"; None if they leave out nothing
+    cause : feature that both renderers omit, such as "hair", to find how much of the error it causes; None if
+        they omit nothing
     """
 
     person: PersonName
@@ -110,7 +111,7 @@ class Measurement:
 
 
 def list_measurements() -> list[Measurement]:
-    """Return all comparisons of people, the most important ones first."""
+    """Return all measurements of people rendered by dermis against path tracing, most important first."""
     found = [Measurement("human", view, "matched") for view in ALL_VIEWS]
     found += [Measurement("human", view, "layered") for view in VIEWS]
     people: tuple[PersonName, ...] = "dark", "old"
@@ -228,7 +229,7 @@ def comparison_figures(comparison: PersonComparison) -> Figures:
 
 
 def save_panels(view_name: str, comparison: PersonComparison) -> None:
-    """Keep the pictures of a view in the cache: frame, path-traced picture, and their signed difference."""
+    """Keep the pictures of a view in the cache: by dermis, path-traced, and their signed difference."""
     from scipy.ndimage import uniform_filter
 
     ours, reference = (
@@ -245,7 +246,10 @@ def save_panels(view_name: str, comparison: PersonComparison) -> None:
 
 
 def picture_sheet(view_names: Sequence[str]) -> bytes:
-    """Return a WebP file with the frame, the path-traced picture and the difference of each cached view."""
+    """Return a WebP file that shows each view three times: by dermis, path-traced, and their difference.
+
+    Views whose pictures are not in the cache are left out.
+    """
     panels: dict[str, NDArray[np.uint8]] = {}
     for view in view_names:
         found = load_arrays(_PANEL_FOLDER, _panel_key(view), _PANEL_NAMES)
@@ -418,7 +422,7 @@ def view_rows(people_figures: Figures) -> str:
 
 
 def people_rows(people_figures: Figures) -> str:
-    """Return Markdown rows with the errors of all people except "human"."""
+    """Return Markdown rows with the errors of all people but "human", which is the package's default head."""
     keys = [(one, view) for one in get_args(PersonName)[1:] for view in _PEOPLE_VIEWS]
     rows = ((one, view, people_figures.get(Measurement(one, view, "matched").key)) for one, view in keys)
     return "\n".join(f"| {one} | {view} | {_error_cells(row)} |" for one, view, row in rows)
@@ -449,9 +453,10 @@ def region_table(people_figures: Figures) -> str:
 
 
 def cause_table(people_figures: Figures) -> str:
-    """Return a Markdown table with the relative RMSE and energy ratio when one cause of error is left out.
+    """Return a Markdown table with the relative RMSE and energy ratio of the person "human", by cause of error.
 
-    In the first row, nothing is left out. Each further row is for one cause.
+    In the first row, both renderers omit nothing. In each further row, they omit one feature that causes
+    errors, such as the hair.
     """
     lines = [
         f"| left out on both sides | {' | '.join(f'{view} | energy' for view in _ABLATED_VIEWS)} |",
@@ -466,7 +471,10 @@ def cause_table(people_figures: Figures) -> str:
 
 
 def iris_cells(people_figures: Figures) -> dict[str, str]:
-    """Return texts with errors of the iris in the view "eye", keyed by the placeholder that each replaces."""
+    """Return texts on how the iris rendered by dermis differs from the path-traced one in the view "eye".
+
+    The keys are the placeholders of docs/templates/path_traced.md that the texts replace.
+    """
     row = people_figures.get(Measurement("human", "eye", "matched").key) or {}
     iris = row.get("iris", {})
     names = "right", "down", "brightness", "left_half", "right_half"

@@ -1,6 +1,6 @@
 """Errors of the reflectance and transmittance of rendered slabs, by direction of incidence.
 
-The reference is adding and doubling, which tests compare with Monte Carlo.
+The reference is computed by the adding-doubling method, which the tests check against Monte Carlo.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def slabs(adapter: str = "auto") -> None:
 
 
 def exact_slab_response(medium: Medium, thickness_mm: float, mean_cosine: float = 0.0) -> Array:
-    """Return reflectance and transmittance (2, n, 3) of a slab by adding and doubling, for n angles.
+    """Return reflectance and transmittance (2, n, 3) of a slab by the adding-doubling method, for n angles.
 
     The angles of incidence are `INCIDENT_DEGREES`.
 
@@ -80,7 +80,7 @@ def rendered_slab_response(renderer: dermis.Renderer, skin: Skin, thickness_mm: 
 
 
 def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
-    """Return two skins that have the diffusion profile of a medium, keyed by their setting `direction`.
+    """Return two skins that have the diffusion profile of a medium, keyed by their value of `Skin.direction`.
 
     Light leaves the skin "lambertian" with equal radiance in all directions. Light leaves the skin
     "half-space" with the angular distribution of a half-space.
@@ -96,7 +96,7 @@ def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
 
 
 def slab_error_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows with errors of rendered slabs, by medium, skin `direction` and thickness."""
+    """Return Markdown rows with errors of rendered slabs, by medium, `Skin.direction` and thickness."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, eta in SLAB_MEDIA:
@@ -112,8 +112,9 @@ def slab_error_rows(renderer: dermis.Renderer) -> str:
 def forward_scattering_error_rows(renderer: dermis.Renderer) -> str:
     """Return Markdown rows with errors of rendered slabs against references with forward scattering.
 
-    The `direction` of the rendered skin is "half-space". In half of the rows, the `anisotropy` of this skin
-    is 0; in the others, it is the mean cosine of the reference.
+    `Skin.direction` is "half-space" in all rows: the rendered skin reflects light with the angular
+    distribution of a half-space. `Skin.anisotropy` is 0 in half of the rows, and the mean cosine of the
+    reference in the others.
     """
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -130,10 +131,11 @@ def forward_scattering_error_rows(renderer: dermis.Renderer) -> str:
 
 
 def forward_scattering_direction_rows() -> str:
-    """Return Markdown rows with errors of skin with `direction` "half-space", over light and view directions.
+    """Return Markdown rows with errors of the reflection of skin, over all directions of light and view.
 
-    The medium is "skin1" with forward scattering. A row is for one value of the skin's `anisotropy`. A cell
-    is for one index of refraction and has the errors in red, green and blue.
+    The errors are those of the model that `Skin.direction` "half-space" selects, relative to a half-space of
+    the medium "skin1" with forward scattering. Each row belongs to one value of `Skin.anisotropy`, each
+    column to one index of refraction. A cell has the errors in red, green and blue.
     """
     rows = []
     for g in (0.0, FORWARD_G):
@@ -162,10 +164,11 @@ def _direction_pairs_error(albedo: float, eta: float, skin_anisotropy: float) ->
 def _error_cells(slab_response: Array, reference: Array) -> str:
     """Return two table cells with errors of transmittance, then two with errors of reflectance.
 
-    The first cell of each pair has the relative RMS error. The second has the ratio of red light to the
-    reference for each angle of incidence.
+    The first cell of each pair has the relative RMS error. The second has, for each angle of incidence, the
+    value in red divided by that of the reference.
 
-    slab_response, reference : (2, n, 3) reflectance and transmittance for n angles of incidence
+    slab_response : (2, n, 3) reflectance, then transmittance, for n angles of incidence
+    reference : exact values in the same form
     """
     flux, cells = np.sqrt(np.cos(np.radians(INCIDENT_DEGREES)))[:, None], []
     for side in (1, 0):
@@ -198,7 +201,7 @@ def forward_scattering_rows() -> str:
 
 
 def slab_error_tables(adapter: str = "auto") -> dict[str, str]:
-    """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
+    """Return Markdown rows with errors of slabs, keyed by placeholder of docs/templates/accuracy.md."""
     renderer = dermis.Renderer(adapter)
     return {
         "slab_errors": slab_error_rows(renderer),

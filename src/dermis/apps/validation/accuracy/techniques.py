@@ -1,4 +1,4 @@
-"""Scattering techniques on the scanned head compared with references, for docs/techniques.md."""
+"""Scattering techniques on the head "lee_perry_smith", compared with references, for docs/techniques.md."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ BALL_SAMPLES_BY_LIGHT = {"front": 64, "back": 64}  # paths per pixel
 
 
 def techniques(adapter: str = "auto") -> None:
-    """Compare the techniques with the references and write docs/techniques.md.
+    """Compare scattering techniques with reference solutions, and write docs/techniques.md.
 
-    Needs the sample data, Mitsuba and the folder tests of a checkout. Traced paths are cached on disk, so
-    only the first run takes long.
+    Needs the sample data, Mitsuba, and a checkout of the project with its folder `tests`. The path-traced
+    reference images are cached on disk, so only the first run takes long.
     """
     require_in_checkout(PAGE)
     add_tests_to_path()
@@ -70,7 +70,7 @@ def _compare_under_light(
 ) -> Comparison:
     """Return a comparison of techniques with a reference under one light.
 
-    reference_name : name of the reference
+    reference_name : key of `comparisons.references.REFERENCES`, such as "path-traced"
     options : further arguments of `compare`; the default region and number of samples depend on the light
     """
     defaults: dict[str, Any] = {"region": default_region(light_name), "samples": SAMPLES_BY_LIGHT[light_name]}
@@ -88,11 +88,13 @@ def technique_row(first_cell: str, comparison_row: ComparisonRow) -> str:
 def technique_rows(
     head: Head, reference_name: str, medium: str, adapter: str, model: ModelName | None = None
 ) -> tuple[str, dict[str, Comparison]]:
-    """Return Markdown rows of all techniques under each light, and a dictionary from light to comparison.
+    """Return a Markdown table with the errors of techniques under each light, and the comparisons by light.
 
-    reference_name : name of the reference
-    medium : name of the medium
-    model : scattering model of the medium's profile
+    All techniques are compared, or three of them with the reference "heat".
+
+    reference_name : key of `comparisons.references.REFERENCES`, such as "path-traced"
+    medium : published medium of the skin, such as "skin1"
+    model : scattering model of the medium's profile; see `medium_gaussians` for the default
     """
     rows, comparison = [TABLE_HEADER], {}
     for light in SAMPLES_BY_LIGHT:
@@ -108,7 +110,8 @@ def technique_rows(
 def fine_atlas_row(head: Head, adapter: str) -> str:
     """Return a Markdown row with the errors of texture-space diffusion on an atlas of 2048 by 2048 texels.
 
-    The head is lit by the laser's stripe. The reference is the heat equation on the surface.
+    The head is lit by a narrow stripe of light, as from a laser. In the reference, light diffuses along the
+    surface according to the heat equation.
     """
     settings, only = SETTINGS.model_copy(update={"atlas": 2048}), ("texture-space",)
     comparison = _compare_under_light(
@@ -121,6 +124,9 @@ def profile_model_rows(
     head: Head, comparisons_by_medium: dict[str, dict[str, Comparison]], adapter: str
 ) -> str:
     """Return Markdown rows with errors against path tracing, for profiles of two scattering models.
+
+    The models are "layered", which is layered diffusion, and "counted", which is tabulated counts of traced
+    photons.
 
     comparisons_by_medium : comparisons for profiles of the model "counted", keyed by medium, then by light
     """
@@ -184,9 +190,10 @@ def lambertian_limit_text(head: Head, medium: str, path_traced_comparison: Compa
 
 
 def direction_rows(head: Head, samples_by_light: dict[str, int], settings: Settings, adapter: str) -> str:
-    """Return Markdown rows with errors of skin with `direction` "lambertian" and "half-space".
+    """Return a Markdown table that compares the values "lambertian" and "half-space" of `Skin.direction`.
 
-    The reference is path tracing. The rows are for the head under each light, and for a ball.
+    `Skin.direction` sets how diffuse light depends on the directions of light and view. For each value, the
+    table has the errors of skin against path tracing, for the head under each light and for a ball.
 
     samples_by_light : dictionary from the name of a light to the number of paths per pixel
     """

@@ -1,4 +1,8 @@
-"""Causes of the difference between texture-space diffusion and the surface integral."""
+"""Causes of the difference between texture-space diffusion and the surface integral.
+
+The surface integral is a reference for scattered light: at each pixel, irradiance times diffusion profile is
+integrated over the surface of the head.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +50,10 @@ LANDMARKS_BY_REGION: dict[str, dict[str, tuple[str, ...]]] = {
 
 
 def texture_space_error_tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
-    """Return Markdown rows for docs/templates/techniques.md, keyed by placeholder."""
+    """Return texts on errors of texture-space diffusion, and of the surface integral that is its reference.
+
+    They are keyed by the placeholders of docs/templates/techniques.md that they replace.
+    """
     rows: dict[str, list[str]] = {"by_atlas": [], "zero_width": [], "places": [], "even": []}
     for light in COMPARED_LIGHTS:
         region = default_region(light)
@@ -62,9 +69,10 @@ def texture_space_error_tables(head: Head, settings: Settings, adapter: str) -> 
 
 
 def render_technique(subject: ComparisonSubject, technique: str, **changed_settings: object) -> Floats:
-    """Render a technique to linear radiance (h, w, 3).
+    """Render the subject's scene with a scattering technique, and return the linear radiance (h, w, 3).
 
-    Like the references, the image has one sample per pixel and no interreflection.
+    Like the reference images with which it is compared, the image has one sample per pixel and no
+    interreflection.
 
     changed_settings : settings that replace those of the subject
     """
@@ -112,7 +120,10 @@ def narrow_profile_row(subject: ComparisonSubject, light_name: str) -> str:
 
 
 def uniform_light_integral(subject: ComparisonSubject) -> Floats:
-    """Return the surface integral at each pixel (h, w, 3) for an irradiance and an albedo of 1."""
+    """Return the surface integral at each pixel (h, w, 3) for an irradiance and an albedo of 1.
+
+    On a flat surface, it would be 1.
+    """
     samples = irradiance_samples(subject)
     uniform_samples = replace(samples, irradiance=np.ones_like(samples.irradiance))
     visible = surface_points(subject.renderer, subject.scene, subject.settings)
@@ -125,7 +136,7 @@ def uniform_light_integral(subject: ComparisonSubject) -> Floats:
 def mean_and_percentile_text(uniform_integral: Floats) -> str:
     """Return text with the mean and the 95th percentile of each channel.
 
-    uniform_integral : (n, 3) surface integral in uniform light, at n pixels
+    uniform_integral : (n, 3) result of `uniform_light_integral` at n pixels
     """
     pairs = zip(uniform_integral.mean(axis=0), np.percentile(uniform_integral, 95, axis=0), strict=True)
     return ", ".join(f"{mean:.3f} ({high:.3f})" for mean, high in pairs)

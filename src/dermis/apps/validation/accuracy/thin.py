@@ -95,9 +95,9 @@ def integrated_light(mesh: Mesh, light_direction: Array, points: Array, spacing_
 
 
 def slab_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows with the transmittance of slabs: rendered, and computed from the profile.
+    """Return Markdown rows with the transmittance of slabs: rendered, and computed from a diffusion profile.
 
-    It is measured far from the rim of the slabs.
+    The profile is `BLURRED_PROFILE`. The rendered transmittance is measured far from the rim of the slabs.
     """
     rows = []
     for thickness in THICKNESSES_MM:
@@ -164,8 +164,8 @@ def comparison_cells(
 
     point_filter : function that returns the mask of the points to compare, given positions and normals
     spacing_mm : largest distance between neighbouring samples of the irradiance
-    compares_without_air : whether to add a cell with the energy ratio for "thin" to a reference from which
-        `light_across_air` is subtracted
+    compares_without_air : whether to add a fifth cell: the energy ratio for "thin" if `light_across_air` is
+        subtracted from the reference
     """
     cells = []
     for transmission in ("none", "thin"):
@@ -227,7 +227,10 @@ def ear_rows(renderer: dermis.Renderer) -> str:
 
 
 def thin_body_error_tables(adapter: str = "auto") -> dict[str, str]:
-    """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
+    """Return Markdown rows with errors of light transmitted through thin bodies: slabs, wedges and ears.
+
+    They are keyed by the placeholders of docs/templates/accuracy.md that they replace.
+    """
     renderer = dermis.Renderer(adapter)
     rows = {"thin_slabs": slab_rows, "thin_wedges": wedge_rows, "thin_ears": ear_rows}
     return {name: make(renderer) for name, make in rows.items()}

@@ -1,4 +1,4 @@
-"""Benchmark cases and their scenes: a base frame, and frames that each differ from it in one parameter."""
+"""Benchmark cases and their scenes: a base case, and cases that each differ from it in one parameter."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class BenchmarkCase:
     samples : samples per pixel
     technique : scattering technique of `Settings`; or `FRAGMENT_TECHNIQUE`, for the passes of GPU Gems 3 in
         the graphics pipeline
-    varies : name of the parameter whose value differs from that of the base frame; "" for the base frame
+    varies : name of the parameter whose value differs from that of the base case; "" for the base case
     """
 
     image: tuple[int, int] = (1920, 1080)
@@ -60,7 +60,7 @@ class BenchmarkCase:
 
 @dataclass(frozen=True)
 class BenchmarkPreset:
-    """Set of benchmark cases: a base frame, and other values to measure for each of its parameters."""
+    """Set of benchmark cases: a base case, and other values to measure for each of its parameters."""
 
     base_case: BenchmarkCase
     image: tuple[tuple[int, int], ...]
@@ -73,7 +73,7 @@ class BenchmarkPreset:
     technique: tuple[str, ...] = (GPU_GEMS_3, FRAGMENT_TECHNIQUE)
 
     def cases(self) -> list[BenchmarkCase]:
-        """Return the base frame, then the frames that vary one parameter of it."""
+        """Return the base case, then the cases that each differ from it in one parameter."""
         cases = [self.base_case]
         sizes = "image", "atlas", "gaussians", "lights", "environment", "targets", "subdivide"
         for name in ("technique", *sizes):

@@ -104,10 +104,11 @@ def _scattering_bytes(traffic: FrameTraffic, shadow_bytes: int) -> dict[str, flo
 
 
 def _blur_surface_bytes(inputs: FrameInputs, texel_count: int) -> float:
-    """Return the memory traffic of everything that blurs read or write besides the light itself [byte].
+    """Return the memory traffic of the blur passes, without that of the light itself [byte].
 
-    This is the stretch map (texels per millimetre), the reach map (how far the chart extends from each texel)
-    and the gutters. The passes of GPU Gems 3 use no reach map and no gutters, but also blur the stretch map.
+    The passes also read the stretch map (texels per millimetre) and the reach map (how far the chart extends
+    from each texel), and fill the gutters. The passes of GPU Gems 3 use no reach map and no gutters, but also
+    blur the stretch map.
 
     texel_count : number of atlas texels that show the surface
     """
@@ -142,9 +143,9 @@ def _translucency_bytes(translucency: Translucency, levels: PyramidLevels, blur:
 
 
 def _map_bytes(inputs: FrameInputs, point_count: int) -> int:
-    """Return the bytes read from the maps of a head to shade points: one texel per map and point.
+    """Return a lower bound of the bytes read from the maps of a head to shade points.
 
-    No texel is counted twice.
+    Of each map, one texel is counted for each point, but at most all texels of the map.
 
     point_count : number of points to shade
     """

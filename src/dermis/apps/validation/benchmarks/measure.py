@@ -138,7 +138,7 @@ def _measure_case(
 
 
 def sequence_ms(renderer: Renderer, scenes: Iterator[Scene], frame_count: int, settings: Settings) -> float:
-    """Return the elapsed time of drawing consecutive frames until the last one is done [ms].
+    """Draw consecutive frames, and return the total time until the device has finished the last one [ms].
 
     scenes : scenes that all differ in camera and lights, so no frame can reuse results of another frame
     frame_count : number of frames

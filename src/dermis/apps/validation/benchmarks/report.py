@@ -85,10 +85,11 @@ def row_cells(benchmark_row: BenchmarkRow) -> tuple[str, ...]:
 
 
 def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
-    """Return a table of the stages of the base frame, with column titles as its first row.
+    """Return a table of the stages of the base case, with column titles as its first row.
 
-    The first columns are the device time, its lower bound, and the ratio of the two. Further columns have the
-    device times of frames drawn with the passes of GPU Gems 3.
+    The base case is the frame from which all other cases differ in one parameter. The first columns are its
+    device time, the lower bound of this time, and the ratio of the two. Further columns have the device times
+    of the same frame drawn with the passes of GPU Gems 3.
     """
     if benchmark.base_row is None:
         return []
@@ -106,9 +107,10 @@ def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
 
 
 def gpu_gems_3_text(benchmark: Benchmark) -> str:
-    """Return a sentence that compares frames rendered with the passes of GPU Gems 3 to the base frame.
+    """Return a sentence on how much longer a frame takes with the passes of GPU Gems 3.
 
-    The text is empty if these passes were not measured.
+    The frame is that of the base case, from which all other cases differ in one parameter. The text is empty
+    if these passes were not measured.
     """
     names = {GPU_GEMS_3: "as compute", FRAGMENT_TECHNIQUE: "as fragments"}
     ratios = {form: benchmark.relative_time(name) for name, form in names.items()}

@@ -60,16 +60,22 @@ class Benchmark:
 
     @property
     def base_row(self) -> BenchmarkRow | None:
-        """Return the measurements of the base frame; None if the base frame was skipped."""
+        """Return the measurements of the base case, from which all other cases differ in one parameter.
+
+        Returns None if the base case was skipped.
+        """
         return next((row for row in self.rows if not row.case.varies), None)
 
     def row_with_technique(self, technique: str) -> BenchmarkRow | None:
-        """Return the measurements of the base frame drawn with a technique; None if they were skipped."""
+        """Return the measurements of the case that differs from the base case only in its technique.
+
+        Returns None if this case was skipped.
+        """
         rows = (row for row in self.rows if row.case.varies == "technique")
         return next((row for row in rows if row.case.technique == technique), None)
 
     def relative_time(self, technique: str) -> float | None:
-        """Return the device time of the base frame drawn with another technique, divided by its usual time.
+        """Return the device time of the base case with another technique, divided by that of the base case.
 
         Returns None if one of the two times was not measured.
         """

@@ -86,7 +86,7 @@ pigments of the person, with the surface of "matched".
 """
 TRUTHS: tuple[TruthName, ...] = get_args(TruthName)
 Cause = Literal["pigments", "relief", "reflection", "hair", "scattering", "bounces"]
-"""Cause of error that frame and path tracer can leave out.
+"""Feature that frame and path tracer can both omit, to find how much of the error it causes.
 
 "pigments": variation of the colour. "relief": folds, pores, and variation of gloss. "reflection": specular
 lobe of the skin. "hair": hair, brows and lashes. "scattering": subsurface scattering, so that skin is
@@ -108,9 +108,9 @@ class SharedSkin:
 
 
 def shared_skin(renderer: Renderer, head: Head, reference_kind: TruthName, folder: Path) -> SharedSkin:
-    """Return the skin of a person for a kind of path-traced reference, and write its diffusion profile.
+    """Return the skin of a person that dermis and the path tracer share, and write its diffusion profile.
 
-    For the kind "layered", the skin has two layers with the pigments of the person. For the other kinds, it
+    For `reference_kind` "layered", the skin has two layers with the pigments of the person. Otherwise, it
     is homogeneous, with the mean scattering distance of the default skin.
 
     reference_kind : model of the skin that both renderers use, one of `TRUTHS`
@@ -134,7 +134,8 @@ def shared_skin(renderer: Renderer, head: Head, reference_kind: TruthName, folde
 class PersonSubject:
     """Scene of a person, and the textures of the skin for the path tracer.
 
-    cause : cause of error that both renderers leave out, such as "hair"; None if they leave out nothing
+    cause : feature that both renderers omit, such as "hair", to find how much of the error it causes; None if
+        they omit nothing
     """
 
     scene: Scene
@@ -143,7 +144,7 @@ class PersonSubject:
 
 
 def without_cause(subject: PersonSubject, cause: Cause) -> PersonSubject:
-    """Return a subject for which both dermis and the path tracer leave out one cause of error."""
+    """Return a subject for which dermis and the path tracer both omit one feature that causes errors."""
     scene, textures, head = subject.scene, subject.textures, subject.scene.head
     maps, flat = head.maps, np.ones((1, 1), np.float32)
     assert isinstance(maps, PaintedMaps)

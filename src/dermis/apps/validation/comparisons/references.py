@@ -36,7 +36,11 @@ SAMPLES_PER_PIXEL = 16
 
 @dataclass(frozen=True)
 class ComparisonSubject:
-    """Scene in which techniques are compared, with its renderer, its settings, and the profile and medium."""
+    """Scene in which techniques are compared, with its renderer and settings.
+
+    profile : diffusion profile of the skin
+    medium : scattering medium of the skin, which has this profile
+    """
 
     renderer: Renderer
     scene: Scene

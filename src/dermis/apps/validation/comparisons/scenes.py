@@ -120,17 +120,21 @@ def default_region(light_name: str) -> str:
 
 
 ModelName = Literal["counted", "layered", "montecarlo"]
-"""Source of a profile: table of Monte Carlo profiles, layered diffusion, or a new Monte Carlo simulation."""
+"""Scattering model from which a diffusion profile is computed.
+
+"counted": tabulated photon counts of earlier Monte Carlo simulations. "layered": layered diffusion.
+"montecarlo": a new Monte Carlo simulation.
+"""
 _PHOTONS_PER_CHANNEL = 2_000_000  # per channel
 
 
 def medium_gaussians(medium: Medium, model: ModelName | None = None) -> GaussianSum:
     """Return the sum of six Gaussians that fits a medium's diffusion profile.
 
-    model : scattering model; by default "counted", or "layered" if the tables of "counted" do not contain the
-        medium
+    model : scattering model; None for "counted", the tabulated Monte Carlo profiles, or for "layered" if no
+        table covers the medium
 
-    Raises DermisError if the model is "counted" and its tables do not contain the medium.
+    Raises DermisError if the model is "counted" and no table covers the medium.
     """
     if model == "montecarlo":
         return fit_radial(monte_carlo_profile(medium, photons=_PHOTONS_PER_CHANNEL), medium.name)

@@ -68,14 +68,14 @@ def babylon_page(library_folder: Path) -> Iterator[Page]:
 def measured_radiance(
     page: Page, profile_colour: Floats, meters_per_unit: float, pixel_mm: float, azimuth: float
 ) -> Floats:
-    """Return the radiance (side, side, 3) that Babylon.js draws, relative to that of a fully lit plane.
+    """Return the radiance (side, side, 3) of a half-lit plane in Babylon.js, relative to a fully lit plane.
 
     Row 0 is at the bottom.
 
     profile_colour : colour by which Babylon.js describes the diffusion profile
     meters_per_unit : value of the setting metersPerUnit of Babylon.js; the scene is in millimetres
     pixel_mm : size of a pixel [mm]
-    azimuth : direction across the edge of the light [rad]
+    azimuth : direction in the picture perpendicular to the edge of the lit half, towards the lit side [rad]
     """
     edge = {
         "colour": list(map(float, profile_colour)),
@@ -91,14 +91,15 @@ def measured_radiance(
 def predicted_radiance(
     profile_colour: Floats, meters_per_unit: float, pixel_mm: float, azimuth: float
 ) -> Floats:
-    """Return the radiance (side, side, 3) predicted from the shader's sample positions.
+    """Return the radiance (side, side, 3) that Babylon.js is predicted to draw for a half-lit plane.
 
-    Sample positions are rounded to whole pixels.
+    It is relative to that of a fully lit plane. It is computed from the positions at which the shader of
+    Babylon.js samples the light, rounded to whole pixels.
 
     profile_colour : colour by which Babylon.js describes the diffusion profile
     meters_per_unit : value of the setting metersPerUnit of Babylon.js; the scene is in millimetres
     pixel_mm : size of a pixel [mm]
-    azimuth : direction across the edge of the light [rad]
+    azimuth : direction in the picture perpendicular to the edge of the lit half, towards the lit side [rad]
     """
     r, angle, weight = spiral_samples(profile_colour)
     distance = RENDERED_WIDTH_RATIO * 1e-3 * r / meters_per_unit / pixel_mm
@@ -114,11 +115,11 @@ def predicted_radiance(
 def edge_profile(
     picture: Floats, pixel_mm: float, azimuth: float, edge_distance_mm: Floats, half_width_mm: float
 ) -> Floats:
-    """Return the mean radiance (n, 3) at distances from the edge of the light, in a strip across the edge.
+    """Return the mean radiance (n, 3) at distances from the edge of the lit half, in a strip across the edge.
 
     picture : (side, side, 3) radiance
     pixel_mm : size of a pixel [mm]
-    azimuth : direction across the edge [rad]
+    azimuth : direction in the picture perpendicular to the edge, towards the lit side [rad]
     edge_distance_mm : (n,) evenly spaced distances from the edge, positive on the lit side [mm]
     half_width_mm : half the width of the strip [mm]
     """
@@ -140,9 +141,9 @@ def edge_responses(
 ) -> JsonObject:
     """Measure the edge response of a diffusion profile in Babylon.js, and compare it with predictions.
 
-    An edge response is the radiance of a half-lit plane by distance from the edge of the light. Here it is
-    averaged over directions across the edge. The predictions come from the samples of Babylon.js's shader and
-    from exact Burley profiles.
+    An edge response is the radiance of a half-lit plane by distance from the edge of the lit half. Here it is
+    averaged over several orientations of the edge in the picture. The predictions come from the samples of
+    Babylon.js's shader and from exact Burley profiles.
 
     profile_colour : colour by which Babylon.js describes the diffusion profile
     meters_per_unit : value of the setting metersPerUnit of Babylon.js; the scene is in millimetres

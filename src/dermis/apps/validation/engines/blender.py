@@ -88,7 +88,10 @@ def measure_edges(python_by_version: dict[str, Path]) -> Iterator[JsonObject]:
 
 
 def column_edge_distances() -> Floats:
-    """Return the distances of the pixel columns from the edge of the light, in units of the Burley width."""
+    """Return the distances of the pixel columns from the edge of the lit half of the plane.
+
+    They are in units of the width d of Burley's profile, and positive on the lit side.
+    """
     return 12.0 * (np.arange(EDGE_BIN_COUNT * PIXELS_PER_BIN) + 0.5) / (EDGE_BIN_COUNT * PIXELS_PER_BIN) - 6.0
 
 
@@ -97,7 +100,7 @@ def measure_edge_response(
 ) -> JsonObject:
     """Return the measured and the predicted edge response of an exported skin, and its errors.
 
-    An edge response is the radiance of a half-lit plane by distance from the edge of the light.
+    An edge response is the radiance of a half-lit plane by distance from the edge of the lit half.
 
     python_program : Python program that has Blender's module bpy
     blender_version : version of Blender for which the skin is exported

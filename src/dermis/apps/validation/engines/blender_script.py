@@ -1,7 +1,7 @@
 """Script for Blender's Python that renders a plane of exported skin in Cycles, lit where x > 0.
 
 Its argument is a folder with skin.py, as written by `dermis export --to blender`, and passes.json. The script
-adds done.json: Blender's version and, for each pass, the radiance of each column of pixels.
+adds done.json: Blender's version and, for each pass, the mean radiance of each column of pixels.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ PLANE_HALF_SIDE_M, CARD_HEIGHT_M = (
 
 
 def main(folder: Path) -> None:
-    """Render the passes listed in passes.json and write the radiance of each column to done.json."""
+    """Render the passes listed in passes.json; write the mean radiance of each pixel column to done.json."""
     spec = importlib.util.spec_from_file_location("skin", folder / "skin.py")
     skin = importlib.util.module_from_spec(spec)  # type: ignore[arg-type]
     spec.loader.exec_module(skin)  # type: ignore[union-attr]
@@ -101,7 +101,7 @@ def black_material() -> Any:
 def column_radiance(
     skin_script: Any, camera: Any, path: Path, width_m: float, picture_size: Any, **parameters: int
 ) -> Any:
-    """Render a picture across the edge of the light, and return the mean radiance of each pixel column.
+    """Render the edge of the lit half of the plane, and return the mean radiance of each pixel column.
 
     skin_script : exported script, imported as a module
     path : file to which the picture is written

@@ -143,7 +143,7 @@ def pixel_edge_response(
 def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int) -> JsonObject:
     """Return the measured edge responses of an exported skin, and their errors, by channel.
 
-    An edge response is the radiance of a half-lit plane by distance from the edge of the light.
+    An edge response is the radiance of a half-lit plane by distance from the edge of the lit half.
 
     mi : module mitsuba
     boundary : surface of the skin: "matched" for none, "smooth" or "rough"

@@ -40,7 +40,10 @@ _BLENDER_HEAD_HEADER = """\
 
 
 def page() -> None:
-    """Replace the tables in docs/engines.md, and print the tables for Blender."""
+    """Rewrite the tables of docs/engines.md, except the two tables with measurements in Blender.
+
+    These two are printed, to be copied into the page by hand.
+    """
     write_page(PAGE, fill_tables(require_in_checkout(PAGE).read_text("utf-8")))
     print_lines(blender_tables())
 
@@ -110,7 +113,7 @@ def babylon_table() -> str:
 
 
 def heads_table() -> str:
-    """Return a Markdown table that compares pictures of a head by other programs with that by dermis."""
+    """Return a Markdown table that compares each picture of a head by another program with that by dermis."""
     titles = "program", "outline [px]", "lit skin relative to dermis", "relative RMSE", "pixels"
     return markdown_table(titles, map(_head_row, read_results(RESULTS / "engines_heads.json")["heads"]))
 
@@ -126,7 +129,11 @@ def _head_row(comparison: JsonObject) -> list[str]:
 
 
 def blender_tables() -> str:
-    """Return Markdown tables of edge responses and heads in Blender, to be copied into the page by hand."""
+    """Return two Markdown tables with measurements in Blender, to be copied into docs/engines.md by hand.
+
+    The first has the errors of edge responses of skin. The second compares pictures of a head with those by
+    dermis.
+    """
     results = read_results(RESULTS / "engines_blender.json")
     edges, heads = _blender_edges_table(results["edges"]), _blender_heads_table(results["heads"])
     return "\n".join([_BLENDER_EDGE_HEADER, *edges, "", _BLENDER_HEAD_HEADER, *heads]) + "\n"

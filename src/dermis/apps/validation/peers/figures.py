@@ -258,9 +258,11 @@ def _cycles_cost(
 
 
 def _energy_corrected_error(peer_renders: PeerRenders, variant_name: str, mask: Mask) -> float:
-    """Return the relative RMSE of an image by dermis whose channels are scaled to the reference's energy [-].
+    """Return the relative RMSE of an image by dermis, after it is given the brightness of the reference [-].
 
-    variant_name : name of the variant of dermis
+    Each channel is scaled so that its sum within the mask is that of the reference.
+
+    variant_name : name of the settings of dermis, a key of `DERMIS_VARIANTS`
     """
     reference, image = peer_renders.reference, peer_renders.ours[variant_name].image.astype(np.float64)
     scale = reference.image[mask].sum(axis=0, dtype=np.float64) / image[mask].sum(axis=0)

@@ -31,7 +31,7 @@ CYCLES_METHODS: tuple[SubsurfaceMethod, ...] = ("random-walk", "burley")
 
 @dataclass(frozen=True)
 class RenderVariant:
-    """Variant of dermis that is compared with other renderers.
+    """Settings with which dermis renders a picture for the comparison with other renderers.
 
     technique : scattering technique
     atlas : side of the atlas [texel]
@@ -49,7 +49,7 @@ DERMIS_VARIANTS = {
     "Lambertian skin, atlas 1024": RenderVariant("texture-space", 1024, "lambertian"),
     "screen space": RenderVariant("screen-space", 64),
 }
-"""Variants of dermis by their names in the report; screen space needs no atlas."""
+"""Settings of dermis by their names in the report; screen space needs no atlas."""
 GPU_GEMS_3_VARIANTS = {
     "passes of 2007 as compute": RenderVariant(GPU_GEMS_3, direction="lambertian"),
     "passes of 2007 as fragments": RenderVariant(FRAGMENT_TECHNIQUE, direction="lambertian"),
@@ -68,7 +68,8 @@ class PeerPlan:
     side : side of the square image [pixel]
     samples : paths per pixel of each pass of Cycles
     paths : paths per pixel of Mitsuba
-    frames : number of frames of each variant of dermis that are timed per turn; the programs take turns
+    frames : number of frames that are timed per turn with each of the settings of dermis; the programs take
+        turns
     """
 
     side: int = 512
@@ -90,7 +91,7 @@ class PeerPlan:
 
 @dataclass
 class FrameTimes:
-    """Image of one variant of dermis, and elapsed and CPU times of its frames [s]."""
+    """Image rendered by dermis with one of the compared settings, and elapsed and CPU times of its frames [s]."""
 
     image: NDArray[np.float32]
     seconds: list[float] = field(default_factory=list)
@@ -190,9 +191,9 @@ def _cycles_passes(
 def _time_frames(
     dermis_frames: dict[str, FrameTimes], renderer: Renderer, scene: Scene, comparison_plan: PeerPlan
 ) -> None:
-    """Draw and time frames of each variant of dermis; each frame recomputes all stages.
+    """Draw and time frames with each of the compared settings of dermis; each frame recomputes all stages.
 
-    dermis_frames : dictionary from the name of a variant to an image and times; new times are appended
+    dermis_frames : dictionary from the name of the settings to an image and times; new times are appended
     """
     for name, variant in (DERMIS_VARIANTS | GPU_GEMS_3_VARIANTS).items():
         values = {"technique": variant.technique, "atlas": variant.atlas}
