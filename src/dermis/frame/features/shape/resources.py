@@ -1,4 +1,4 @@
-"""Resources of the shape of a head: buffers of the mesh and the rig, the posed vertices, and the curvature."""
+"""Resources of the shape of a head: buffers of the mesh and rig, the posed vertices, and the curvature."""
 
 from __future__ import annotations
 
