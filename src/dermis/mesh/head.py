@@ -157,6 +157,7 @@ class Head:
     @cached_property
     def axes(self) -> Doubles:
         """Return unit vectors to the viewer's right, upwards and to the front, as rows (3, 3).
+
         For a head the directions are x, y and z. The front of a flat patch of skin is the side to which its
         normals point.
         """
@@ -164,9 +165,9 @@ class Head:
 
     @property
     def seen_positions_mm(self) -> Floats:
-        """Return the positions (v, 3) of the vertices along the directions `axes`, relative to the centre [mm].
+        """Return the positions (v, 3) of the vertices as seen from the front, relative to the centre [mm].
 
-        For somebody who looks at the front, x is to the right and y is up; z points to the front.
+        Along the directions `axes`: x to the viewer's right, y up, and z to the front, towards the viewer.
         """
         positions = self.mesh.positions - np.array(self.centre_mm, dtype=np.float32)
         return positions if self.skull_mm is not None else positions @ self.axes.T.astype(np.float32)

@@ -159,7 +159,7 @@ class Rig(ShortRepr):
         return self._outline_for(motion.positions_mm).pose(motion.weights, motion.matrices)
 
     def _outline_for(self, rest_positions: Floats) -> RigOutline:
-        """Return the points that bound the mesh in every pose, for other rest positions of the control points.
+        """Return the points that bound the mesh in every pose, after a change of the rest positions.
 
         The last result is cached. It is returned again if its points have the same rest positions.
         rest_positions : (p, 3) rest positions of all control points [mm]

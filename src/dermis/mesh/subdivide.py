@@ -154,10 +154,10 @@ def _cached_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
 
 @logged_step("subdividing the mesh")
 def _compute_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
-    """Return the connectivity of the subdivided mesh and the weights of its points, as a dictionary of arrays.
+    """Return connectivity and weights of the subdivided mesh, as a dictionary from name to array.
 
-    The weights "weight" of control points "control" start at index "first" for each point. The vertices have
-    "uv" and "point"; the faces have vertices "corner" and "material".
+    Each of its points is a weighted mean of control points; "first", "control" and "weight" are the fields of
+    `Stencils`. Its vertices have "uv" and "point". Its faces have vertices "corner" and a "material".
 
     by_quads : whether to use Catmull and Clark's rules instead of Loop's
     """
@@ -198,13 +198,14 @@ def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
 
 
 def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
-    """Return triangles (t, 3) of a subdivided head, with fewer levels of subdivision in flat regions.
+    """Return triangles (t, 3) of a subdivided head, coarser in flat regions.
 
-    The triangles are indices of vertices of the subdivided mesh. Triangles with an opacity map are left out.
+    There, the faces of an earlier level of subdivision replace the finest faces. The triangles are indices of
+    vertices of the subdivided mesh. Triangles from which an opacity map cuts out parts are left out.
 
     min_faces : levels are dropped only as long as the coarser mesh has at least this number of faces
-    tolerance_mm : a coarse face counts as flat if, on each of its edges, the dropped vertex is at most this
-        far from the middle of the edge [mm]
+    tolerance_mm : a coarse face counts as flat if, on each of its edges, the vertex that the next finer level
+        adds is at most this far from the middle of the edge [mm]
     """
     mesh, levels = head.mesh, head.levels
     by_quads = len(mesh.quads) > 0
@@ -233,8 +234,8 @@ def _coarsen_triangles(
         first three are at its corners
     dropped_levels : number of subdivision levels to leave out in flat regions
     positions_mm : (v, 3) vertices of the finest level [mm]
-    tolerance_mm : a coarse face counts as flat if, on each of its edges, the dropped vertex is at most this
-        far from the middle of the edge [mm]
+    tolerance_mm : a coarse face counts as flat if, on each of its edges, the vertex that the next finer level
+        adds is at most this far from the middle of the edge [mm]
     """
     coarse, finer = triangles, triangles
     for _ in range(dropped_levels):
@@ -257,8 +258,8 @@ def _coarsen_quads(
         k quads, which meet at its centre
     dropped_levels : number of subdivision levels to leave out in flat regions
     positions_mm : (v, 3) vertices of the finest level [mm]
-    tolerance_mm : a coarse face counts as flat if, on each of its edges, the dropped vertex is at most this
-        far from the middle of the edge [mm]
+    tolerance_mm : a coarse face counts as flat if, on each of its edges, the vertex that the next finer level
+        adds is at most this far from the middle of the edge [mm]
     """
     coarse = quads
     for _ in range(dropped_levels - 1):

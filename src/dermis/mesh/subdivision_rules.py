@@ -195,9 +195,9 @@ def _edge_end_weights(sides: _Sides, edge_weight: Doubles) -> csr_array:
 def _old_point_weights(
     sides: _Sides, inner_weight: Doubles, neighbour_weight: Doubles, border_weight: float
 ) -> csr_array:
-    """Return the matrix (p, p) by which the old positions of points are multiplied to get their new positions.
+    """Return the sparse matrix (p, p) that computes the new positions of the old points.
 
-    Row i contains the weights of all old positions in the new position of point i.
+    The new position of point i is the mean of the old positions of all points, with row i as the weights.
 
     inner_weight : (p,) weight of the old position of each inner point in its own new position
     neighbour_weight : (p,) weight of every neighbour of an inner point in the new position of this point
