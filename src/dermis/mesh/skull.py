@@ -116,7 +116,7 @@ def centre_of_box(positions: Floats) -> Point:
 
 
 def facing_axes(positions: Floats, normals: Floats) -> Doubles:
-    """Return the directions (3, 3) to the viewer's right, up and to the front of a mesh without a head, as rows.
+    """Return directions to the viewer's right, up and to the front of a mesh without a head, as rows (3, 3).
 
     The directions are x, y and z, unless the mesh is flat: the front of a flat mesh is the side to which its
     normals point.

@@ -195,9 +195,10 @@ def _edge_end_weights(sides: _Sides, edge_weight: Doubles) -> csr_array:
 def _old_point_weights(
     sides: _Sides, inner_weight: Doubles, neighbour_weight: Doubles, border_weight: float
 ) -> csr_array:
-    """Return the sparse matrix (p, p) that computes the new positions of the old points.
+    """Return the sparse matrix (p, p) of the weights of old point positions in new point positions.
 
-    The new position of point i is the mean of the old positions of all points, with row i as the weights.
+    Row i is for the new position of point i, and column j for the old position of point j. Callers add the
+    weights of face centres, if their rules have any.
 
     inner_weight : (p,) weight of the old position of each inner point in its own new position
     neighbour_weight : (p,) weight of every neighbour of an inner point in the new position of this point
