@@ -197,8 +197,8 @@ def _old_point_weights(
 ) -> csr_array:
     """Return the sparse matrix (p, p) of the weights of old point positions in new point positions.
 
-    Row i is for the new position of point i, and column j for the old position of point j. Callers add the
-    weights of face centres, if their rules have any.
+    Row i is for the new position of point i, and column j for the old position of point j. Callers add
+    further weights, such as those of face centres.
 
     inner_weight : (p,) weight of the old position of each inner point in its own new position
     neighbour_weight : (p,) weight of every neighbour of an inner point in the new position of this point

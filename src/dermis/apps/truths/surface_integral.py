@@ -72,12 +72,12 @@ def integrate_exitance(
 def _weight_error_bounds(octree: Octree, error_weight: float) -> Octree:
     """Return the octree with changed error bounds, in which errors that hardly cancel have more weight.
 
-    The three points that replace a node have the centroid and second moments of its light, summed over the
-    channels, but not exactly those of each channel. The errors that this causes hardly cancel in the sum over
-    nodes. Therefore the bound `centroid_error` is multiplied by a weight, and the bound `second_moment` is
-    increased by `moment_error` times this weight.
+    In each channel, the centroid and the second moments of the light of a node differ from those of the three
+    points that replace it. The errors due to these differences hardly cancel in the sum over nodes. Therefore
+    the bound `centroid_error` is multiplied by a weight, and the bound `second_moment` is increased by
+    `moment_error` times this weight.
 
-    error_weight : the weight
+    error_weight : weight of the differences of centroids and of second moments
     """
     second_moment = octree.second_moment + error_weight * octree.moment_error
     return octree._replace(second_moment=second_moment, centroid_error=error_weight * octree.centroid_error)
