@@ -30,7 +30,11 @@ class AcceptedWords:
         self.words = words
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """Return a pydantic schema that accepts the words and all values of the annotated type."""
+        """Return a pydantic schema that accepts values of the field's type and the words of this annotation.
+
+        source : type of the annotated field
+        handler : function that returns the schema of that type
+        """
         from pydantic_core import core_schema
 
         def accept_keyword(value: Any, validate_number: Any) -> Any:

@@ -181,6 +181,9 @@ class SphereLight(PointLight):
 class DirectionalLight(_LightBase):
     """Parallel light, such as the sun.
 
+    `angle_degrees` is the angle that the source of the light subtends. If it is above 0, shadows are soft, and
+    `sources` has the bibliography key of the method that draws them; otherwise, `sources` is empty.
+
     Examples
     --------
     >>> import dermis
@@ -201,7 +204,7 @@ class DirectionalLight(_LightBase):
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Return the bibliography keys of the shading method; empty for a light without angular size."""
+        """Return the bibliography keys of the method for soft shadows; empty if `angle_degrees` is 0."""
         return ("Roberts2018",) if self.angle_degrees > 0 else ()
 
 

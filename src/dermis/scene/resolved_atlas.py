@@ -20,11 +20,11 @@ _MIN_ATLAS_SIDE = 1024  # coarser texels would blur the light of the narrowest p
 
 
 def atlas_side_for_picture(scene: Scene, settings: Settings) -> int:
-    """Return the side of the smallest atlas with at least one texel per three pixels of the picture [texel].
+    """Return the side of the smallest atlas whose texels are at most as long as three pixels [texel].
 
     The atlas is the square texture in which light is diffused. Its side is a power of two, at least 1024 and
-    at most the side in `settings`. The lengths of pixels and texels on the skin are estimated from the
-    height visible at the camera's target and from the area of the skin.
+    at most the side in `settings`, even if texels are then longer. The lengths of pixels and texels on the
+    skin are estimated from the height visible at the camera's target and from the area of the skin.
     """
     pixels_per_mm = settings.size[1] / scene.camera.frame_mm
     side = (

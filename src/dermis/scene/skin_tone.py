@@ -39,9 +39,9 @@ def with_skin_tone(
     skin_site : name of a measured colour to use instead of the materials' colours, see `measured_tone`
     colour_map_chosen : whether the user has chosen the colour map
 
-    By default, the uniform colour is the mean colour of the skin's materials. A material that has no colour
-    of its own, because it is white or has Blender's default grey, counts with the colour of the default
-    skin. Maps with a colour map are returned unchanged. The note is "" if there is nothing to say.
+    By default, the uniform colour is the mean colour of the skin's materials. For a material that has no
+    colour of its own, because it is white or has Blender's default grey, the colour of the default skin
+    enters the mean. Maps with a colour map are returned unchanged. The note is "" if there is nothing to say.
 
     Raises DermisError for an unknown `skin_site`, and for a `skin_site` together with a colour map.
     """

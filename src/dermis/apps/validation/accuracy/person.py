@@ -453,10 +453,10 @@ def region_table(people_figures: Figures) -> str:
 
 
 def cause_table(people_figures: Figures) -> str:
-    """Return a Markdown table with the relative RMSE and energy ratio of the person "human", by cause of error.
+    """Return a Markdown table with the errors of the person "human" without features that cause errors.
 
-    In the first row, both renderers omit nothing. In each further row, they omit one feature that causes
-    errors, such as the hair.
+    The errors are the relative RMSE and the energy ratio. In the first row, both renderers omit nothing. In
+    each further row, they omit one feature that causes errors, such as the hair.
     """
     lines = [
         f"| left out on both sides | {' | '.join(f'{view} | energy' for view in _ABLATED_VIEWS)} |",

@@ -91,7 +91,11 @@ class PeerPlan:
 
 @dataclass
 class FrameTimes:
-    """Image rendered by dermis with one of the compared settings, and elapsed and CPU times of its frames [s]."""
+    """Image that dermis renders with one of the compared settings, and times of its frames.
+
+    seconds : elapsed times of the frames [s]
+    core_seconds : CPU times of the frames [s]
+    """
 
     image: NDArray[np.float32]
     seconds: list[float] = field(default_factory=list)

@@ -1,1 +1,1 @@
-"""Skin of the people in a spectral archive: statistics, and comparison with randomly drawn people."""
+"""Skin of the people in a spectral archive: statistics, and comparison with people sampled at random."""

@@ -1,4 +1,4 @@
-"""Commands that compare randomly drawn people with a spectral archive of measured people.
+"""Commands that compare people sampled at random with a spectral archive of measured people.
 
 The commands need the archive in the folder DERMIS_DATA, see docs/measured.md.
 """

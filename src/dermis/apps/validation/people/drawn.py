@@ -1,4 +1,7 @@
-"""Skin colours of randomly drawn people, compared with those of the people in a spectral archive."""
+"""Skin colours of people sampled at random, compared with those of the people in a spectral archive.
+
+People are sampled by `Human.drawn`.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +35,7 @@ _MIN_OLD_AGE_YEARS = 55.0  # least age of the older people [years]
 
 
 class DrawnPeople(NamedTuple):
-    """Skin colours of n randomly drawn people of one group, at each of `HEAD_SITES`.
+    """Skin colours of n people of one group who are sampled at random, at each of `HEAD_SITES`.
 
     cielab : (n, 7, 3) colours under D65
     age : (n,) ages [years]
@@ -61,7 +64,7 @@ def site_skin_variables(look: SkinLook) -> Doubles:
 
 @logged_step("drawing people")
 def draw_random_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
-    """Draw random people of a group, and compute their skin colours with the spectral model."""
+    """Sample random people of an ancestry group, and compute their skin colours with the spectral model."""
     drawn = [Human.drawn(seed, skin_ancestry=group) for seed in seeds]
     variables = np.concatenate([site_skin_variables(one.look) for one in drawn])
     colours = model_lab(variables).reshape(len(drawn), len(HEAD_SITES), 3)
@@ -69,28 +72,28 @@ def draw_random_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
 
 
 def draw_random_people_by_group(seed_count: int = _SEED_COUNT) -> dict[str, DrawnPeople]:
-    """Return a dictionary from each group to randomly drawn people, with the same seeds for all groups."""
+    """Return random people by ancestry group, sampled with the same seeds for all groups."""
     return {group: draw_random_people(group, range(seed_count)) for group in GROUP_OF_CODE.values()}
 
 
 def people(seeds: int = _SEED_COUNT) -> None:
-    """Print a comparison of randomly drawn people with the people in the archive.
+    """Print a comparison of people sampled at random with the people in the archive.
 
     Parameters
     ----------
     seeds
-        Number of drawn people of each group.
+        Number of people that are sampled for each ancestry group of the archive.
     """
     print_tables(_people_tables(seeds))
 
 
 def page(seeds: int = _SEED_COUNT) -> None:
-    """Compare randomly drawn people with the people in the archive, and write docs/measured.md.
+    """Compare people sampled at random with the people in the archive, and write docs/measured.md.
 
     Parameters
     ----------
     seeds
-        Number of drawn people of each group.
+        Number of people that are sampled for each ancestry group of the archive.
     """
     write_results(PEOPLE_FILE, _people_tables(seeds))
     write_measured_page()
@@ -108,9 +111,9 @@ def _people_tables(seed_count: int) -> dict[str, str]:
 
 
 def cheek_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> str:
-    """Return a Markdown table that compares the colour of the cheek in the archive and of drawn people.
+    """Return a Markdown table that compares the cheek colours of measured and of randomly sampled people.
 
-    It has medians, ranges and energy distances for each group.
+    For each group, the table has medians, ranges, and energy distances between the two distributions.
     """
     lines = [
         "| group | quantity | archive: median | 5 to 95 % | drawn: median | 5 to 95 % | distance | expected "
@@ -152,10 +155,10 @@ def two_sample_distance(first_sample: Doubles, second_sample: Doubles) -> tuple[
 def site_differences(
     archive: Archive, drawn_people: Mapping[str, DrawnPeople]
 ) -> Iterator[tuple[str, str, int, Doubles, Doubles]]:
-    """Yield median colours of measured people, and differences of drawn people from these, by group and site.
+    """Yield median colours of measured people, and how those of sampled people differ, by group and site.
 
     Each tuple has the group, the site, the number of measured people, their median CIELAB colour (3,), and
-    the difference (3,): the median colour of drawn people minus that of measured people.
+    the difference (3,): the median colour of randomly sampled people minus that of measured people.
     """
     for code, group in GROUP_OF_CODE.items():
         for k, site in enumerate(HEAD_SITES):
@@ -167,7 +170,10 @@ def site_differences(
 
 
 def sites_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> str:
-    """Return a Markdown table of median colours of measured and drawn people, by group and site."""
+    """Return a Markdown table of median colours of measured people, by group and site.
+
+    It also has the median colours of randomly sampled people minus these.
+    """
     lines = [
         "| group | site | people | archive: L*, a*, b* | drawn minus archive | |",
         "|---|---|---|---|---|---|",
@@ -187,7 +193,7 @@ def sites_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> st
 def sex_age_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> str:
     """Return a Markdown table of how the colour of the cheek differs between sexes and between ages.
 
-    The differences are averaged over the groups.
+    The differences are those of measured people and of randomly sampled people, averaged over the groups.
     """
     lines = ["| difference | archive: L*, a*, b* | drawn |", "|---|---|---|"]
     for name in ("men minus women", "from 55 years minus below 45"):

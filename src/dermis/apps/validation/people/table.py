@@ -55,7 +55,8 @@ _CALIBRATION_STEP_COUNT = 6
 _WINSOR_PERCENT = 5.0
 _TRUE_SPREAD_FRACTION = 0.5
 """Fraction of the measured spread of differences between sites that is due to people; pressure and placing of
-the probe cause the rest. With the whole spread, drawn foreheads, necks and hands would vary too much."""
+the probe cause the rest. With the whole spread, foreheads, necks and hands of random people would vary too
+much."""
 _CELLS_CSV_HEADER = """\
 # quantity: medians of measured skin by group, site, sex and age group: CIELAB under D65 without specular
 #   reflection, melanin, blood, oxygen and thickness by the package's own model; covariances of CIELAB and of
@@ -84,7 +85,7 @@ def table() -> None:
 
 
 def build_measured_table(archive: Archive, skin_variables: Doubles) -> dict[str, Any]:
-    """Return the statistics in a `MeasuredTable` as a JSON object.
+    """Compute the statistics of measured skin; return them as a JSON object to be parsed to a `MeasuredTable`.
 
     skin_variables : (n, 4) skin variables of the measurements, from `invert_spectra`
     """
@@ -126,7 +127,10 @@ def build_measured_table(archive: Archive, skin_variables: Doubles) -> dict[str,
 def person_median_measurements(
     archive: Archive, skin_variables: Doubles, site_index: int
 ) -> tuple[Archive, Doubles]:
-    """Return the measurement of median lightness for each person at a site, and its skin variables (n, 4).
+    """Return one measurement for each of n people at a site, and its skin variables (n, 4).
+
+    The measurement of a person is the one whose lightness is the median of the person's measurements at the
+    site.
 
     skin_variables : skin variables of all measurements, from `invert_spectra`
     """
@@ -146,7 +150,7 @@ def _group_masks(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
 def _sex_age_effects(cheek: Archive, skin_variables: Doubles) -> tuple[Doubles, Doubles]:
     """Return two arrays (4,): the effects of sex and of `age_term` on the skin variables of `model_spectra`.
 
-    The effects are fitted by least squares, with an intercept for each group. `age_term` rises from 0 for
+    The effects are fitted by least squares, with an intercept for each ancestry group. `age_term` rises from 0 for
     young adults to 1 for old people.
 
     cheek : n measurements at the cheek
@@ -163,8 +167,8 @@ def _sex_age_effects(cheek: Archive, skin_variables: Doubles) -> tuple[Doubles, 
 def _centred_sex_age_effects(cheek: Archive, sex_effect: Doubles, age_effect: Doubles) -> Doubles:
     """Return the changes (n, 4) of the four skin variables of n people that are due to sex and age.
 
-    Each change is relative to the mean sex and the mean `age_term` of the person's group. `age_term` rises
-    from 0 for young adults to 1 for old people.
+    Each change is relative to a person whose sex (0 for female, 1 for male) and `age_term` are the means of
+    the same ancestry group. `age_term` rises from 0 for young adults to 1 for old people.
 
     cheek : measurements of n people at the cheek
     sex_effect, age_effect : (4,) effects of sex and of `age_term` on the variables
@@ -191,12 +195,15 @@ def _normal_scores(skin_variables: Doubles, archive_rows: Archive) -> Doubles:
 
 
 def _site_differences(archive: Archive, skin_variables: Doubles) -> tuple[Doubles, Doubles, Doubles]:
-    """Return how sites differ from the cheek: medians (g, 12, 3), slopes (12, 2) and spreads (12, 2).
+    """Return how the skin at 12 sites differs from the cheek of the same person, as three arrays.
 
-    The last axis has melanin, blood and, for medians only, oxygenation. A median is the difference between
-    site and cheek in one of the g groups; in small groups it is blended with the mean of larger groups. A
-    slope says how much the difference changes when the cheek of a person differs by 1 from the median of the
-    group. A spread is the standard deviation of the differences that remain, reduced by a constant factor.
+    The medians (g, 12, 3) are the median differences between site and cheek in g groups. In small groups,
+    they are blended with the mean over larger groups. A person's difference also depends on how far the
+    person's cheek deviates from the median of the group; the slopes (12, 2) are the change of the difference
+    per unit of this deviation. The spreads (12, 2) are the standard deviations of what remains of the
+    differences, reduced by a constant factor.
+
+    The last axis has log2 of melanin, log2 of blood and, for medians only, oxygenation.
     """
     shifts, counts = np.zeros((len(GROUP_OF_CODE), len(SITES), 3)), np.zeros((len(GROUP_OF_CODE), len(SITES)))
     slope, spread = np.zeros((len(SITES), 2)), np.zeros((len(SITES), 2))
@@ -240,7 +247,7 @@ def _random_ages_and_sexes() -> tuple[Doubles, Doubles]:
 def _calibrate_median_colours(
     table_document: dict[str, Any], archive: Archive, ages: Doubles, sexes: Doubles
 ) -> None:
-    """Adjust statistics so that drawn people have the same median colours as people in the archive.
+    """Adjust statistics of skin so that people sampled from them have the archive's median colours.
 
     The quantiles and the differences between sites in `table_document` are changed in place. Spectra do not
     determine the thickness of the epidermis. Several values are therefore tried for each group, and the value
@@ -309,10 +316,12 @@ def _calibrate_group(
 def _drawn_cheek_variables(
     table_document: dict[str, Any], group: str, random_people: _Population
 ) -> tuple[MeasuredTable, Doubles]:
-    """Return the parsed statistics, and skin variables (n, 4) at the cheek of people drawn from a group.
+    """Return the table that a JSON object describes, and skin variables (n, 4) of people sampled from it.
 
-    table_document : statistics to parse, as returned by `build_measured_table`
-    random_people : random numbers, ages and sexes of n people
+    The variables are those of the cheeks of n people of one group.
+
+    table_document : statistics of measured skin, as returned by `build_measured_table`
+    random_people : ages and sexes of the n people, and the random numbers from which their skin is sampled
     """
     found, weights = parse_measured_table(table_document), {group: 1.0}
     scores = random_people.normals @ symmetric_square_root(found.group_mean("correlation", weights)[:4, :4])

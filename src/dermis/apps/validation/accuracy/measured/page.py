@@ -13,7 +13,7 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN
 PAGE = DOCS / "measured.md"
 RESULT_FILE = RESULTS / "measured.json"
 PEOPLE_FILE = RESULTS / "people.json"
-"""Tables about drawn people, written by `python -m dermis.apps.validation.people page`."""
+"""Tables about people sampled at random, written by `python -m dermis.apps.validation.people page`."""
 GROUP_LABELS = {
     "CA": "Caucasian",
     "CN": "Chinese",
