@@ -181,8 +181,8 @@ class SphereLight(PointLight):
 class DirectionalLight(_LightBase):
     """Parallel light, such as the sun.
 
-    `angle_degrees` is the angle that the source of the light subtends. If it is above 0, shadows are soft, and
-    `sources` has the bibliography key of the method that draws them; otherwise, `sources` is empty.
+    `angle_degrees` is the angle that the source of the light subtends. If it is above 0, shadows are soft,
+    and `sources` has the bibliography key of the method that draws them; otherwise, `sources` is empty.
 
     Examples
     --------

@@ -85,7 +85,7 @@ def table() -> None:
 
 
 def build_measured_table(archive: Archive, skin_variables: Doubles) -> dict[str, Any]:
-    """Compute the statistics of measured skin; return them as a JSON object to be parsed to a `MeasuredTable`.
+    """Compute statistics of measured skin; return them as the JSON object that describes a `MeasuredTable`.
 
     skin_variables : (n, 4) skin variables of the measurements, from `invert_spectra`
     """
@@ -150,8 +150,8 @@ def _group_masks(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
 def _sex_age_effects(cheek: Archive, skin_variables: Doubles) -> tuple[Doubles, Doubles]:
     """Return two arrays (4,): the effects of sex and of `age_term` on the skin variables of `model_spectra`.
 
-    The effects are fitted by least squares, with an intercept for each ancestry group. `age_term` rises from 0 for
-    young adults to 1 for old people.
+    The effects are fitted by least squares, with an intercept for each ancestry group. `age_term` rises from
+    0 for young adults to 1 for old people.
 
     cheek : n measurements at the cheek
     skin_variables : (n, 4) skin variables of these measurements
