@@ -156,7 +156,7 @@ def _notify_once(message: str) -> None:
 
 
 def _has_room(folder: Path, byte_count: int) -> bool:
-    """Return whether a file of `byte_count` bytes fits into a folder beside all recently used files.
+    """Return whether a folder has room for `byte_count` more bytes without deleting recently used files.
 
     Without this check, files that a process needs at the same time would evict each other.
     """

@@ -31,10 +31,10 @@ class FileProperty:
     other_parts: Treatment | None = None
 
     def documentation_cells(self, has_parts_column: bool) -> list[str]:
-        """Return the cells of the row for this property in a table of the documentation.
+        """Return the cells of this property's row in a table of the documentation.
 
-        has_parts_column : whether the table has a column for the treatment in materials of skin, and another
-            column for the treatment in all other materials
+        has_parts_column : whether the table has two columns for what the file reader does with the property:
+            one for materials of skin, and one for all other materials
         """
         others = [self.other_parts or self.treatment] if has_parts_column else []
         return [self.name, self.treatment, *others, self.detail]
@@ -47,7 +47,11 @@ def _file_property(
     *keys: str,
     other_parts: Treatment | None = None,
 ) -> FileProperty:
-    """Return a `FileProperty` with these fields; `drawn`, `noted` and similar functions set `treatment`."""
+    """Return a `FileProperty`; callers use `drawn`, `noted` ..., which pass their treatment to this function.
+
+    keys : words by which the reader recognises the property
+    other_parts : treatment in the materials of parts that are not skin; None if it is the same
+    """
     return FileProperty(treatment, property_name, detail_text, keys, other_parts)
 
 

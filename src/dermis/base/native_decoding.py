@@ -83,7 +83,9 @@ def run_decoder(
 
 
 def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
-    """Read a request from stdin, and write the answer to stdout; called by decoders run as programs.
+    """Read a request from stdin, decode it, and write the answer to stdout.
+
+    A decoder calls this function when it is run as a program, in its own process.
 
     decode : function that takes the request and returns the answer; raises DermisError to refuse the data,
         and any other exception if the data are damaged

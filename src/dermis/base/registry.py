@@ -137,7 +137,7 @@ class RegisteredName:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return all accepted names: the names in the registry, then the additional words."""
+        """Return all accepted names: those in the registry, then the words that are accepted in addition."""
         return (*self.registry, *self.words)
 
     def check(self, name: str) -> str:

@@ -188,7 +188,7 @@ def _render_frames(
 
 
 def _common_exposure(animated_scene: _AnimatedScene, renderer: Renderer) -> float:
-    """Return the exposure of all frames: the value of --exposure, or else as metered on the first frame."""
+    """Return the exposure of all frames: --exposure, or by default the one metered on the first frame."""
     if animated_scene.settings.exposure != "auto":
         return animated_scene.settings.exposure
     (scene,) = animated_scene.scenes([animated_scene.first])

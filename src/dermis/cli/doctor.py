@@ -92,7 +92,9 @@ def _test_adapter(adapter: str) -> Options:
 
 
 def _render_test_frame(renderer: Renderer) -> Options:
-    """Render a white sphere lit from the camera, and return whether the sphere's brightness is right.
+    """Render a white sphere lit from the camera, and return the entries of the JSON report on this test.
+
+    The entry "passed" tells whether the sphere's brightness is right.
 
     The centre must have radiance 1, which is the irradiance over pi, and no pixel may be brighter.
     """

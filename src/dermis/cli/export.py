@@ -86,7 +86,7 @@ def export(
     map_side:
         Side of the painted maps, a power of two from 256 to 4096 [texel].
     naive:
-        Also print the parameters that a user would get by copying the numbers without conversion.
+        Also print the parameters that a user might choose without knowing their meaning in the program.
     as_json:
         Print one JSON object with the parameters and errors.
     """

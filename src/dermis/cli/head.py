@@ -227,7 +227,8 @@ def _look_with_values(look: Look, option_values: list[str] | None, option_name: 
 def _hair_look_with_values(look: HairLook, option_values: list[str] | None) -> HairLook:
     """Return a copy of a hair look with the field values that the option --hair gives.
 
-    option_values : values "NAME=VALUE,..." of the option, with a word for the style and numbers otherwise
+    option_values : values "NAME=VALUE,..." of the option; VALUE is a word for the field `style`, and a number
+        for all other fields
     """
     pairs = [pair for pair in ",".join(option_values or []).split(",") if pair]
     styles = [pair.removeprefix("style=") for pair in pairs if pair.startswith("style=")]

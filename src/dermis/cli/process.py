@@ -148,8 +148,8 @@ class Interruption:
     """Context manager that raises KeyboardInterrupt once, after Ctrl-C, SIGTERM or SIGHUP.
 
     A second signal ends the process immediately, even while the main thread is inside a driver or another
-    library. The handling of a signal is not changed if the parent process or a library has already changed
-    it.
+    library. A signal whose handler was already replaced, by the parent process or by a library, keeps that
+    handler.
 
     code : exit status for the received signal; 0 without a signal
     """
@@ -209,7 +209,7 @@ class Interruption:
         self._writing.send(_RETRY_BYTE)
 
     def _on_unraisable(self, error: sys.UnraisableHookArgs) -> None:
-        """Repeat a KeyboardInterrupt that Python ignored, such as one raised in a destructor."""
+        """Raise a KeyboardInterrupt again later if Python has discarded it, as in a destructor."""
         if self.code and issubclass(error.exc_type, KeyboardInterrupt):
             self._raise_interrupt_later()
         else:

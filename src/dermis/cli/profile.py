@@ -28,7 +28,10 @@ _PIGMENT_OPTION_NAMES = {"structure": "skin"}
 
 
 def _pigment_default_texts() -> dict[str, str]:
-    """Return each pigment option's default as help text, with differing values of named skins."""
+    """Return a dictionary from pigment option to its default as help text.
+
+    The text also lists the named skins that have another value, with this value.
+    """
     defaults: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
     for field in Pigments.model_fields.keys() - defaults.keys():
         default = getattr(DEFAULT_SKIN, field)

@@ -82,7 +82,7 @@ def render(
         Image to write: .png (sRGB, 8 bit) or .exr (linear Rec. 709, float); it has alpha if --background is
         none.
     as_json:
-        Print one JSON object with the timings of a frame whose caches are filled.
+        Print one JSON object with timings, measured on a second frame after the first has filled the caches.
     """
     started = time.perf_counter()
     from dermis.images.io import check_output
@@ -134,7 +134,7 @@ def render(
 
 @contextlib.contextmanager
 def _disable_garbage_collection() -> Iterator[None]:
-    """Disable garbage collection in a with block, as it frees little memory while one picture is rendered."""
+    """Disable garbage collection in a with block; collections would free little memory during one render."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:

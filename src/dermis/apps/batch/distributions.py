@@ -39,7 +39,11 @@ class Distribution(ABC):
 
     @abstractmethod
     def quantile(self, probability: float) -> SampleValue:
-        """Return the value at a cumulative probability between 0 and 1."""
+        """Return the sample that belongs to a probability between 0 and 1.
+
+        For random, uniform probabilities, the samples have this distribution. For a distribution of numbers,
+        the result is the quantile: a sample lies below it with the given probability.
+        """
 
     @abstractmethod
     def spec_value(self) -> SpecValue:
@@ -85,7 +89,7 @@ class Uniform(Distribution):
         return self.low, self.high
 
     def quantile(self, probability: float) -> float:
-        """Return the number at a cumulative probability between 0 and 1."""
+        """Return the number below which a sample lies with a given probability between 0 and 1."""
         if not self.logarithmic:
             return self.low + probability * (self.high - self.low)
         low, high = log(self.low), log(self.high)
@@ -113,7 +117,7 @@ class Normal(Distribution):
         return self.mean - _MAX_STANDARD_DEVIATIONS * self.sd, self.mean + _MAX_STANDARD_DEVIATIONS * self.sd
 
     def quantile(self, probability: float) -> float:
-        """Return the number at a cumulative probability between 0 and 1."""
+        """Return the number below which a sample lies with a given probability between 0 and 1."""
         return self.mean + self.sd * min(
             max(float(ndtri(probability)), -_MAX_STANDARD_DEVIATIONS), _MAX_STANDARD_DEVIATIONS
         )
@@ -158,7 +162,7 @@ class TruncatedNormal(Distribution):
         return self.low, self.high
 
     def quantile(self, probability: float) -> float:
-        """Return the number at a cumulative probability between 0 and 1."""
+        """Return the number below which a sample lies with a given probability between 0 and 1."""
         below, above = self._limit_probabilities
         if self.low > self.mean:
             deviation = -float(ndtri(above - probability * (above - below)))
@@ -197,7 +201,11 @@ class Choice(Distribution):
         return min(bounds), max(bounds)
 
     def quantile(self, probability: float) -> SampleValue:
-        """Return the value at a cumulative probability between 0 and 1."""
+        """Return the sample that belongs to a probability between 0 and 1.
+
+        Each of the `values` has an interval of probabilities, whose length is proportional to its weight. The
+        relative position in the interval is passed to the `quantile` of the chosen value.
+        """
         cumulative = list(accumulate(self.weights))
         position = probability * cumulative[-1]
         index = bisect_right(cumulative, position)
@@ -228,7 +236,7 @@ class FileChoice(Distribution):
         return self.names
 
     def quantile(self, probability: float) -> str:
-        """Return the path at a cumulative probability between 0 and 1."""
+        """Return the path to which a probability belongs; the paths share the range 0 to 1 equally."""
         return self.names[min(int(probability * len(self.names)), len(self.names) - 1)]
 
     def spec_value(self) -> SpecValue:
@@ -236,7 +244,7 @@ class FileChoice(Distribution):
         return {"files": self.pattern}
 
     def __repr__(self) -> str:
-        """Return the TOML table as a string, with the pattern but not the paths."""
+        """Return the TOML table as a string, which has the file name pattern but not the matching paths."""
         return repr(self.spec_value())
 
 

@@ -37,9 +37,10 @@ class WorkerPool(Protocol):
     """Protocol of worker pools: `ProcessPool` on this machine, or `DaskCluster` on several."""
 
     def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Render parts and verify shards; yield the events that the workers send.
+        """Render parts of shards, and verify complete shards; yield the events that the workers send.
 
-        tasks : parts of shards to render, and complete shards to verify; damaged parts are rendered again
+        tasks : objects of the class `Part` are rendered, and all other shards are verified; the damaged parts
+            of a shard are rendered again
         """
         ...
 

@@ -47,7 +47,7 @@ _CONDITIONAL_PARAMETERS: tuple[tuple[str | tuple[str, ...], Callable[[Parameters
 
 
 def table_numbers(parameters: Mapping[str, float | int | str], table_name: str) -> dict[str, float]:
-    """Return the numeric parameters of a spec table, with the name of the table removed from their names.
+    """Return the numeric parameters of one table of the spec, without the table's name in their names.
 
     table_name : dotted name of the table, such as "light.key"
     """
@@ -231,7 +231,9 @@ class Sampler:
         return float(ndtri(self._uniform_number(image_number, parameter)))
 
     def _target_weights(self, image_number: int, sampled_parameters: Parameters) -> dict[str, float]:
-        """Return the weights in one image of all morph targets that the spec can use, by name.
+        """Return a dictionary from morph target name to the target's weight in one image.
+
+        It has an entry for each morph target that the spec can use, also for those with weight 0.
 
         image_number : number of the image
         sampled_parameters : parameters of the image that have been sampled so far

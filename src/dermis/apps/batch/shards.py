@@ -48,7 +48,7 @@ class Part(Shard):
     __slots__ = ()
 
     def __str__(self) -> str:
-        """Return the name of the part in messages."""
+        """Return the name by which messages refer to the part."""
         return f"images {self.first} to {self.stop - 1} of shard {self.index}"
 
 
@@ -77,7 +77,12 @@ def list_parts(shard: Shard, spec: Spec) -> list[Part]:
 
 
 def shard_path(dataset_folder: Path, shard: Shard, spec: Spec) -> Path:
-    """Return the path of the tar file or folder of a shard, or of a part."""
+    """Return the path of the tar file or folder of a shard, or of one part of a shard.
+
+    A part has its own file or folder until all parts of its shard are joined.
+
+    shard : shard, or its part as an object of the class `Part`
+    """
     name = f"part-{image_key(shard.first)}" if isinstance(shard, Part) else f"shard-{shard.index:05d}"
     return dataset_folder / f"{name}{'.tar' if spec.format == 'webdataset' else ''}"
 
@@ -188,7 +193,7 @@ def read_manifest(path: Path) -> ShardManifest:
 
 
 def shard_exists(dataset_folder: Path, shard: Shard, spec: Spec) -> bool:
-    """Return whether a complete shard or part exists at its final path.
+    """Return whether a shard, or a `Part` of a shard, is complete at its final path.
 
     A shard with too few images, written before the data set was enlarged, is not complete.
 
@@ -207,7 +212,7 @@ def shard_exists(dataset_folder: Path, shard: Shard, spec: Spec) -> bool:
 
 
 def is_intact(dataset_folder: Path, shard: Shard, spec: Spec) -> bool:
-    """Read a shard or part completely, and return whether it exists and matches its SHA-256.
+    """Read a shard, or one part of it, completely; return whether it exists and matches its SHA-256.
 
     Raises DermisError for a shard of another data set.
     """

@@ -176,7 +176,7 @@ class Spec(FrozenModel):
 
 
 def _table_distributions(table_name: str, table_value: object) -> dict[str, Distribution]:
-    """Return the distributions in a spec table and in the table's subtables, by dotted name.
+    """Return the distributions in a table of the spec and in the table's subtables, by dotted name.
 
     table_name : dotted name of the table; "" for the whole spec
     table_value : the table, or one of its values; values that are not distributions are ignored
@@ -272,7 +272,7 @@ def _build_model(model_class: type[P], table_name: str, toml_table: object) -> P
 
 
 def fields_except_none(spec_table: FrozenModel) -> dict[str, object]:
-    """Return the fields of a spec table that are not None, by name."""
+    """Return the fields of a table of the spec that are not None, by name."""
     values = {name: getattr(spec_table, name) for name in type(spec_table).model_fields}
     return {name: value for name, value in values.items() if value is not None}
 

@@ -40,7 +40,9 @@ def check_spec(
     correlation_groups: Sequence[CorrelationGroup],
     folder: Path,
 ) -> None:
-    """Raise DermisError for distributions whose samples cannot be rendered; the message states table and key.
+    """Raise DermisError for distributions whose samples cannot be rendered.
+
+    The message names the key at fault, and the table of the TOML spec that contains the key.
 
     distributions : distribution of each parameter by its dotted name
     expressions : weights of morph targets by name of the expression
@@ -141,7 +143,13 @@ def _check_heads_and_environments(distributions: Mapping[str, Distribution], fol
 
 
 def _check_looks(distributions: Mapping[str, Distribution]) -> None:
-    """Raise DermisError for unknown names or invalid values of people, skins and morph targets."""
+    """Raise DermisError for unknown names or invalid values in the tables of looks, skin and morph targets.
+
+    The tables of looks are person.skin, person.eyes and person.hair; those of morph targets are
+    person.targets and pose.
+
+    distributions : distribution of each parameter by its dotted name
+    """
     for part, kind in _LOOK_MODELS.items():
         known = [one.name for one in fields(kind) if one.name not in (_SEED_FIELD, SITES_FIELD)]
         _check_table(f"person.{part}", distributions, known, kind)
@@ -160,7 +168,7 @@ def _check_table(
     allowed_keys: Sequence[str],
     make_model: Callable[..., object],
 ) -> None:
-    """Raise DermisError for unknown keys of a spec table, and for distributions with invalid samples.
+    """Raise DermisError for unknown keys of a table of the spec, and for distributions with invalid samples.
 
     table_name : dotted name of the table
     distributions : distributions of all tables, by dotted name

@@ -24,7 +24,7 @@ _DISTRIBUTION_RANGE_NOTE = "; normal extends 6 sd to both sides, truncated to it
 
 
 class DistributionField:
-    """Annotation with which pydantic parses a field of a spec table as a distribution."""
+    """Annotation with which pydantic parses a field of a table of the spec as a distribution."""
 
     def check(self, spec_value: object) -> Distribution | None:
         """Return the distribution that a value describes; None for an omitted field.
@@ -62,7 +62,7 @@ class NumberField(DistributionField):
         self.ge, self.le, self.reason = lower_bound, upper_bound, reason
 
     def check_support(self, distribution: Distribution) -> None:
-        """Raise ValueError if the distribution can give strings, or numbers that are out of bounds."""
+        """Raise ValueError unless all samples of the distribution are numbers between the bounds."""
         if any(isinstance(bound, str) or not self.ge <= bound <= self.le for bound in distribution.support):
             reason = f" ({self.reason})" if self.reason else ""
             note = "" if isinstance(distribution, Constant) else _DISTRIBUTION_RANGE_NOTE
@@ -79,7 +79,7 @@ class NameField(DistributionField):
         self.allowed_names = allowed_names
 
     def check_support(self, distribution: Distribution) -> None:
-        """Raise ValueError if the distribution can give numbers, or names that are not in the list."""
+        """Raise ValueError unless all samples are names, and in the list of allowed names if there is one."""
         names = list(self.allowed_names()) if self.allowed_names else []
         for value in distribution.support:
             if not isinstance(value, str) or (names and value not in names):
@@ -148,7 +148,7 @@ T = TypeVar("T")
 
 
 def table_values(values_by_dotted_name: Mapping[str, T], table_name: str) -> dict[str, T]:
-    """Return the entries of one spec table, with the name of the table removed from their names.
+    """Return the entries of one table of the spec, without the table's name in their names.
 
     values_by_dotted_name : entries of all tables by dotted name, such as "light.key.size_mm"
     table_name : dotted name of the table, such as "light.key"
@@ -172,7 +172,10 @@ _Distributions = dict[str, Annotated[Distribution, DistributionField()]]
 
 
 class PersonTable(FrozenModel):
-    """Spec table of people. All omitted keys are sampled at random, unless `head` names existing heads."""
+    """TOML table of a data set's spec with the people to sample.
+
+    All omitted keys are sampled at random, unless `head` names existing heads.
+    """
 
     head: Annotated[Distribution | None, NameField()] = None
     """Heads in place of sampled people: names as in `dermis render`, or files of people (.json), meshes
@@ -211,7 +214,7 @@ class PersonTable(FrozenModel):
 
 
 class ExpressionTable(FrozenModel):
-    """Spec table of the facial expression: a named expression, or random movements."""
+    """TOML table of a data set's spec with the facial expression: a named expression, or random movements."""
 
     name: Annotated[Distribution, NameField()] = Constant("neutral")
     """Name of an expression of the package or of [expressions.NAME], or "mixture": at most one random
@@ -225,7 +228,7 @@ class ExpressionTable(FrozenModel):
 
 
 class HeadRotationTable(FrozenModel):
-    """Spec table of the rotation of the head on the neck."""
+    """TOML table of a data set's spec with the rotation of the head on the neck."""
 
     yaw_deg: Annotated[Distribution, NumberField(-60, 60, "degrees: range of the neck")] = Constant(0.0)
     """Rotation to the head's left [degrees]."""
@@ -236,7 +239,7 @@ class HeadRotationTable(FrozenModel):
 
 
 class GazeTable(FrozenModel):
-    """Spec table of the gaze direction of the eyes."""
+    """TOML table of a data set's spec with the gaze direction of the eyes."""
 
     at: Annotated[Distribution, NameField(lambda: (GAZE_CAMERA, GAZE_ANGLES))] = Constant(GAZE_CAMERA)
     """Gaze target: the camera, or the direction given by the two angles."""
@@ -247,7 +250,7 @@ class GazeTable(FrozenModel):
 
 
 class CameraTable(FrozenModel):
-    """Spec table of the camera; the complete face is always in the picture."""
+    """TOML table of a data set's spec with the camera; the complete face is always in the picture."""
 
     distance_mm: Annotated[Distribution, _CAMERA_DISTANCE_FIELD] = Constant(1100.0)
     """Distance to the centre of the face [mm]."""
@@ -268,7 +271,7 @@ class CameraTable(FrozenModel):
 
 
 class LampTable(FrozenModel):
-    """Spec table of a lamp of the rig: a uniform square area light that faces the head."""
+    """TOML table of a data set's spec with one lamp: a uniform square area light that faces the head."""
 
     yaw_deg: Annotated[Distribution, _ANGLE_FIELD] = Constant(0.0)
     """Angle around the head, from its front to its left [degrees]."""
@@ -285,7 +288,7 @@ class LampTable(FrozenModel):
 
 
 class LightTable(FrozenModel):
-    """Spec table of the lamps: a preset rig, or sampled key, fill and rim lamps."""
+    """TOML table of a data set's spec with the lamps: a preset rig, or sampled key, fill and rim lamps."""
 
     kind: Annotated[Distribution, NameField(lambda: [LAMP_RIG, *light_presets()])] = Constant("studio")
     """Rig of the package, or "rig" for the key, fill and rim lamps of the tables below."""
@@ -302,7 +305,7 @@ class LightTable(FrozenModel):
 
 
 class EnvironmentTable(FrozenModel):
-    """Spec table of the environment light."""
+    """TOML table of a data set's spec with the environment light."""
 
     name: Annotated[Distribution, NameField()] = Constant(NO_ENVIRONMENT)
     """Environment: "none", "uniform", a sample (royal_esplanade, lebombo; downloaded once), or files (.hdr,
@@ -314,7 +317,7 @@ class EnvironmentTable(FrozenModel):
 
 
 class BackgroundTable(FrozenModel):
-    """Spec table of the picture's background, which emits no light."""
+    """TOML table of a data set's spec with the picture's background, which emits no light."""
 
     kind: Annotated[Distribution, NameField(lambda: BACKGROUND_KINDS)] = Constant("gradient")
     """"none" for alpha, "gradient", "colour", or "environment", which is a gradient if the image has none."""

@@ -96,7 +96,11 @@ class ProcessPool:
 
 @dataclass
 class _WorkerProcess:
-    """Worker process with its slot and its tasks: the task in progress, and at most one task to do next."""
+    """Worker process, and the tasks that were sent to it.
+
+    slot : graphics adapter and number of threads with which this worker renders
+    tasks : the task in progress, and at most one task to do next
+    """
 
     slot: WorkerSlot
     child: ChildProcess

@@ -1,1 +1,1 @@
-"""Export of skins and heads to other programs, with predicted errors of the skin that a program renders."""
+"""Export of skins and heads to other programs, with the predicted errors of each program's rendering."""

@@ -84,7 +84,8 @@ class ExportReport:
     def lines(self, with_naive_parameters: bool = False) -> list[str]:
         """Return the report as lines of plain text for the terminal.
 
-        with_naive_parameters : whether to list the naive parameters too
+        with_naive_parameters : whether to list also `naive_parameters`, which a user might choose without
+            knowing their meaning in the program
         """
         target = " ".join(filter(None, (self.title, self.version, self.variant)))
         lines = [f"{self.subject}, profile by {self.model}, for {target}"]
@@ -103,7 +104,11 @@ class ExportReport:
         return [*lines, "", *self.limitation_texts()]
 
     def limitation_texts(self) -> list[str]:
-        """Return sentences on the error of the exported skin and on the program's limitations."""
+        """Return sentences on what the target program renders wrongly.
+
+        If no parameters reproduce the skin's profile, the first sentence states the error. The last sentences
+        are the `limitations` of the program.
+        """
         worst = int(self.error.cdf.argmax())
         error = float(self.error.cdf[worst])
         if error < _NOTABLE_PROFILE_ERROR:

@@ -315,7 +315,8 @@ class JsonTarget(Target):
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write a JSON file of the parameters with their units and meanings.
 
-        The file also states that it has not been tested in the program.
+        The file also states that the parameters follow the target program's documentation, and have not been
+        tested in that program.
         """
         file = self.main_file(output, subject)
         rows = {p.name: {"value": p.value, "unit": p.unit, "meaning": p.meaning} for p in parameters}

@@ -184,9 +184,9 @@ def _colour_map_srgb(head: Head) -> Bytes:
 
 
 def _hair_cards(hair_paths: Doubles, outward_directions: Doubles, width_mm: float) -> _Surface:
-    """Return hair cards: ribbons along paths, each with the texture of a randomly chosen hair card.
+    """Return hair cards: ribbons along paths, each of which shows a picture of several hairs.
 
-    The texture coordinates refer to the picture of cards that `_hair_card_picture` returns.
+    Each ribbon shows a randomly chosen column of the picture that `_hair_card_picture` returns.
 
     hair_paths : (n, k, 3) points of each path from root to tip [mm]
     outward_directions : (n, k, 3) outward directions at these points
@@ -219,7 +219,7 @@ def _hair_card_picture(
     seed: int,
     taper_fraction: float = 0.15,
 ) -> Bytes:
-    """Return a picture (h, w, 4) of several hair cards side by side, with hairs of different lengths.
+    """Return a picture (h, w, 4) with columns for different hair cards, each with hairs of different lengths.
 
     colour : mean colour of the hairs, linear Rec. 709
     hair_count : number of hairs in each hair card

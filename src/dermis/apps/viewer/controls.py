@@ -163,7 +163,9 @@ class Controls:
 
 
 class SplitView:
-    """Before/after comparison: a frozen state to the left of a divider, and the live state to its right.
+    """Before/after comparison: the picture is divided by a vertical line, the divider.
+
+    To its left is a frozen state; to its right is the live state, which the user changes.
 
     frozen_state : state to the left of the divider, rendered with the live camera; None without a divider
     divider_position : fraction of the picture's width that lies to the left of the divider
@@ -180,7 +182,7 @@ class SplitView:
         self.frozen_state = state
 
     def release(self) -> None:
-        """Remove the divider, so that only the live state is shown."""
+        """End the comparison: discard the frozen state, and show the live state without a divider."""
         self.frozen_state, self.is_dragged = None, False
 
     def handle(self, event: Event, picture_width: float) -> bool:

@@ -81,7 +81,7 @@ class QualityController:
 
     @property
     def quality(self) -> Quality:
-        """Return the quality limits of the next frame if the picture is changing."""
+        """Return the quality limits of the next frame, which apply only while the picture is changing."""
         return QUALITY_LEVELS[self._level]
 
     def record_frame_time(self, frame_ms: float) -> None:

@@ -204,7 +204,10 @@ def check_map_side(map_side: object) -> int:
 
 
 def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) -> BakedMaps:
-    """Return the maps of the skin: its material, the irradiance in the scene, and the heights, if any.
+    """Return the maps of a skin, baked from the skin's material and from the light of the scene.
+
+    They are material properties such as albedo, normal and roughness, the irradiance of the skin, and the
+    height if the head has a height map.
 
     map_side : side of the maps [texel]
     """

@@ -61,7 +61,7 @@ class Pointer(_InputMessage):
 
 
 class Wheel(_InputMessage):
-    """Event of the mouse wheel, in CSS pixels."""
+    """Event of the mouse wheel: position of the pointer, and scrolled distances [CSS pixel]."""
 
     type: Literal["wheel"]
     x: Coordinate

@@ -67,9 +67,10 @@ class Uploads:
     def _accept_upload(
         self, file_name: str, headers: dict[bytes, bytes]
     ) -> tuple[str, Callable[[Path, str], None]]:
-        """Return the suffix of an upload, and a function that opens a file, given its path and original name.
+        """Return the suffix of an upload, and the function that opens the received file in the viewer.
 
-        The suffix is one of `HEAD_FILE_SUFFIXES`.
+        The suffix is one of `HEAD_FILE_SUFFIXES`. The arguments of the function are the path at which the
+        upload was stored, and the name of the file on the user's machine.
 
         Raises DermisError for an upload that is not permitted.
         """

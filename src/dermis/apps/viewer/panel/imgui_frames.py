@@ -52,10 +52,10 @@ ReportError = Callable[[Exception], None]
 
 
 class ImguiFrames:
-    """Dear ImGui context, with the GPU resources that draw the layouts.
+    """Dear ImGui context, with the GPU resources that draw its frames.
 
-    report_error : function called with each error that is raised during a layout; later frames are still
-        drawn
+    report_error : function called with each error that is raised while a frame is laid out; later frames are
+        still drawn
     """
 
     def __init__(self, report_error: ReportError) -> None:
@@ -63,7 +63,7 @@ class ImguiFrames:
         self._is_new = self._has_layout = False
 
     def open(self, device: Device, target_format: str) -> None:
-        """Create the Dear ImGui context, and the GPU resources that draw the layouts.
+        """Create the Dear ImGui context, and the GPU resources that draw its frames.
 
         target_format : format of the textures to draw into
         """
@@ -101,7 +101,7 @@ class ImguiFrames:
             self._recreate_context()
 
     def render(self, target_view: TextureView) -> None:
-        """Draw the last layout over the content of the target; draw nothing if that layout failed."""
+        """Draw the last frame over the content of the target; draw nothing if laying it out failed."""
         if not self._has_layout:
             return
         encoder = self._device.handle.create_command_encoder()
@@ -145,6 +145,9 @@ _SCROLL_PER_WHEEL_UNIT = 0.01
 def feed_pointer(event: Event, lay_out_frame: Callable[[], None]) -> None:
     """Pass a pointer event, one of the types in `POINTER_EVENTS`, to Dear ImGui.
 
+    The panel is laid out before and after each press and release, so that Dear ImGui processes them apart
+    from movements of the pointer.
+
     lay_out_frame : function that lays out the panel, using all events received so far
     """
     kind = event["event_type"]
@@ -163,7 +166,7 @@ def feed_pointer(event: Event, lay_out_frame: Callable[[], None]) -> None:
 def feed_key(event: Event, lay_out_frame: Callable[[], None]) -> None:
     """Pass a key or character event to Dear ImGui, and lay out the panel immediately.
 
-    Without this layout, a key that is pressed and released between two frames would have no effect.
+    Otherwise, a key that is pressed and released between two frames would have no effect.
 
     lay_out_frame : function that lays out the panel, using all events received so far
     """

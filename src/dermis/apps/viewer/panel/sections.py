@@ -112,7 +112,7 @@ def _draw_light_selector(session: Session) -> None:
 
 
 def _draw_light(session: Session, light_index: int, light: Light) -> None:
-    """Draw controls for all fields of a light but its position, which the user changes by Shift-drag."""
+    """Draw controls for all fields of a light except the position, which the user changes with Shift-drag."""
     strength = max(*light.irradiance, 1e-6)
 
     def state_with_fields(**fields: object) -> ViewerState:

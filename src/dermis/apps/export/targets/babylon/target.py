@@ -55,7 +55,7 @@ class Babylon(EnginePage):
     }
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the profile's colour c and metersPerUnit for the fitted Burley widths d [mm].
+        """Return the diffusion profile's colour c, and metersPerUnit, for the fitted Burley widths d [mm].
 
         With k = sqrt(d_min d_max), the colour is c = k/d and metersPerUnit is 2/k, where d_min and d_max are
         the smallest and the largest of the three widths. The shader then renders the width d in each channel,
@@ -66,7 +66,10 @@ class Babylon(EnginePage):
         return _profile_parameters(subject, k / d, RENDERED_WIDTH_RATIO / k)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return parameters with the Burley widths [mm] as the colour c, and metersPerUnit 1."""
+        """Return the parameters of a user who mistakes the colour c of the diffusion profile for its widths.
+
+        The colour is then the Burley widths [mm] and not their inverse, and metersPerUnit is 1.
+        """
         return _profile_parameters(subject, fit_burley_width(subject.curve), 1.0)
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
@@ -116,7 +119,7 @@ def spiral_samples(
     To get the rendered radii in mm, multiply the returned radii by `RENDERED_WIDTH_RATIO` / metersPerUnit.
     The ratio is 2, as a bug in the shader doubles all widths.
 
-    profile_colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
+    profile_colour : (3,) colour c of the diffusion profile; the width is proportional to 1/c in each channel
     sample_count : number n of samples
     """
     s = np.asarray(profile_colour, np.float64)
@@ -142,9 +145,11 @@ def burley_radii(enclosed_fraction: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def spiral_profile(profile_colour: ArrayLike, meters_per_unit: float, energy: ArrayLike) -> CumulativeProfile:
-    """Return the cumulative profile of the shader's samples, averaged over all rotations of the spiral.
+    """Return the cumulative profile that Babylon.js renders with its samples on a spiral.
 
-    profile_colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
+    The profile is averaged over all rotations of the spiral about the shaded point.
+
+    profile_colour : (3,) colour c of the diffusion profile; the width is proportional to 1/c in each channel
     meters_per_unit : value of the setting metersPerUnit, which is inversely proportional to the radii
     energy : (3,) total energy of the profile [-]
     """

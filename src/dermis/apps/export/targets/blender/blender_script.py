@@ -109,7 +109,7 @@ def add_ball(diameter_m: float) -> None:
 
 
 def make_skin_material() -> Any:
-    """Return a new skin material of uniform colour, for the ball."""
+    """Return a new skin material of uniform colour, for the ball that is shown if no head was exported."""
     material = bpy.data.materials.new("skin")
     material.use_nodes = True
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")

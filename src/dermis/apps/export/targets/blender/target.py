@@ -212,7 +212,7 @@ class Blender(Target):
         return self._material_parameters(tuple(round(float(x), 5) for x in radius), version)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return parameters with published diffuse mean free paths of skin as the subsurface radius."""
+        """Return the parameters of a user who enters published diffuse mean free paths as the radius."""
         return self._material_parameters(JENSEN_DMFP_MM, version)
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
@@ -290,7 +290,11 @@ class Blender(Target):
         return [RandomWalk(float(one), "straight" if plain else "skin") for one in albedos]
 
     def _unit_cdf_by_channel(self, subject: Subject, version: str) -> list[Cdf]:
-        """Return each channel's cumulative profile; radii are in Burley widths or mean free paths."""
+        """Return each channel's cumulative profile as a function of the radius.
+
+        The unit of the radius is the width of the Burley profile in the variants "burley" and "eevee", and
+        the mean free path in the variants with random walks.
+        """
         if self.variant in ("burley", "eevee"):
             return [burley_cdf] * 3
         return [walk.cdf for walk in self._random_walks(subject, version)]

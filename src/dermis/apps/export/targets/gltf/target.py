@@ -48,10 +48,11 @@ class Gltf(Target):
     part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the parameters of the variant.
+        """Return the material parameters for the variant of this target.
 
-        In the variant "scatter", a scattering volume is fitted to the skin's profile. In the variant
-        "diffuse-transmission", the skin transmits as much light as an ear.
+        In the variant "scatter", they describe a scattering volume that is fitted to the skin's profile. In
+        the variant "diffuse-transmission", they are the fraction and the colour of the light that skin as
+        thick as an ear transmits.
         """
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_transmission_parameters(subject, *_ear_transmission(subject))

@@ -138,9 +138,11 @@ def medium_description(medium: IsotropicMedium) -> SceneDict:
 def surface_bsdf(
     surface_model: Boundary, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
 ) -> SceneDict:
-    """Return Mitsuba's description of the skin's surface.
+    """Return Mitsuba's description of the skin's surface, or of the outer one of its two layers.
 
-    An index-matched surface consists of two layers; the description is that of the outer, reflecting layer.
+    Only the surface model "matched" has two layers. Its medium has the refractive index of air, so that its
+    boundary does not reflect; an outer layer is added to reflect light. For the inner layer, see
+    `_lower_surface_bsdf`.
 
     surface_model : surface model of the skin
     transmittance : texture that scales light on entry and again on exit; None for a factor of 1

@@ -155,9 +155,10 @@ def _half_space_kind(surface_model: Boundary) -> HalfSpaceKind:
 
 
 def _boundary_transmittance(surface_model: Boundary) -> float:
-    """Return the transmittance of the skin's reflecting layer; 1 for a surface model without this layer.
+    """Return the transmittance of the reflecting layer above the medium; 1 if there is no such layer.
 
-    Only the surface model "matched" has the layer, which lies on an index-matched medium.
+    Only the surface model "matched" has this layer: its medium has the refractive index of air and does not
+    reflect, so the layer adds the reflection of skin.
     """
     return 1.0 - MATCHED_REFLECTANCE if surface_model == "matched" else 1.0
 
@@ -197,7 +198,8 @@ def _encode_opaque_meshes(scene: Scene, adapter: str, textured_materials: Contai
 class SkinColours:
     """Mean and brightest colour of the colour map of a skin.
 
-    The medium is as bright as the brightest texels. Where the map is darker, a texture dims its light.
+    All skin is one medium, which is as light as the brightest texels of the map. Where the map is darker,
+    textures absorb part of the light that enters or leaves the medium.
 
     mean, brightest : (3,) mean and brightest colour, linear Rec. 709; equal for uniform skin
     lightness_ratio : luminance of the lightest texels divided by the mean luminance [-]
@@ -210,15 +212,15 @@ class SkinColours:
     def medium_colour(self, surface_model: Boundary) -> Floats:
         """Return the colour (3,) of the medium without textures.
 
-        Under an index-matched surface, textures can only change lightness, so the colour is the mean colour
-        scaled to the luminance of the lightest texels.
+        Under an index-matched surface, textures can only scale all channels equally, so the colour is the
+        mean colour scaled to the luminance of the lightest texels.
         """
         return np.minimum(
             self.lightness_ratio * self.mean if surface_model == "matched" else self.brightest, 0.97
         )
 
     def transmittance(self, surface_model: Boundary) -> tuple[float, ...]:
-        """Return the mean factor (3,) by which the textures dim light that enters and leaves the skin [-]."""
+        """Return the mean factor (3,) by which textures scale light that enters and leaves the skin [-]."""
         return flat_tuple(self.mean / self.medium_colour(surface_model))
 
 
@@ -244,9 +246,9 @@ def mean_roughness(subject: Subject) -> float:
 
 
 def skin_textures(subject: Subject, colours: SkinColours) -> tuple[float | Map, Map | None, Map | None]:
-    """Return the roughness, transmittance and dimming of the skin, see `SkinAppearance`.
+    """Return the fields `roughness`, `transmittance` and `dimming` of the skin's `SkinAppearance`.
 
-    Without a roughness map, roughness is a number. Without a colour map, transmittance and dimming are None.
+    Without a roughness map, the roughness is a number. Without a colour map, the other two are None.
     """
     roughness: float | Map = mean_roughness(subject)
     maps = None if subject.head is None else subject.head.maps

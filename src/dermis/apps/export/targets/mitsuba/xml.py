@@ -33,15 +33,19 @@ _KIND_BY_PLUGIN = {plugin: kind for kind, plugins in _PLUGINS_BY_KIND.items() fo
 
 
 class Transform:
-    """Affine transformation; the result of each method applies a new transformation, and then this one."""
+    """Affine transformation.
+
+    Each method returns the product of this transformation and a new one. The product transforms a point by
+    the new transformation first, as in Mitsuba.
+    """
 
     def __init__(self, matrix: ArrayLike | None = None) -> None:
         self.matrix = np.eye(4) if matrix is None else np.asarray(matrix, np.float64).reshape(4, 4)
 
     def look_at(self, origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> Transform:
-        """Return a transformation that places a camera at `origin`, and then applies this transformation.
+        """Return the product of this transformation and one that places a camera at `origin`.
 
-        The +Z axis of the camera points towards `target`.
+        The placed camera's +Z axis points towards `target`.
         """
         forward = _normalise(np.subtract(target, origin))
         left = _normalise(np.cross(np.asarray(up, np.float64), forward))
@@ -50,7 +54,7 @@ class Transform:
         return Transform(self.matrix @ matrix)
 
     def scale(self, scale_factors: ArrayLike) -> Transform:
-        """Return a transformation that scales along the axes, and then applies this transformation.
+        """Return the product of this transformation and a scaling along the axes.
 
         scale_factors : one factor, or (3,) factors of x, y and z
         """

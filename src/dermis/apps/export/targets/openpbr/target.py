@@ -88,15 +88,19 @@ class OpenPbr(Target):
         return surface_parameters(subject, self.shader, path, meaning)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return parameters with published diffuse mean free paths, where OpenPBR expects mean free paths."""
+        """Return the parameters of a user who enters published diffuse mean free paths as mean free paths.
+
+        The entered values are those of `published_mean_free_path_mm`. OpenPBR expects mean free paths, which
+        have other values.
+        """
         meaning = "diffuse mean free path, as published"
         return surface_parameters(subject, self.shader, published_mean_free_path_mm(subject), meaning)
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile that the renderer will show for the exported radii.
 
-        For variants that end in "profile", this is MaterialX's Burley profile, otherwise the profile of a
-        random walk.
+        In variants whose name ends in "profile", it is MaterialX's Burley profile; in all others, it is the
+        profile of a random walk.
         """
         radius = get_radii_mm(parameters, self.shader)
         if self.uses_burley_profile:
@@ -175,7 +179,7 @@ def published_mean_free_path_mm(subject: Subject) -> Floats:
 
 
 def lowest_layer(subject: Subject) -> Layer | None:
-    """Return the lowest layer of the subject's tissue if its coefficients are given for RGB, or None."""
+    """Return the lowest layer of the tissue; None without tissue, or if its coefficients are not for RGB."""
     tissue = subject.tissue
     if tissue is None or tissue.rgb is not None or tissue.medium.channels != 3:
         return None

@@ -54,17 +54,17 @@ class LibraryFile:
 
     @property
     def url(self) -> str:
-        """Return the public URL from which the page loads the file."""
+        """Return the public URL from which the page loads this library file."""
         return f"{_CDN_URL}/{self.package}@{self.version}/{self.path}"
 
     @property
     def integrity(self) -> str:
-        """Return the value of the HTML attribute `integrity`, with which the browser checks the file."""
+        """Return the value of the HTML attribute `integrity`, with which the browser checks this file."""
         return f"sha384-{self.sha384}"
 
     @property
     def html_element(self) -> str:
-        """Return the HTML element that loads and checks the file."""
+        """Return the HTML element that loads this script; the browser runs it only if its hash is right."""
         return f'<script src="{self.url}" integrity="{self.integrity}" crossorigin="anonymous"></script>'
 
     def read(self, node_modules_folder: Path) -> str:

@@ -185,7 +185,7 @@ class Pbrt(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the reflectance, and the mean free paths whose profile is closest to the reference."""
+        """Return the reflectance, and the mean free paths that bring pbrt's profile closest to the skin's."""
         path = fit_radius_scale(subject.curve, _unit_profile(subject.albedo))
         return _material_parameters(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 

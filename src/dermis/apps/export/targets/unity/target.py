@@ -76,7 +76,7 @@ class Unity(Target):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return parameters with the skin's colour as the scattering colour, and multiplier 1."""
+        """Return parameters without a fit: the scattering distance is the skin's colour times 1 mm."""
         colour = flat_tuple(subject.clipped_albedo())
         values: dict[str, ParameterValue] = {
             _SCATTERING_DISTANCE_NAME: colour,

@@ -63,7 +63,11 @@ class Unreal(Target):
         return _profile_parameters(albedo, path_cm, version)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return parameters with the reduced mean free path of the tissue as "mean free path"."""
+        """Return the parameters of a user who enters the tissue's reduced mean free path.
+
+        It differs from the fitted value, as the engine derives the width of a Burley profile from its field
+        "mean free path".
+        """
         path = fit_homogeneous_medium(subject.curve, subject.curve.energy).mfp_mm
         if subject.tissue is not None and subject.tissue.rgb is None:
             path = subject.tissue.medium.layers[-1].mean_free_path_mm

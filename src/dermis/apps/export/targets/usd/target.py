@@ -43,7 +43,10 @@ class Usd(OpenPbr):
         return (*super().parameters(subject, version), _METERS_PER_UNIT_PARAMETER)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return parameters with published diffuse mean free paths, where OpenPBR expects mean free paths."""
+        """Return the parameters of a user who enters published diffuse mean free paths as mean free paths.
+
+        OpenPBR expects mean free paths, which have other values.
+        """
         return (*super().naive_parameters(subject, version), _METERS_PER_UNIT_PARAMETER)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:

@@ -124,7 +124,8 @@ def build_page_content(
     """Capture the frames for every requested kind of adapter, and return the data that the page embeds.
 
     on_frames_captured : function called after the frames for a kind of adapter were captured; its arguments
-        are the renderer (which then uses the maps of the page), the scene and the settings
+        are the renderer, whose textures then hold the maps as the page decodes them, the scene and the
+        settings
     """
     content = PageContent()
     for adapter_kind in (one for one in ADAPTER_KINDS if page_request.sizes.get(one)):

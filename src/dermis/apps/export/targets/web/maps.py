@@ -47,7 +47,8 @@ def encode_picture(texels: Halves, is_colour_map: bool) -> Picture:
     """Return one layer of a map encoded as a WebP image.
 
     texels : (h, w, c) texels
-    is_colour_map : whether the first three channels are a colour; all further channels are then constant
+    is_colour_map : whether the first three channels are a colour, to be encoded as a colour image; any
+        further channel must then be constant
     """
     curves = np.stack(
         [_quantisation_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])]
@@ -123,9 +124,11 @@ class MapPictures:
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, map_role: str, texels: NDArray[np.float16]) -> bool:
-        """Return whether texels equal those of the first layer of a map at full resolution, before encoding.
+        """Return whether texels equal those from which the first picture of a map was encoded.
 
-        map_role : role of that map
+        That picture shows layer 0 of the map at mip level 0.
+
+        map_role : role of the map
         """
         return bool(np.array_equal(self._encoded_texels[map_role], texels))
 
@@ -199,9 +202,9 @@ def quantise_hairs(
 
 
 def read_texels(frame_capture: FrameCapture, resource_index: int, mip_level: int) -> NDArray[np.float16]:
-    """Return the (l, h, w, c) texels of a mip level of a half-float texture.
+    """Return the texels (l, h, w, c) of one mip level of a half-float texture with l layers.
 
-    resource_index : index of the texture or buffer in the capture
+    resource_index : index of the texture among the resources of the capture
     """
     width, height, layers = frame_capture.resources[resource_index]["size"]
     sides = max(1, height >> mip_level), max(1, width >> mip_level)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 Bytes = NDArray[np.uint8]
 ByteRun = tuple[int, int, int, int, int, tuple[float, ...]]
-"""Offset and size of a run of bytes, bytes per word, words per row, order of the differences between rows,
-and the step of each float in a row. With 0 bytes per word, the last entry has the indices of runs that are
-concatenated instead."""
+"""Byte run: offset, size, bytes per word, words per row, how many times each row was replaced by its
+difference from the previous row, and the step of each float in a row. With 0 bytes per word, the run is a
+concatenation of other runs, and the last entry has their indices."""
 _ESCAPED_CHARACTERS = frozenset({0, 13, ord("<")})
 """Characters that HTML changes in a script element, or that end it."""
 _WORDS_PER_ROW_CHOICES = (1, 2, 3, 4, 6, 8, 12, 16, 24)
@@ -44,22 +44,26 @@ class ByteRunCollector:
     def add(
         self, raw_bytes: Bytes | bytes, candidate_layouts: Iterable[tuple[int, int, int]] | None = None
     ) -> int:
-        """Add a run of bytes, and return the run's index in `runs`.
+        """Add a byte run, and return its index in `runs`.
 
-        candidate_layouts : layouts to try, of which the best is used: bytes per word, words per row, and
-            order of the differences; None for all layouts that suit the number of bytes
+        candidate_layouts : layouts to try, of which the best is used: bytes per word, words per row, and how
+            many times each row is replaced by its difference from the previous row; None for all layouts
+            that suit the number of bytes
         """
         raw = np.frombuffer(raw_bytes, np.uint8)
         return self._add_run(raw, list(candidate_layouts or _possible_layouts(len(raw))), ())
 
     def add_parts(self, encoded_parts: Iterable[Bytes]) -> int:
-        """Add a run that concatenates separately encoded parts, and return the run's index in `runs`."""
+        """Add a byte run that is the concatenation of several parts, and return its index in `runs`.
+
+        encoded_parts : parts in order; the layout of each part is chosen separately
+        """
         numbers = tuple(self.add(one) for one in encoded_parts)
         self.runs.append((0, sum(self.runs[k][1] for k in numbers), 0, 0, 0, numbers))
         return len(self.runs) - 1
 
     def add_floats(self, floats: NDArray[np.float32], column_steps: tuple[float, ...]) -> int:
-        """Add a run of floats, stored as integer multiples of the steps; return the run's index in `runs`.
+        """Add a byte run of floats, stored as integer multiples of the steps; return its index in `runs`.
 
         floats : (n, c) floats that are multiples of the steps
         column_steps : (c,) step of each column, a power of two
@@ -82,7 +86,7 @@ class ByteRunCollector:
         return self._run_indices[key]
 
     def compress(self) -> bytes:
-        """Return all runs as one gzip file."""
+        """Return the data of all byte runs, one after another, as one gzip file."""
         return gzip.compress(b"".join(self._data), 9, mtime=0)
 
 
@@ -134,7 +138,8 @@ def _possible_layouts(byte_count: int) -> Iterable[tuple[int, int, int]]:
 def _best_layout(raw_bytes: Bytes, candidate_layouts: list[tuple[int, int, int]]) -> tuple[int, int, int]:
     """Return the layout with which a sample of the bytes compresses best.
 
-    candidate_layouts : layouts to try: bytes per word, words per row, and order of the differences
+    candidate_layouts : layouts to try: bytes per word, words per row, and how many times each row is replaced
+        by its difference from the previous row
     """
     sample = raw_bytes
     if len(raw_bytes) > _LAYOUT_SAMPLE_COUNT * _LAYOUT_SAMPLE_BYTES:

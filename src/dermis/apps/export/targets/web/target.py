@@ -75,7 +75,7 @@ def page_html(page_content: build.PageContent, sliders: tuple[Slider, ...], titl
 
 
 def player_script() -> str:
-    """Return the JavaScript modules of the player joined into one script."""
+    """Return one script with all JavaScript modules of the player, which replays the captured frames."""
     texts = ((_PAGE_FOLDER / f"{name}.js").read_text("utf-8") for name in PLAYER_MODULES)
     return "".join(_EXPORT_KEYWORD.sub("", _IMPORT_STATEMENT.sub("", text)) for text in texts)
 
@@ -115,7 +115,7 @@ class Web(Target):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the exported parameters, as the page has no parameters that a user could set."""
+        """Return the exported parameters: the page has none that a user could choose differently."""
         return self.parameters(subject, version)
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
