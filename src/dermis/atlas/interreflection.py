@@ -100,7 +100,7 @@ def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) -
 
 
 def form_factor_table_name(mapped_triangles: Mask) -> str:
-    """Return the name under which the package stores the form factors of a mesh, for `shipped_arrays`.
+    """Return the table name by which `shipped_arrays` finds form factors that the package contains.
 
     mapped_triangles : (f,) mask of triangles that have texels
     """
@@ -134,7 +134,7 @@ def _trace_lines(
     """Trace lines through the air between the cells of the uv square, see `FormFactors`.
 
     Returns the index pairs (m, 2) of cells that a line connects, one pair for each line and direction. Also
-    returns the number of lines that left each cell, (CELLS_PER_SIDE^2,).
+    returns the number of lines that leave each cell, (CELLS_PER_SIDE^2,).
 
     corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
     mapped_triangles : (f,) mask of triangles that have texels
@@ -223,10 +223,11 @@ def _integer_range(corner_coordinates: Doubles) -> tuple[Doubles, Index]:
 
 
 def _facing_cells(line_index: Index, depth: Doubles, faces_forward: Mask, cell_index: Index) -> Index:
-    """Return index pairs (m, 2) of cells of the uv square: the cell that a line leaves and the next it meets.
+    """Return index pairs (m, 2) of cells of the uv square that see each other along a line through the air.
 
-    Each line is followed in both directions. A line that meets no other surface gives no pair. The index is
-    -1 for a surface that has no texels.
+    The first cell is where the line leaves a surface, and the second is where it meets the next surface. Each
+    line is followed in both directions, so each connection gives two pairs. Where a surface has no texels, -1
+    stands for the cell.
 
     line_index, depth, faces_forward : (n,) results of `intersect_lines`
     cell_index : (n,) cell of each intersection, -1 if the surface has no texels
@@ -268,10 +269,14 @@ def _line_axes(direction: Doubles, roll_angle: float) -> Doubles:
 def _form_factors(
     facing_cells: Index, line_counts: Doubles, mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask
 ) -> FormFactors:
-    """Return the form factors that follow from the number of lines between cells of the uv square.
+    """Return form factors, estimated from the random lines that connect cells of the uv square.
 
-    facing_cells : (m, 2) index pairs of cells that lines connect, from `_trace_lines`
-    line_counts : (CELLS_PER_SIDE^2,) number of lines that left each cell
+    The form factor from a cell or patch to another patch is the fraction of the lines leaving the former that
+    reach the latter.
+
+    facing_cells : (m, 2) index pairs of cells, one pair for each connecting line and direction, from
+        `_trace_lines`
+    line_counts : (CELLS_PER_SIDE^2,) number of lines that leave each cell
     corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
     mapped_triangles : (f,) mask of triangles that have texels
     """
@@ -312,9 +317,11 @@ def _sparse_form_factors(
 ) -> tuple[Words, Words, Floats]:
     """Return form factors as a sparse matrix: the start of each row, the patch indices and the factors.
 
-    row_index : (m,) index of the cell or patch that each line left
-    target_patch : (m,) index of the patch that the line met next
-    line_counts : (r,) number of lines that left each cell or patch
+    Row k contains the form factors from cell (or patch) k to the patches that it faces.
+
+    row_index : (m,) index of the cell or patch from which each of m random lines starts
+    target_patch : (m,) index of the patch that this line reaches
+    line_counts : (r,) number of lines that start from each of the r cells or patches
     patch_count : number of patches
     """
     entry, lines = np.unique(row_index * max(patch_count, 1) + target_patch, return_counts=True)
@@ -354,10 +361,11 @@ def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) 
 
 
 def _sample_points(mesh: Mesh, mapped_triangles: Mask) -> tuple[Index, Doubles, Doubles]:
-    """Return random points on the triangles that have texels: triangle indices, weights and ranks.
+    """Return random points on the triangles that have texels, with a random rank for each point.
 
-    Each triangle has at least one point, so points are denser on small triangles. The ranks are random
-    numbers. Points that are chosen in order of rank are uniformly distributed over the surface.
+    Returns the triangle indices (n,), the barycentric weights (n, 3) and the ranks (n,). Every triangle has
+    at least one point, which makes the points too dense on small triangles. The ranks correct this: a subset
+    that consists of the points of lowest rank is uniformly distributed over the surface.
 
     mapped_triangles : (f,) mask of triangles that have texels
     """

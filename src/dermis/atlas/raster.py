@@ -86,8 +86,9 @@ def covered_texels(
 
     corners : (t, 3, 2) corners of the triangles [texel]; texel centres are at integers
     grid_shape : height and width of the grid of texels
-    margin : smallest distance of a covered centre from the edges, measured along rows and columns; if
-        negative, centres just outside a triangle count as covered [texel]
+    margin : distance by which a covered centre must be inside the triangle: along x, from both edges that its
+        row crosses, and along y, from the lowest and highest corner; if negative, centres up to this distance
+        outside count as covered, too [texel]
     """
     height, width = grid_shape
     low, high = corners[..., 1].min(axis=1), corners[..., 1].max(axis=1)
@@ -190,10 +191,12 @@ def _triangles_of_overlapped_charts(
 def _assign_texels(
     mesh: Mesh, mapped_triangles: Mask, texel: Index, triangle: Index, atlas_side: int
 ) -> tuple[Ints, Mask]:
-    """Assign each texel to one triangle; return its index, and the mask (f,) of triangles with few texels.
+    """Assign each texel to one of the triangles that cover its centre.
 
-    Where a chart is folded onto itself in uv, texels are assigned to its unmirrored triangles. The mask
-    selects triangles that get less than half of the texels that they cover.
+    Returns the triangle index of each texel (n, n), -1 for texels without a triangle. Also returns the mask
+    (f,) of hidden triangles, which get less than half of the texels that they cover.
+
+    Where a chart is folded onto itself in uv, texels are assigned to its unmirrored triangles.
 
     mapped_triangles : (f,) mask of triangles to which texels may be assigned
     texel, triangle : (k,) flat texel index and triangle index of each covered texel centre

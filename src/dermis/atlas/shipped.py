@@ -42,7 +42,10 @@ def table_file_name(mesh: Mesh) -> str:
 
 
 def table_file_arrays(mesh: Mesh, tables: dict[str, dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
-    """Return the contents of a table file: a dictionary from the names of arrays in the file to the arrays.
+    """Return the arrays to store in the file of precomputed tables for a mesh, by their names in the file.
+
+    These are the arrays of all tables, and the position fingerprint by which `shipped_arrays` recognises the
+    mesh.
 
     tables : dictionary from table names to the arrays of each table, as `shipped_arrays` returns them
     """

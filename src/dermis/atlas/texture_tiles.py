@@ -126,7 +126,14 @@ def _picture_size(material: FileMaterial) -> tuple[int, int]:
 def _shift_charts_to_unit_square(
     mesh: Mesh, texture: Texture, uv: Doubles, vertices: NDArray[np.integer], triangles: NDArray[np.integer]
 ) -> Doubles:
-    """Return uv (n, 2) in which the charts of repeating textures are shifted by whole periods into [0, 1]."""
+    """Return uv (n, 2) in which each chart of a repeating texture is shifted by whole periods.
+
+    The shift brings the middle of the chart into the first period: 0 to 1, or 0 to 2 for a mirrored texture.
+
+    uv : (n, 2) uv of the vertices
+    vertices : (n,) sorted indices of the mesh vertices that the texture covers
+    triangles : indices of the triangles that the texture covers
+    """
     if uv.min() > -UV_TOLERANCE and uv.max() < 1.0 + UV_TOLERANCE:
         return uv
     corner = np.searchsorted(vertices, mesh.triangles[triangles])

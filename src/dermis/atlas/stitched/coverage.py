@@ -56,9 +56,9 @@ def compute_coverage(
     gutter_width: GutterWidth,
     grid_shape: tuple[int, int],
 ) -> Coverage:
-    """Compute the surface points that the texels of packed pieces and their gutters show.
+    """Compute which point of the surface each texel of the packed chart pieces and their gutters represents.
 
-    triangle_piece : (f,) piece of each triangle, -1 if there is none
+    triangle_piece : (f,) index of each triangle's chart piece, -1 for triangles in no piece
     member_triangles : (t,) indices of the triangles to rasterise
     border : border of the pieces, see `find_border`
     packing : positions of the triangles on the texel grid
@@ -88,7 +88,7 @@ def _add_gutters(coverage: Coverage, triangle_piece: Index, texels: GutterTexels
 
     The rim of a piece consists of the texels outside it that are read by bilinear interpolation within it.
 
-    triangle_piece : (f,) piece of each triangle, -1 if there is none
+    triangle_piece : (f,) index of each triangle's chart piece, -1 for triangles in no piece
     """
     y, x = texels.y, texels.x
     coverage.triangle[y, x], coverage.weights[y, x] = texels.triangle, texels.weights
@@ -111,7 +111,7 @@ def _add_gutters(coverage: Coverage, triangle_piece: Index, texels: GutterTexels
 def hidden_triangles(surface: FlatSurface, triangle_piece: Index, packing: Packing, atlas_side: int) -> Mask:
     """Return the mask (f,) of triangles that are mostly hidden in uv by other triangles of their piece.
 
-    triangle_piece : (f,) piece of each triangle, -1 if there is none
+    triangle_piece : (f,) index of each triangle's chart piece, -1 for triangles in no piece
     packing : positions of the triangles on the texel grid
     """
     members = np.flatnonzero(triangle_piece >= 0)
@@ -127,7 +127,7 @@ def _drawing_order(surface: FlatSurface, triangle_piece: Index, member_triangles
     Triangles that are drawn later replace earlier ones, so mirrored triangles get only the texels that no
     unmirrored triangle covers.
 
-    triangle_piece : (f,) piece of each triangle, -1 if there is none
+    triangle_piece : (f,) index of each triangle's chart piece, -1 for triangles in no piece
     member_triangles : (t,) indices of the triangles to sort
     """
     return member_triangles[
@@ -154,8 +154,8 @@ def _extend_surface_edge(
 
     A blur along the edge then reads the same light from a gutter as from the chart piece beside it.
 
-    coverage : surface points that the texels show, changed in place
-    triangle_piece : (f,) piece of each triangle, -1 if there is none
+    coverage : surface points that the texels represent, changed in place
+    triangle_piece : (f,) index of each triangle's chart piece, -1 for triangles in no piece
     beyond_end : (h, w) mask of texels beyond the end of the surface
     y, x : (n,) row and column of each gutter texel to fill; `beyond_end` is True at these texels
     """
@@ -176,7 +176,7 @@ def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> 
     A gutter texel has the metric of its anchor, the nearest point of its chart.
 
     packing : positions of the triangles on the texel grid
-    coverage : surface points that the texels show
+    coverage : surface points that the texels represent
     """
     covered = coverage.anchor_triangle >= 0
     anchor, weights = coverage.anchor_triangle[covered], coverage.anchor_weights[covered]
@@ -189,12 +189,13 @@ def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> 
 
 
 def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -> NDArray[np.uint16]:
-    """Return how far each texel's piece and gutter extend left, right, up and down, (h, w, 4) [texel].
+    """Return how far texels are connected to the left and right of each texel, and up and down.
 
-    A piece also ends at a gap: between adjacent texels whose surface points are far apart.
+    The result is an array (h, w, 4) [texel]. Adjacent texels are connected if both belong to the same chart
+    piece or its gutter, and if there is no gap on the surface between the points that they represent.
 
     packing : positions of the triangles on the texel grid
-    coverage : surface points that the texels show
+    coverage : surface points that the texels represent
     """
     anchor = coverage.anchor_triangle
     owner = np.where(anchor >= 0, np.where(coverage.distance_mm > 0, -1, anchor), -2)
@@ -223,11 +224,11 @@ def _pairs_with_gap(
 ) -> Mask:
     """Return the mask (n,) of pairs of adjacent texels whose surface points are not adjacent.
 
-    These are the pairs for which `anchors_diverge` is true, and whose surface points are farther apart than
-    `gap_limit_mm`.
+    A pair is selected if two conditions hold: the anchors of its texels (the nearest points of the chart
+    piece) are far apart, see `anchors_diverge`, and its surface points are farther apart than `gap_limit_mm`.
 
     packing : positions of the triangles on the texel grid
-    coverage : surface points that the texels show
+    coverage : surface points that the texels represent
     first_texels, second_texels : (n,) flat indices of the texels
     axis : 0 for pairs along x, 1 along y
     """

@@ -46,7 +46,7 @@ class Geodesics(NamedTuple):
     orientation: Doubles
 
     def select(self, mask: Mask) -> Geodesics:
-        """Return the geodesics that a mask selects."""
+        """Return only those of the n geodesics for which a mask (n,) is true."""
         return Geodesics._make(part[mask] for part in self)
 
 
@@ -175,7 +175,10 @@ def _cross(first_vector: Complex, second_vector: Complex) -> Doubles:
 
 
 def _exit_fraction(rays: Geodesics) -> Doubles:
-    """Return the position at which each geodesic crosses its exit side, from 0 (start) to 1 (end) [-]."""
+    """Return where each geodesic leaves its current triangle, as a position (n,) along the exit side [-].
+
+    The position is 0 at the first end point of this side (`side_start`), and 1 at the second (`side_end`).
+    """
     here, there = _cross(rays.direction, rays.side_start), _cross(rays.direction, rays.side_end)
     return np.clip(here / np.where(here == there, np.inf, here - there), 0.0, 1.0)
 

@@ -58,7 +58,7 @@ class GutterWidth(NamedTuple):
 def find_border(surface: FlatSurface, triangle_piece: Index, member_triangles: Index) -> Border:
     """Return the triangle sides that form the borders of chart pieces.
 
-    triangle_piece : (f,) piece of each triangle, -1 if there is none
+    triangle_piece : (f,) index of each triangle's chart piece, -1 for triangles in no piece
     member_triangles : (t,) indices of the triangles whose sides are examined; each triangle is in a piece
     """
     neighbour = surface.uv_neighbour[member_triangles]
@@ -119,7 +119,7 @@ def needed_texels(
 
 
 class GutterTexels(NamedTuple):
-    """Gutter and rim texels (n,) outside the triangles of a piece, with the surface points that they show.
+    """Gutter and rim texels (n,) outside the triangles of a piece, with their surface points.
 
     y, x : row and column
     rim : mask of texels that are read by bilinear interpolation within the piece
@@ -145,11 +145,14 @@ class GutterTexels(NamedTuple):
 def trace_gutter(
     surface: FlatSurface, border: Border, packing: Packing, gutter_width: GutterWidth, texel_triangle: Ints
 ) -> GutterTexels:
-    """Find the gutter texels of a border, and trace geodesics to the surface points that they show.
+    """Find the gutter texels along the border of chart pieces, and the surface point of each gutter texel.
 
+    To find this point, a geodesic is traced over the surface from the nearest point of the border.
+
+    border : border of the pieces, see `find_border`
     packing : positions of the triangles on the texel grid
     gutter_width : width of the gutters
-    texel_triangle : (h, w) index of the triangle that covers each texel of the pieces, -1 outside
+    texel_triangle : (h, w) index of the triangle that covers each texel, -1 for texels outside the pieces
     """
     nearest = nearest_border_points(
         sides := border_sides(surface, border, packing, gutter_width), texel_triangle >= 0

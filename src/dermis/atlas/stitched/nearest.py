@@ -13,11 +13,11 @@ _RIM_WIDTH_TEXELS = 1.001  # a texel, with a margin for rounding
 
 
 class BorderSides(NamedTuple):
-    """Border sides (k,) of chart pieces on the texel grid, with surface metric and gutter width.
+    """Triangle sides (k,) on the borders of chart pieces, placed on the texel grid, with the gutter width.
 
     ends : (k, 2, 2) positions of both end points [texel]
-    steps : (k, 2, 2, 2) surface vectors of a texel step to the right and of a step down, at both end points
-        [mm]
+    steps : (k, 2, 2, 2) at both end points, the two vectors on the surface that correspond to a step by one
+        texel to the right and to a step by one texel down, in the plane of the triangle [mm]
     gutter_mm : (k,) width of the gutter on the surface [mm]
     max_texels : (k,) largest width of the gutter on the grid [texel]
     """
@@ -29,12 +29,13 @@ class BorderSides(NamedTuple):
 
 
 class NearestPoints(NamedTuple):
-    """Nearest border points of n texels that are outside chart pieces.
+    """For each of n texels outside the chart pieces, the nearest point on the border of a piece.
 
     texel : flat index of the texel
-    side : index of the border side
-    fraction : position of the point along the side, 0 to 1 [-]
-    distance_mm : distance between texel and border point in the surface metric of the side [mm]
+    side : index, in `BorderSides`, of the border side on which the nearest point lies
+    fraction : position of the point along this side, 0 to 1 [-]
+    distance_mm : distance from the texel to the point, converted to mm by the surface metric at this side
+        [mm]
     rim : mask of texels that are read by bilinear interpolation at border points
     """
 
@@ -46,10 +47,10 @@ class NearestPoints(NamedTuple):
 
 
 class _SideMetric(NamedTuple):
-    """Surface metric at k border sides, used to measure offsets on the texel grid in mm.
+    """Surface metric at k border sides (see `BorderSides`), which converts offsets on the texel grid to mm.
 
-    x, y, down : (k,) coefficients; the length of an offset (dx, dy) on the surface is that of the vector
-        (x dx + y dy, down dy) [mm]
+    x, y, down : (k,) entries of the upper triangular matrix ((x, y), (0, down)), which converts an offset
+        (dx, dy) [texel] to a vector (x dx + y dy, down dy) whose length is the distance on the surface [mm]
     along : (k, 2) lengths of a step by one texel along x and of a step by one texel along y, projected onto
         the side, as fractions of the side's length
     half_extent : (k, 2) margin in x and y around the side's bounding box, wide enough for the gutter [texel]

@@ -77,7 +77,8 @@ class _PieceGrid(NamedTuple):
 
     owner : (h, w) triangle to which each texel belongs, -1 in gutters, -2 elsewhere
     row : (h, w) index of each texel in `anchored`
-    anchored : texels of the piece, followed by gutter texels, with their anchors
+    anchored : texels of the piece, followed by gutter texels, each with its anchor: the nearest point of the
+        piece
     packing : position of the piece on the grid
     border : border of the piece
     sides : border sides on the grid
@@ -172,12 +173,13 @@ def _gap_pairs(surface: FlatSurface, mapped_triangles: Mask, grid: _PieceGrid) -
 def _texel_points(
     surface: FlatSurface, mapped_triangles: Mask, grid: _PieceGrid, chosen_texels: Index
 ) -> Doubles:
-    """Return the surface points (n, 3) of all texels of the grid, NaN for points that are not computed [mm].
+    """Compute the surface points of chosen texels; return one row for each texel of the grid, (n, 3) [mm].
 
-    Points are computed for the chosen texels, except for texels beyond the end of the surface.
+    The rows are in the order of `_PieceGrid.anchored`. Rows of other texels are NaN, and so are those of
+    chosen texels that lie beyond the end of the surface.
 
     mapped_triangles : (f,) mask of triangles that belong to any piece
-    chosen_texels : indices into `_PieceGrid.anchored` of the chosen texels
+    chosen_texels : row indices of the chosen texels
     """
     owner, texels = grid.owner[grid.owner >= 0], grid.anchored.texels
     points, is_chosen = np.full((len(texels), 3), np.nan), np.zeros(len(texels), np.bool_)
@@ -193,9 +195,12 @@ def _texel_points(
 
 
 def cut_overlaps(surface: FlatSurface, triangle_piece: Index, gutter_mm: float) -> Index:
-    """Cut charts along straight lines until gutters hardly overlap; return piece indices (f,).
+    """Cut charts along straight lines where their gutters overlap; return the piece of each triangle (f,).
 
-    triangle_piece : (f,) piece of each triangle before the cuts, -1 if there is none
+    A piece is an uncut chart or a part of a cut chart. Charts are cut until the remaining overlap is too
+    short for a cut, or until the new gutters would take too much area.
+
+    triangle_piece : (f,) index of the chart of each triangle before the cuts, -1 for triangles in no chart
     gutter_mm : width of the gutters [mm]
     """
     done, count = np.full(len(triangle_piece), -1, np.int64), 0
@@ -303,12 +308,13 @@ def _conflict_strip(
     one_side_mask: Mask,
     gutter_width_texels: float,
 ) -> Mask:
-    """Return the mask (t,) of a piece's triangles near conflicts between gutters, on one side of a line.
+    """Return the mask (t,) of the triangles to cut off from a piece so that two of its gutters are separated.
 
-    The function compares the triangles near conflicts on both sides of the line, and selects those of the
-    side where their total area is smaller.
+    These are the triangles that lie near conflicts between the gutters and on one side of a line that
+    separates the conflicts. The side is chosen where the total area of these triangles is smaller.
 
     member_triangles : (t,) indices of the piece's triangles
+    conflicts : conflicts that the line separates
     one_side_mask : (t,) True for triangles on one side of the line, False for those on the other side
     gutter_width_texels : gutter width [texel]
     """
@@ -360,12 +366,13 @@ def _best_cut_line(conflicts: Conflicts, gutter_width_texels: float) -> tuple[Do
 def _connected_parts(
     surface: FlatSurface, member_triangles: Index, part_of_triangle: Index, gutter_mm: float
 ) -> Index | None:
-    """Divide the parts of a cut chart into connected parts; merge small parts into their largest neighbour.
+    """Divide the parts into which a piece was cut so that each is connected, and merge small parts.
 
-    Returns the part of each triangle (t,), or None if only one part remains.
+    A small part is merged into its largest neighbour. Returns the index of each triangle's part (t,), or None
+    if only one part remains.
 
-    member_triangles : (t,) indices of the piece's triangles
-    part_of_triangle : (t,) part to which each of these triangles belongs
+    member_triangles : (t,) indices of the triangles of the piece that was cut
+    part_of_triangle : (t,) index of the part to which the cut assigns each of these triangles
     gutter_mm : width of the gutters [mm]
     """
     index = np.full(len(surface.uv), -1, np.int64)

@@ -88,10 +88,11 @@ class _Piece(NamedTuple):
     """Chart, or part of a chart, prepared for packing.
 
     surface : triangles of the piece
-    uv : (t, 3, 2) uv of the corners, scaled and moved so that the lowest coordinates are 0
-    extent : (2,) largest u and v of the scaled uv
-    scale : factor by which the mesh's uv is scaled
-    uv_per_mm : scaled uv per mm on the surface [1/mm]
+    uv : (t, 3, 2) uv of the corners: the mesh's uv multiplied by `scale`, and moved so that the lowest
+        coordinates are 0
+    extent : (2,) largest u and v in `uv`
+    scale : factor from the mesh's uv to `uv`
+    uv_per_mm : length in `uv` per mm on the surface, averaged over the piece [1/mm]
     border : border of the piece, with triangle indices within the piece
     """
 
@@ -108,7 +109,7 @@ class _PieceMask(NamedTuple):
 
     spans : (m, 3) row, first and last column of each run of cells
     margin : (2,) distance from the first column and row to the origin of the piece's uv [cell]
-    scale : cells per unit of the piece's scaled uv
+    scale : number of cells per unit of `_Piece.uv`
     """
 
     spans: Index
@@ -121,7 +122,7 @@ class PieceLayout(NamedTuple):
 
     The grid has one cell per texel of the map, but at most 512 x 512 cells.
 
-    scale : cells per unit of the pieces' scaled uv
+    scale : number of cells per unit of `_Piece.uv`, the same for all pieces
     origins : (p, 2) position of the origin of each piece's uv [cell]
     """
 
@@ -231,7 +232,7 @@ def _find_largest_scale(masks: list[_PieceMask], cells_per_side: int, max_scale:
 
     masks : cells that each piece occupies
     cells_per_side : cells along each side of the grid
-    max_scale : largest scale to try, in cells per unit of the pieces' scaled uv
+    max_scale : largest scale to try, in cells per unit of `_Piece.uv`
     """
     coarse, best = None, 0
     for order in range(_PACKING_ORDER_COUNT):
@@ -333,9 +334,9 @@ def _scaled_mask(piece_mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
 
 
 def _piece_mask(piece: _Piece, scale: float, gutter_width: GutterWidth) -> _PieceMask:
-    """Return the grid cells that a chart piece and its gutter may need.
+    """Return the grid cells that a chart piece and its gutter occupy, including partly occupied cells.
 
-    scale : cells per unit of the piece's scaled uv
+    scale : number of cells per unit of `_Piece.uv`
     """
     margin = np.ceil(_gutter_extent(piece, scale, gutter_width)) + 2
     columns, rows = np.ceil(piece.extent * scale + 2 * margin).astype(int) + 1

@@ -25,8 +25,8 @@ class Adjacency(NamedTuple):
     neighbour : (f, 3) index of the triangle across each side, -1 if there is none
     neighbour_side : (f, 3) side of the neighbour that is the shared edge
     flipped : (f, 3) mask of neighbours that face the opposite way
-    apex : (f, 3, 2) third corner relative to each side: coordinates along the side and to its left, as
-        fractions of the side's length
+    apex : (f, 3, 2) for each side, the position of the opposite corner: the distance from the start of the
+        side along it, and the distance to its left, as fractions of the side's length
     passable : (f,) mask of triangles that geodesics may cross
     """
 
@@ -48,7 +48,7 @@ class FlatSurface:
     uv : (f, 3, 2) uv of the corners in the mesh's own layout
     area_mm2 : (f,) area on the surface [mm2]
     area_uv : (f,) area in uv, negative where uv is mirrored as seen from outside
-    skin : (f,) mask of skin triangles, which light may cross
+    skin : (f,) mask of skin triangles, the only triangles that geodesics may cross
     valid : (f,) mask of skin triangles with an area in space and in uv
     adjacency : neighbours in space, for geodesics
     uv_neighbour : (f, 3) index of the triangle across each side in uv; the triangle itself at a seam
@@ -158,9 +158,12 @@ def side_neighbours(mesh: Mesh) -> tuple[Ints, NDArray[np.int8], Mask]:
 
 
 def _apexes(planar_corners: Doubles) -> Doubles:
-    """Return the third corner relative to each side (f, 3, 2): coordinates along the side and to its left.
+    """Return the position of the opposite corner for each side of each triangle, (f, 3, 2).
 
-    The coordinates are fractions of the side's length.
+    The two coordinates are the distance from the start of the side along it, and the distance to its left,
+    both as fractions of the side's length.
+
+    planar_corners : (f, 3, 2) corners in the plane of each triangle [mm]
     """
     side = np.roll(planar_corners, -1, axis=1) - planar_corners
     third = np.roll(planar_corners, -2, axis=1) - planar_corners

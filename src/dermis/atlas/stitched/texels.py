@@ -29,7 +29,9 @@ def rasterise_texel_triangles(corners: Doubles, drawn_triangles: Index, grid_sha
 
 
 def mostly_hidden_triangles(corners: Doubles, drawn_triangles: Index, texel_triangle: Ints) -> Mask:
-    """Return the mask (f,) of triangles to which less than half of the texels that they cover belong.
+    """Return the mask (f,) of triangles that own less than half of the texels that they cover.
+
+    Their other texels belong to triangles that are drawn over them.
 
     corners : (f, 3, 2) corners of all triangles [texel]
     drawn_triangles : (t,) indices of the drawn triangles
@@ -71,7 +73,9 @@ class AnchoredTexels(NamedTuple):
 
 
 def unconnected_pairs(surface: FlatSurface, texel_triangle: Ints, axis: int) -> tuple[Index, Index]:
-    """Find pairs of adjacent texels whose triangles share no side in uv; return flat indices, (n,) for each.
+    """Find pairs of adjacent texels whose triangles share no side in uv, or of which one is a gutter texel.
+
+    Returns the flat indices (n,) of the first texels of the pairs, and those (n,) of the second texels.
 
     texel_triangle : (h, w) triangle to which each texel belongs, -1 in gutters, -2 elsewhere
     axis : 0 for texels adjacent along x, 1 along y

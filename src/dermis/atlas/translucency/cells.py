@@ -44,12 +44,12 @@ class Cells:
     max_sigma_mm : standard deviation of the widest Gaussian of the diffusion profiles [mm]
     cell_mm : median side of a cell on the surface [mm]
     stride : a source cell averages the light of every `stride`-th texel along each axis [texel]
-    receiver_mask : (side, side) mask of the cells that receive light: cells with lit texels, and their
-        neighbours
+    receiver_mask : (side, side) mask of the cells that receive light: cells with texels of `Atlas.lit`, and
+        their neighbours
     receivers, receiver_first : (m,) uint32 packed x and y of the receiving cells, sorted by tile
     receiver_points : (m, 2) uint32 surface point at the centre of each receiving cell: triangle index, and
         packed barycentric weights
-    sources, source_first : (n,) indices of the cells with lit texels, sorted by tile
+    sources, source_first : (n,) indices of the cells with texels of `Atlas.lit`, sorted by tile
     triangles, triangle_first : (k,) uint32 indices of the triangles that overlap each tile
     gutter_copies, gutter_copy_first : (c, 2) uint32 packed x and y of a gutter texel, and of the texel that
         it copies, sorted by cell
@@ -118,7 +118,7 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: flo
 
 
 def _median_texel_mm(atlas: Atlas) -> float:
-    """Return the median side of a lit texel on the surface [mm]."""
+    """Return the median side, on the surface, of the texels whose light is computed (`Atlas.lit`) [mm]."""
     step = max(1, atlas.size // _MAX_AVERAGED_TEXELS_PER_SIDE)
     lit, stretch = atlas.lit[::step, ::step], atlas.stretch[::step, ::step].astype(np.float32)
     density = stretch[..., 0][lit] * stretch[..., 1][lit]
@@ -171,9 +171,10 @@ def _source_cells(lit_mask: Mask, tiles_per_side: int) -> tuple[Index, Index]:
 
 
 def _tiles_of_points(atlas: Atlas, points: Words, cells_per_side: int, tiles_per_side: int) -> Ints:
-    """Return the index (m,) of the tile that contains each surface point's position in the atlas.
+    """Return the index (m,) of the tile of the atlas in which each surface point lies.
 
-    This is the position in the chart of the point's triangle, not in a gutter that also shows the point.
+    A point may appear twice in the atlas: in the chart of its triangle, and in the gutter of another chart.
+    The tile is that of the position in the chart.
 
     points : (m, 2) triangle index, and packed barycentric weights
     cells_per_side, tiles_per_side : cells and tiles along each side of the atlas
@@ -192,9 +193,10 @@ def _pack_words(low_halves: NDArray[np.integer], high_halves: NDArray[np.integer
 
 
 def _tile_triangles(atlas: Atlas, cells_per_side: int, tiles_per_side: int) -> tuple[Words, Words]:
-    """Return the fields `triangle_first` and `triangles` of `Cells`.
+    """Return the triangles that overlap each tile, sorted by tile.
 
-    A triangle overlaps a tile if its bounding box in uv does.
+    The results are the fields `triangle_first` (index of the first entry of each tile) and `triangles` of
+    `Cells`. A triangle counts as overlapping a tile if its bounding box in uv overlaps the tile.
     """
     index = np.flatnonzero(atlas.mapped)
     uv, margin = atlas.corner_uv[index].astype(np.float64), TILE_MARGIN_TEXELS / atlas.size
@@ -211,7 +213,11 @@ def _tile_triangles(atlas: Atlas, cells_per_side: int, tiles_per_side: int) -> t
 
 
 def _gutter_copies(atlas: Atlas, cells_per_side: int) -> tuple[Index, Words]:
-    """Return the fields `gutter_copy_first` and `gutter_copies` of `Cells`."""
+    """Return the texels that copy light from another texel, sorted by the cell that contains the other texel.
+
+    The results are the fields `gutter_copy_first` (index of the first entry of each cell) and `gutter_copies`
+    (pairs of texels) of `Cells`.
+    """
     rim, uv = _rim_texels(atlas)
     texel = np.concatenate([atlas.gutter, rim])
     x, y = np.clip(np.rint(np.concatenate([atlas.source, uv])), 0, atlas.size - 1).astype(np.int64).T
@@ -222,10 +228,11 @@ def _gutter_copies(atlas: Atlas, cells_per_side: int) -> tuple[Index, Words]:
 
 
 def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], Floats]:
-    """Return the lit texels outside their chart, and the atlas positions of the points that they show.
+    """Return the rim texels, and the positions inside charts at which the atlas contains the same points.
 
-    Both arrays are (r, 2): x and y of the texels, and positions [texel]. These texels lie around a chart
-    and are read by interpolation inside the chart. Other texels show the same points as well.
+    Rim texels lie just outside a chart and are read by bilinear interpolation inside it. Their light is
+    computed, not copied. Each represents a surface point that is also inside the chart of its triangle.
+    Both arrays are (r, 2): x and y of the texels, and positions in the atlas [texel].
     """
     inner, view = np.pad(atlas.lit, GUTTER_TEXELS), np.lib.stride_tricks.sliding_window_view
     for axis in (0, 1):

@@ -69,7 +69,14 @@ def merge_stray_pieces(triangle_chart: Index, triangles: Index) -> Index:
 
 
 def _smooth_chart_borders(triangle_chart: Index, triangles: Index) -> Index:
-    """Return the most frequent chart (f,) among the triangles around each triangle."""
+    """Return for each triangle the most frequent chart (f,) in its neighbourhood, which smooths borders.
+
+    The neighbourhood grows in a few steps, in each of which a triangle averages the triangles that share a
+    corner with it.
+
+    triangle_chart : (f,) chart of each triangle
+    triangles : (f, 3) indices of the triangles' corners
+    """
     corner = triangles.ravel()
     triangle_count = np.maximum(np.bincount(corner), 1)[:, None]
     weight = np.eye(int(triangle_chart.max()) + 1)[triangle_chart]
@@ -135,7 +142,8 @@ def _seed_triangles(corners: Doubles, connected_piece: Index, chart_count: int, 
 
     corners : (f, 3, 3) positions of the corners [mm]
     connected_piece : (f,) connected piece to which each triangle belongs
-    chart_count : number of triangles to draw, before those for connected pieces without any are added
+    chart_count : number of triangles to draw at random; one triangle is then added for each connected piece
+        in which none was drawn
     seed : seed of the random choice
     """
     area = triangle_areas(corners)

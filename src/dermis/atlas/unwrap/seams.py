@@ -163,7 +163,10 @@ def _repair_charts(mesh: ChartMesh, flat_charts: FlatCharts, repair_count: int) 
 
 
 def _reassign_faulty_triangles(mesh: ChartMesh, flat_charts: FlatCharts) -> Index:
-    """Return the chart of each triangle (f,) after moving faulty triangles to adjacent charts, if any."""
+    """Move each faulty triangle that has an adjacent chart to that chart; return each triangle's chart (f,).
+
+    `FlatCharts.faulty` states which triangles are faulty.
+    """
     adjacent = flat_charts.chart[neighbour_triangles(mesh.triangles)]
     other = np.where(adjacent == flat_charts.chart[:, None], -1, adjacent).max(axis=1)
     return merge_stray_pieces(
@@ -172,7 +175,10 @@ def _reassign_faulty_triangles(mesh: ChartMesh, flat_charts: FlatCharts) -> Inde
 
 
 def _split_faulty_charts(mesh: ChartMesh, flat_charts: FlatCharts) -> Index:
-    """Return the chart of each triangle (f,) after splitting each chart with faulty triangles in two."""
+    """Split each chart that contains faulty triangles in two; return the chart of each triangle (f,).
+
+    `FlatCharts.faulty` states which triangles are faulty.
+    """
     chart = 2 * flat_charts.chart
     for k in np.unique(flat_charts.chart[flat_charts.faulty]):
         own = np.flatnonzero(flat_charts.chart == k)

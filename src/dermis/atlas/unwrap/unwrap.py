@@ -64,7 +64,7 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
 
 
 def _packing_orders(chart_sizes: Doubles) -> Iterator[Index]:
-    """Yield orders in which charts are dropped: by height, by width, and random orders.
+    """Yield orders in which to place charts when they are packed: by height, by width, and random orders.
 
     chart_sizes : (c, 2) width and height of each chart
     """
