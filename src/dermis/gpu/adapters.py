@@ -94,7 +94,7 @@ def register_c_types(ffi: Any) -> int:
 def _pointer_and_array_types(declarations: Any) -> Iterator[tuple[str, Any]]:
     """Yield the C type names of pointers and arrays as wgpu spells them, with their cffi models.
 
-    declarations : declarations that cffi parsed from wgpu's header, by name
+    declarations : dictionary from C names to the declarations that cffi parsed from wgpu's header
     """
     from cffi import model  # type: ignore[import-untyped]
 
@@ -115,9 +115,12 @@ def _pointer_and_array_types(declarations: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _callback_types(declarations: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the C signatures of callbacks as wgpu spells them, with their cffi models.
+    """Yield, for each callback type of wgpu's header, its C signature and its parsed type.
 
-    declarations : declarations that cffi parsed from wgpu's header, by name
+    The signature is a string that uses the header's names of types; the parsed type is an object of
+    `cffi.model`.
+
+    declarations : dictionary from C names to the declarations that cffi parsed from wgpu's header
     """
     from cffi import model
 

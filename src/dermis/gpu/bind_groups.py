@@ -91,7 +91,10 @@ class ResourceCache(Generic[T]):
 
     @property
     def resource_count(self) -> int:
-        """Return the number of resources whose release the cache watches."""
+        """Return the number of resources that the cached objects use.
+
+        The cache observes these resources, to drop the objects that use a resource when it is released.
+        """
         return len(self._keys)
 
     def find(self, cache_key: ResourceKey) -> T | None:

@@ -55,8 +55,8 @@ class CapturedPass:
         and the indices of three resources (index buffer, depth view, colour target), where -1 stands for a
         missing resource; None for other passes
     written : for a write from the host, the index of the buffer and the bytes; None for other passes
-    unit : index of the unit to which the pass belongs; a unit is a recording or a single pass, and its passes
-        are run or skipped together
+    unit : index of the unit to which the pass belongs; a unit is a single pass, or a group of passes
+        that are run or skipped together
     """
 
     stage: str
@@ -81,10 +81,10 @@ class CapturedFrame:
     _record_index: dict[int, int] = field(default_factory=dict)
 
     def add(self, captured_pass: CapturedPass, unit_index: int | None) -> None:
-        """Append a pass.
+        """Append a pass to the captured frame.
 
-        unit_index : index of the recording to which the pass belongs; None for a pass that is a unit by
-            itself
+        unit_index : index of the unit, a group of passes that are run or skipped together, to which the pass
+            belongs; None for a pass that is run or skipped on its own
         """
         last = self.passes[-1].unit if self.passes else -1
         captured_pass.unit = last + 1 if unit_index is None else unit_index
@@ -147,7 +147,7 @@ class FrameCapture(Graph):
         return [np.ascontiguousarray(one).view(np.uint8).reshape(-1) for one in texels]
 
     def resource_at(self, resource_index: int) -> Untyped:
-        """Return the texture, view, buffer or sampler that `resources` describes at an index."""
+        """Return the captured texture, view, buffer or sampler that `resources[resource_index]` describes."""
         return self._objects[resource_index]
 
     def index_of_resource(self, bound_object: Bindable) -> int:
@@ -205,13 +205,14 @@ class FrameCapture(Graph):
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Raise NotImplementedError, as players of captured frames cannot run a program once per texel."""
+        """Raise NotImplementedError, as programs that replay a captured frame do not support such passes."""
         raise NotImplementedError(f"{stage}: passes that fill targets cannot be captured")
 
     def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
         """Capture all passes of `record_passes(recorder, *args)` as one unit, and return its result.
 
-        Players run either all passes of a unit or none.
+        A program that replays the captured frame runs either all passes of a unit or none. Within another
+        call of `repeat`, the passes belong to the unit of the outer call.
         """
         if self._unit is not None:
             return record_passes(self, *args)

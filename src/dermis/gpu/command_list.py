@@ -61,7 +61,7 @@ class CommandList(Recorder):
     ) -> None:
         """Add a dispatch of a compute program, see `Recorder.dispatch`.
 
-        in_place_resource : ignored, as only the search for stale passes needs it
+        in_place_resource : ignored; only the frame graph needs it, to find passes with outdated output
         access : `Access` of the program to these resources, which caches the native dispatch for later frames
         """
         key = stage, workgroups, program.record_positions(resources, self._uniforms)
@@ -166,7 +166,10 @@ class CommandList(Recorder):
         self.device.wait(self.submitted)
 
     def stage_ms(self) -> dict[str, float] | None:
-        """Return the time of each stage and of the frame ("total") after `submit` [ms]; None if not timed."""
+        """Return the times of the whole frame ("total") and of its stages, after `submit` [ms].
+
+        Returns None if the frame is not timed.
+        """
         clock = self._wall_clock or self._timestamps
         return clock.stage_ms() if clock else None
 
@@ -178,8 +181,9 @@ class CommandList(Recorder):
         targets: Sequence[TextureOrView],
         depth_attachment: Mapping[str, object] | None = None,
     ) -> Untyped:
-        """Begin a render pass with cleared targets, pipeline and bind group, and return its encoder.
+        """Begin a render pass that clears its targets, set its pipeline and bind group; return its encoder.
 
+        targets : colour attachments, which are cleared to 0
         depth_attachment : wgpu's description of the depth attachment; None for a pass without depth
         """
         cleared = {"load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}
@@ -197,7 +201,7 @@ class CommandList(Recorder):
 
     @property
     def _encoder(self) -> Untyped:
-        """Return the open command encoder, or create one if there is none since the last submission."""
+        """Return the open command encoder; create one if none has been opened since the last submission."""
         if self._open_encoder is None:
             self._open_encoder = self.device.command_encoder()
         return self._open_encoder
@@ -332,7 +336,13 @@ class Timestamps:
         self._stages: list[str] = []
 
     def begin(self, stage: str) -> TimestampWrites | None:
-        """Reserve a timestamp for a pass; return wgpu's description of it, or None if none is taken."""
+        """Reserve the timestamp at the start of a pass, and return its description for wgpu.
+
+        Returns None if the pass gets no timestamp: with `frame_only`, all passes except the first get none,
+        and neither do passes for which the pool has no timestamps left.
+
+        stage : name of the stage to which the time of the pass is added
+        """
         is_full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
         if is_full or (self._frame_only and self._stages):
             return None
@@ -349,7 +359,7 @@ class Timestamps:
             encoder.resolve_query_set(self._queries, 0, len(self._stages), self._resolved, 0)
 
     def stage_ms(self) -> dict[str, float]:
-        """Return the time of each stage (unless `frame_only`) and of the frame ("total") [ms]."""
+        """Return the time of the whole frame ("total") and, without `frame_only`, that of each stage [ms]."""
         if not self._stages:
             return {"total": 0.0}
         raw = self._device.handle.queue.read_buffer(self._resolved, 0, 8 * len(self._stages))

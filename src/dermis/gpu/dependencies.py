@@ -52,9 +52,9 @@ class ResourceState:
         return found
 
     def set_version(self, version: int) -> None:
-        """Set the version of this resource and of its views.
+        """Set the version of this resource and of its views, a number that identifies their current content.
 
-        If this resource is a view, the version of the viewed texture becomes unknown.
+        If this resource is a view, the version of the viewed texture becomes unknown (0).
         """
         self.version = version
         for view in self.views:
@@ -108,17 +108,20 @@ def resource_state(device: Device, resource: Bindable) -> ResourceState:
 
 
 PassAccess = tuple[int, tuple[ResourceState, ...], tuple[ResourceState, ...]]
-"""Access id of a pass, the resources that it reads, and those that it writes."""
+"""`Access.id` of a pass, the states of the resources that it reads, and of those that it writes."""
 
 
 class Dependencies:
     """Dependencies between the passes of a frame, used to find stale passes: those with outdated output.
 
-    The version of a pass's output is a hash of the versions that the pass reads and of its key, which stands
-    for all other inputs. A pass is skipped if its outputs already have that version. It is also skipped if no
-    pass that runs reads its outputs, and each output is scratch or overwritten later.
+    A version is a number that identifies the content of a resource. The version of a pass's outputs is a hash
+    of the versions of the resources that the pass reads and of the key of the pass, which stands for all
+    other inputs. A pass is skipped if its outputs already have their version. It is also skipped if no pass
+    that runs reads its outputs, and each output is overwritten later or is not needed after the frame (see
+    `mark_scratch`).
 
-    passes : for each pass, in order, its access id and the states of the resources that it reads and writes
+    passes : for each pass, in order, the number of its combination of program and resources (`Access.id`),
+        and the states of the resources that it reads and writes
     """
 
     def __init__(self, passes: list[PassAccess]) -> None:

@@ -189,7 +189,10 @@ class Device:
         )
 
     def release_staging(self, buffer: Buffer) -> None:
-        """Keep a staging buffer for later readbacks; if its size is new, drop kept buffers of other sizes."""
+        """Keep a staging buffer for later readbacks.
+
+        The first buffer of a new size replaces the kept buffers of other sizes.
+        """
         if buffer.size not in self._staging:
             self._staging.clear()
         self._staging.setdefault(buffer.size, []).append(buffer)

@@ -72,8 +72,8 @@ class FrameListing:
 
         stage : name of the stage
         workgroups : see `ListedPass.groups`
-        declared_index : index of the declared pass, which may be a recording that contains several listed
-            passes
+        declared_index : index of the pass among those declared on the graph; all passes of a recording have
+            the same index, because a recording is declared as one pass
         recorded : whether the pass belongs to a recording
         """
         bindings = {one.name: self._describe_binding(resources[one.name]) for one in program.bindings}
@@ -86,7 +86,7 @@ class FrameListing:
     def add_write(self, stage: str, buffer: Buffer, byte_count: int, declared_index: int) -> None:
         """Append a write of `byte_count` bytes from the host to a buffer.
 
-        declared_index : index of the declared pass that writes
+        declared_index : index of the write among the passes declared on the graph
         """
         self.passes.append(
             ListedPass(stage, "from the host", {}, {"written": self._describe_binding(buffer)}, (byte_count,))
@@ -94,7 +94,7 @@ class FrameListing:
         self._pass_index.append(declared_index)
 
     def finish(self, ran_by_declared_pass: Sequence[bool]) -> None:
-        """Set `ran` of all listed passes after the frame.
+        """After the frame, store in `ListedPass.ran` of each listed pass whether it ran.
 
         ran_by_declared_pass : for each declared pass, whether it ran
         """
@@ -114,10 +114,10 @@ class FrameListing:
 
 
 class ListingRecorder(Recorder):
-    """Recorder that lists the passes of a recording instead of recording them.
+    """Recorder that only adds the passes of a recording (see `Recording`) to a listing.
 
     listing : listing to which the passes are added
-    index : index of the recording among the declared passes
+    declared_index : index of the recording among the passes declared on the graph
     """
 
     def __init__(self, device: Device, listing: FrameListing, declared_index: int) -> None:
@@ -151,7 +151,8 @@ class DeclaredPass:
     stages : names of the stages of the pass or passes
     run : function that adds the pass, or the passes, to a command list
     key : everything that the output depends on besides the resources that are read
-    access : access id, and states of the resources that are read and written
+    access : number of the combination of program and resources (`Access.id`), and the states of the resources
+        that are read and written
     """
 
     stages: tuple[str, ...]
@@ -164,13 +165,15 @@ class Graph(Recorder):
     """Frame graph: a recorder that runs only those declared passes whose output is outdated.
 
     The resources that a pass reads and writes follow from the bindings of its shader. The version of its
-    output is a hash of the program, the resources and their versions, the workgroups, and the uniforms that
-    the shader reads. A pass is skipped if its outputs already have that version. It is also skipped if no
-    pass that runs reads its outputs, and each output is scratch or overwritten later.
+    outputs, a number that identifies their content, is a hash of the program, the resources and their
+    versions, the workgroups, and the uniforms that the shader reads. A pass is skipped if its outputs already
+    have that version. It is also skipped if no pass that runs reads its outputs, and each output is
+    overwritten later or is not needed after the frame (see `mark_scratch`).
 
     recordings : cache of the recordings that `repeat` makes
     executed_stages : stages of the passes that ran in the last frame, in order
-    listing : listing to which the passes of the next frame are added; None for no listing
+    listing : object that lists the passes of the next frame and whether they ran, for inspection; None if the
+        next frame is not listed
     """
 
     def __init__(self, device: Device) -> None:
@@ -282,7 +285,10 @@ class Graph(Recorder):
         return result
 
     def read_back(self, *buffers: Buffer) -> BufferReadback:
-        """Return a readback: a copy, made after the frame, of the content of buffers one after another."""
+        """Request copies of buffers at the end of the frame; return the readback that gives their content.
+
+        The readback contains the content of all buffers, concatenated in the order of the arguments.
+        """
         readback = BufferReadback(self.device, sum(buffer.size for buffer in buffers))
         self._readbacks.append((buffers, readback))
         return readback

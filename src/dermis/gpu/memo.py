@@ -39,8 +39,8 @@ class Memo:
 
     cache_size : number of results to keep for each function, for callers that alternate between a few sets of
         arguments
-    cache_ttl : number of frames after which the results of an unused function are dropped; at least
-        `cache_size` squared
+    cache_ttl : number of frames after which the results of an unused function are dropped; if this number is
+        smaller than the square of `cache_size`, the square is used instead
     """
 
     def __init__(self, cache_size: int = 1, cache_ttl: int = 1) -> None:

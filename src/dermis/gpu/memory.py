@@ -48,7 +48,8 @@ class OutOfMemoryError(DermisError):
     actual : second part of the message, which says why it does not fit
     size : size of the resource [byte]
 
-    Callers can combine both parts with other advice.
+    The message also contains advice. Callers can replace the advice: they catch the error, and raise a new
+    one with the same `expected` and `actual`.
     """
 
     def __init__(self, expected: str, actual: str, size: float, advice: str = _SMALLER_FRAME_ADVICE) -> None:

@@ -137,7 +137,10 @@ class Program:
         return tuple(found)
 
     def _bound_resources(self, resources: Bindings) -> Sequence[Bindable]:
-        """Return the bound resources in the order of the shader's bindings, without uniform records."""
+        """Return the resources to bind, in the order of the shader's bindings, without uniform records.
+
+        resources : resources and uniform records by their names in the shader
+        """
         try:
             return self._get_resources(resources)
         except KeyError as missing:
@@ -147,10 +150,12 @@ class Program:
         return KeyError(f"{self.name}.wgsl declares {key_error.args[0]!r}, and nothing is bound to it")
 
     def _make_bind_group(self, bound_resources: Sequence[Bindable], resources: Bindings) -> BindGroup:
-        """Create the bind group for some resources.
+        """Create the bind group of the shader.
 
-        bound_resources : resources in the order of the bindings, the buffers of uniform records last
-        resources : resources and uniform records by their names in the shader
+        bound_resources : resources to bind, in the order of the bindings; the last ones are the buffers that
+            contain the uniform records
+        resources : resources and uniform records by their names in the shader; only the sizes of the uniform
+            records are used
         """
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
         sizes = [records[one.name].nbytes for one in self._uniforms]
@@ -221,7 +226,8 @@ class RenderProgram(Program):
     depth_compare : wgpu's name of the depth test, such as "less"; None for no depth attachment
     has_fragment : whether `fragment` runs; None to run it if there are targets. Without targets, `fragment`
         may discard pixels of the depth pass
-    raster : depth test and format of the first target, for players of captured frames (see capture.py)
+    raster : depth test and format of the first target, for programs that replay captured
+        frames (see capture.py)
     """
 
     stages = "VERTEX", "FRAGMENT"
@@ -278,7 +284,7 @@ def used_constants(path: Path, folders: Sequence[Folder], constants: Constants) 
 def shader_source(path: Path, folders: Sequence[Folder]) -> ShaderSource:
     """Return a shader with its includes and other directives expanded.
 
-    folders : folders in which included files are searched, before the folder of this toolkit
+    folders : folders in which included files are searched, before the shaders of `dermis.gpu`
     """
     return compose_shader(path, (*folders, _TOOLKIT_SHADER_FOLDER))
 

@@ -16,9 +16,9 @@ class BufferReadback:
     """Copy of a buffer in staging memory, which becomes readable when a submission has finished.
 
     In wgpu's own mapping, another thread waits for the newest submission. Here, only the reader waits, and
-    only for the submission that fills the copy.
+    only for the submission that fills the staging buffer.
 
-    size : size of the copy [byte]
+    size : size of the copied buffer [byte]
     """
 
     def __init__(self, device: Device, size: int) -> None:
@@ -28,9 +28,9 @@ class BufferReadback:
         self.buffer = device.acquire_staging(size)
 
     def start(self, submission: int) -> None:
-        """Request that the copy be mapped to host memory after a submission.
+        """Request that the staging buffer be mapped to host memory when a submission has finished.
 
-        submission : number of the submission that fills the copy, from `Device.submit`
+        submission : number, returned by `Device.submit`, of the submission that fills the staging buffer
         """
         ffi, lib = self.device.ffi, self.device.lib
         info = ffi.new("WGPUBufferMapCallbackInfo *")

@@ -30,9 +30,12 @@ class DrawTarget(NamedTuple):
 
 
 class Recorder(ABC):
-    """Interface for adding passes: to a command list, a graph, a recording, a capture or a listing.
+    """Interface for adding passes, with which the same code can run, schedule, store or list passes.
 
-    All implementations accept compute passes; recordings and listings of recordings refuse other passes.
+    The implementations are a command list, which runs the passes; a graph, which runs only passes with
+    outdated output; a recording, which stores compute passes to replay them in later frames; a capture, which
+    stores a frame for export; and a recorder that adds the passes of a recording to a listing for inspection.
+    All accept compute passes; the recording and the listing accept no others.
     """
 
     device: Device
@@ -123,7 +126,8 @@ class Recorder(ABC):
     def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
         """Add the passes that `record_passes(recorder, *args)` adds, and return the result of the call.
 
-        Passes and result must depend only on `args`.
+        An implementation may reuse the passes and the result of an earlier call with equal `args`, so both
+        must depend only on `args`.
         """
         return record_passes(self, *args)
 

@@ -100,7 +100,11 @@ def _uniform_chunk(device: Device, chunks: list[Buffer], chunk_index: int) -> Bu
 
 
 class RecordingCache:
-    """Cache of the latest recordings of each function, for callers that alternate between arguments."""
+    """Cache of recorded compute passes, so that functions that add passes need not be called in each frame.
+
+    For each function, the recordings of the most recent sets of arguments are kept, because some callers
+    alternate between a few sets.
+    """
 
     def __init__(self) -> None:
         self._recordings: dict[Callable[..., object], list[tuple[object, Recording, Any]]] = {}

@@ -55,7 +55,7 @@ class Uniforms:
         return self._chunk(index), offset
 
     def upload(self) -> None:
-        """Write all placed records to their buffers before the next submission runs."""
+        """Write all collected uniform records to their buffers, so that the next submission reads them."""
         for index, staged in enumerate(self._staged):
             last = index == len(self._staged) - 1
             self._device.write(self._chunk(index), staged, self._end if last else UNIFORM_CHUNK_BYTES)

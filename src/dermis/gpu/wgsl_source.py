@@ -95,7 +95,8 @@ def compose_shader(path: Path, folders: Sequence[Folder]) -> ShaderSource:
     path : file of the shader
     folders : folders in which an included file is searched if it is not next to the file that includes it
 
-    Raises DermisError for a missing file, list, {word} or `//#end`.
+    Raises DermisError if an included file or a list does not exist, if a {word} has no replacement, or if
+    `//#if`, `//#else` and `//#end` do not match.
     """
     shared = [folder for folder in folders if isinstance(folder, ShaderFolder)]
     lists = {name: tuple(members()) for folder in shared for name, members in folder.lists.items()}
@@ -108,7 +109,13 @@ def compose_shader(path: Path, folders: Sequence[Folder]) -> ShaderSource:
 
 
 class _Definitions(NamedTuple):
-    """Folders, lists, numbers and options to which directives refer, in hashable form as a cache key."""
+    """Definitions to which the directives of shaders refer; they are hashable, to be part of a cache key.
+
+    folders : folders in which included files are searched
+    lists : pairs of the name and the members of each list for `//#include <list>` and `//#each`
+    numbers : pairs of a {word} of `//#fill` and the number, as text, that replaces it
+    options : names for which `//#if` is true
+    """
 
     folders: tuple[Path, ...]
     lists: tuple[tuple[str, tuple[ShaderListMember, ...]], ...]

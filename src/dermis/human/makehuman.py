@@ -45,7 +45,7 @@ def morphed_points_mm(target_weights: Mapping[str, float]) -> Points:
 
     target_weights : mapping from names of MakeHuman's morph targets to weights
 
-    Raises DermisError for unknown targets.
+    Raises DermisError for names that are not morph targets of MakeHuman.
     """
     arrays, targets = makehuman_arrays(), target_deltas()
     points = [np.arange(len(arrays["positions_mm"]))]

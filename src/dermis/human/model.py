@@ -171,9 +171,9 @@ class Template:
     refinement: Refinement | None
 
     def refine_head(self, control_head: Head) -> Head:
-        """Return the subdivided head of a person, which shares the uv atlas of the template's head.
+        """Return the subdivided head of a person, which uses the uv atlas of `head`, the mean person's head.
 
-        control_head : head before subdivision, with the uv layout of the template
+        control_head : the person's head before subdivision, in the same uv layout as `head`
         """
         rig = replace(control_head.control, stencils=self.head.control.stencils, template=self.head.control)
         mesh = control_head.mesh

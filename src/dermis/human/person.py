@@ -160,13 +160,15 @@ def _sample_ancestry(
     sampled_fractions: NDArray[np.float64],
     fixed_fields: Mapping[str, Any],
 ) -> tuple[NDArray[np.float64], dict[str, float]]:
-    """Return the ancestry fractions (3,) of a person's shape, and the ancestry of the skin.
+    """Sample the ancestry of a person, in one form for the shape of the head and in another for the skin.
 
-    The skin's ancestry is a dictionary from the names of groups of measured people to weights, with which the
+    Returns the fractions (3,) of African, Asian and Caucasian ancestry for the shape. For the skin, returns a
+    dictionary from names of groups of people, whose skin has been measured, to weights with which the
     pigments of these groups are averaged.
+
     If the ancestry of the shape is fixed, the skin follows the shape. If only a skin ancestry or an ITA is
-    fixed, the shape follows the skin. Otherwise some people of Caucasian shape have South Asian or Middle
-    Eastern skin.
+    fixed, the shape follows the skin. If nothing is fixed, the skin follows the shape, too, except that some
+    people of Caucasian shape get South Asian or Middle Eastern skin.
 
     fixed_numbers : values of numeric fields that are not sampled
     sampled_fractions : (3,) sampled ancestry fractions of the shape
@@ -324,8 +326,8 @@ class Human:
         Name of a group of measured people whose colours of skin, eyes and hair the person gets, independently
         of the shape, such as "south asian"; "" for the colours of the shape's ancestries.
     ita : float, optional
-        Individual typology angle of the cheek if `skin` is not given, -65 (darkest) to 70 (lightest)
-        [degrees]; the skin is otherwise typical of measured people with this angle.
+        Individual typology angle of the cheek, -65 (darkest) to 70 (lightest) [degrees]; the pigments are
+        typical of measured people whose skin has this angle. Ignored if `skin` is given.
 
     Raises
     ------
@@ -438,7 +440,7 @@ class Human:
         Raises
         ------
         DermisError
-            For unknown targets and for values out of range.
+            For values out of range, and if `targets` contains names that are not morph targets of MakeHuman.
         """
         if layout not in get_args(Layout):
             actual = f"got {format_value(layout)}"
@@ -518,7 +520,7 @@ class Human:
         `Pose(positions_mm=...)` gives the head of any other person this shape, because all people have
         corresponding points.
 
-        Raises DermisError for unknown targets.
+        Raises DermisError if `targets` contains names that are not morph targets of MakeHuman.
         """
         return control_points_mm(self.weights())
 

@@ -30,7 +30,10 @@ _STRETCH_ATLAS_SIDE = 1024
 
 
 def person_parameters(person: Human) -> dict[str, Any]:
-    """Return all parameters of a person as a dictionary; looks that are not set are the typical looks."""
+    """Return all parameters of a person as a dictionary.
+
+    If the look of the skin, hair or eyes is not set, the look that is typical for the person takes its place.
+    """
     numbers = {one.name: getattr(person, one.name) for one in fields(person)}
     numbers |= {"targets": dict(person.targets), "skin": asdict(person.look)}
     return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hairdo)}

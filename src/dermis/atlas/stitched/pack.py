@@ -296,7 +296,7 @@ def _layout_at_scale(
     """Return the layout of the pieces at one scale, or None if they do not fit.
 
     masks : cells that each piece occupies
-    scale : cells per unit of the pieces' scaled uv
+    scale : number of cells per unit of `_Piece.uv`, the same for all pieces
     cells_per_side : cells along each side of the grid
     order_index : index of the packing order: order_index // 2 selects the sort key (0 area, 1 height, 2
         width); if the index is odd, pieces are placed column by column instead of row by row

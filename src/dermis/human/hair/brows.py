@@ -32,7 +32,8 @@ class SurfacePoints(NamedTuple):
     """Sampled skin points with their normals and tangents.
 
     position_mm, normal : (n, 3) positions [mm] and unit normals
-    derivative_x, derivative_y : (n, 3) derivatives of the position with respect to x and to y [-]
+    derivative_x, derivative_y : (n, 3) tangents of the skin: derivatives of the position with respect to x
+        and y, the coordinates of the grid on which `BrowSurface` samples the skin [-]
     """
 
     position_mm: Doubles

@@ -48,9 +48,10 @@ class HairDensity(NamedTuple):
 
 
 def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.random.Generator) -> Roots:
-    """Return random, evenly distributed hair roots, ordered by quad.
+    """Return random hair roots, ordered by quad, whose number per area follows the density map.
 
-    No hair grows on the ears, on the lips or in the mouth.
+    Within a quad, the candidates are points of a low-discrepancy sequence, so that roots do not cluster. No
+    hair grows on the ears, on the lips or in the mouth.
 
     mesh : control mesh of the person
     density : relative density over the skin

@@ -58,7 +58,10 @@ class _LidEdge(NamedTuple):
 
 
 class RootFinder:
-    """Search for hair roots on a quad mesh, by x and y seen from the front or by a position on a lid's edge.
+    """Finder of hair roots on a quad mesh.
+
+    A root is searched either by its x and y as seen from the front, or by its position along the edge of an
+    eyelid.
 
     mesh : control mesh
     points_mm : (p, 3) positions of the control points [mm]

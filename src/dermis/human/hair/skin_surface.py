@@ -62,7 +62,11 @@ class RootFrames:
 
     @cached_property
     def frame_vectors(self) -> Floats:
-        """Return the frames as an array (3, 3, n), indexed by axis, component of the axis and root."""
+        """Return the coordinate frames as an array (3, 3, n).
+
+        The first dimension is the axis of the frame, the second the x, y and z of this axis, and the third
+        the root.
+        """
         return np.ascontiguousarray(self.frame.transpose(1, 2, 0), np.float32)
 
 
@@ -87,7 +91,10 @@ class GrowthSurface:
         return self._columns.T
 
     def root_frames(self, roots: Roots) -> RootFrames:
-        """Convert roots on quads of the control mesh to roots on the subdivided mesh, with frames."""
+        """Convert roots on quads of the control mesh to roots on the subdivided mesh.
+
+        The result also contains the position of each root and the axes of its coordinate frame.
+        """
         finer = refine_roots(self.control_mesh, roots, self._levels)
         return RootFrames(finer, *root_frames(self._mesh, finer, self.points_mm))
 

@@ -27,16 +27,18 @@ class Style:
     gravity : strength of gravity
     cut_y_mm : height at which hair is cut level; None for hair that is not cut level
     fringe_y_mm : height at which hair over the forehead is cut; None for a style without a fringe
-    round : size of the ellipsoid to which standing hair is cut, 0 to 1; 0 for no such cut
+    round : distance from the skull to the ellipsoid at which standing hair is cut, as an approximate fraction
+        of `max_length_mm`, 0 to 1; 0 for no such cut
     layers : largest random shortening of strands, as a fraction of their length
     fade : usual shortening of the hair at the sides and the nape, 0 to 1, which `HairLook` may replace
     clump : pull of strands towards the middle of their clump, 0 to 1
     clump_mm : size of the clumps
     rope_mm : radius of the ropes into which hair is twisted or braided; 0 for loose hair
     braid : whether ropes are braids of three bundles instead of twists
-    tie_mm : position of the hair tie of a ponytail or bun
+    tie_mm : (3,) position of the hair tie of a ponytail or bun, relative to the midpoint between the eyes
     coil_mm : radius of the bun; 0 for a ponytail
-    crown : recession of the hair at crown and temples, 0 to 1; used if the recession in `SkinLook` is smaller
+    crown : smallest recession of the hair at crown and temples, 0 to 1; a larger recession in `SkinLook`
+        takes precedence
     women, men : relative probabilities of the style among women and among men
     tight : whether tightly coiled hair is worn in this style
     loose : whether hair that is not tightly coiled is worn in this style

@@ -1,4 +1,4 @@
-"""Label classes of hairs and meshes, with the borders of facial parts as signed distance fields."""
+"""Label classes of hairs and meshes; on the skin, the borders of classes are given by signed distances."""
 
 from __future__ import annotations
 
@@ -210,7 +210,8 @@ def _iris_fields(head: Head) -> dict[str, Doubles]:
     """Return the signed distances (p,) of the head's points to the border of each iris [mm].
 
     The keys are the label classes of the two irises. Distances are positive inside the iris, and scaled as if
-    the eye had average size. Points outside the eyeball get -1.
+    the eye had average size. All points that are not on the front of the eyeball get the value -1, so that
+    they count as outside.
     """
     if head.eyes is None:
         return {}
@@ -231,8 +232,9 @@ def _iris_fields(head: Head) -> dict[str, Doubles]:
 def _skin_fields(head: Head) -> dict[str, Doubles]:
     """Return the signed distances (p,) of the head's points to the borders of parts of the skin [mm].
 
-    The keys are the label classes of these parts, such as lips, brows and ears. Points that are not on the
-    skin get -1.
+    The keys are the label classes of these parts, such as lips, brows and ears. Distances are positive inside
+    a part. All points that are not on the skin get the value -1, whatever their distance, so that they count
+    as outside.
     """
     mesh = head.mesh
     count = int(mesh.point.max()) + 1

@@ -1,4 +1,4 @@
-"""Average human, on which regions and landmarks are defined: its head, outer skin and landmarks."""
+"""Average human: its head and outer skin, and the face regions and landmarks that are defined on them."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def average_skin() -> DenseSkin:
 
 
 def _bare_head(levels: int) -> Head:
-    """Return the head of the average human without hair, at a level of subdivision."""
+    """Return the head of the average human, subdivided `levels` times and without its hair."""
     return template("own", levels).refine_head(build_head(AVERAGE_HUMAN.weights(), Maps(), "own", EyeLook()))
 
 
@@ -118,7 +118,7 @@ def classify_surface(points: Doubles, quad_index: NDArray[np.int64]) -> NDArray[
     """Return the face region (n,) of points on or near the average human, as indices into `REGIONS`.
 
     points : (n, 3) positions [mm]
-    quad_index : (n,) index of the nearest control quad
+    quad_index : (n,) for each point, the index of the nearest quad of the average head before subdivision
     """
     parts, mesh = quads_of_parts(), average_head().mesh
     mouth_materials = [k for k, one in enumerate(mesh.materials) if one.name in _MOUTH_MATERIALS]

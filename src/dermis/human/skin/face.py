@@ -94,11 +94,11 @@ def zone_table(recession: float = 0.0, site_differences: SiteDifferences | None 
 
 @cache
 def _zone_amounts_of_sites() -> NDArray[np.float64]:
-    """Return amounts (k, 7) for the k Gaussian zones of the face; each column changes one of seven sites.
+    """Return heights (k, 7) of the k Gaussian zones of the face, with one column for each of seven sites.
 
-    The sites are positions on the face: the cheek, then `FACE_SITES`. As zones overlap, several zones affect
-    a site. With the amounts of one column as the heights of the Gaussians, the sum of all Gaussians is 1 at
-    the site of this column and 0 at the other sites.
+    The sites are positions on the face: the cheek, then `FACE_SITES`. With the heights of one column, the sum
+    of all Gaussians is 1 at the site of this column and 0 at the six other sites. As zones overlap, a column
+    has heights for several zones.
     """
     zones, names = read_rows(__package__, "zones"), (_REFERENCE_SITE, *FACE_SITES)
     places = {row["site"]: row for row in read_rows(__package__, "sites")}

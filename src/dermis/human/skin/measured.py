@@ -1,7 +1,7 @@
-"""Pigments of human skin by ancestry, sex, age, site of the body and skin tone, from measured people.
+"""Pigments of human skin by ancestry, sex, age, site of the body and skin tone, from measurements of people.
 
-The table `measured.json` is written by `python -m dermis.apps.validation.people table` from the spectra of
-the International Skin Spectra Archive, by inversion of the package's own model [Lu2025].
+The table `measured.json` is written by `python -m dermis.apps.validation.people table`, which fits this
+package's model of skin to the spectra of the International Skin Spectra Archive [Lu2025].
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ class SiteDifferences:
             object.__setattr__(self, one.name, checked)
 
     def as_array(self) -> Doubles:
-        """Return the differences as an array (6, 3) in the order of `FACE_SITES`."""
+        """Return the differences between each site and the cheek, (6, 3), in the order of `FACE_SITES`."""
         return np.array([getattr(self, name) for name in FACE_SITES], np.float64)
 
 
@@ -146,12 +146,12 @@ class _Group(NamedTuple):
 
 
 class MeasuredTable(NamedTuple):
-    """Distributions of the pigments of measured people.
+    """Distributions of skin pigments in groups of people, from measurements of their skin.
 
     The four variables describe the cheek: log2 of melanin, log2 of blood, oxygen, and log2 of the thickness
-    of the epidermis in mm.
+    of the epidermis in mm. Their distributions in each group are stored as quantiles.
 
-    probabilities : (k,) probabilities of the quantiles
+    probabilities : (k,) cumulative probabilities, 0 to 1, to which the k quantiles of each variable belong
     groups : mapping from group name to distribution
     sex, age : (4,) changes of the variables from female to male, and from young to old
     mean_age_term : mean of `age_term` over the ages that `Human.drawn` samples
@@ -224,13 +224,13 @@ class MeasuredTable(NamedTuple):
 
 @cache
 def measured_table() -> MeasuredTable:
-    """Return the distributions of the pigments of measured people, read from the package's file."""
+    """Return the distributions of skin pigments in groups of people, read from `measured.json`."""
     text = resources.files("dermis.human").joinpath("data", "measured.json").read_text("utf-8")
     return parse_measured_table(json.loads(text))
 
 
 def parse_measured_table(json_object: Mapping[str, Any]) -> MeasuredTable:
-    """Return the distributions of the pigments of measured people from a JSON object.
+    """Return the distributions of skin pigments in groups of people from the content of `measured.json`.
 
     json_object : content of measured.json
     """
@@ -277,7 +277,7 @@ def _split_union_weight(union_name: str, weight: float) -> dict[str, float]:
 
 
 def pigment_ancestry(weight_of_group: GroupWeights) -> tuple[float, float, float]:
-    """Return the African, Asian and European fractions that determine pigments of hair and eyes.
+    """Return the fractions of African, Asian and European ancestry that determine hair and eye pigments.
 
     weight_of_group : weight of each group of measured people; the weights add up to 1
     """

@@ -50,7 +50,9 @@ def painted_colour_tables(skin_look: SkinLook) -> NDArray[np.float32]:
 
 @dataclass(frozen=True, repr=False)
 class PaintedMaps(Maps):
-    """Skin maps that the GPU paints from a skin look; a map that is not None replaces the painted map.
+    """Skin maps that the GPU paints from a skin look, unless the user gives them.
+
+    A field is None if its map is painted; a map in the field is used instead of the painted map.
 
     look : pigments and texture of the skin
     """

@@ -27,9 +27,10 @@ _CREST_LID_DISTANCE_LIMITS_MM = 0.15, 0.8  # limits of the lid distance in the c
 
 @cache
 def average_surface() -> tuple[Floats, Floats]:
-    """Return the average person's control points (p, 3), and their distances (p, 3) to three borders [mm].
+    """Return the control points (p, 3) of the average person, and signed distances (p, 3) to borders [mm].
 
-    `BORDER_FIELDS` names the three borders and states the signs of the distances.
+    For each point, these are the distances to the borders of the lips, the mouth and the eyelids; see
+    `BORDER_FIELDS` for the signs.
     """
     points_mm, fields = _load_array("places"), _load_array("fields")
     rings = lid_rings()
