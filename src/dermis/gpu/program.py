@@ -226,8 +226,8 @@ class RenderProgram(Program):
     depth_compare : wgpu's name of the depth test, such as "less"; None for no depth attachment
     has_fragment : whether `fragment` runs; None to run it if there are targets. Without targets, `fragment`
         may discard pixels of the depth pass
-    raster : depth test and format of the first target, for programs that replay captured
-        frames (see capture.py)
+    raster : depth test and format of the first target, for programs that replay captured frames
+        (see capture.py)
     """
 
     stages = "VERTEX", "FRAGMENT"

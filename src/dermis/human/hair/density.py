@@ -48,7 +48,7 @@ class HairDensity(NamedTuple):
 
 
 def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.random.Generator) -> Roots:
-    """Return random hair roots, ordered by quad, whose number per area follows the density map.
+    """Return random hair roots, ordered by quad, whose number per area follows `density`.
 
     Within a quad, the candidates are points of a low-discrepancy sequence, so that roots do not cluster. No
     hair grows on the ears, on the lips or in the mouth.
