@@ -92,7 +92,7 @@ def test_a_coarse_file_is_refined_as_the_person_is(tmp_path: Path) -> None:
 
 def test_an_expression_can_be_the_one_at_rest(tmp_path: Path) -> None:
     head = PERSON.head()
-    path, order = written(tmp_path, head, weights={"jawOpen": 0.4}), in_file(head)
+    path, order = written(tmp_path, head, expression_weights={"jawOpen": 0.4}), in_file(head)
     back = load_head(path, eyes="plain", subdivide=0)
     assert np.abs(back.mesh.positions - posed_mm(head, Pose({"jawOpen": 0.4}))[order]).max() < SAME_MM
     closed = posed_mm(back, Pose({"jawOpen": 0.0}))
