@@ -134,7 +134,7 @@ def test_other_tables_are_refused(tmp_path: Path, text: str, told: str) -> None:
 
 def test_measured_people_have_the_colours_of_the_model(archive: Archive) -> None:
     """The limits are the goals of the model: without half of the baseline absorption all are exceeded."""
-    sample = archive.select_rows(np.isin(archive.site, CHEEK_AND_FOREHEAD)).sample(500)
+    sample = archive.select_rows(np.isin(archive.site, CHEEK_AND_FOREHEAD)).sample_rows(500)
     two, three = (fit_skin(sample.spectra, n, "colour").delta_e() for n in (TWO_UNKNOWNS, THREE_UNKNOWNS))
     assert np.median(two) < 0.85 and np.median(three) < 0.25
     assert np.median(fit_skin(sample.spectra, FIVE_UNKNOWNS).rms) < 0.006

@@ -66,7 +66,7 @@ def test_lossless_frame_does_not_delay_others(viewer: Any, monkeypatch: pytest.M
     begun, gate, encode_image = threading.Event(), threading.Event(), canvas.encode_image
 
     def slowly(array: NDArray[np.uint8], *, is_lossless: bool) -> bytes:
-        if lossless:
+        if is_lossless:
             begun.set()
             gate.wait(PATIENCE_S)
         return encode_image(array, is_lossless=is_lossless)
