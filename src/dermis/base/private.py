@@ -1,4 +1,4 @@
-"""Private folders and files, to which only this user and root can have written."""
+"""Private folders and files, which only this user and root can change."""
 
 from __future__ import annotations
 

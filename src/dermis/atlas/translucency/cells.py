@@ -118,7 +118,7 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: flo
 
 
 def _median_texel_mm(atlas: Atlas) -> float:
-    """Return the median side, on the surface, of the texels whose light is computed (`Atlas.lit`) [mm]."""
+    """Return the median side length on the surface of texels whose light is computed (`Atlas.lit`) [mm]."""
     step = max(1, atlas.size // _MAX_AVERAGED_TEXELS_PER_SIDE)
     lit, stretch = atlas.lit[::step, ::step], atlas.stretch[::step, ::step].astype(np.float32)
     density = stretch[..., 0][lit] * stretch[..., 1][lit]

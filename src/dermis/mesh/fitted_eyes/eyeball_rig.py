@@ -1,4 +1,4 @@
-"""Rig of fitted eyeballs, which move like the eyeballs of the file that they replace."""
+"""Rig of fitted eyeballs, which replace the eyeballs of a file and move like them."""
 
 from __future__ import annotations
 

@@ -131,8 +131,9 @@ def make_levels(device: Device, atlas_side: int, halvings: Halvings, texel_forma
 def levels_by_resolution(halvings: Halvings) -> tuple[range, ...]:
     """Return the range of level indices that each resolution stores, finest resolution first.
 
-    A range covers the levels of all atlas layouts. Each range except that of the finest resolution starts
-    with the last level of the next finer resolution, of which a downsampled copy is stored too.
+    A range includes every level that any atlas layout stores at this resolution. Every range but the first
+    begins with the last level of the previous range, because each resolution also stores a downsampled copy
+    of that level.
 
     halvings : for each atlas layout, the number of times that the resolution of each level is halved
     """
