@@ -8,7 +8,6 @@ from __future__ import annotations
 
 RERUN = {
     "test_browser": "two taps are one gesture within a time that Chromium measures",
-    "test_drivers": "processes are killed at random moments, and their children end in their own time",
     "test_served": "a still picture follows 0.3 s after the last change, by the timer of the event loop",
     "test_window": "the X server and the window's toolkit pass events on at a pace of their own",
 }

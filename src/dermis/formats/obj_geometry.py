@@ -232,7 +232,7 @@ def _refuse_line(
 
     row_index : index of the statement in `statement_rows`
     expected : what the statement should contain
-    actual : clause that says what is wrong; by default a quotation of the statement
+    actual : description of the fault; by default a quotation of the statement
     """
     ends = np.append(statement_rows.start[1:], len(statement_rows.text))
     words = " ".join(

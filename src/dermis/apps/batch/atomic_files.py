@@ -49,7 +49,7 @@ def atomic_write(final_path: Path, write_content: Callable[[Path], object]) -> N
 
 
 def move_into_place(unfinished_path: Path, final_path: Path, replaces_folder: bool = True) -> None:
-    """Rename a temporary file or folder to its final path, replacing what was at that path.
+    """Rename a temporary file or folder to its final path, and replace any file or folder there.
 
     replaces_folder : whether to replace a non-empty folder; if False, the folder is kept and OSError is
         raised

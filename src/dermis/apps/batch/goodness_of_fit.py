@@ -64,7 +64,7 @@ class FitTest(NamedTuple):
 def fit_tests(dataset_folder: Path, spec: Spec) -> Iterator[FitTest]:
     """Yield a goodness-of-fit test of each parameter that is not constant, from a data set's index.
 
-    A parameter that describes a person has one sample per person, whatever the person's number of images.
+    A parameter that describes a person has one sample per person, for any number of images of that person.
 
     Raises DermisError if there is no index.
     """

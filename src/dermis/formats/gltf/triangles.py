@@ -151,7 +151,7 @@ class _SceneReader:
     def _check_scene_count(self, item_noun: str, count: int) -> None:
         """Refuse a scene with more than the allowed number of parts, triangles, vertices or displacements.
 
-        item_noun : plural noun for what is counted, a key of `_MAX_SCENE_COUNTS`
+        item_noun : plural name of the counted items, a key of `_MAX_SCENE_COUNTS`
         count : number of the counted items in the scene
         """
         advice = "Export the head alone, or decimated"

@@ -1,4 +1,4 @@
-"""VRM avatars: the direction in which they face, their expressions, and notes on what is ignored."""
+"""VRM avatars: the direction in which they face, their expressions, and notes on ignored data."""
 
 from __future__ import annotations
 

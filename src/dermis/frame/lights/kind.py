@@ -20,7 +20,7 @@ LightT = TypeVar("LightT", bound=Light)
 
 
 class Kind(Generic[LightT]):
-    """Kind of light. This base class is a punctual light that needs no shader members of its own.
+    """Kind of light. This base class is a punctual light that needs no additional shader members.
 
     The shader has the name of the module, with the suffix .wgsl. It defines the following function, where
     NAME is the name of the kind in scene files, with hyphens replaced by underscores:

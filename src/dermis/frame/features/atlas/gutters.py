@@ -56,7 +56,7 @@ def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: Atla
 
 
 def with_separate_gutters(device: Device, textures: AtlasTextures) -> AtlasTextures:
-    """Return a copy of the atlas with gutter buffers of its own, which `draw` fills for each person."""
+    """Return a copy of the atlas with separate gutter buffers, which `draw` fills for each person."""
 
     def with_empty_gutter_buffer(textures_at_mip: AtlasTextures) -> AtlasTextures:
         words = np.zeros((len(textures_at_mip.gutter_texels), GUTTER_ENTRY_BYTES // 4), np.uint32)

@@ -12,7 +12,7 @@ from dermis.gpu import Device, Memo
 
 @dataclass(frozen=True, eq=False)
 class Resources:
-    """Buffers of a head's shape, which is posed again in each frame.
+    """Buffers of a head's shape, which each frame's pose moves.
 
     shape : buffers of the posed shape
     tables : buffers that are constant for a mesh
