@@ -86,6 +86,7 @@ def test_a_killed_driver_leaves_nobody_and_is_gone_on_with(
     skipped = len(list(tmp_path.glob("shard-*.tar")))
     last = started(small_folder / "spec.toml", tmp_path)
     output, notes = last.communicate()
+    wait_until_ended(last.pid)
     assert (last.returncode, besides_progress(notes)) == (0, []) and session_processes(last.pid) == []
     assert f"({skipped} reused)".encode() in output and 2 <= skipped <= SHARDS
     assert contents(tmp_path) == undisturbed
