@@ -45,6 +45,7 @@ class Memo:
 
     def __init__(self, cache_size: int = 1, cache_ttl: int = 1) -> None:
         self._cache_size = cache_size
+        self._larger_sizes: dict[FunctionKey, int] = {}  # of functions for which more results are kept
         # The results of each function, the most recently used first.
         self._results: dict[FunctionKey, list[CachedResult]] = {}
         self._recent_keys: deque[set[FunctionKey]] = deque(
@@ -55,11 +56,18 @@ class Memo:
         self._hits: list[tuple[FunctionKey, CachedResult]] = []
 
     @overload
-    def get(self, function: Callable[[*Ts], T], *args: *Ts, caller_name: str = "") -> T: ...
+    def get(
+        self, function: Callable[[*Ts], T], *args: *Ts, caller_name: str = "", min_cache_size: int = 1
+    ) -> T: ...
 
     @overload
     def get(
-        self, function: Callable[..., T], *args: object, untracked: tuple[object, ...], caller_name: str = ""
+        self,
+        function: Callable[..., T],
+        *args: object,
+        untracked: tuple[object, ...],
+        caller_name: str = "",
+        min_cache_size: int = 1,
     ) -> T: ...
 
     def get(
@@ -68,22 +76,26 @@ class Memo:
         *args: object,
         untracked: tuple[object, ...] = (),
         caller_name: str = "",
+        min_cache_size: int = 1,
     ) -> T:
         """Return `function(*args, *untracked)`, or the cached result of a call with equal `args`.
 
         untracked : further arguments that do not affect the result and are not compared
         caller_name : name of the caller, such as a feature, if several callers use the same function; their
             results are cached separately
+        min_cache_size : least number of results to keep for this function
         """
         key = function, caller_name
         results = self._results.setdefault(key, [])
+        if min_cache_size > self._cache_size:
+            self._larger_sizes[key] = min_cache_size
         for found in results:
             if are_equal(found.args, args):
                 found.args = args  # these may be equal copies, which are recognised faster from now on
                 break
         else:
             self._mark_hits_used(key)
-            results[:] = results[: self._cache_size - 1]  # before the call, which may need the space
+            results[:] = results[: self._size(key) - 1]  # before the call, which may need the space
             found = self._call_function(function, args, untracked)
             found.keys.add(key)
             self._mark_used(key, found)
@@ -115,7 +127,7 @@ class Memo:
 
     def end_frame(self) -> None:
         """End a frame: drop results of functions that were not called in the last `cache_ttl` frames."""
-        if self._cache_size > 1:
+        if self._cache_size > 1 or self._larger_sizes:
             self._mark_hits_used()
         self._recent_keys[-1].update(*(result.keys for _, result in self._hits))
         self._hits.clear()
@@ -123,6 +135,10 @@ class Memo:
         if len(used) < len(self._results):
             self._results = {key: results for key, results in self._results.items() if key in used}
         self._recent_keys.append(set())
+
+    def _size(self, function_key: FunctionKey) -> int:
+        """Return the number of results to keep for a function."""
+        return self._larger_sizes.get(function_key, self._cache_size)
 
     def clear(self) -> None:
         """Drop all cached results."""
@@ -155,7 +171,7 @@ class Memo:
         self._recent_keys[-1].add(function_key)
         results = self._results.setdefault(function_key, [])
         if not results or results[0] is not result:
-            results[:] = [result, *(one for one in results if one is not result)][: self._cache_size]
+            results[:] = [result, *(one for one in results if one is not result)][: self._size(function_key)]
         for part in result.parts:
             self._mark_used(*part)
 

@@ -172,11 +172,11 @@ class Head:
         positions = self.mesh.positions - np.array(self.centre_mm, dtype=np.float32)
         return positions if self.skull_mm is not None else positions @ self.axes.T.astype(np.float32)
 
-    @property
+    @cached_property
     def reach_mm(self) -> float:
         """Return the largest distance of a vertex from the centre [mm]."""
-        corners = self.mesh.outline.points_mm - np.array(self.centre_mm)
-        return float(np.linalg.norm(corners, axis=1).max())
+        offsets = self.mesh.positions - np.array(self.centre_mm)
+        return float(np.sqrt(np.einsum("vi,vi->v", offsets, offsets).max()))
 
     def frontmost(self, x_mm: float, y_mm: float) -> tuple[float, float, float]:
         """Return the position (x, y, z) of the frontmost vertex near a point seen from the front [mm].

@@ -7,16 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.optics.diffusion.boundary import normal_reflectance
-from dermis.optics.diffusion.hankel import NEAR_ZERO_FREQUENCY
-from dermis.optics.diffusion.models import hankel_transform
-from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
+from dermis.optics.diffusion.boundary import boundary_mismatch, normal_reflectance
+from dermis.optics.diffusion.layered_diffusion import solve_two_layers
+from dermis.optics.media import SKIN_ETA, Floats, Layer
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.pigments.skin import dj2006_layers
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 _COLOUR_TABLE_NODES = 65
-_TABLE_ROWS_PER_BATCH = 5  # rows of the table that are computed together and fit into the processor's cache
+_TABLE_ROWS_PER_BATCH = 13  # rows of the table that are computed together and fit into the processor's cache
 _COEFFICIENT_FIELDS = ("sigma_a", "sigma_s_prime")
 
 
@@ -69,8 +68,9 @@ def colour_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_NOD
     parameters : parameters of the skins; melanin and blood are ignored
     node_count : number n of fractions along each axis of the table
     """
-    colours = spectral_table(parameters, node_count) @ rgb_weights(WAVELENGTHS_NM).T
-    return ColourTable(np.maximum(colours, 0.0))
+    spectra = spectral_table(parameters, node_count)
+    colours = spectra.reshape(-1, len(WAVELENGTHS_NM)) @ rgb_weights(WAVELENGTHS_NM).T
+    return ColourTable(np.maximum(colours, 0.0).reshape(node_count, node_count, 3))
 
 
 def spectral_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_NODES) -> Floats:
@@ -79,23 +79,22 @@ def spectral_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_N
     The wavelengths are `WAVELENGTHS_NM`. The parameters and the grid are those of `colour_table`.
     """
     epidermis, dermis = dj2006_layers(parameters, np.linspace(0.0, 1.0, node_count) ** 2)
-    blood = np.arange(node_count)
-    spectra = []
-    for melanin in np.array_split(np.arange(node_count), -(-node_count // _TABLE_ROWS_PER_BATCH)):
-        rows, columns = np.repeat(melanin, node_count), np.tile(blood, len(melanin))
-        medium = Medium("skins", (_select_rows(epidermis, rows), _select_rows(dermis, columns)), SKIN_ETA)
-        total = hankel_transform(medium, "layered", "layer", NEAR_ZERO_FREQUENCY)[0]
-        spectra.append(total.reshape(-1, len(WAVELENGTHS_NM)))
-    entering = 1.0 - normal_reflectance(SKIN_ETA)
-    return np.asarray(entering * np.concatenate(spectra)).reshape(node_count, node_count, len(WAVELENGTHS_NM))
+    mismatch = boundary_mismatch(SKIN_ETA, "exact")
+    rows = [
+        solve_two_layers(_with_axis(epidermis, 1, rows), parameters.epidermis_mm, _with_axis(dermis, 0), mismatch)
+        for rows in np.array_split(np.arange(node_count), -(-node_count // _TABLE_ROWS_PER_BATCH))
+    ]
+    return np.asarray((1.0 - normal_reflectance(SKIN_ETA)) * np.concatenate(rows))
 
 
-def _select_rows(layer: Layer, row_indices: NDArray[np.int64]) -> Layer:
-    """Return a layer with the channels of k selected rows of another layer's coefficients.
+def _with_axis(layer: Layer, axis: int, rows: NDArray[np.int64] | None = None) -> Layer:
+    """Return a layer with coefficients (n, c), or some rows of them, that have a further axis of length 1.
 
-    The coefficients of the result have the shape (k * c,), one row after another.
-
-    layer : layer with coefficients of the shape (n, c)
-    row_indices : (k,) indices of the rows, which may repeat
+    axis : position of the new axis
+    rows : indices of the rows; None for all rows
     """
-    return replace(layer, **{name: getattr(layer, name)[row_indices].ravel() for name in _COEFFICIENT_FIELDS})
+    fields = {name: getattr(layer, name) for name in _COEFFICIENT_FIELDS}
+    return replace(
+        layer,
+        **{name: np.expand_dims(one if rows is None else one[rows], axis) for name, one in fields.items()},
+    )

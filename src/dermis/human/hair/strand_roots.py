@@ -31,7 +31,7 @@ STRANDS_PER_CM2 = 150.0
 BEARD_STRANDS_PER_CM2 = 60.0
 """Density of the possible strands of beards [1/cm2]."""
 _CACHE_VERSION = 9  # of this module's algorithm, part of the keys of cached tables
-_MAX_CACHED_STYLES = 8
+_MAX_CACHED_STYLES, _MAX_CACHED_LOOKS = 4, 24  # single styles; hair styles with or without a beard
 # Distances between guides from which strands are less, and then not at all, interpolated between them [mm].
 _GUIDE_SEPARATION_MM = 25.0, 55.0
 _SEED = 20
@@ -53,7 +53,7 @@ class StyleStrands(NamedTuple):
     centre_mm: Doubles
 
 
-@lru_cache(_MAX_CACHED_STYLES)
+@lru_cache(_MAX_CACHED_LOOKS)
 def style_strands(
     scalp_style: Style | None, has_beard: bool, root_finder: RootFinder, subdivision_levels: int
 ) -> StyleStrands:

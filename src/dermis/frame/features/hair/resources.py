@@ -36,6 +36,7 @@ _PROJECTED_KNOT_BYTES = 32
 _MIN_DRAWN_STRANDS, _MIN_KNOTS = 5_000, 4
 # Width added per unit of cover: where hair hides hair, fewer strands suffice.
 _WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = 0.2, 1.0
+_KEPT_STYLE_COUNT = 12  # hair styles whose buffers, of at most 8 MB each, are kept for the next person
 _MIN_STRANDS_PER_PIXEL = 2.0  # where all strands are short; fewer would look like dots
 _ROOT_AREA_MM2 = 6e4  # approximate area of the skin on which scalp hair and beard grow
 _MAX_SHORT_KNOTS_FRACTION = 0.4  # largest fraction of `Detail.drawn_knots` that is spent against dots
@@ -469,8 +470,9 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resourc
     capacity, casters = (strand_capacity(fine, one) for one in (coarse, caster_strand_counts(device, coarse)))
     groom = None
     if head.hair is not None:
-        style = cached(make_guide_tables, device, head.hair.guides)
-        roots = cached(make_strand_roots, device, head.hair.roots, head.topology.mesh)
+        kept = _KEPT_STYLE_COUNT
+        style = cached(make_guide_tables, device, head.hair.guides, min_cache_size=kept)
+        roots = cached(make_strand_roots, device, head.hair.roots, head.topology.mesh, min_cache_size=kept)
         groom = cached(make_groom_tables, device, head.hair, style, roots)
     buffers = cached(make_strand_buffers, device, capacity, casters)
     tables = cached(make_strand_tables, device, head.bare, coarse, buffers, groom)
