@@ -66,7 +66,7 @@ def drawn(renderer: Renderer, scene: Scene, technique: str, seams: str) -> Drawn
             fill(frame, stage, *rest)
 
         patch.setattr(CommandList, "fill", counted)
-        renderer.draw(scene, settings, force=True)
+        renderer.draw(scene, settings, run_all_passes=True)
     inputs = renderer.prepare(scene, settings)
     device, levels, layout = renderer.device, inputs.resources.diffusion.levels, inputs.layouts[0]
     assert layout.translucency is not None
