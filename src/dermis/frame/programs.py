@@ -102,7 +102,8 @@ def program(
     constants : pipeline constants
     source_format : format of the texture from which the shader reads light
     store_format : format of the texture to which the shader writes light
-    stores_hair_labels : for shaders that draw hair, whether they store the labels of pixels besides the picture
+    stores_hair_labels : for shaders that draw hair, whether they store the labels of pixels besides the
+        picture
     """
     active = shader_options(source_format, store_format, stores_hair_labels, constants)
 

@@ -23,7 +23,8 @@ class ProfileSplit:
     leaves where it enters. Instead of being read from the atlas, this share is computed again at each pixel
     of the picture. The narrow Gaussian is called the unblurred Gaussian.
 
-    unblurred_weight : (3,) weights of the unblurred Gaussian in red, green and blue; 0 if all Gaussians are blurred [-]
+    unblurred_weight : (3,) weights of the unblurred Gaussian in red, green and blue; 0 if all Gaussians are
+        blurred [-]
     total : (3,) sums of the weights of all Gaussians [-]
     blurred_mm2 : (k,) variances of the Gaussians with which light is blurred [mm^2]
     weight : (k, 3) weights of these Gaussians [-]
@@ -41,7 +42,7 @@ class ProfileSplit:
 
     @property
     def unblurred_differences(self) -> Floats:
-        """Return, for each of the n profiles in `others`, its field `unblurred_weight` minus that of this profile [-].
+        """Return, for each of the n profiles in `others`, its `unblurred_weight` minus that of this one [-].
 
         The result has the shape (n, 3).
         """

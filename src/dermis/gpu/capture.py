@@ -83,8 +83,8 @@ class CapturedFrame:
     def add(self, captured_pass: CapturedPass, replay_unit_index: int | None) -> None:
         """Append a pass to the captured frame.
 
-        replay_unit_index : index of the unit, a group of passes that are run or skipped together, to which the pass
-            belongs; None for a pass that is run or skipped on its own
+        replay_unit_index : index of the unit, a group of passes that are run or skipped together, to which
+            the pass belongs; None for a pass that is run or skipped on its own
         """
         last = self.passes[-1].unit if self.passes else -1
         captured_pass.unit = last + 1 if replay_unit_index is None else replay_unit_index

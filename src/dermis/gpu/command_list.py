@@ -144,7 +144,7 @@ class CommandList(Recorder):
     def draw_fullscreen(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Add a render pass that runs a program once per texel of its targets, see `Recorder.draw_fullscreen`."""
+        """Add a pass that runs a program once per texel of its targets, see `Recorder.draw_fullscreen`."""
         views = [one.create_view() if hasattr(one, "create_view") else one for one in targets]
         render_pass = self._render_pass(stage, program, resources, views)
         render_pass.draw(3)
@@ -326,8 +326,8 @@ class Timestamps:
     The time of a pass extends to the start of the next pass, so that the times of the stages sum to the
     total.
 
-    whole_frame_only : whether to take only the first and the last timestamp of a frame, which takes less time than
-        one for each pass
+    whole_frame_only : whether to take only the first and the last timestamp of a frame, which takes less time
+        than one for each pass
     """
 
     def __init__(self, device: Device, *, whole_frame_only: bool = False) -> None:
@@ -338,8 +338,8 @@ class Timestamps:
     def begin(self, stage: str) -> TimestampWrites | None:
         """Reserve the timestamp at the start of a pass, and return its description for wgpu.
 
-        Returns None if the pass gets no timestamp: with `whole_frame_only`, all passes except the first get none,
-        and neither do passes for which the pool has no timestamps left.
+        Returns None if the pass gets no timestamp: with `whole_frame_only`, all passes except the first get
+        none, and neither do passes for which the pool has no timestamps left.
 
         stage : name of the stage to which the time of the pass is added
         """
@@ -359,7 +359,7 @@ class Timestamps:
             encoder.resolve_query_set(self._queries, 0, len(self._stages), self._resolved, 0)
 
     def stage_ms(self) -> dict[str, float]:
-        """Return the time of the whole frame ("total") and, without `whole_frame_only`, that of each stage [ms]."""
+        """Return the time of the frame ("total") and, without `whole_frame_only`, that of each stage [ms]."""
         if not self._stages:
             return {"total": 0.0}
         raw = self._device.handle.queue.read_buffer(self._resolved, 0, 8 * len(self._stages))

@@ -38,7 +38,8 @@ def open_device(adapter: str = "auto", *, guaranteed_capabilities_only: bool = F
     """Open an adapter as a device; if the best matching adapter does not open, try the next match.
 
     adapter : "auto" (the best), "cpu" (software), part of an adapter's name, or "#" and the adapter's number
-    guaranteed_capabilities_only : whether to request only the limits that WebGPU guarantees everywhere, and no optional feature
+    guaranteed_capabilities_only : whether to request only the limits that WebGPU guarantees everywhere, and
+        no optional feature
 
     Raises DermisError if no adapter matches or none opens.
     """
@@ -58,7 +59,8 @@ class Device:
 
     adapter : opened adapter
     selection_reason : reason for the choice of the adapter, for users
-    guaranteed_capabilities_only : whether the maximum sizes are also WebGPU's defaults, and no optional feature is requested
+    guaranteed_capabilities_only : whether the maximum sizes are also WebGPU's defaults, and no optional
+        feature is requested
     executor : threads for work outside Python (compiling, reading, copying); jobs that have not started are
         cancelled when the device is dropped
     ffi : cffi interface of wgpu's native library

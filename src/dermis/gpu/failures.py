@@ -62,8 +62,8 @@ class ReopeningDevice:
 
     open_device : function that opens a device
     on_open : function that is called with each opened device and creates the resources of the caller on it
-    reopens_lost_device : whether a lost device is opened again; if False, its loss raises DeviceLostError. Pass False if
-        the device also holds resources that `on_open` does not create
+    reopens_lost_device : whether a lost device is opened again; if False, its loss raises DeviceLostError.
+        Pass False if the device also holds resources that `on_open` does not create
     """
 
     def __init__(

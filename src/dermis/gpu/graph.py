@@ -264,7 +264,7 @@ class Graph(Recorder):
     def draw_fullscreen(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Declare a render pass that runs a program once per texel of its targets, see `Recorder.draw_fullscreen`."""
+        """Declare a pass that runs once per texel of its targets, see `Recorder.draw_fullscreen`."""
         writes = tuple(resource_state(self.device, one) for one in targets)
 
         def add_fullscreen_draw(frame: CommandList) -> None:

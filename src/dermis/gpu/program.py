@@ -158,10 +158,10 @@ class Program:
     ) -> BindGroup:
         """Create the bind group of the shader.
 
-        ordered_resources : resources to bind, in the order of the bindings; the last ones are the buffers that
-            contain the uniform records
-        resources_by_name : resources and uniform records by their names in the shader; only the sizes of the uniform
-            records are used
+        ordered_resources : resources to bind, in the order of the bindings; the last ones are the buffers
+            that contain the uniform records
+        resources_by_name : resources and uniform records by their names in the shader; only the sizes of the
+            uniform records are used
         """
         records: UniformRecords = resources_by_name  # type: ignore[assignment]  # no cast, which costs time
         sizes = [records[one.name].nbytes for one in self._uniforms]

@@ -53,8 +53,8 @@ def _equivalent_half_space_column(eta: float, use_photon_table: bool, total_refl
     path].
 
     eta : index of refraction relative to air [-]
-    use_photon_table : whether R(r) comes from a table of Monte Carlo results, if one exists, instead of layered
-        diffusion
+    use_photon_table : whether R(r) comes from a table of Monte Carlo results, if one exists, instead of
+        layered diffusion
     total_reflectance : reflectance for light at normal incidence [-]
     """
     albedo = albedo_for_total_reflectance(total_reflectance, eta, use_photon_table)

@@ -114,8 +114,8 @@ def solve_slabs(
     optical_depth : (n,) thicknesses above 0, in mean free paths; in reduced mean free paths if scattering is
         anisotropic [-]
     eta : index of refraction relative to the air on both sides, at least 1 [-]
-    direction_node_count : number of discrete directions in which light can leave the slab; if eta is above 1, the
-        same number of directions is added in which light is totally reflected
+    direction_node_count : number of discrete directions in which light can leave the slab; if eta is above 1,
+        the same number of directions is added in which light is totally reflected
     g : mean cosine of the scattering angle, at least 0 [-]
 
     Source: [Chandrasekhar1960] section 50 for the addition of layers.

@@ -115,8 +115,8 @@ def oblique_transmittance(
 
     total_reflectance : (c,) reflectance of the half-space for light at normal incidence [-]
     eta : index of refraction relative to air [-]
-    use_photon_table : whether the albedo for this reflectance comes from a table of Monte Carlo results, if one
-        exists, instead of layered diffusion
+    use_photon_table : whether the albedo for this reflectance comes from a table of Monte Carlo results, if
+        one exists, instead of layered diffusion
     g : mean cosine of the scattering angle [-]
     """
     return interpolate_columns(

@@ -74,8 +74,8 @@ def diffuse_fresnel_reflectance(eta: float, integral_method: DiffuseIntegral = "
 def boundary_mismatch(eta: float, integral_method: DiffuseIntegral = "polynomial") -> float:
     """Return the boundary mismatch A = (1 + F_dr) / (1 - F_dr), which is 1 at an index-matched surface [-].
 
-    F_dr is the `diffuse_fresnel_reflectance`. In diffusion theory, the fluence, extrapolated linearly beyond the
-    surface, is zero at the height 2 A D, where D is the diffusion coefficient.
+    F_dr is the `diffuse_fresnel_reflectance`. In diffusion theory, the fluence, extrapolated linearly beyond
+    the surface, is zero at the height 2 A D, where D is the diffusion coefficient.
 
     eta : index of refraction relative to air [-]
     integral_method : "polynomial" or "exact", see `diffuse_fresnel_reflectance`

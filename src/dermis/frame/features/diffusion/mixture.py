@@ -28,8 +28,8 @@ class ProfileMixture:
     """Textures for skin where a map blends a first profile with one or two others.
 
     uv_weights : texture over uv of the blend weights of all profiles but the first
-    entering_light : for each profile but the first, the blur pyramid of the light that enters the skin, multiplied
-        by the blend weight of the profile
+    entering_light : for each profile but the first, the blur pyramid of the light that enters the skin,
+        multiplied by the blend weight of the profile
     atlas_weights : for each atlas layout, a texture over the atlas of the same blend weights
     sums : texture array. Layer 0 is the exitance of skin that has the first profile everywhere. Two layers
         follow for each other profile. Both hold the light diffused by this profile minus the light diffused
@@ -56,8 +56,8 @@ def make_profile_mixture(
     """Allocate the textures of a mixture of profiles.
 
     uv_weights : texture over uv of the blend weights
-    entering_light_pyramids : for each profile but the first, the pyramid in which the light that enters the skin is
-        blurred, after it is multiplied by the blend weight of the profile
+    entering_light_pyramids : for each profile but the first, the pyramid in which the light that enters the
+        skin is blurred, after it is multiplied by the blend weight of the profile
     layout_count : number of atlas layouts
     """
     side, texel_format = entering_light_pyramids[0].size, entering_light_pyramids[0].texel_format

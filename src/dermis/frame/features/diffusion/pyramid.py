@@ -76,7 +76,8 @@ class Blur:
     edge : how blurs treat texels beyond a chart and its gutter: "repeated", "cleared" or "skipped"
     clear : irradiance that blurs read from empty texels if `edge` is "cleared"
     intermediate_levels : indices of levels without weight, which only serve as the source of wider blurs
-    weight_differences : for each profile but the first, its (k, 3) weights minus the weights of the first profile
+    weight_differences : for each profile but the first, its (k, 3) weights minus the weights of the first
+        profile
     """
 
     variance_mm2: Floats

@@ -124,7 +124,8 @@ class StrandPicture:
     list_heads : buffer of the first link of each linked list of segments, see strands_bin.wgsl
     links : buffer of the links of these lists; a link consists of a segment and the index of the next link
     result : texture of the picture with hair
-    segment_lists_per_tile : number of linked lists per tile; the lists of a tile are filled and drawn in parallel
+    segment_lists_per_tile : number of linked lists per tile; the lists of a tile are filled and drawn in
+        parallel
     """
 
     list_heads: Buffer

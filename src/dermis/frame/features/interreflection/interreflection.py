@@ -90,7 +90,8 @@ def make_interreflection(
 
     profile_albedo : (3,) albedo of the skin's diffusion profile [-]
     has_occlusion : whether there is a map of the visible fraction of the sky
-    light_cache_key : cache key of the scene's light; callers that draw several scenes in turn use different keys
+    light_cache_key : cache key of the scene's light; callers that draw several scenes in turn use different
+        keys
     layout_key : name of the atlas layout in the cache
     """
     form_factors = memo.get(_form_factors, head, atlas, caller_name=layout_key)

@@ -126,7 +126,7 @@ def make_head_rotation_points(head: Head) -> HeadRotationPoints:
 
 
 def head_rotation(rotation_points: HeadRotationPoints, motion: Motion) -> Floats:
-    """Return the (3, 3) rotation that best fits the motion of the control points in `rotation_points` [Kabsch1976].
+    """Return the (3, 3) rotation that best fits the motion of the `rotation_points` [Kabsch1976].
 
     Morph targets do not rotate a head and are ignored.
     """
