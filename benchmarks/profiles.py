@@ -43,9 +43,9 @@ def main() -> None:
     rows = [f"| tissue | {' | '.join(columns)} |", "|---|---|---|---|"]
     for name in ("dj3", "skin1", "light", "dark"):
         tissue = dermis.load_tissue(name)
-        rings = tissue.profile().rings()
+        rings = tissue.profile().ring_target()
         near = fit_gaussians(rings, 6).profile
-        moved = neighbour(tissue).profile().rings()
+        moved = neighbour(tissue).profile().ring_target()
         cells = (
             median_ms(tissue.profile),
             median_ms(partial(fit_gaussians, rings, 6)),

@@ -29,7 +29,7 @@ def draw(studio):
                 file = Path(folder) / f"{melanin}-{blood}.toml"
                 pigments = {"melanin": melanin, "blood": blood, "epidermis_mm": 0.1}
                 tissue = dermis.load_tissue("spectral", pigments=pigments)
-                write_profile(file, fit_gaussians(tissue.profile().rings(), 6).profile, {})
+                write_profile(file, fit_gaussians(tissue.profile().ring_target(), 6).profile, {})
                 skin = dermis.Skin(profile=str(file), albedo="profile")
                 scene = dermis.Scene(head, camera=camera, skin=skin)
                 panels[f"melanin {melanin:.1%}, blood {blood:.1%}"] = studio.render(scene, 0.6, exposure=1.4)

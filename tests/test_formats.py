@@ -66,7 +66,7 @@ def test_region_table_and_landmarks_example_loads(folder: Path) -> None:
 
 def test_tissue_and_profile_examples_load(folder: Path) -> None:
     medium = load_tissue(str(folder / "tissue.toml")).medium
-    assert medium.name == "thin over thick" and len(medium.layers) == 2 and medium.semi_infinite
+    assert medium.name == "thin over thick" and len(medium.layers) == 2 and medium.is_semi_infinite
     table = find_gaussians(folder / "profile.csv")
     published = find_gaussians("gpu-gems-3")
     assert table is not None and published is not None

@@ -13,13 +13,13 @@ import pytest
 
 import dermis
 from dermis.apps.export.target import Target
-from dermis.frame.lights.kind import Kind
+from dermis.frame.lights.kind import LightKind
 from dermis.frame.techniques.technique import Technique
 from dermis.scene.outputs import Output
-from dermis.specular.models import Model
+from dermis.specular.models import SpecularModel
 
 PUBLIC = {name: getattr(dermis, name) for name in dermis.__all__}
-ENTRIES = {one.__name__: one for one in (Target, Kind, Technique, Output, Model)}
+ENTRIES = {one.__name__: one for one in (Target, LightKind, Technique, Output, SpecularModel)}
 """Types of the entries of registries."""
 
 

@@ -11,7 +11,7 @@ from dermis.apps.validation.benchmarks.cases import pose_at_moment, with_test_ri
 from dermis.apps.validation.pages import template_path
 from dermis.base.command_line import run_script
 from dermis.formats.samples import is_available
-from dermis.gpu.graph import FrameListing, ListedPass
+from dermis.gpu.graph import FrameListing, FrameListingEntry
 
 PAGE = Path(__file__).parent.parent / "docs" / "frame_graph.md"
 SETTINGS, TARGETS = dermis.Settings(size=(1920, 1080), atlas=2048), 52
@@ -36,7 +36,7 @@ def changes(scene: dermis.Scene) -> dict[str, tuple[dermis.Scene, dermis.Setting
 def full_listing(renderer: dermis.Renderer, scene: dermis.Scene) -> FrameListing:
     """Return the listing of a frame in which all passes run."""
     renderer.graph.listing = listing = FrameListing()
-    renderer.draw(scene, SETTINGS, force=True)
+    renderer.draw(scene, SETTINGS, run_all_passes=True)
     return listing
 
 
@@ -54,7 +54,7 @@ def stage_rows(listing: FrameListing, ms: dict[str, float], marks: dict[str, set
         yield f"| {stage} | {shaders} | {len(own)} | {time} | {cells} |"
 
 
-def pass_row(one: ListedPass) -> str:
+def pass_row(one: FrameListingEntry) -> str:
     """Return the table row of a pass."""
     bound = ", ".join(f"{name} {value}" for name, value in one.bindings.items() if value != "sampler")
     groups = " x ".join(map(str, one.groups))
@@ -67,7 +67,7 @@ def main(adapter: str = "auto", page: Path = PAGE) -> None:
     name = "lee_perry_smith" if is_available("lee_perry_smith") else "human"
     scene = dermis.Scene(with_test_rig(dermis.load_head(name, subdivide=0), TARGETS))
     renderer.draw(scene, SETTINGS)
-    ms = renderer.draw_warm(scene, SETTINGS).gpu_ms or {}
+    ms = renderer.draw_after_warm_up(scene, SETTINGS).gpu_ms or {}
     listing, marks = full_listing(renderer, scene), dict[str, set[str]]()
     for change, frame in changes(scene).items():
         renderer.draw(scene, SETTINGS)

@@ -15,7 +15,7 @@ from dermis.apps.batch.worker_pool import SlotRequest
 def patch_machine(monkeypatch: pytest.MonkeyPatch, cores: int, kind: str, *numbers: int) -> None:
     found = [SimpleNamespace(kind=kind, number=number) for number in numbers]
     by_name: dict[str, Any] = {f"#{one.number}": [one] for one in found} | {"auto": found}
-    monkeypatch.setattr(worker_pool, "similar_adapters", by_name.__getitem__)
+    monkeypatch.setattr(worker_pool, "adapters_like_best_match", by_name.__getitem__)
     monkeypatch.setattr(worker_pool, "available_cores", lambda: cores)
 
 

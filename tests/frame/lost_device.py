@@ -77,28 +77,28 @@ def loading(renderer: Renderer) -> Any:
 
 def recording(renderer: Renderer) -> Any:
     with losing(CommandList, "run", 3):
-        return renderer.draw(scene(), DRAWN, force=True).linear()
+        return renderer.draw(scene(), DRAWN, run_all_passes=True).linear()
 
 
 def between_passes(renderer: Renderer) -> Any:
     with losing(CommandList, "_end_pass", 2):
-        return renderer.draw(scene(), DRAWN, force=True).linear()
+        return renderer.draw(scene(), DRAWN, run_all_passes=True).linear()
 
 
 def submitting(renderer: Renderer) -> Any:
     with losing(CommandList, "_flush"):
-        return renderer.draw(scene(), DRAWN, force=True, timed=False).linear()
+        return renderer.draw(scene(), DRAWN, run_all_passes=True, timed=False).linear()
 
 
 def waiting(renderer: Renderer) -> Any:
     with losing(Device, "wait"):
-        return renderer.draw(scene(), DRAWN, force=True).linear()
+        return renderer.draw(scene(), DRAWN, run_all_passes=True).linear()
 
 
 def reading(renderer: Renderer) -> Any:
     """Read by each method, one after the other."""
     rendered = renderer.draw(scene(), DRAWN)
-    ways = (lambda: rendered.exposure, rendered.clipped, rendered.srgb8)
+    ways = (lambda: rendered.exposure, rendered.clipped_fraction, rendered.srgb8)
     known = [read() for read in ways]
     for way, before in zip(ways, known, strict=True):
         opened[-1].handle.destroy()

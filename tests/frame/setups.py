@@ -116,7 +116,7 @@ def probe(
     program = ComputeProgram(device, path, shader_folders(), dict(constants))
     made = {output: make_texture(device, size, "rgba32float") for output in outputs}
     records = {
-        key: program.record(key.title(), **v) if isinstance(v, dict) else v for key, v in bound.items()
+        key: program.make_record(key.title(), **v) if isinstance(v, dict) else v for key, v in bound.items()
     }
     frame = CommandList(device)
     frame.compute(name, program, {**made, **records}, size)

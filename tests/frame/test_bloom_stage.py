@@ -60,7 +60,7 @@ def test_bloom_runs_only_when_enabled(renderer: Renderer) -> None:
     scene = scene_of(head_of(plane(30.0)), frontal())
     ran = []
     for share in (0.0, 0.3):
-        drawn = renderer.draw(scene, settings_of(bloom=share, size=(128, 128)), force=True)
+        drawn = renderer.draw(scene, settings_of(bloom=share, size=(128, 128)), run_all_passes=True)
         ran.append("bloom" in renderer.graph.executed_stages)
     assert ran == [False, True]
     image = drawn.linear()

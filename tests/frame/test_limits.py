@@ -105,7 +105,7 @@ def _number(text: str, spelled: str) -> int:
 def bare(renderer: Renderer) -> Renderer:
     """Return a renderer on a device without features and with default limits."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(renderer_module, "open_device", partial(open_device, bare=True))
+        patch.setattr(renderer_module, "open_device", partial(open_device, guaranteed_capabilities_only=True))
         return Renderer(renderer.device.adapter.name)
 
 

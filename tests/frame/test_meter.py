@@ -133,5 +133,5 @@ def test_clipping_is_counted_over_the_head(renderer: Renderer) -> None:
     ball = head_of(uv_sphere(30.0, 48, 24), colour=np.full((8, 8, 3), 0.5))
     scene = scene_of(ball, frontal(np.pi), camera=front_camera(ball, frame_mm=120.0), **DULL)
     white = renderer.draw(scene, settings_of(background=(1.0, 1.0, 1.0)))
-    assert white.clipped() == 0.0
-    assert 0.2 < renderer.draw(scene, settings_of(exposure=3.0, technique="none")).clipped() < 1.0
+    assert white.clipped_fraction() == 0.0
+    assert 0.2 < renderer.draw(scene, settings_of(exposure=3.0, technique="none")).clipped_fraction() < 1.0

@@ -18,7 +18,7 @@ from dermis.atlas.build import cached_atlas
 from dermis.frame.features.occlusion import moving as moving_occlusion
 from dermis.frame.features.occlusion.baked import bake_occlusion
 from dermis.frame.features.occlusion.moving import DEPTH_MAP_SIDE as MAP_SIDE
-from dermis.frame.features.occlusion.moving import head_rotation, make_rotation_anchors, sky_views
+from dermis.frame.features.occlusion.moving import head_rotation, make_head_rotation_points, sky_views
 from dermis.frame.features.visibility.layers import make_layers
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
@@ -170,7 +170,7 @@ def test_occlusion_runs_only_when_the_shape_changes(renderer: Renderer, head: He
 
 def test_rotation_is_derived_from_points_and_bones() -> None:
     human = Human().head(subdivide=0)
-    anchors, rig = make_rotation_anchors(human), human.control
+    anchors, rig = make_head_rotation_points(human), human.control
     assert np.abs(head_rotation(anchors, rig.rest) - np.eye(3)).max() < 1e-6
     given = Pose(positions_mm=rig.positions_mm @ TURN.T).motion(rig)
     assert np.abs(head_rotation(anchors, given) - TURN).max() < 1e-5

@@ -65,7 +65,7 @@ def pictured(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
 def spread(light: Floats, variance_mm2: float) -> Floats:
     """Return (n, n, 3) light after a Gaussian blur with exact integrals over texels; the edge is repeated.
 
-    Gaussians narrower than 0.1 mm are relit in the picture and not blurred.
+    Gaussians narrower than 0.1 mm are evaluated in the picture and not blurred.
     """
     from scipy.special import ndtr
 
@@ -92,11 +92,11 @@ def mixed_by(name: Path, *others: str) -> dict[str, Any]:
 
 
 def mixed(renderer: Renderer, scene: Scene, name: Path, others: int) -> tuple[Floats, Floats, Floats]:
-    """Return light that enters, light that leaves with the relit level, and the blend weights."""
+    """Return light that enters, light that leaves with the unblurred level, and the blend weights."""
     inputs, light, made = lights(renderer, scene)
     shares = load_blend_weights(str(name)).astype(float)
-    changes = inputs.view["relit_changes"][:others, :3]
-    return light, made + light * (inputs.view["relit"] + shares[..., :others] @ changes), shares
+    changes = inputs.view["unblurred_differences"][:others, :3]
+    return light, made + light * (inputs.view["unblurred_weight"] + shares[..., :others] @ changes), shares
 
 
 @pytest.mark.parametrize("others", [("skin2",), ("skin2", "gpu-gems-3")])
@@ -123,7 +123,7 @@ def test_mixture_conserves_energy(renderer: Renderer, maps: dict[str, Path]) -> 
 
 @pytest.fixture(scope="module")
 def tables(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
-    """Write two profiles of the same Gaussians, whose narrowest one is relit in the picture."""
+    """Write two profiles of the same Gaussians, whose narrowest one is not blurred."""
     folder = tmp_path_factory.mktemp("tables")
     rows = {"narrow": ("0.006,0.7,0.8,0.9", "4,0.3,0.2,0.1"), "wide": ("0.006,0.2,0.5,0.6", "4,0.8,0.5,0.4")}
     for name, lines in rows.items():

@@ -274,7 +274,7 @@ def test_exposure_scales_the_image(renderer: Renderer) -> None:
 
 
 def test_frame_statistics_are_reported(renderer: Renderer) -> None:
-    rendered = renderer.draw(scene(), settings_of(), force=True)
+    rendered = renderer.draw(scene(), settings_of(), run_all_passes=True)
     assert rendered.gaussians == 6
     assert rendered.frame_ms > 0 and rendered.setup_ms > 0
     if rendered.gpu_ms is not None:
@@ -304,7 +304,7 @@ def test_more_than_the_memory_is_refused(renderer: Renderer, monkeypatch: pytest
 
 
 def test_old_names_of_options_warn(renderer: Renderer) -> None:
-    with pytest.warns(DeprecationWarning, match="is now force"):
+    with pytest.warns(DeprecationWarning, match="is now run_all_passes"):
         renderer.draw(scene(), settings_of(), anew=True)  # type: ignore[call-arg]
     with pytest.warns(DeprecationWarning, match="depth is now cache_size"):
         Renderer(renderer.device.adapter.name, depth=2)  # type: ignore[call-arg]

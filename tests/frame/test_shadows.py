@@ -162,7 +162,7 @@ def test_only_moved_lights_are_redrawn(renderer: Renderer) -> None:
     assert not stages_of(renderer, SLANTED, frontal())  # the second casts no shadow
     assert stages_of(renderer, SLANTED, frontal(shadows=True))
     assert stages_of(renderer, turned)
-    assert stages_of(renderer, turned, force=True)
+    assert stages_of(renderer, turned, run_all_passes=True)
     assert not stages_of(renderer, turned)
 
 

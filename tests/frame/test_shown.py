@@ -50,7 +50,7 @@ def test_reused_light_does_not_change_pictures(keeping: Renderer, name: str) -> 
     keeping.clear_cache()
     kept = [drawn(keeping, settings) for settings in SEQUENCES[name]]
     assert [a == b for a, b in zip(kept, fresh, strict=True)] == [True] * len(fresh)
-    assert drawn(keeping, SEQUENCES[name][-1], force=True) == fresh[-1]
+    assert drawn(keeping, SEQUENCES[name][-1], run_all_passes=True) == fresh[-1]
 
 
 def test_only_affected_stages_run_again(keeping: Renderer) -> None:
@@ -66,5 +66,5 @@ def test_only_affected_stages_run_again(keeping: Renderer) -> None:
     lit = {"irradiance", "diffuse", "translucency", "combine"}
     whole = lit | {"pairs", "shape", "stretch", "surface", "visibility", "shade", "post"}
     assert ran == [whole, set(), {"post"}, {"visibility", "shade", "post"}, lit | {"shade", "post"}]
-    keeping.draw(brighter, settings_of(exposure=2.0), force=True)
+    keeping.draw(brighter, settings_of(exposure=2.0), run_all_passes=True)
     assert set(keeping.graph.executed_stages) == whole

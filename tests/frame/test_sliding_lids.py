@@ -11,7 +11,7 @@ from tolerances import SHAPE
 
 from dermis import Human
 from dermis.frame.features.shape import shape
-from dermis.frame.features.shape.shape import MotionBytes, make_shape, shape_tables
+from dermis.frame.features.shape.shape import PoseBytes, make_shape, shape_tables
 from dermis.frame.features.surface.painting.painted_head import with_painted_maps
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, Device
@@ -42,7 +42,7 @@ def test_lid_sliding_matches_numpy(device: Device) -> None:
     words = (
         part.astype(np.float32).tobytes() for part in (rig.positions_mm, motion.weights, motion.matrices)
     )
-    shape.draw(frame, made, MotionBytes(*words))
+    shape.draw(frame, made, PoseBytes(*words))
     frame.submit()
     found = np.frombuffer(device.handle.queue.read_buffer(made.surface["points"]), np.float32).reshape(-1, 3)
     assert rig.contact is not None

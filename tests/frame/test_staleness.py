@@ -224,7 +224,7 @@ def test_all_stages_run_when_forced(renderer: Renderer) -> None:
     renderer.clear_cache()
     renderer.draw(BASE, SETTINGS)
     first = list(renderer.graph.executed_stages)
-    renderer.draw(BASE, SETTINGS, force=True)
+    renderer.draw(BASE, SETTINGS, run_all_passes=True)
     assert renderer.graph.executed_stages == first and "shade" in first
 
 

@@ -34,7 +34,9 @@ BODY = published_media()["skin1"].with_eta(1.0)
 def skin1(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Return a file of the profile of skin1."""
     file: Path = tmp_path_factory.mktemp("profile") / "skin1.toml"
-    write_profile(file, fit_gaussians(diffusion_profile(BODY).rings(), 6, profile_name="skin1").profile, {})
+    write_profile(
+        file, fit_gaussians(diffusion_profile(BODY).ring_target(), 6, profile_name="skin1").profile, {}
+    )
     return str(file)
 
 
@@ -110,7 +112,7 @@ def test_flesh_that_scatters_forward_lets_more_through(
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("direction", ["lambertian", "half-space"])
 def test_unscattered_colour_is_not_transmitted(renderer: Renderer, tmp_path: Path, direction: str) -> None:
-    """All blue light is in the relit Gaussian, so that thin parts lose none of it."""
+    """All blue light is in the unblurred Gaussian, so that thin parts lose none of it."""
     weight = np.array([[0.2, 0.2, 0.3], [0.2, 0.1, 0.0], [0.2, 0.1, 0.0]])
     write_profile(tmp_path / "red.toml", GaussianSum("red", np.array([1e-4, 0.5, 4.0]), weight), {})
     skin = {"albedo": "profile", "profile": str(tmp_path / "red.toml"), "direction": direction}

@@ -270,7 +270,7 @@ def scattered(
 ) -> tuple[Floats, Floats, Floats]:
     """Return (n, 3) positions and normals of the texels with surface, and the light that leaves them.
 
-    The profile has its own colour, and the relit level is left out.
+    The profile has its own colour, and the unblurred level is left out.
     """
     head = head_of(mesh)
     scene = scene_of(head, *(lights or (BEHIND,)), albedo="profile", rho_s=0.0)

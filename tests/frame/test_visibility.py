@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, joined, place, run_frame, scene_of
 
 from dermis.frame.features.visibility.layers import draw_layers, make_layers
-from dermis.frame.projection import pixel_samples
+from dermis.frame.projection import pixel_sample_positions
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download
 from dermis.mesh.head import Head
@@ -97,7 +97,7 @@ def test_visible_triangles_match_ray_casting(
 ) -> None:
     scene = view_of(HEADS[name], turned)
     made = nearest(renderer, scene, triangles=True, compute=compute, samples=samples)
-    for layer, offset in zip(made, pixel_samples(samples), strict=True):
+    for layer, offset in zip(made, pixel_sample_positions(samples), strict=True):
         expected, sure = first_hit(scene.head, *rays(scene, offset))
         assert sure.mean() > 0.9 and 0.1 < (expected > 0).mean() < 1
         assert np.array_equal(layer[sure], expected[sure])
@@ -110,7 +110,7 @@ def test_both_methods_give_the_same_depth(renderer: Renderer, name: str) -> None
     by_raster, by_compute = (
         nearest(renderer, scene, triangles=False, compute=way, samples=1)[0] for way in (False, True)
     )
-    _, sure = first_hit(scene.head, *rays(scene, pixel_samples(1)[0]))
+    _, sure = first_hit(scene.head, *rays(scene, pixel_sample_positions(1)[0]))
     assert by_raster.max() < 1 and (by_raster > 0).any()
     # corners that snap to 1/256 of a pixel move the rasteriser's depth by a little of its slope
     assert np.abs(by_raster - by_compute)[sure].max() < 2e-3
@@ -159,7 +159,7 @@ def test_previous_view_leaves_no_trace(renderer: Renderer, triangles: bool) -> N
 @pytest.mark.parametrize("count", [1, 2, 5, 8, 64])
 def test_samples_are_even_in_both_axes(count: int) -> None:
     """Each of `count` columns and rows of the pixel has one sample, and their mean is close to the centre."""
-    places = pixel_samples(count)
+    places = pixel_sample_positions(count)
     assert places.shape == (count, 2) and (places >= 0).all() and (places < 1).all()
     assert sorted((places[:, 0] * count).astype(int)) == list(range(count))
     assert len({tuple(p) for p in places}) == count
@@ -167,4 +167,4 @@ def test_samples_are_even_in_both_axes(count: int) -> None:
 
 
 def test_one_sample_is_the_centre() -> None:
-    assert pixel_samples(1).tolist() == [[0.5, 0.5]]
+    assert pixel_sample_positions(1).tolist() == [[0.5, 0.5]]

@@ -80,7 +80,7 @@ def shown(layers: ViewLayers, renderer: Renderer, head: Head, camera: Camera, sa
     draw_layers(frame, "nearest", layers, inputs.camera_views, inputs.resources.head)
     frame.submit()
     made = [download(renderer.device, layers.texture, layer=k) for k in range(layers.count)]
-    return made, inputs.camera_views.sample_matrices(SIZE)
+    return made, inputs.camera_views.clip_matrices_of_samples(SIZE)
 
 
 SOUP = soup(600)
@@ -115,7 +115,7 @@ def test_more_blocks_than_a_workgroup_list_are_drawn(
 ) -> None:
     """A workgroup of 128 triangles with 11 blocks each exceeds its list of 1024."""
     monkeypatch.setattr(visibility_buffer, "_TARGET_WORKGROUP_COUNT", 1)
-    monkeypatch.setattr(visibility_buffer, "_CONSECUTIVE_TRIANGLES", 128)
+    monkeypatch.setattr(visibility_buffer, "_CONSECUTIVE_TRIANGLES_PER_WORKGROUP", 128)
     head = head_of(plane(80.0, 8))
     layers = make_layers(renderer.device, SIZE, 1, store_triangles=True, use_compute_pass=True)
     (layer,), _ = shown(layers, renderer, head, front_camera(head, (0, 0, 0.1), frame_mm=31.0), 1)

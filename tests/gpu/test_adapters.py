@@ -19,8 +19,8 @@ from dermis.gpu.adapters import (
     DEFAULT_LIMITS,
     DRIVER_INSTALL_HINT,
     OPTIONAL_FEATURES,
+    adapters_like_best_match,
     select_adapters,
-    similar_adapters,
 )
 
 
@@ -90,9 +90,9 @@ def test_equal_adapter_names_are_distinguished_by_numbers(machine: Any) -> None:
 def test_all_gpus_of_the_best_kind_are_taken_once_each(machine: Any) -> None:
     twice = [fake("H200", "DiscreteGPU"), fake("H200", "DiscreteGPU")]
     machine(CPU, fake("Iris", "IntegratedGPU"), *twice, fake("H200", "DiscreteGPU", "D3D12"), CPU)
-    assert [one.handle for one in similar_adapters("auto")] == twice
-    assert [one.handle for one in similar_adapters("#1")] == twice[1:]
-    assert [one.name for one in similar_adapters("cpu")] == ["llvmpipe"]
+    assert [one.handle for one in adapters_like_best_match("auto")] == twice
+    assert [one.handle for one in adapters_like_best_match("#1")] == twice[1:]
+    assert [one.name for one in adapters_like_best_match("cpu")] == ["llvmpipe"]
 
 
 def test_only_optional_features_are_listed() -> None:

@@ -15,7 +15,7 @@ from dermis.gpu import CommandList, ComputeProgram, Device, download, make_textu
 from dermis.gpu.bind_groups import ResourceCache, resource_key
 from dermis.gpu.command_list import Timing
 from dermis.gpu.failures import converted_gpu_failures
-from dermis.gpu.textures import half_store_rounding, texture_from_array
+from dermis.gpu.textures import float16_store_rounding, texture_from_array
 from dermis.gpu.uniforms import UNIFORM_CHUNK_BYTES, Uniforms
 
 SIZE = (37, 21)  # no multiple of a tile
@@ -33,7 +33,7 @@ def test_passes_follow_each_other(device: Device, scale: ComputeProgram) -> None
     for factor in (2.0, 3.0, 0.5):
         textures.append(make_texture(device, SIZE, "r32float"))
         bound = {
-            "factor": scale.record("Factor", value=factor),
+            "factor": scale.make_record("Factor", value=factor),
             "image": textures[-2],
             "scaled": textures[-1],
         }
@@ -46,7 +46,7 @@ def test_stage_times_add_up_to_the_total(device: Device, scale: ComputeProgram) 
     frame = CommandList(device)
     image, into = (make_texture(device, (512, 512), "r32float") for _ in range(2))
     for stage in ("one", "two", "one"):
-        bound = {"factor": scale.record("Factor", value=1), "image": image, "scaled": into}
+        bound = {"factor": scale.make_record("Factor", value=1), "image": image, "scaled": into}
         frame.compute(stage, scale, bound, (512, 512))
     frame.submit()
     frame.wait()
@@ -64,7 +64,7 @@ def staged_times(device: Device, scale: ComputeProgram, timed: Timing) -> tuple[
     image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
     frame = CommandList(device, timed=timed)
     for stage in ("one", "two", "one"):
-        bound = {"factor": scale.record("Factor", value=1), "image": image, "scaled": into}
+        bound = {"factor": scale.make_record("Factor", value=1), "image": image, "scaled": into}
         frame.compute(stage, scale, bound, SIZE)
     frame.submit()
     frame.wait()
@@ -99,7 +99,7 @@ def test_an_empty_frame_takes_no_time(device: Device) -> None:
 
 
 def record_of(scale: ComputeProgram, value: float) -> Any:
-    return scale.record("Factor", value=value)
+    return scale.make_record("Factor", value=value)
 
 
 def test_uniform_records_keep_distinct_offsets(device: Device, scale: ComputeProgram) -> None:
@@ -218,4 +218,4 @@ def test_driver_messages_become_package_errors(device: Device) -> None:
 
 
 def test_half_precision_stores_round_as_expected(device: Device) -> None:
-    assert half_store_rounding(device) in {"nearest", "toward zero", "other"}
+    assert float16_store_rounding(device) in {"nearest", "toward zero", "other"}

@@ -16,7 +16,7 @@ RAISED = {"max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-bu
 
 @pytest.fixture(scope="module")
 def bare(device: Device) -> Device:
-    return open_device(device.adapter.name, bare=True)
+    return open_device(device.adapter.name, guaranteed_capabilities_only=True)
 
 
 def test_limits_are_the_default_ones(device: Device, bare: Device) -> None:

@@ -22,7 +22,9 @@ def test_fragments_fill_every_texel_of_all_targets(device: Device) -> None:
     layered = make_texture(device, SIZE, "rgba16float", layer_count=3, content_source="raster")
     view = layered.create_view(dimension="2d", base_array_layer=1, array_layer_count=1)
     frame = CommandList(device)
-    frame.fill("places", program, {"added": program.record("Added", more=(0, 0, 5, 0))}, [one, view])
+    frame.draw_fullscreen(
+        "places", program, {"added": program.make_record("Added", more=(0, 0, 5, 0))}, [one, view]
+    )
     frame.submit()
     frame.wait()
     x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)

@@ -32,7 +32,7 @@ class Chain:
         """Return which of the passes (source, destination, factor) ran, as "0-1"."""
         self.graph.begin()
         for source, into, factor in passes:
-            record = self.scale.record("Factor", value=factor)
+            record = self.scale.make_record("Factor", value=factor)
             bound = {"factor": record, "image": self.textures[source], "scaled": self.textures[into]}
             self.graph.compute(f"{source}-{into}", self.scale, bound, SIZE)
         self.graph.submit()
@@ -115,7 +115,7 @@ def test_view_and_texture_share_their_state(
     def frame(*passes: tuple[Any, Any, float]) -> int:
         graph.begin()
         for source, into, factor in passes:
-            bound = {"factor": scale.record("Factor", value=factor), "image": source, "scaled": into}
+            bound = {"factor": scale.make_record("Factor", value=factor), "image": source, "scaled": into}
             graph.compute("scale", scale, bound, SIZE)
         graph.submit()
         return len(graph.executed_stages)
@@ -147,7 +147,11 @@ def test_layers_are_tracked_separately_and_together(device: Device) -> None:
     def frame(*factors: float) -> list[str]:
         graph.begin()
         for k, factor in enumerate(factors):
-            bound = {"factor": program.record("Factor", value=factor), "image": image, "scaled": layers[k]}
+            bound = {
+                "factor": program.make_record("Factor", value=factor),
+                "image": image,
+                "scaled": layers[k],
+            }
             graph.compute(f"layer {k}", program, bound, SIZE)
         graph.submit()
         return graph.executed_stages
@@ -190,9 +194,9 @@ def test_accesses_are_what_shaders_declare() -> None:
     }
     for declaration, expected in declared.items():
         (one,) = shader_bindings(f"@group(0) @binding(0) {declaration}")
-        assert (one.has_content, one.reads, one.writes) == expected, declaration
+        assert (one.has_content, one.is_readable, one.is_writable) == expected, declaration
     (sampler,) = shader_bindings("@group(0) @binding(0) var x: sampler;")
-    assert not sampler.has_content and not sampler.writes
+    assert not sampler.has_content and not sampler.is_writable
 
 
 STRUCT = "struct S { a: f32, b: vec3f, c: f32 }\n@group(0) @binding(0) var<uniform> one: S;\n"

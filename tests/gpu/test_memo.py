@@ -104,7 +104,7 @@ def test_owners_have_separate_results() -> None:
 
 def test_arguments_without_effect_are_not_compared() -> None:
     memo = Memo()
-    assert [memo.get(max, 1, untracked=(more,)) for more in (5, 7)] == [5, 5]
+    assert [memo.get(max, 1, untracked_arguments=(more,)) for more in (5, 7)] == [5, 5]
 
 
 @dataclass(frozen=True)

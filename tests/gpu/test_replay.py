@@ -30,14 +30,14 @@ class Chain:
     def record(self, recorder: Recorder, first: Any, between: Any, last: Any, factor: float) -> float:
         self.recorded += 1
         for stage, image, scaled in (("a", first, between), ("b", between, last)):
-            record = self.scale.record("Factor", value=factor)
+            record = self.scale.make_record("Factor", value=factor)
             recorder.compute(stage, self.scale, {"factor": record, "image": image, "scaled": scaled}, SIZE)
         return 10.0 * self.recorded
 
     def repeated(self, factor: float) -> float:
         """Run a frame of the passes only and return the result of the recording."""
         self.graph.begin()
-        returned = self.graph.repeat(self.record, *self.textures, factor)
+        returned = self.graph.add_replayable(self.record, *self.textures, factor)
         self.graph.submit()
         return returned
 
@@ -112,7 +112,7 @@ def test_recording_may_be_void_while_its_arguments_live(device: Device, scale: C
         upload(device, chain.textures[0], np.full(SIZE[::-1], value, np.float32))
         graph.invalidate()
         graph.begin()
-        graph.repeat(record, chain.textures[0], chain.textures[2])
+        graph.add_replayable(record, chain.textures[0], chain.textures[2])
         graph.submit()
         assert download(device, chain.textures[2])[0, 0] == 9.0 * value
         held[:] = [make_texture(device, SIZE, "r32float")]
@@ -121,12 +121,12 @@ def test_recording_may_be_void_while_its_arguments_live(device: Device, scale: C
 
 def test_only_compute_passes_can_be_recorded(device: Device) -> None:
     def record(recorder: Any) -> None:
-        recorder.fill("filled", None, {}, [])
+        recorder.draw_fullscreen("filled", None, {}, [])
 
     graph = Graph(device)
     graph.begin()
     with pytest.raises(NotImplementedError, match="filled: Recording takes compute"):
-        graph.repeat(record)
+        graph.add_replayable(record)
 
 
 def test_stages_of_repeated_passes_are_timed(device: Device, scale: ComputeProgram) -> None:
@@ -134,7 +134,7 @@ def test_stages_of_repeated_passes_are_timed(device: Device, scale: ComputeProgr
     for _ in range(2):
         chain.graph.invalidate()
         chain.graph.begin()
-        chain.graph.repeat(chain.record, *chain.textures, 3.0)
+        chain.graph.add_replayable(chain.record, *chain.textures, 3.0)
         frame = chain.graph.submit(timed=True)
         frame.wait()
         times = frame.stage_ms()

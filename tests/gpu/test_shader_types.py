@@ -65,7 +65,7 @@ def test_padded_array_elements_are_refused() -> None:
 def test_shader_reads_what_numpy_wrote(device: Device) -> None:
     """Check all kinds of members by a shader that reads them on the device."""
     program = ComputeProgram(device, Path(__file__).parent / "layout_probe.wgsl")
-    record = program.record("Probe")
+    record = program.make_record("Probe")
     numbers = iter(range(1, 100))
     flat: list[int] = []
     for member in ("lone", "three", "matrix", "pair", "inner", "last"):

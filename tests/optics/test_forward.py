@@ -17,7 +17,7 @@ from dermis.optics.angular_response import (
 )
 from dermis.optics.media import published_media
 from dermis.optics.slabs import (
-    DIRECTION_NODES,
+    DIRECTION_NODE_COUNT,
     anisotropic_response,
     half_space_radiance,
     phase_matrices,
@@ -51,7 +51,7 @@ def test_photons_leave_slabs_as_often(reduced: float, eta: float) -> None:
     for depth in (0.5, 2.0, 10.0):
         body = ScatteringLayer(1.0 - reduced, reduced / (1.0 - G), depth, G, eta)
         run = trace_slab([body], PHOTONS).relative_to_entering
-        for nodes in (8, DIRECTION_NODES):
+        for nodes in (8, DIRECTION_NODE_COUNT):
             made = solve_slabs(reduced, depth, eta, nodes, G)
             back, through = (from_above(made.cosine, part[0]) for part in (made.reflected, made.transmitted))
             error = FORWARD_AMOUNT + 3.0 * run.total_reflectance_se
@@ -69,14 +69,14 @@ def test_no_light_is_made_or_lost(eta: float) -> None:
 
 
 def test_phase_functions_sum_to_one_and_have_their_mean() -> None:
-    x, w = np.polynomial.legendre.leggauss(DIRECTION_NODES)
+    x, w = np.polynomial.legendre.leggauss(DIRECTION_NODE_COUNT)
     mu, weight = 0.5 * (x + 1.0), 0.5 * w
-    made = phase_matrices(0.9, G, mu, DIRECTION_NODES)
-    assert 0.5 * (made.backward + made.forward) @ weight == pytest.approx(np.ones(DIRECTION_NODES))
-    on = G**DIRECTION_NODES
+    made = phase_matrices(0.9, G, mu, DIRECTION_NODE_COUNT)
+    assert 0.5 * (made.backward + made.forward) @ weight == pytest.approx(np.ones(DIRECTION_NODE_COUNT))
+    on = G**DIRECTION_NODE_COUNT
     mean = on * mu + (1.0 - on) * 0.5 * (made.forward - made.backward) @ (weight * mu)
     assert mean == pytest.approx(G * mu)
-    even = phase_matrices(0.9, 0.0, mu, DIRECTION_NODES)
+    even = phase_matrices(0.9, 0.0, mu, DIRECTION_NODE_COUNT)
     assert (even.backward == 1.0).all() and (even.forward == 1.0).all()
     assert (even.albedo, even.extinction, even.unscaled_extinction) == (0.9, 1.0, 1.0)
 
@@ -145,7 +145,7 @@ def test_photons_leave_a_refracting_half_space_as_told() -> None:
 @pytest.mark.parametrize("reduced", [0.9585, 0.838, 0.678])
 def test_all_pairs_of_directions(reduced: float, eta: float, most: float) -> None:
     """Radiance below the surface is weighted by uniform light."""
-    a, fraction, exact = half_space_radiance(reduced, eta, DIRECTION_NODES, G)
+    a, fraction, exact = half_space_radiance(reduced, eta, DIRECTION_NODE_COUNT, G)
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
     slant, weight = (
         1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta),

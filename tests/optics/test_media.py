@@ -64,7 +64,7 @@ def test_medium_of_a_file(tmp_path: Path) -> None:
     medium = parsed(tmp_path, text)
     assert (medium.name, medium.eta, len(medium.layers)) == ("own", 1.3, 2)
     assert medium.layers[0].sigma_s_prime.tolist() == [4.0, 5.5, 6.0]
-    assert medium.layers[1].name == "layer" and medium.semi_infinite
+    assert medium.layers[1].name == "layer" and medium.is_semi_infinite
 
 
 LAYER = "[[layers]]\nabsorption_per_mm = [1,1,1]\nscattering_per_mm = [1,1,1]\n"
@@ -141,7 +141,7 @@ def _thin() -> Medium:
 @pytest.mark.parametrize("name", ["skin1", "spectral"])
 def test_rings_alone_are_those_of_the_profile(name: str) -> None:
     tissue = load_tissue(name)
-    alone, whole = tissue.rings(), tissue.profile().rings()
+    alone, whole = tissue.ring_target(), tissue.profile().ring_target()
     assert np.array_equal(alone.energy, whole.energy) and np.array_equal(alone.total, whole.total)
 
 

@@ -22,7 +22,7 @@ DEPTH = REACH * np.linspace(0.0, 1.0, THICKNESS_ROWS) ** 2
 
 @pytest.fixture(scope="module")
 def profile() -> GaussianSum:
-    return fit_gaussians(diffusion_profile(BODY).rings(), 6, profile_name="skin1").profile
+    return fit_gaussians(diffusion_profile(BODY).ring_target(), 6, profile_name="skin1").profile
 
 
 def test_a_profile_tells_its_medium(profile: GaussianSum) -> None:

@@ -11,7 +11,7 @@ from small_figure import CENTRE, arm, figure, patch, write_obj
 
 import dermis
 from dermis.formats.parts import DEFAULT_COLOUR
-from dermis.frame.features.shading.view import camera_views, pinhole
+from dermis.frame.features.shading.view import camera_views, world_space_pinhole
 from dermis.human.skin.measured import measured_cells
 from dermis.images.colour import lab
 from dermis.mesh.head import Head
@@ -33,7 +33,9 @@ def head_of(mesh: Mesh) -> Head:
 
 def seen(camera: Camera, head: Head) -> np.ndarray:
     """Return where the vertices are in the picture: x to the right, y up, -1 to 1."""
-    (clip,) = camera_views(pinhole(camera, head, Settings(size=(64, 64))), head.mesh.outline, 1).clips
+    (clip,) = camera_views(
+        world_space_pinhole(camera, head, Settings(size=(64, 64))), head.mesh.outline, 1
+    ).clips
     x, y, _, w = clip @ np.column_stack((head.mesh.positions, np.ones(len(head.mesh.positions)))).T
     assert (w > 0).all()
     return np.column_stack((x / w, y / w))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_head import SIZE, write_head
 
-from dermis.frame.features.shading.view import camera_views, pinhole
+from dermis.frame.features.shading.view import camera_views, world_space_pinhole
 from dermis.mesh.head import Head
 from dermis.scene import Camera, Settings
 from dermis.scene.camera import CAMERA_PRESETS
@@ -20,7 +20,9 @@ def head(tmp_path_factory: pytest.TempPathFactory) -> Head:
 
 def _seen(camera: Camera, head: Head, points: np.ndarray) -> np.ndarray:
     """Project points [mm from the head's centre] into the picture: x to the right, y up, -1 to 1."""
-    (clip,) = camera_views(pinhole(camera, head, Settings(size=(64, 64))), head.mesh.outline, 1).clips
+    (clip,) = camera_views(
+        world_space_pinhole(camera, head, Settings(size=(64, 64))), head.mesh.outline, 1
+    ).clips
     world = np.column_stack((points + head.centre_mm, np.ones(len(points))))
     x, y, _, w = clip @ world.T
     assert (w > 0).all()

@@ -10,7 +10,7 @@ from tolerances import FURNACE
 
 from dermis.specular.albedo import directional_albedo
 from dermis.specular.cosines import cosines
-from dermis.specular.fresnel import ENERGY_SCHEMES, EnergyScheme
+from dermis.specular.fresnel import ENERGY_SCHEMES, EnergyConservationScheme
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
@@ -24,7 +24,9 @@ def mean_albedo(m: float, model: str = "kelemen") -> float:
     return float(w @ (directional_albedo(mu, m, MODELS[model].lobe) * mu))
 
 
-def furnace(energy: EnergyScheme, views: Floats, m: float, rho_s: float, model: str = "kelemen") -> Floats:
+def furnace(
+    energy: EnergyConservationScheme, views: Floats, m: float, rho_s: float, model: str = "kelemen"
+) -> Floats:
     rho = directional_albedo(views, m, MODELS[model].lobe)
     return energy.furnace_radiance(rho, mean_albedo(m, model), rho_s)
 
@@ -33,7 +35,9 @@ def test_published_scheme_loses_the_measured_energy() -> None:
     """Check strength 0.18 and m = 0.3: 0.96 overall and 0.85 at grazing angles, 0.99 if divided by pi."""
     ends = furnace(ENERGY_SCHEMES["published"], np.array([1.0, 0.05]), 0.3, 0.18)
     assert ends == pytest.approx([0.96, 0.85], abs=0.005)
-    divided = furnace(EnergyScheme(1.0, returns_internal_light=False), np.array([1.0, 0.05]), 0.3, 0.18)
+    divided = furnace(
+        EnergyConservationScheme(1.0, returns_internal_light=False), np.array([1.0, 0.05]), 0.3, 0.18
+    )
     assert divided == pytest.approx([0.99, 0.99], abs=0.005)
 
 

@@ -15,7 +15,7 @@ from dermis.specular.beckmann import beckmann
 from dermis.specular.comparison import normal_incidence_peak, reciprocity_error
 from dermis.specular.cosines import Cosines, cosines
 from dermis.specular.fresnel import ENERGY_SCHEMES, FRESNEL, SKIN_F0, schlick
-from dermis.specular.models import MODELS, EnergyName, FresnelName
+from dermis.specular.models import MODELS, EnergyConservationName, FresnelName
 from dermis.specular.torrance_sparrow import smith_masking
 from dermis.specular.two_lobe import NARROW_FACTOR, WIDE_FACTOR, two_lobe_masking
 
@@ -38,7 +38,7 @@ def towards(theta: Floats, phi: Floats) -> Floats:
 
 def test_names_are_the_same_everywhere_and_in_one_order() -> None:
     assert get_args(FresnelName) == tuple(FRESNEL)
-    assert get_args(EnergyName) == tuple(ENERGY_SCHEMES)
+    assert get_args(EnergyConservationName) == tuple(ENERGY_SCHEMES)
 
 
 @pytest.mark.parametrize("name", MODELS)

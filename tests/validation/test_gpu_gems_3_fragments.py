@@ -59,14 +59,14 @@ def drawn(renderer: Renderer, scene: Scene, technique: str, seams: str) -> Drawn
     settings = settings_of(technique=technique, atlas=128, seams=seams)
     with pytest.MonkeyPatch.context() as patch:
         filled: list[str] = []
-        fill = CommandList.fill
+        draw_fullscreen = CommandList.draw_fullscreen
 
         def counted(frame: CommandList, stage: str, *rest: Any) -> None:
             filled.append(stage)
-            fill(frame, stage, *rest)
+            draw_fullscreen(frame, stage, *rest)
 
-        patch.setattr(CommandList, "fill", counted)
-        renderer.draw(scene, settings, force=True)
+        patch.setattr(CommandList, "draw_fullscreen", counted)
+        renderer.draw(scene, settings, run_all_passes=True)
     inputs = renderer.prepare(scene, settings)
     device, levels, layout = renderer.device, inputs.resources.diffusion.levels, inputs.layouts[0]
     assert layout.translucency is not None

@@ -60,8 +60,8 @@ class FakeRenderer:
         self.device = SimpleNamespace(adapter=SimpleNamespace(name=adapter))
         self.techniques: list[str] = []
 
-    def draw(self, scene: Any, settings: Any, force: bool) -> Any:
-        assert force and settings.size == (SIDE, SIDE)
+    def draw(self, scene: Any, settings: Any, run_all_passes: bool) -> Any:
+        assert run_all_passes and settings.size == (SIDE, SIDE)
         self.techniques.append(settings.technique)
         return SimpleNamespace(linear=lambda: picture(1.0 + OURS))
 
@@ -175,7 +175,7 @@ def test_unknown_lights_are_named(peers: Any) -> None:
 
 def test_a_bias_above_our_error_is_reported(peers: Any, tmp_path: Path, capsys: Any) -> None:
     class Nearer(FakeRenderer):
-        def draw(self, scene: Any, settings: Any, force: bool) -> Any:
+        def draw(self, scene: Any, settings: Any, run_all_passes: bool) -> Any:
             return SimpleNamespace(linear=lambda: picture(1.0 + 0.5 * BIAS))
 
     dermis.Renderer = Nearer  # type: ignore[misc]  # put back by the fixture's patch

@@ -81,7 +81,7 @@ def test_reused_results_do_not_change_pictures(
     image(view_renderer, state)
     validated_copy = CHANGES[name](state)
     expected = fresh.draw(
-        validated_copy.scene, validated_copy.settings.model_copy(update={"size": SIZE}), force=True
+        validated_copy.scene, validated_copy.settings.model_copy(update={"size": SIZE}), run_all_passes=True
     )
     off = np.abs(image(view_renderer, validated_copy) - expected.srgb8().astype(int))
     assert off.max() <= (1 if name == "pigments" else 0)  # whose fit begins elsewhere

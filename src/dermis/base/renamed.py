@@ -18,6 +18,8 @@ from typing import Any, ParamSpec, TypeVar, cast
 RENAMED_OBJECTS: Mapping[str, str] = {
     "profile": "side",
     "scene.profile": "scene.side",
+    "frame.lights.kind.Kind": "frame.lights.kind.LightKind",
+    "specular.models.Model": "specular.models.SpecularModel",
     "apps.inverse.unmixing.unmix.Change": "apps.inverse.unmixing.unmix.PigmentChange",
     "apps.inverse.unmixing.unmix.Share": "apps.inverse.unmixing.unmix.FractionChange",
 }

@@ -73,18 +73,18 @@ def _package_version(package_name: str) -> str:
 def _test_adapter(adapter: str) -> Options:
     """Render a test frame on an adapter; return whether the adapter works, as entries of the JSON report."""
     from dermis.frame.renderer import Renderer
-    from dermis.gpu.textures import half_store_rounding
+    from dermis.gpu.textures import float16_store_rounding
 
     try:
         renderer = Renderer(adapter)
-        rounding = renderer.reopening_device.run(lambda: half_store_rounding(renderer.device))
+        rounding = renderer.reopening_device.run(lambda: float16_store_rounding(renderer.device))
         test = _render_test_frame(renderer)
     except DermisError as error:
         return {"healthy": False, "used": None, "problem": str(error)}
     adapter_info = {
         "name": renderer.device.adapter.name,
         "backend": renderer.device.adapter.backend,
-        "reason": renderer.device.reason,
+        "reason": renderer.device.selection_reason,
         "half_store_rounding": rounding,
     }
     problem = None if test["passed"] else "the brightness of the test frame is wrong"

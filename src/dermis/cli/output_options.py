@@ -20,7 +20,7 @@ from dermis.scene.outputs import OUTPUTS, check_outputs
 
 if TYPE_CHECKING:
     from dermis.base.arrays import Bytes, Floats
-    from dermis.frame.features.outputs.planes import PlaneArray
+    from dermis.frame.features.outputs.output_images import OutputArray
     from dermis.frame.observation import Landmarks as ProjectedLandmarks
     from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer
@@ -69,7 +69,7 @@ class FrameOutputs:
         if "motion" in self.names:
             note("note: motion is 0 in a single picture; Renderer.observe measures it between pictures")
 
-    def write(self, picture: Floats | None, output_values: Mapping[str, PlaneArray]) -> None:
+    def write(self, picture: Floats | None, output_values: Mapping[str, OutputArray]) -> None:
         """Write the outputs to their files.
 
         picture : linear image to write into the same EXR file as the outputs; None if outputs have separate
@@ -154,7 +154,7 @@ def _landmark_rows(landmarks: ProjectedLandmarks) -> list[dict[str, object]]:
     return [dict(zip(keys, row, strict=True)) for row in rows]
 
 
-WriteFrame = Callable[[int, "PlaneArray"], None]
+WriteFrame = Callable[[int, "OutputArray"], None]
 """Function that writes a frame, given its number and its image."""
 
 

@@ -140,8 +140,8 @@ def profile(
         Print one JSON object with the profile, its fits and errors.
     """
     from dermis.cli.profile_report import ProfileReport, additional_fit, draw_plot, gaussian_fit
-    from dermis.optics.diffusion.models import error_against_photons, measured_model_error
-    from dermis.optics.half_space import COUNTED_MODEL
+    from dermis.optics.diffusion.models import error_against_monte_carlo, measured_model_error
+    from dermis.optics.half_space import PHOTON_TABLE_MODEL
     from dermis.optics.profiles import find_gaussians
     from dermis.optics.radial import gaussian_radial_profile
 
@@ -161,9 +161,9 @@ def profile(
         monte_carlo, model_error = None, measured_model_error(radial.model, "" if changed else name)
         if check and model != "montecarlo":
             monte_carlo = _compute_profile(tissue, "montecarlo", clamp, tracing)
-            model_error = error_against_photons(radial, monte_carlo)
+            model_error = error_against_monte_carlo(radial, monte_carlo)
         spectrum = _reflectance_spectrum(tissue, model, clamp)
-    conserve = keep_energy or radial.model == COUNTED_MODEL
+    conserve = keep_energy or radial.model == PHOTON_TABLE_MODEL
     table_fit, terms = (table, _DEFAULT_TERM_COUNT) if fit is None else (None, fit)
     fitted = gaussian_fit(
         radial, table_fit, terms, shared_variances=variances == "shared", keep_energy=conserve

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from dermis.optics.diffusion.models import ModelError
+    from dermis.optics.diffusion.models import ModelDeviation
     from dermis.optics.gaussians import GaussianSum
     from dermis.optics.media import Floats
     from dermis.optics.radial import RadialProfile
@@ -62,7 +62,9 @@ def gaussian_fit(
     """
     if published_gaussians is not None:
         return GaussianFit(published_gaussians, np.zeros(3), np.zeros(3), "pointwise", shared=True)
-    target = radial_profile.points() if radial_profile.finite_at_centre else radial_profile.rings()
+    target = (
+        radial_profile.point_target() if radial_profile.finite_at_centre else radial_profile.ring_target()
+    )
     return fit_gaussians(
         target,
         gaussian_count,
@@ -78,8 +80,8 @@ def additional_fit(radial_profile: RadialProfile, fit_kind: str) -> BurleyFit | 
     fit_kind : "burley", "separable" or "gaussian"
     """
     if fit_kind == "burley":
-        return fit_burley(radial_profile.rings())
-    return fit_separable(radial_profile.rings()) if fit_kind == "separable" else None
+        return fit_burley(radial_profile.ring_target())
+    return fit_separable(radial_profile.ring_target()) if fit_kind == "separable" else None
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ class ProfileReport:
     fit: GaussianFit
     other_fit: BurleyFit | SeparableFit | None
     through_mm: tuple[float, ...]
-    model_error: ModelError | None = None
+    model_error: ModelDeviation | None = None
     spectrum: Floats | None = None
 
     @property
@@ -109,7 +111,7 @@ class ProfileReport:
 
         The light that emerges through each of several concentric rings around the point of entry is compared.
         """
-        return self.radial.rings().error(self.fit.profile.variance_mm2, self.fit.profile.weight)
+        return self.radial.ring_target().error(self.fit.profile.variance_mm2, self.fit.profile.weight)
 
     @property
     def tone(self) -> SkinTone | None:

@@ -29,7 +29,7 @@ from dermis.cli.scene_options import (
 from dermis.scene.techniques import TECHNIQUES
 
 if TYPE_CHECKING:
-    from dermis.frame.features.outputs.planes import PlaneArray
+    from dermis.frame.features.outputs.output_images import OutputArray
     from dermis.frame.rendered_frame import RenderedFrame
     from dermis.scene.model import Scene
     from dermis.scene.settings import Settings
@@ -107,7 +107,7 @@ def render(
             values = {name: rendered.output(name) for name in frame_outputs.names}
             setup_ms = rendered.setup_ms
             if as_json:  # time a second frame, because the first one fills the caches
-                rendered = renderer.draw_warm(loaded_scene, settings)
+                rendered = renderer.draw_after_warm_up(loaded_scene, settings)
         _note_lighting_problems(loaded_scene, settings, rendered)
         _write_images(rendered, output, frame_outputs, values)
         _note_overexposure(rendered)
@@ -148,7 +148,7 @@ def _write_images(
     rendered_frame: RenderedFrame,
     output: Path,
     frame_outputs: FrameOutputs,
-    output_values: Mapping[str, PlaneArray],
+    output_values: Mapping[str, OutputArray],
 ) -> None:
     """Write the image file and the requested outputs, which may share the image's EXR file.
 
@@ -191,6 +191,6 @@ def _note_lighting_problems(scene: Scene, settings: Settings, rendered_frame: Re
 
 
 def _note_overexposure(rendered_frame: RenderedFrame) -> None:
-    if (fraction := rendered_frame.clipped()) > _MAX_CLIPPED_FRACTION:
+    if (fraction := rendered_frame.clipped_fraction()) > _MAX_CLIPPED_FRACTION:
         advice = f"use less than --exposure {rendered_frame.exposure:.3g}, or --tone neutral"
         note(f"note: {fraction:.0%} of the head is overexposed: {advice}")

@@ -37,8 +37,8 @@ _MIN_LOBE_ELONGATION = 1.8  # ratio of length to width above which the pair lies
 _FIT_PASS_COUNT = 2
 _REGULARISATION_WEIGHT = 0.01  # strength of the pull of undetermined parameters to the mean of the neighbours
 _MAX_FIT_EVALUATIONS = 30
-_MAX_LOBE_OFFSET_DEVIATIONS = 5.0  # bound of positions [widths of the lobe] and of logarithms of weights
-_PAIR_SEPARATION_DEVIATIONS = 0.4  # initial separation of a pair
+_MAX_LOBE_OFFSET_SIGMAS = 5.0  # bound of positions [widths of the lobe] and of logarithms of weights
+_PAIR_SEPARATION_SIGMAS = 0.4  # initial separation of a pair
 _IN_PLANE_POSITION, _OUT_OF_PLANE_POSITION, _LOG_WIDTH, _LOG_WEIGHT = range(4)
 _INITIAL_LOBES = np.array(
     [
@@ -151,15 +151,12 @@ def _arrange_lobe_pair(initial_parameters: Floats, target_lobe: LobeTarget, view
     """
     lobes = initial_parameters.copy()
     separation = lobes[_IN_PLANE_POSITION, -1] - lobes[_IN_PLANE_POSITION, -2]
-    if _is_elongated(target_lobe) and abs(separation) < _PAIR_SEPARATION_DEVIATIONS:
+    if _is_elongated(target_lobe) and abs(separation) < _PAIR_SEPARATION_SIGMAS:
         lobes[_IN_PLANE_POSITION, -2:] = (
-            lobes[_IN_PLANE_POSITION, -2:].mean() + np.array([-0.5, 0.5]) * _PAIR_SEPARATION_DEVIATIONS
+            lobes[_IN_PLANE_POSITION, -2:].mean() + np.array([-0.5, 0.5]) * _PAIR_SEPARATION_SIGMAS
         )
-    if (
-        not _is_elongated(target_lobe)
-        and abs(lobes[_OUT_OF_PLANE_POSITION, -2]) < _PAIR_SEPARATION_DEVIATIONS
-    ):
-        lobes[_OUT_OF_PLANE_POSITION, -2:] = _PAIR_SEPARATION_DEVIATIONS, -_PAIR_SEPARATION_DEVIATIONS
+    if not _is_elongated(target_lobe) and abs(lobes[_OUT_OF_PLANE_POSITION, -2]) < _PAIR_SEPARATION_SIGMAS:
+        lobes[_OUT_OF_PLANE_POSITION, -2:] = _PAIR_SEPARATION_SIGMAS, -_PAIR_SEPARATION_SIGMAS
     lobes[_OUT_OF_PLANE_POSITION, :-2] = 0.0
     if _is_elongated(target_lobe) or view_index == VIEW_COUNT - 1:
         lobes[_OUT_OF_PLANE_POSITION] = 0.0
@@ -199,7 +196,7 @@ def _fit_parameters(
     regularisation = _REGULARISATION_WEIGHT * np.where(kinds == _LOG_WEIGHT, 0.5, 1.0)
 
     @lru_cache(maxsize=2)
-    def reduced_system(parameter_bytes: bytes) -> Floats:
+    def reduced_jacobian_and_residuals(parameter_bytes: bytes) -> Floats:
         """Return Jacobian and residuals of the fit side by side, reduced to as many rows as columns.
 
         A QR factorisation reduces the rows. The residuals are the last column.
@@ -220,10 +217,10 @@ def _fit_parameters(
         return qr_factor(np.vstack([system.real, system.imag]))
 
     def residuals_at(free_parameters: Floats) -> Floats:
-        return reduced_system(free_parameters.tobytes())[:, -1]
+        return reduced_jacobian_and_residuals(free_parameters.tobytes())[:, -1]
 
     def jacobian_at(free_parameters: Floats) -> Floats:
-        return reduced_system(free_parameters.tobytes())[:, :-1]
+        return reduced_jacobian_and_residuals(free_parameters.tobytes())[:, :-1]
 
     inside = np.clip(first, low + 1e-4, high - 1e-4)
     solution = least_squares(
@@ -236,10 +233,10 @@ def _parameter_bounds(target_lobe: LobeTarget, parameter_kinds: NDArray[np.intp]
     smoothest, roughest = np.log([MIN_LAYER_ROUGHNESS, MAX_LAYER_ROUGHNESS]) - np.log(
         target_lobe.across_deviation
     )
-    low, high = (np.full(4, side * _MAX_LOBE_OFFSET_DEVIATIONS) for side in (-1.0, 1.0))
+    low, high = (np.full(4, side * _MAX_LOBE_OFFSET_SIGMAS) for side in (-1.0, 1.0))
     low[_OUT_OF_PLANE_POSITION], high[_OUT_OF_PLANE_POSITION] = (
         0.0,
-        min(_MAX_LOBE_OFFSET_DEVIATIONS, 0.45 * np.pi / target_lobe.across_deviation),
+        min(_MAX_LOBE_OFFSET_SIGMAS, 0.45 * np.pi / target_lobe.across_deviation),
     )
     low[_LOG_WIDTH], high[_LOG_WIDTH] = smoothest, max(roughest, smoothest + 0.1)
     return low[parameter_kinds], high[parameter_kinds]

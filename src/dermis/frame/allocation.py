@@ -55,7 +55,7 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
     """
     settings, cached = request.settings, memo.get
     check_limits(device, request)
-    map_options = request.albedo_from_map, settings.gamma == "right", request.painted_side
+    map_options = request.takes_albedo_from_map, settings.gamma == "right", request.painted_map_side
     map_inputs = device, request.head, *map_options, request.has_animated_maps
     maps = memo.submit(device.executor, upload_maps, *map_inputs)  # in the background, as files load slowly
     shadow_maps = _shadow_maps(memo, device, request)
@@ -72,7 +72,7 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         _make_layout(memo, device, request, technique, atlas, shapes, bindings, k)
         for k, atlas in enumerate(atlases)
     )
-    resources = technique.make(memo, device, settings, request.profile)
+    resources = technique.make_resources(memo, device, settings, request.profile)
     thin = [layout.translucency for layout in layouts]
     scattered = layouts[0].scattered
     if len(layouts) > 1:
@@ -100,7 +100,7 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         outputs=outputs.make_resources(memo, device, request, shapes.tables, thin),
         suns=len(request.environment_map.suns),
         gaussians=len(request.profile.variance_mm2),
-        unscattered_fraction=cached(atlases[0][0].unscattered_fraction, request.topology.mesh),
+        unscattered_fraction=cached(atlases[0][0].unscattered_fraction, request.atlas_head.mesh),
     )
 
 
@@ -124,7 +124,7 @@ def _shade_record(
     resources : tables and textures of the technique; None if the technique needs none
     """
     program = shade_program(device)
-    view = view_record(program, request.head, request.settings, request.split)
+    view = view_record(program, request.head, request.settings, request.profile_split)
     technique.write_view_record(view, program, resources)
     return view
 
@@ -133,7 +133,12 @@ def _shadow_maps(memo: Memo, device: Device, request: FrameRequest) -> ShadowMap
     layers = request.shadow_layers
     size = request.settings.shadow_size if layers else 1
     return memo.get(
-        _make_shadow_maps, device, request.topology, layers, size, caller_name=f"{layers} {request.view_name}"
+        _make_shadow_maps,
+        device,
+        request.atlas_head,
+        layers,
+        size,
+        caller_name=f"{layers} {request.view_name}",
     )
 
 
@@ -147,7 +152,7 @@ def _shared_bindings(
 ) -> MutableBindings:
     """Return the shader resources that all atlas layouts share, except the maps and the lights."""
     skin, program = request.skin, shade_program(device)
-    environment, total = request.environment, request.split.total
+    environment, total = request.environment, request.profile_split.total
     curvature, light_count = shape_resources.curvature, sum(request.light_part_counts)
     return {
         "skin": memo.get(skin_record, program, skin, request.head.maps, request.profile, light_count),
@@ -166,17 +171,17 @@ def _cached_sky_visibility(
     memo: Memo, device: Device, request: FrameRequest, layout: AtlasLayout, shape_resources: shape.Resources
 ) -> VertexSkyVisibility:
     """Return the sky visibility at the vertices of the head in its rest pose, cached if possible."""
-    at_rest = rest_geometry(memo, device, layout.head, shape_resources.tables, request.topology, None, 0)
-    return memo.get(make_vertex_sky_visibility, device, request.topology, untracked=(at_rest,))
+    at_rest = rest_geometry(memo, device, layout.head, shape_resources.tables, request.atlas_head, None, 0)
+    return memo.get(make_vertex_sky_visibility, device, request.atlas_head, untracked_arguments=(at_rest,))
 
 
 def _cached_uploaded_atlas(
     memo: Memo, device: Device, request: FrameRequest, layout_name: str, layout_index: int
 ) -> UploadedAtlas:
-    stretch = request.technique.stretch(request.settings)
+    stretch = request.technique.stretch_correction(request.settings)
     atlas = memo.get(
         cached_atlas,
-        request.topology.mesh,
+        request.atlas_head.mesh,
         request.atlas_plan.side,
         layout_name,
         caller_name=str(layout_index),
@@ -206,7 +211,7 @@ def _make_layout(
     cached, layout_key, head, (atlas, textures) = (
         memo.get,
         str(layout_index),
-        request.topology,
+        request.atlas_head,
         uploaded_atlas,
     )
     geometry = cached(
@@ -232,7 +237,13 @@ def _make_layout(
         inputs = bindings, textures.resources["atlas"]
         hair = request.head.hair if settings.strands else None
         occlusion = cached(
-            cached_occlusion_map, device, head, atlas, hair, untracked=inputs, caller_name=layout_key
+            cached_occlusion_map,
+            device,
+            head,
+            atlas,
+            hair,
+            untracked_arguments=inputs,
+            caller_name=layout_key,
         )
     else:
         occlusion = placeholder_occlusion(device)
@@ -245,14 +256,14 @@ def _make_layout(
     if request.blur_count and settings.transmission == "thin" and request.technique.supports_translucency:
         searched = at_rest(pair_positions_mm(memo, request), layout_index)
         posed, rest = ({**one.resources, **textures.resources} for one in (geometry, searched))
-        blurred = request.split.blurred_mm2, request.split.weight
+        blurred = request.profile_split.blurred_mm2, request.profile_split.weight
         tissue = thin_part_tables(memo, request), request.skin.overrides_tissue
         translucency = make_translucency(
             memo, device, posed, rest, atlas, *blurred, *tissue, layout_key=layout_key
         )
     interreflection = None
     if request.has_interreflection:
-        light = request.split.total, request.has_occlusion, request.light_key
+        light = request.profile_split.total, request.has_occlusion, request.light_cache_key
         interreflection = make_interreflection(memo, device, head, atlas, *light, layout_key=layout_key)
     bindings["from_skin"] = (
         interreflection.buffers.from_skin if interreflection else placeholder_interreflection(device)
@@ -278,7 +289,7 @@ def _exitance_texture(
 ) -> Texture:
     owner = f"{texture_role} {request.view_name}"
     return memo.get(
-        _make_exitance_texture, device, technique, atlas_side, request.light_key, caller_name=owner
+        _make_exitance_texture, device, technique, atlas_side, request.light_cache_key, caller_name=owner
     )
 
 

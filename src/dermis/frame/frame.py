@@ -49,7 +49,7 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
     targets = image, inputs.settings.size, layers
     shaded = bindings, view, inputs.constants, resources.visibility, scattered
     radiance = shading.draw(graph, *shaded, *targets)
-    radiance = technique.finish(graph, inputs, radiance)
+    radiance = technique.add_subsurface_light(graph, inputs, radiance)
     stage_inputs = _stage_inputs(graph, inputs, technique, scattered)
     shared, triangles = (bindings, view, inputs.light_constants), resources.visibility.texture
     if resources.hair:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dermis.frame.features.diffusion.pyramid import Blur
 from dermis.frame.features.occlusion.moving import SkyViews
 from dermis.frame.features.outputs.stage_inputs import PreviousScene
-from dermis.frame.features.shape.shape import MotionBytes
+from dermis.frame.features.shape.shape import PoseBytes
 from dermis.frame.projection import Triple, Views
 from dermis.frame.resources import AtlasLayout, Resources
 from dermis.gpu import Bindings, Constants, UniformRecord
@@ -43,7 +43,7 @@ class FrameInputs:
 
     resources: Resources
     settings: Settings
-    motion: MotionBytes
+    motion: PoseBytes
     face_movements: NDArray[np.float32] | None
     layouts: tuple[AtlasLayout, ...]
     blurs: tuple[Blur, ...]

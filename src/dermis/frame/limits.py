@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dermis.base.errors import refuse
-from dermis.frame.features.diffusion.mixture import sum_layer_count
+from dermis.frame.features.diffusion.mixture import layer_count_of_sums
 from dermis.frame.features.shadows.shadows import SHADOW_TEXEL_BYTES
 from dermis.frame.features.surface.texels import SURFACE_TEXEL_BYTES
 from dermis.frame.request import FrameRequest
@@ -114,7 +114,7 @@ def frame_bytes(request: FrameRequest) -> dict[str, float]:
 def _mixing_texel_bytes(request: FrameRequest) -> float:
     """Return the additional memory per atlas texel for blending several profiles [bytes]."""
     others = len(request.other_profiles)
-    maps = len(request.atlas_plan.layouts) + sum_layer_count(others)
+    maps = len(request.atlas_plan.layouts) + layer_count_of_sums(others)
     return (
         others * request.technique.texel_bytes(request.blur_count) + _FLOAT_TEXEL_BYTES * maps
         if others

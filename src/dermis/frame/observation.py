@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.base.summary import ShortRepr
-from dermis.frame.features.outputs.planes import PlaneArray
+from dermis.frame.features.outputs.output_images import OutputArray
 from dermis.frame.features.outputs.readback import Readback
 from dermis.gpu.memo import are_equal
 from dermis.scene.head_pose import gaze_directions, head_pose
@@ -72,7 +72,7 @@ class Observation(ShortRepr):
     """
 
     picture: NDArray[np.uint8 | np.float32]
-    outputs: Mapping[str, PlaneArray]
+    outputs: Mapping[str, OutputArray]
     camera: OpenCvCamera
     landmarks: Mapping[str, Landmarks]
     head_pose: NDArray[np.float64]

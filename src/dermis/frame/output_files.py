@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dermis.base import atomic_write as files
 from dermis.base.errors import refuse
-from dermis.frame.features.outputs.planes import PlaneArray
+from dermis.frame.features.outputs.output_images import OutputArray
 from dermis.images.codecs import encode_png
 from dermis.images.io import encode_exr_parts
 from dermis.scene.outputs import OUTPUTS, Output
@@ -38,7 +38,7 @@ def output_path(picture_path: Path, output_name: str, file_format: FileFormat) -
     return picture_path.with_name(f"{picture_path.stem}.{output_name}.{file_format}")
 
 
-def encode_output(output_name: str, output_array: PlaneArray, file_format: FileFormat) -> bytes:
+def encode_output(output_name: str, output_array: OutputArray, file_format: FileFormat) -> bytes:
     """Return the bytes of a file that stores one output; equal arrays give equal bytes.
 
     output_name : name of the output
@@ -48,7 +48,7 @@ def encode_output(output_name: str, output_array: PlaneArray, file_format: FileF
     return _ENCODERS[file_format](output_name, output_array)
 
 
-def write_output(path: Path, output_name: str, output_array: PlaneArray) -> None:
+def write_output(path: Path, output_name: str, output_array: OutputArray) -> None:
     """Write an output as .exr, .png or .npy, atomically.
 
     output_name : name of the output
@@ -58,7 +58,7 @@ def write_output(path: Path, output_name: str, output_array: PlaneArray) -> None
     _write_atomically(path, encode_output(output_name, output_array, kinds[path.suffix.lower()]))
 
 
-def write_multipart(path: Path, picture: PlaneArray, output_arrays: Mapping[str, PlaneArray]) -> None:
+def write_multipart(path: Path, picture: OutputArray, output_arrays: Mapping[str, OutputArray]) -> None:
     """Write a linear picture and outputs as the parts of one OpenEXR file.
 
     picture : (h, w, 3 or 4) linear floats
@@ -69,7 +69,7 @@ def write_multipart(path: Path, picture: PlaneArray, output_arrays: Mapping[str,
     _write_atomically(path, encode_exr_parts(parts))
 
 
-def quantise(output_name: str, output_array: PlaneArray) -> NDArray[np.uint8 | np.uint16]:
+def quantise(output_name: str, output_array: OutputArray) -> NDArray[np.uint8 | np.uint16]:
     """Return an output as integers for a PNG file, (h, w) or (h, w, 3).
 
     Outputs with two channels get a third channel of zeros, because PNG has no format with two colour
@@ -85,31 +85,31 @@ def quantise(output_name: str, output_array: PlaneArray) -> NDArray[np.uint8 | n
     return words if words.ndim == 2 or words.shape[2] > 2 else np.pad(words, ((0, 0), (0, 0), (0, 1)))
 
 
-def _named_channels(output: Output, output_array: PlaneArray) -> dict[str, PlaneArray]:
+def _named_channels(output: Output, output_array: OutputArray) -> dict[str, OutputArray]:
     """Return a dictionary from channel names in OpenEXR, such as normal.X, to channels of an output."""
     channels = np.atleast_3d(output_array)
     names = output.channel_names or [str(k) for k in range(channels.shape[2])]
     return {f"{output.name}.{name}": channels[..., k] for k, name in enumerate(names)}
 
 
-def _encode_exr(output_name: str, output_array: PlaneArray) -> bytes:
+def _encode_exr(output_name: str, output_array: OutputArray) -> bytes:
     return encode_exr_parts(
         {output_name: _named_channels(OUTPUTS[output_name], output_array)}, use_run_length_encoding=True
     )
 
 
-def _encode_png(output_name: str, output_array: PlaneArray) -> bytes:
+def _encode_png(output_name: str, output_array: OutputArray) -> bytes:
     words = quantise(output_name, output_array)
     return encode_png(words[..., None] if words.ndim == 2 else words, 6)
 
 
-def _encode_npy(output_name: str, output_array: PlaneArray) -> bytes:
+def _encode_npy(output_name: str, output_array: OutputArray) -> bytes:
     stream = io.BytesIO()
     np.save(stream, output_array, allow_pickle=False)
     return stream.getvalue()
 
 
-_ENCODERS: Mapping[FileFormat, Callable[[str, PlaneArray], bytes]] = {
+_ENCODERS: Mapping[FileFormat, Callable[[str, OutputArray], bytes]] = {
     "exr": _encode_exr,
     "png": _encode_png,
     "npy": _encode_npy,

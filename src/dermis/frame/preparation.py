@@ -14,17 +14,17 @@ from dermis.frame.features.diffusion.profiles import ProfileMix, SkinProfiles
 from dermis.frame.features.diffusion.pyramid import Blur, half_precision_scale
 from dermis.frame.features.hair.resources import strand_shadow_constants
 from dermis.frame.features.occlusion.moving import (
-    RotationAnchors,
+    HeadRotationPoints,
     SkyViews,
     head_rotation,
-    make_rotation_anchors,
+    make_head_rotation_points,
     sky_views,
     sky_views_record,
 )
 from dermis.frame.features.outputs.stage_inputs import PreviousScene
 from dermis.frame.features.shading.shade import shade_program
-from dermis.frame.features.shading.view import EyePoses, camera_views, pinhole, with_camera
-from dermis.frame.features.shape.shape import MotionBytes, rest_motion
+from dermis.frame.features.shading.view import EyePoses, camera_views, with_camera, world_space_pinhole
+from dermis.frame.features.shape.shape import PoseBytes, rest_pose_bytes
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.lights.environment import add_suns, load_environment_map, peak_irradiance
 from dermis.frame.lights.records import light_constants, light_part_counts, light_records, light_shadow_views
@@ -54,7 +54,7 @@ RequestedNames = tuple[str, ...]
 class HeadState(NamedTuple):
     """Current state of a head: its pose, the outline of the posed shape, and the poses of its eyes."""
 
-    motion: MotionBytes
+    motion: PoseBytes
     outline: Outline
     eyes: EyePoses | None
 
@@ -70,7 +70,7 @@ class Preparation:
         self.device, self.memo = device, Memo(cache_size, cache_ttl)
         self.profiles = SkinProfiles()
 
-    def inputs(
+    def prepare_frame(
         self,
         scene: Scene,
         settings: Settings,
@@ -114,7 +114,9 @@ class Preparation:
         scene = add_suns(self.memo, scene, environment_map)
         state = self._head_state(head, scene.motion)
         light_inputs = head, tuple(scene.lights), state.outline, settings.shadow_size
-        lights, shadow_views, part_counts = cached(_light_resources, *light_inputs, untracked=(device, scene))
+        lights, shadow_views, part_counts = cached(
+            _light_resources, *light_inputs, untracked_arguments=(device, scene)
+        )
         request = FrameRequest(
             head=scene.head,
             skin=scene.skin,
@@ -138,11 +140,11 @@ class Preparation:
         except OutOfMemoryError as error:
             self.memo.clear()
             raise out_of_memory_error(error, device, request) from error
-        camera = pinhole(scene.camera, head, settings)
+        camera = world_space_pinhole(scene.camera, head, settings)
         constants = light_constants(scene) + strand_shadow_constants(head, settings)
         constants += interreflection_constants(resources)
-        texel = resources.diffusion.levels.texel
-        scale = half_precision_scale(texel, peak_irradiance(scene, environment_map))
+        texel_format = resources.diffusion.levels.texel_format
+        scale = half_precision_scale(texel_format, peak_irradiance(scene, environment_map))
         animated = resources.expression_maps is not None
         return FrameInputs(
             resources=resources,
@@ -175,8 +177,13 @@ class Preparation:
         self, head: Head, motion: Motion | None, outline: Outline
     ) -> tuple[SkyViews, UniformRecord]:
         """Return the views of the posed head that ambient occlusion needs, and their uniform record."""
-        anchors, motion = self.memo.get(make_rotation_anchors, head.topology), motion or head.control.rest
-        return self.memo.get(_sky_view, outline, untracked=(motion, self.device, head, anchors))
+        rotation_points, motion = (
+            self.memo.get(make_head_rotation_points, head.topology),
+            motion or head.control.rest,
+        )
+        return self.memo.get(
+            _sky_view, outline, untracked_arguments=(motion, self.device, head, rotation_points)
+        )
 
     def _previous_scene(self, scene: Scene, previous: Scene, inputs: FrameInputs) -> PreviousScene:
         """Return the pose and the camera of the previous scene, for motion vectors.
@@ -187,16 +194,16 @@ class Preparation:
         if not are_equal(previous.head.bare, head):
             actual, advice = f"got {previous.head.name!r}", "Leave it out when the head changes"
             refuse("previous", "a scene of the same head", actual, advice)
-        motion = self.memo.get(_rest_motion_bytes, head)
+        motion = self.memo.get(_rest_pose_bytes, head)
         if previous.motion is not None:
-            motion = self.memo.get(_motion_bytes, head, previous.motion, motion, caller_name="before")
-        camera = pinhole(previous.camera, head, inputs.settings)
+            motion = self.memo.get(_pose_bytes, head, previous.motion, motion, caller_name="before")
+        camera = world_space_pinhole(previous.camera, head, inputs.settings)
         view = with_camera(inputs.resources.view, camera, None)
         return PreviousScene(None if motion == inputs.motion else motion, view)
 
     def _head_state(self, head: Head, motion: Motion | None) -> HeadState:
         """Return the pose, outline and eyes of a head; if `motion` is None, the head is at rest."""
-        at_rest = self.memo.get(_rest_motion_bytes, head)
+        at_rest = self.memo.get(_rest_pose_bytes, head)
         return self.memo.get(_posed_state, head, motion or head.control.rest, at_rest)
 
 
@@ -205,7 +212,7 @@ def interreflection_constants(resources: Resources) -> Constants:
     return (("INTERREFLECTION", 1),) if resources.layouts[0].interreflection else ()
 
 
-def _motion_bytes(head: Head, motion: Motion, rest_bytes: MotionBytes) -> MotionBytes:
+def _pose_bytes(head: Head, motion: Motion, rest_bytes: PoseBytes) -> PoseBytes:
     """Return a pose as bytes for the shaders.
 
     rest_bytes : bytes of the rest pose; its positions are reused if the pose has the same control points
@@ -231,8 +238,8 @@ def _face_movements(head: Head, motion: Motion | None) -> NDArray[np.float32]:
     return movement_weights(head.targets, motion.weights)
 
 
-def _rest_motion_bytes(head: Head) -> MotionBytes:
-    return rest_motion(head.control)
+def _rest_pose_bytes(head: Head) -> PoseBytes:
+    return rest_pose_bytes(head.control)
 
 
 def _eye_poses(head: Head, motion: Motion) -> EyePoses | None:
@@ -243,17 +250,17 @@ def _eye_poses(head: Head, motion: Motion) -> EyePoses | None:
     return EyePoses(head.eyes.eye_matrices(rig, motion), edges)
 
 
-def _posed_state(head: Head, motion: Motion, rest_bytes: MotionBytes) -> HeadState:
-    rig, posed = head.control, _motion_bytes(head, motion, rest_bytes)
+def _posed_state(head: Head, motion: Motion, rest_bytes: PoseBytes) -> HeadState:
+    rig, posed = head.control, _pose_bytes(head, motion, rest_bytes)
     if posed == rest_bytes:  # the outline of the mesh is exact
         return HeadState(posed, head.mesh.outline, _eye_poses(head, motion))
     return HeadState(posed, Outline(rig.outline_mm(motion), _OUTLINE_MARGIN_MM), _eye_poses(head, motion))
 
 
 def _sky_view(
-    outline: Outline, motion: Motion, device: Device, head: Head, anchors: RotationAnchors
+    outline: Outline, motion: Motion, device: Device, head: Head, rotation_points: HeadRotationPoints
 ) -> tuple[SkyViews, UniformRecord]:
-    views = sky_views(outline, head_rotation(anchors, motion))
+    views = sky_views(outline, head_rotation(rotation_points, motion))
     return views, sky_views_record(device, views, len(head.mesh.positions))
 
 

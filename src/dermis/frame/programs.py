@@ -42,7 +42,7 @@ _MAX_SAMPLES_PER_INVOCATION = (
 )
 
 
-ListMembers = Callable[[], Sequence[ShaderListMember]]
+GetListMembers = Callable[[], Sequence[ShaderListMember]]
 _COMMON_SHADERS = (  # shaders of most frames
     "shading/shade.wgsl",
     "surface/surface_texels.wgsl",
@@ -67,13 +67,13 @@ def shader_folders(*option_names: str) -> tuple[Folder, ...]:
 
 
 @lru_cache(maxsize=1)
-def _feature_definitions(_: int) -> tuple[dict[str, ListMembers], dict[str, float]]:
+def _feature_definitions(_: int) -> tuple[dict[str, GetListMembers], dict[str, float]]:
     """Return the shader lists and shader constants of all features.
 
     The parameter, from `registry_version`, only serves as a cache key.
     """
     constants = light_shader_constants() | isotropic_lobe_constants() | reflection_constants()
-    lists: dict[str, ListMembers] = {"lights": light_shaders}
+    lists: dict[str, GetListMembers] = {"lights": light_shaders}
     for feature in _feature_packages():
         constants |= getattr(feature, "shader_constants", dict)()
         lists |= getattr(feature, "shader_lists", dict)()
@@ -92,7 +92,7 @@ def program(
     constants: Constants = (),
     source_format: str = FLOAT_TEXEL_FORMAT,
     store_format: str = FLOAT_TEXEL_FORMAT,
-    with_labels: bool = False,
+    stores_hair_labels: bool = False,
 ) -> ComputeProgram:
     """Return the compiled program of a shader; programs are cached per device.
 
@@ -102,9 +102,10 @@ def program(
     constants : pipeline constants
     source_format : format of the texture from which the shader reads light
     store_format : format of the texture to which the shader writes light
-    with_labels : for shaders that draw hair, whether they store the labels of pixels besides the picture
+    stores_hair_labels : for shaders that draw hair, whether they store the labels of pixels besides the
+        picture
     """
-    active = shader_options(source_format, store_format, with_labels, constants)
+    active = shader_options(source_format, store_format, stores_hair_labels, constants)
 
     def compile_program() -> ComputeProgram:
         file, folders = FEATURES_FOLDER / path, shader_folders(*active)
@@ -114,13 +115,13 @@ def program(
 
 
 def shader_options(
-    source_format: str, store_format: str, with_labels: bool, constants: Constants = ()
+    source_format: str, store_format: str, stores_hair_labels: bool, constants: Constants = ()
 ) -> tuple[str, ...]:
     """Return the names of the `//#if` conditions that are true for the given options of `program`."""
     values = {
         "FILTERED_SOURCE": source_format == HALF_TEXEL_FORMAT,
         "STORED_HALVES": store_format == HALF_TEXEL_FORMAT,
-        "HAIR_LABELS": with_labels,
+        "HAIR_LABELS": stores_hair_labels,
     }
     options = [name for name, value in values.items() if value]
     return (*options, *(name for name, value in constants if name in OPTIONAL_BINDING_CONSTANTS and value))
@@ -189,8 +190,8 @@ def start_compiling_common_programs(device: Device) -> None:
     """Start compiling the programs that most frames need, while other threads load the scene."""
     for name in _COMMON_SHADERS:
         program(device, name)
-    texel = level_format(device)
-    program(device, "atlas/stitch_gather.wgsl", source_format=texel)
-    program(device, "diffusion/diffuse_halve.wgsl", source_format=texel, store_format=texel)
+    texel_format = level_format(device)
+    program(device, "atlas/stitch_gather.wgsl", source_format=texel_format)
+    program(device, "diffusion/diffuse_halve.wgsl", source_format=texel_format, store_format=texel_format)
     for name in ("atlas/stitch_place.wgsl", "irradiance/irradiance.wgsl"):
-        program(device, name, store_format=texel)
+        program(device, name, store_format=texel_format)

@@ -21,7 +21,7 @@ Triple = tuple[float, float, float]
 Axes = tuple[Triple, Triple, Triple]
 MatrixRow = tuple[float, float, float, float]
 MatrixRows = tuple[MatrixRow, MatrixRow, MatrixRow]
-_MAX_LIGHT_TANGENT = math.tan(math.radians(80.0))
+_MAX_HALF_VIEW_TANGENT = math.tan(math.radians(80.0))
 _MIN_LIGHT_DISTANCE_MM = 1.0
 _UP_DIRECTION = 0.0, 1.0, 0.0
 _NO_WINDOW_SHIFT = 0.0, 0.0
@@ -39,7 +39,7 @@ class Views(NamedTuple):
     clips: Matrix
     sample_positions: Matrix
 
-    def sample_matrices(self, layer_size: tuple[int, int]) -> Matrix:
+    def clip_matrices_of_samples(self, layer_size: tuple[int, int]) -> Matrix:
         """Return (k n, 4, 4) matrices from world to clip space, one for each of n samples of k views.
 
         They are shifted so that pixel centres fall on sample positions.
@@ -199,7 +199,7 @@ def point_shadow_views(
     near, far = depth.min(axis=1).tolist(), depth.max(axis=1).tolist()
     _check_lights_outside(lights, [one > _MIN_LIGHT_DISTANCE_MM for one in near])
     steepest = _largest_tangents(view_points[:2], depth)
-    _check_lights_outside(lights, [one <= _MAX_LIGHT_TANGENT for one in steepest])
+    _check_lights_outside(lights, [one <= _MAX_HALF_VIEW_TANGENT for one in steepest])
     slack = outline.margin_mm
     bounds = [
         (1.02 * h, max(0.98 * n - slack, 0.1 * n), 1.02 * f + slack)
@@ -258,7 +258,7 @@ def parallel_shadow_view(direction: Vectors, outline: Outline, map_side: int) ->
 
 
 @cache
-def pixel_samples(sample_count: int) -> NDArray[np.float64]:
+def pixel_sample_positions(sample_count: int) -> NDArray[np.float64]:
     """Return the sample positions within a pixel: a (sample_count, 2) Hammersley set in the unit square."""
     index = np.arange(sample_count)
     y, digit, remaining = np.zeros(sample_count), 0.5, index.copy()

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
+from dermis.base.renamed import renamed_attribute
 from dermis.base.summary import ShortRepr
 from dermis.frame.features import outputs as output_features
-from dermis.frame.features.outputs.planes import PlaneArray
+from dermis.frame.features.outputs.output_images import OutputArray
 from dermis.frame.features.outputs.readback import Readback
 from dermis.frame.features.post.meter import Meter, read_meter
 from dermis.frame.features.post.picture import Picture
@@ -68,6 +69,7 @@ class RenderedFrame(ShortRepr):
     start_readback: Callable[[Picture, Settings | None], Readback]
     run_on_device: Callable[[Callable[[], Any]], Any]
     is_current: Callable[[], bool]
+    clipped = renamed_attribute("clipped", "clipped_fraction")
 
     @property
     def picture(self) -> Picture:
@@ -83,7 +85,7 @@ class RenderedFrame(ShortRepr):
 
     def linear(self) -> NDArray[np.float32]:
         """Return the (h, w, 3) linear Rec. 709 picture after bloom and exposure [-]."""
-        return np.ascontiguousarray(self._download_exposed()[..., :3])
+        return np.ascontiguousarray(self._download_exposed_picture()[..., :3])
 
     def srgb8(self) -> NDArray[np.uint8]:
         """Return the (h, w, 3) sRGB bytes of the picture after the tone curve."""
@@ -98,9 +100,9 @@ class RenderedFrame(ShortRepr):
 
     def linear_rgba(self) -> NDArray[np.float32]:
         """Return (h, w, 4) linear floats of a frame with background "none", premultiplied by alpha."""
-        return self._download_exposed()
+        return self._download_exposed_picture()
 
-    def output(self, name: str) -> PlaneArray:
+    def output(self, name: str) -> OutputArray:
         """Return an output of the frame, (h, w) or (h, w, channels) with row 0 at the top.
 
         Raises DermisError for an output that was not requested.
@@ -112,13 +114,13 @@ class RenderedFrame(ShortRepr):
             refuse(f"output {name}", "a requested output", actual, f'Pass outputs=("{name}",) to draw')
         return self._read(lambda frame: _read_output(frame, name))
 
-    def clipped(self) -> float:
+    def clipped_fraction(self) -> float:
         """Return the fraction of the head's pixels that are overexposed in any channel [-]."""
         levels = self._read(lambda frame: download(frame.device, frame.picture.bytes))
         head = levels[levels[..., 3] == _MAX_BYTE_LEVEL]
         return float((head[:, :3].max(axis=1) == _MAX_BYTE_LEVEL).mean()) if len(head) else 0.0
 
-    def _download_exposed(self) -> NDArray[np.float32]:
+    def _download_exposed_picture(self) -> NDArray[np.float32]:
         return self._read(lambda frame: download(frame.device, frame.picture.exposed))
 
     def _read_back(self, alpha_settings: Settings | None = None) -> NDArray[Any]:
@@ -133,9 +135,9 @@ class RenderedFrame(ShortRepr):
         return result
 
 
-def _read_output(frame: FrameTextures, name: str) -> PlaneArray:
+def _read_output(frame: FrameTextures, name: str) -> OutputArray:
     assert frame.outputs is not None
-    planes = frame.outputs.planes_of_output(name)
-    start, size = planes.byte_range(name)
-    raw = frame.device.handle.queue.read_buffer(planes.buffer, start, size)
-    return planes.decode_output(name, np.frombuffer(raw, np.uint8).copy())
+    images = frame.outputs.images_with_output(name)
+    start, size = images.byte_range(name)
+    raw = frame.device.handle.queue.read_buffer(images.buffer, start, size)
+    return images.decode_output(name, np.frombuffer(raw, np.uint8).copy())

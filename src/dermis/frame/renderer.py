@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_integer
-from dermis.base.renamed import renamed_keywords
+from dermis.base.renamed import renamed_attribute, renamed_keywords
 from dermis.frame.features.outputs.landmarks import checked_landmark_sets
 from dermis.frame.features.outputs.readback import Readback, start_readback
 from dermis.frame.features.post.picture import Picture
@@ -87,7 +87,7 @@ class Renderer:
         Number of variants of each resource that are cached, for callers that alternate between a few scenes.
     cache_ttl : int
         Number of frames after which unused resources are released.
-    reopens : bool
+    reopens_lost_device : bool
         Whether a lost device is opened again. If False, DeviceLostError is raised, for callers that keep
         other resources on the device.
 
@@ -109,10 +109,16 @@ class Renderer:
 
     device: Device
     graph: Graph
+    draw_warm = renamed_attribute("draw_warm", "draw_after_warm_up")
 
-    @renamed_keywords(depth="cache_size", rounds="cache_ttl")
+    @renamed_keywords(depth="cache_size", rounds="cache_ttl", reopens="reopens_lost_device")
     def __init__(
-        self, adapter: str = "auto", cache_size: int = 1, *, cache_ttl: int = 1, reopens: bool = True
+        self,
+        adapter: str = "auto",
+        cache_size: int = 1,
+        *,
+        cache_ttl: int = 1,
+        reopens_lost_device: bool = True,
     ) -> None:
         if not isinstance(adapter, str):
             actual = f"got {format_value(adapter)}"
@@ -122,7 +128,9 @@ class Renderer:
         self._adapter, self._opening_ms = adapter, 0.0
         self._latest: FrameTextures | None = None
         self._in_flight: deque[int] = deque()
-        self.reopening_device = ReopeningDevice(self._open, self._use_device, reopens=reopens)
+        self.reopening_device = ReopeningDevice(
+            self._open, self._use_device, reopens_lost_device=reopens_lost_device
+        )
 
     def _open(self) -> Device:
         self._opening_began = time.perf_counter()
@@ -133,7 +141,7 @@ class Renderer:
         start_compiling_common_programs(device)
         self.device, self.graph = device, Graph(device)
         preparation = Preparation(device, self._cache_size, self._cache_ttl)
-        self.memo, self.prepare = preparation.memo, preparation.inputs
+        self.memo, self.prepare = preparation.memo, preparation.prepare_frame
         self.skin_profile = preparation.profiles.profile
         self._in_flight.clear()
         self._opening_ms = 1e3 * (time.perf_counter() - self._opening_began)
@@ -147,7 +155,7 @@ class Renderer:
         self,
         inputs: FrameInputs,
         timed: Timing,
-        force: bool,
+        run_all_passes: bool,
         read_back: Callable[[Graph, Picture], T] | None = None,
     ) -> tuple[CommandList, T | None]:
         """Declare the passes of a frame, run those whose inputs have changed, and start a readback.
@@ -155,10 +163,10 @@ class Renderer:
         All passes are in one submission. Returns the submitted commands, and the result of `read_back`.
 
         timed : whether stages or the whole frame are timed, see `draw`
-        force : whether to run all passes, instead of only the passes whose inputs have changed
+        run_all_passes : whether to run all passes, instead of only the passes whose inputs have changed
         read_back : function that starts the readback of the picture, None for no readback
         """
-        if force:
+        if run_all_passes:
             self.graph.invalidate()
         self.graph.begin()
         draw_frame(self.graph, inputs, TECHNIQUES[inputs.settings.technique])
@@ -203,13 +211,13 @@ class Renderer:
         assert readback is not None
         return readback
 
-    @renamed_keywords(anew="force")
+    @renamed_keywords(anew="run_all_passes", force="run_all_passes")
     def draw(
         self,
         scene: Scene,
         settings: Settings | None = None,
         *,
-        force: bool = False,
+        run_all_passes: bool = False,
         timed: Timing = True,
         view: str = "",
         outputs: Iterable[str] = (),
@@ -223,7 +231,7 @@ class Renderer:
             Scene, or a head alone with default light and camera.
         settings : Settings, optional
             Size, technique and other settings.
-        force : bool
+        run_all_passes : bool
             Whether to run all passes, instead of only the passes whose inputs have changed.
         timed : bool or "whole"
             True times each stage in a separate pass, which makes the frame slower. "whole" times the frame as
@@ -258,18 +266,18 @@ class Renderer:
         settings = as_model(Settings, settings or {}, "settings", "size=(512, 512)")
         previous = previous and Scene.coerce(previous)
         prepared = Scene.coerce(scene), settings, view, check_outputs(outputs), previous
-        return self.reopening_device.run(partial(self._draw, force, timed, *prepared))
+        return self.reopening_device.run(partial(self._draw, run_all_passes, timed, *prepared))
 
-    def _draw(self, force: bool, timed: Timing, *prepared: Any) -> RenderedFrame:
+    def _draw(self, run_all_passes: bool, timed: Timing, *prepared: Any) -> RenderedFrame:
         """Render one frame and leave the picture on the device.
 
-        force, timed : as in `draw`
-        prepared : arguments of `Preparation.inputs`
+        run_all_passes, timed : as in `draw`
+        prepared : arguments of `Preparation.prepare_frame`
         """
         started = time.perf_counter()
         inputs = self.prepare(*prepared)
         ready = time.perf_counter()
-        frame, _ = self._submit(inputs, timed, force)
+        frame, _ = self._submit(inputs, timed, run_all_passes)
         if timed:
             frame.wait()
         else:
@@ -283,7 +291,7 @@ class Renderer:
         self._latest = textures
 
         def redraw() -> None:
-            vars(textures).update(vars(self._draw(force, timed, *prepared).textures))
+            vars(textures).update(vars(self._draw(run_all_passes, timed, *prepared).textures))
             self._latest = textures
 
         return RenderedFrame(
@@ -315,7 +323,7 @@ class Renderer:
 
         return self.reopening_device.run(run)
 
-    def draw_warm(self, scene: Scene, settings: Settings | None = None) -> RenderedFrame:
+    def draw_after_warm_up(self, scene: Scene, settings: Settings | None = None) -> RenderedFrame:
         """Render a scene after warm-up frames that bring a GPU to its full clock rate, to measure times.
 
         Software adapters render without warm-up frames.
@@ -327,13 +335,13 @@ class Renderer:
         settings : Settings, optional
             Size, technique and other settings.
         """
-        rendered = self.draw(scene, settings, force=True)
+        rendered = self.draw(scene, settings, run_all_passes=True)
         if self.device.adapter.kind == "CPU":
             return rendered
         for _ in range(_WARM_UP_FRAME_COUNT):
-            self.draw(scene, settings, force=True, timed=False)
+            self.draw(scene, settings, run_all_passes=True, timed=False)
         self.device.wait()
-        return self.draw(scene, settings, force=True)
+        return self.draw(scene, settings, run_all_passes=True)
 
     def render(self, scene: Scene | Head, **settings: Any) -> NDArray[np.float32]:
         """Return the picture of a scene.

@@ -26,7 +26,7 @@ class FrameRequest:
 
     profile : diffusion profile of the skin; the first profile if the skin has several (`other_profiles`)
     rest_positions_mm : (p, 3) positions of the person's control points in the rest pose [mm]; None if they
-        are the control points of `topology`, the template whose mesh several people can share
+        are the control points of `atlas_head`, the template whose mesh several people can share
     environment : light from all directions around the head, None if there is none
     environment_map : prefiltered panorama of `environment`
     light_part_counts : number of parts into which each light is divided. The last lights are those that
@@ -60,27 +60,27 @@ class FrameRequest:
     landmarks: tuple[str, ...] = ()
 
     @property
-    def topology(self) -> Head:
+    def atlas_head(self) -> Head:
         """Return the head for which the atlas is computed: the template that people share, or `head`."""
         return self.head.topology
 
     @property
-    def is_shared(self) -> bool:
+    def has_shared_mesh(self) -> bool:
         """Return whether several people share the mesh, and thus also the atlas and other resources."""
-        return self.topology is not self.head.bare
+        return self.atlas_head is not self.head.bare
 
     @property
-    def albedo_from_map(self) -> bool:
+    def takes_albedo_from_map(self) -> bool:
         """Return whether the colour map alone determines the albedo."""
         return self.skin.albedo == "map"
 
     @property
-    def light_key(self) -> str:
+    def light_cache_key(self) -> str:
         """Return the cache key of resources that hold light; it consists of view name and shadow map size."""
         return f"{self.view_name} {self.settings.shadow_size}"
 
     @cached_property
-    def split(self) -> ProfileSplit:
+    def profile_split(self) -> ProfileSplit:
         """Return the profile, split into a narrow Gaussian and the Gaussians with which light is blurred.
 
         The narrow Gaussian is not blurred: its share of the light leaves the skin where it enters, and is
@@ -88,7 +88,9 @@ class FrameRequest:
         the splits of the other profiles.
         """
         profiles = self.profile, *self.other_profiles
-        first, *others = (self.technique.split(profile, self.albedo_from_map) for profile in profiles)
+        first, *others = (
+            self.technique.split_profile(profile, self.takes_albedo_from_map) for profile in profiles
+        )
         fine = {} if others else first.fine  # with blends, stripes are as fine as texels
         return replace(first, others=tuple(others), fine=fine)
 
@@ -125,7 +127,7 @@ class FrameRequest:
         return seam_method(self.settings.seams, self.technique.stitches_seams)
 
     @property
-    def painted_side(self) -> int:
+    def painted_map_side(self) -> int:
         """Return the side of the maps that are painted on the device [texels]; 0 for maps from files."""
         if not isinstance(self.head.maps, PaintedMaps):
             return 0
@@ -138,17 +140,17 @@ class FrameRequest:
 
         The painted gloss maps store the strength of this relief."""
         maps = self.head.maps
-        return self.painted_side > 0 and maps.specular is None and maps.roughness is None
+        return self.painted_map_side > 0 and maps.specular is None and maps.roughness is None
 
     @property
     def has_animated_maps(self) -> bool:
         """Return whether expressions change the painted maps."""
-        return self.posed and self.painted_side > 0 and bool(self.head.targets)
+        return self.posed and self.painted_map_side > 0 and bool(self.head.targets)
 
     @property
     def blur_count(self) -> int:
         """Return the number of Gaussians with which light is blurred over the atlas."""
-        return len(self.split.blurred_mm2)
+        return len(self.profile_split.blurred_mm2)
 
     @property
     def output_channels(self) -> dict[str, int]:

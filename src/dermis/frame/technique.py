@@ -21,9 +21,10 @@ class ProfileSplit:
 
     The narrow Gaussian spreads light over so short a distance that no blur is needed: its share of the light
     leaves where it enters. Instead of being read from the atlas, this share is computed again at each pixel
-    of the picture, so the narrow Gaussian is called the relit Gaussian.
+    of the picture. The narrow Gaussian is called the unblurred Gaussian.
 
-    relit : (3,) weights of the relit Gaussian in red, green and blue; 0 if all Gaussians are blurred [-]
+    unblurred_weight : (3,) weights of the unblurred Gaussian in red, green and blue; 0 if all Gaussians are
+        blurred [-]
     total : (3,) sums of the weights of all Gaussians [-]
     blurred_mm2 : (k,) variances of the Gaussians with which light is blurred [mm^2]
     weight : (k, 3) weights of these Gaussians [-]
@@ -32,7 +33,7 @@ class ProfileSplit:
         empty for no correction
     """
 
-    relit: Floats
+    unblurred_weight: Floats
     total: Floats
     blurred_mm2: Floats
     weight: Floats
@@ -40,15 +41,15 @@ class ProfileSplit:
     fine: dict[str, float | NDArray[np.floating]] = field(default_factory=dict)
 
     @property
-    def relit_changes(self) -> Floats:
-        """Return, for each of the n profiles in `others`, its field `relit` minus that of this profile [-].
+    def unblurred_differences(self) -> Floats:
+        """Return, for each of the n profiles in `others`, its `unblurred_weight` minus that of this one [-].
 
         The result has the shape (n, 3).
         """
-        return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
+        return np.array([one.unblurred_weight - self.unblurred_weight for one in self.others]).reshape(-1, 3)
 
     @property
-    def weight_changes(self) -> tuple[Floats, ...]:
+    def weight_differences(self) -> tuple[Floats, ...]:
         """Return, for each profile in `others`, its field `weight` minus that of this profile, (k, 3) [-]."""
         return tuple(one.weight - self.weight for one in self.others)
 
@@ -81,7 +82,7 @@ class TechniqueTraits:
     pixel_bytes: ClassVar[int] = 0
     subsurface_layer_bytes: ClassVar[int] = 0
 
-    def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
+    def split_profile(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
         """Split a profile into a narrow Gaussian and the Gaussians with which light is blurred.
 
         The narrow Gaussian is not blurred: its share of the light leaves the skin where it enters, and is
@@ -94,7 +95,7 @@ class TechniqueTraits:
         total = channel_weights(profile, normalise_weights).sum(axis=0)
         return ProfileSplit(total, total, np.empty(0), np.empty((0, 3)))
 
-    def stretch(self, settings: Settings) -> str:
+    def stretch_correction(self, settings: Settings) -> str:
         """Return the stretch correction of the blurs: "full", "axes" or "none", see `Settings.stretch`."""
         return settings.stretch
 

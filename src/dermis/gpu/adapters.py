@@ -213,7 +213,7 @@ def select_adapters(selector: str) -> tuple[list[Adapter], str]:
     return fitting, reason
 
 
-def similar_adapters(selector: str) -> list[Adapter]:
+def adapters_like_best_match(selector: str) -> list[Adapter]:
     """Return the best adapter for a selector, then all other matching GPUs of the same kind and backend.
 
     Because all returned adapters use one backend, no GPU is listed twice. A software adapter is returned

@@ -80,14 +80,14 @@ class CapturedFrame:
     records: list[tuple[str, UniformRecord]] = field(default_factory=list)
     _record_index: dict[int, int] = field(default_factory=dict)
 
-    def add(self, captured_pass: CapturedPass, unit_index: int | None) -> None:
+    def add(self, captured_pass: CapturedPass, replay_unit_index: int | None) -> None:
         """Append a pass to the captured frame.
 
-        unit_index : index of the unit, a group of passes that are run or skipped together, to which the pass
-            belongs; None for a pass that is run or skipped on its own
+        replay_unit_index : index of the unit, a group of passes that are run or skipped together, to which
+            the pass belongs; None for a pass that is run or skipped on its own
         """
         last = self.passes[-1].unit if self.passes else -1
-        captured_pass.unit = last + 1 if unit_index is None else unit_index
+        captured_pass.unit = last + 1 if replay_unit_index is None else replay_unit_index
         self.passes.append(captured_pass)
 
     def index_of_record(self, struct_name: str, record: UniformRecord) -> int:
@@ -202,17 +202,17 @@ class FrameCapture(Graph):
         captured = self._add_pass(stage, program, resources, (vertex_count,))
         captured.raster = {"layer": instance_index, "far": target.clear_depth, **indices_of}
 
-    def fill(
+    def draw_fullscreen(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
         """Raise NotImplementedError, as programs that replay a captured frame do not support such passes."""
         raise NotImplementedError(f"{stage}: passes that fill targets cannot be captured")
 
-    def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
+    def add_replayable(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
         """Capture all passes of `record_passes(recorder, *args)` as one unit, and return its result.
 
         A program that replays the captured frame runs either all passes of a unit or none. Within another
-        call of `repeat`, the passes belong to the unit of the outer call.
+        call of `add_replayable`, the passes belong to the unit of the outer call.
         """
         if self._unit is not None:
             return record_passes(self, *args)

@@ -44,11 +44,11 @@ class CommandList(Recorder):
         self.submitted = 0
         self._stage = ""
         self._pass: ComputePass | None = None
-        is_software, frame_only = device.adapter.kind == "CPU", timed == "whole"
+        is_software, whole_frame_only = device.adapter.kind == "CPU", timed == "whole"
         self._wall_clock = WallClock() if is_software and timed else None
         has_timestamps = device.has_timestamps and timed and not is_software
-        self._timestamps = Timestamps(device, frame_only=frame_only) if has_timestamps else None
-        self._splits_stages = self._wall_clock is not None or (has_timestamps and not frame_only)
+        self._timestamps = Timestamps(device, whole_frame_only=whole_frame_only) if has_timestamps else None
+        self._splits_stages = self._wall_clock is not None or (has_timestamps and not whole_frame_only)
 
     def dispatch(
         self,
@@ -64,7 +64,7 @@ class CommandList(Recorder):
         in_place_resource : ignored; only the frame graph needs it, to find passes with outdated output
         access : `Access` of the program to these resources, which caches the native dispatch for later frames
         """
-        key = stage, workgroups, program.record_positions(resources, self._uniforms)
+        key = stage, workgroups, program.uniform_record_positions(resources, self._uniforms)
         known = access.dispatches if access else {}
         found = known.get(key)
         if found is None:
@@ -141,10 +141,10 @@ class CommandList(Recorder):
             render_pass.draw_indexed(vertex_count, 1, 0, 0, instance_index)
         render_pass.end()
 
-    def fill(
+    def draw_fullscreen(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Add a render pass that runs a program once per texel of its targets, see `Recorder.fill`."""
+        """Add a pass that runs a program once per texel of its targets, see `Recorder.draw_fullscreen`."""
         views = [one.create_view() if hasattr(one, "create_view") else one for one in targets]
         render_pass = self._render_pass(stage, program, resources, views)
         render_pass.draw(3)
@@ -231,7 +231,7 @@ class CommandList(Recorder):
         started = time.perf_counter()
         self._flush()
         self.wait()
-        wall_clock.add(self._stage, started)
+        wall_clock.add_stage_time(self._stage, started)
 
     def _flush(self) -> None:
         self._uniforms.upload()
@@ -326,25 +326,25 @@ class Timestamps:
     The time of a pass extends to the start of the next pass, so that the times of the stages sum to the
     total.
 
-    frame_only : whether to take only the first and the last timestamp of a frame, which takes less time than
-        one for each pass
+    whole_frame_only : whether to take only the first and the last timestamp of a frame, which takes less time
+        than one for each pass
     """
 
-    def __init__(self, device: Device, *, frame_only: bool = False) -> None:
-        self._device, self._frame_only = device, frame_only
+    def __init__(self, device: Device, *, whole_frame_only: bool = False) -> None:
+        self._device, self._whole_frame_only = device, whole_frame_only
         self._queries, self._resolved = device.timestamp_pool()
         self._stages: list[str] = []
 
     def begin(self, stage: str) -> TimestampWrites | None:
         """Reserve the timestamp at the start of a pass, and return its description for wgpu.
 
-        Returns None if the pass gets no timestamp: with `frame_only`, all passes except the first get none,
-        and neither do passes for which the pool has no timestamps left.
+        Returns None if the pass gets no timestamp: with `whole_frame_only`, all passes except the first get
+        none, and neither do passes for which the pool has no timestamps left.
 
         stage : name of the stage to which the time of the pass is added
         """
         is_full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
-        if is_full or (self._frame_only and self._stages):
+        if is_full or (self._whole_frame_only and self._stages):
             return None
         return self._add_timestamp(stage)
 
@@ -359,7 +359,7 @@ class Timestamps:
             encoder.resolve_query_set(self._queries, 0, len(self._stages), self._resolved, 0)
 
     def stage_ms(self) -> dict[str, float]:
-        """Return the time of the whole frame ("total") and, without `frame_only`, that of each stage [ms]."""
+        """Return the time of the frame ("total") and, without `whole_frame_only`, that of each stage [ms]."""
         if not self._stages:
             return {"total": 0.0}
         raw = self._device.handle.queue.read_buffer(self._resolved, 0, 8 * len(self._stages))
@@ -368,7 +368,7 @@ class Timestamps:
         times: dict[str, float] = {}
         for stage, duration in zip(self._stages, np.diff(ticks), strict=False):
             times[stage] = times.get(stage, 0.0) + float(duration) * tick_ms
-        times = {} if self._frame_only else times
+        times = {} if self._whole_frame_only else times
         times["total"] = float(ticks[-1] - ticks[0]) * tick_ms
         return times
 
@@ -383,7 +383,7 @@ class WallClock:
     def __init__(self) -> None:
         self._times: dict[str, float] = {}
 
-    def add(self, stage: str, start_time: float) -> None:
+    def add_stage_time(self, stage: str, start_time: float) -> None:
         """Add the time since `start_time`, a result of time.perf_counter, to the time of a stage."""
         self._times[stage] = self._times.get(stage, 0.0) + 1e3 * (time.perf_counter() - start_time)
 

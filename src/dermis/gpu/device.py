@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
+from dermis.base.renamed import renamed_keywords
 from dermis.gpu.adapters import Adapter, check_limits, device_limits, select_adapters
 from dermis.gpu.memory import check_software_address_space, checked_allocation
 from dermis.gpu.types import Bindable, Buffer, Sampler, Untyped
@@ -32,19 +33,21 @@ _DEVICE_LOSS_LOG_MESSAGES = "DEVICE LOST!", "The WGPU device was lost"
 _LIMITS_RAISED_TO_ADAPTER = ("max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size")
 
 
-def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
+@renamed_keywords(bare="guaranteed_capabilities_only")
+def open_device(adapter: str = "auto", *, guaranteed_capabilities_only: bool = False) -> Device:
     """Open an adapter as a device; if the best matching adapter does not open, try the next match.
 
     adapter : "auto" (the best), "cpu" (software), part of an adapter's name, or "#" and the adapter's number
-    bare : whether to request only the limits that WebGPU guarantees everywhere, and no optional feature
+    guaranteed_capabilities_only : whether to request only the limits that WebGPU guarantees everywhere, and
+        no optional feature
 
     Raises DermisError if no adapter matches or none opens.
     """
-    (*others, last), reason = select_adapters(adapter)
+    (*others, last), selection_reason = select_adapters(adapter)
     for one in others:
         with contextlib.suppress(DermisError):  # listed, but it does not open
-            return Device(one, reason, bare=bare)
-    return Device(last, reason, bare=bare)
+            return Device(one, selection_reason, guaranteed_capabilities_only=guaranteed_capabilities_only)
+    return Device(last, selection_reason, guaranteed_capabilities_only=guaranteed_capabilities_only)
 
 
 class Device:
@@ -55,8 +58,9 @@ class Device:
     device has the features in `OPTIONAL_FEATURES` that the adapter supports.
 
     adapter : opened adapter
-    reason : reason for the choice of the adapter, for users
-    bare : whether the maximum sizes are also WebGPU's defaults, and no optional feature is requested
+    selection_reason : reason for the choice of the adapter, for users
+    guaranteed_capabilities_only : whether the maximum sizes are also WebGPU's defaults, and no optional
+        feature is requested
     executor : threads for work outside Python (compiling, reading, copying); jobs that have not started are
         cancelled when the device is dropped
     ffi : cffi interface of wgpu's native library
@@ -68,19 +72,23 @@ class Device:
     spare_chunks : unused host memory for uniforms, kept for later frames because allocation is slow
     """
 
-    def __init__(self, adapter: Adapter, reason: str, *, bare: bool = False) -> None:
+    def __init__(
+        self, adapter: Adapter, selection_reason: str, *, guaranteed_capabilities_only: bool = False
+    ) -> None:
         from wgpu.backends.wgpu_native import GPUCommandEncoder, ffi, lib
         from wgpu.backends.wgpu_native._api import libf
 
         self.ffi, self.lib, self.checked, self._encoder = ffi, lib, libf, GPUCommandEncoder
         self.adapter = adapter
-        self.reason = reason
+        self.selection_reason = selection_reason
         logging.getLogger("wgpu").addFilter(_is_not_loss_message)
         if adapter.kind == "CPU":
             check_software_address_space()
         check_limits(adapter.name, adapter.handle.limits)
-        features = [] if bare else list(adapter.features)
-        limits = device_limits(adapter.handle.limits, () if bare else _LIMITS_RAISED_TO_ADAPTER)
+        features = [] if guaranteed_capabilities_only else list(adapter.features)
+        limits = device_limits(
+            adapter.handle.limits, () if guaranteed_capabilities_only else _LIMITS_RAISED_TO_ADAPTER
+        )
         try:
             self.handle: Untyped = adapter.handle.request_device_sync(
                 label="dermis", required_features=features, required_limits=limits

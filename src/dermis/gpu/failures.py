@@ -62,14 +62,22 @@ class ReopeningDevice:
 
     open_device : function that opens a device
     on_open : function that is called with each opened device and creates the resources of the caller on it
-    reopens : whether a lost device is opened again; if False, its loss raises DeviceLostError. Pass False if
-        the device also holds resources that `on_open` does not create
+    reopens_lost_device : whether a lost device is opened again; if False, its loss raises DeviceLostError.
+        Pass False if the device also holds resources that `on_open` does not create
     """
 
     def __init__(
-        self, open_device: Callable[[], Device], on_open: Callable[[Device], None], *, reopens: bool = True
+        self,
+        open_device: Callable[[], Device],
+        on_open: Callable[[Device], None],
+        *,
+        reopens_lost_device: bool = True,
     ) -> None:
-        self._open_device, self._on_open, self._reopens = open_device, on_open, reopens
+        self._open_device, self._on_open, self._reopens_lost_device = (
+            open_device,
+            on_open,
+            reopens_lost_device,
+        )
         self._device: Device | None = None
         self.run(lambda: None)
 
@@ -81,7 +89,7 @@ class ReopeningDevice:
         try:
             return self._run_job(job)
         except DeviceLostError as lost:
-            if not self._reopens:
+            if not self._reopens_lost_device:
                 raise
             notify(f"{lost.name} was lost by its driver; it is opened again, and the frame is restarted")
         try:

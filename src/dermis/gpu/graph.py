@@ -24,7 +24,7 @@ _MAX_CACHED_DEPENDENCIES = 8  # for frames that alternate, such as pictures, rea
 
 
 @dataclass
-class ListedPass:
+class FrameListingEntry:
     """Entry of a frame listing: one pass with its shader, bindings and whether it ran.
 
     stage : name of the stage
@@ -54,7 +54,7 @@ class FrameListing:
     resources : descriptions such as "rgba32float 512 x 512 x 7" or "buffer 4096"
     """
 
-    passes: list[ListedPass] = field(default_factory=list)
+    passes: list[FrameListingEntry] = field(default_factory=list)
     resources: list[str] = field(default_factory=list)
     _resource_index: dict[int, int] = field(default_factory=dict)
     _pass_index: list[int] = field(default_factory=list)
@@ -71,13 +71,13 @@ class FrameListing:
         """Append a pass to the listing.
 
         stage : name of the stage
-        workgroups : see `ListedPass.groups`
+        workgroups : see `FrameListingEntry.groups`
         declared_index : index of the pass among those declared on the graph; all passes of a recording have
             the same index, because a recording is declared as one pass
         recorded : whether the pass belongs to a recording
         """
         bindings = {one.name: self._describe_binding(resources[one.name]) for one in program.bindings}
-        listed = ListedPass(
+        listed = FrameListingEntry(
             stage, program.name, dict(program.constants), bindings, tuple(workgroups), recorded
         )
         self.passes.append(listed)
@@ -89,17 +89,19 @@ class FrameListing:
         declared_index : index of the write among the passes declared on the graph
         """
         self.passes.append(
-            ListedPass(stage, "from the host", {}, {"written": self._describe_binding(buffer)}, (byte_count,))
+            FrameListingEntry(
+                stage, "from the host", {}, {"written": self._describe_binding(buffer)}, (byte_count,)
+            )
         )
         self._pass_index.append(declared_index)
 
-    def finish(self, ran_by_declared_pass: Sequence[bool]) -> None:
-        """After the frame, store in `ListedPass.ran` of each listed pass whether it ran.
+    def mark_passes_that_ran(self, did_declared_pass_run: Sequence[bool]) -> None:
+        """After the frame, store in `FrameListingEntry.ran` of each listed pass whether it ran.
 
-        ran_by_declared_pass : for each declared pass, whether it ran
+        did_declared_pass_run : for each declared pass, whether it ran
         """
         for one, index in zip(self.passes, self._pass_index, strict=True):
-            one.ran = ran_by_declared_pass[index]
+            one.ran = did_declared_pass_run[index]
 
     def _describe_binding(self, bound_object: Bindable) -> int | str:
         if isinstance(bound_object, np.ndarray):
@@ -170,7 +172,7 @@ class Graph(Recorder):
     have that version. It is also skipped if no pass that runs reads its outputs, and each output is
     overwritten later or is not needed after the frame (see `mark_scratch`).
 
-    recordings : cache of the recordings that `repeat` makes
+    recordings : cache of the recordings that `add_replayable` makes
     executed_stages : stages of the passes that ran in the last frame, in order
     listing : object that lists the passes of the next frame and whether they ran, for inspection; None if the
         next frame is not listed
@@ -206,7 +208,7 @@ class Graph(Recorder):
         in_place_resource: str = "",
     ) -> None:
         """Declare a dispatch of a compute program, see `Recorder.dispatch`."""
-        access = program.access(resources)
+        access = program.resource_access(resources)
         writes = access.writes
         if in_place_resource:
             unchanged = resource_state(self.device, resources[in_place_resource])
@@ -254,23 +256,25 @@ class Graph(Recorder):
                 instance_index=instance_index,
             )
 
-        access = program.access(resources)
+        access = program.resource_access(resources)
         index_state = None if index_buffer is None else resource_state(self.device, index_buffer)
         more_keys = instance_index, target.clear_depth, index_state
         self._declare_pass(stage, program, resources, (vertex_count,), access, writes, add_draw, more_keys)
 
-    def fill(
+    def draw_fullscreen(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Declare a render pass that runs a program once per texel of its targets, see `Recorder.fill`."""
+        """Declare a pass that runs once per texel of its targets, see `Recorder.draw_fullscreen`."""
         writes = tuple(resource_state(self.device, one) for one in targets)
 
-        def add_fill(frame: CommandList) -> None:
-            frame.fill(stage, program, resources, targets)
+        def add_fullscreen_draw(frame: CommandList) -> None:
+            frame.draw_fullscreen(stage, program, resources, targets)
 
-        self._declare_pass(stage, program, resources, (3,), program.access(resources), writes, add_fill)
+        self._declare_pass(
+            stage, program, resources, (3,), program.resource_access(resources), writes, add_fullscreen_draw
+        )
 
-    def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
+    def add_replayable(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
         """Declare the passes that `record_passes(recorder, *args)` adds, and return the result of the call.
 
         The passes are recorded once per set of arguments. Either all passes of a recording run, or none.
@@ -305,7 +309,7 @@ class Graph(Recorder):
             is_stale = dependencies.find_stale_passes(versions)
             stale = [one for one, now in zip(self._passes, is_stale, strict=True) if now]
             if self.listing is not None:
-                self.listing.finish(is_stale)
+                self.listing.mark_passes_that_ran(is_stale)
                 self.listing = None
             for one in stale:
                 one.run(frame)

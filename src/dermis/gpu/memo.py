@@ -65,7 +65,7 @@ class Memo:
         self,
         function: Callable[..., T],
         *args: object,
-        untracked: tuple[object, ...],
+        untracked_arguments: tuple[object, ...],
         caller_name: str = "",
         min_cache_size: int = 1,
     ) -> T: ...
@@ -74,13 +74,13 @@ class Memo:
         self,
         function: Callable[..., T],
         *args: object,
-        untracked: tuple[object, ...] = (),
+        untracked_arguments: tuple[object, ...] = (),
         caller_name: str = "",
         min_cache_size: int = 1,
     ) -> T:
-        """Return `function(*args, *untracked)`, or the cached result of a call with equal `args`.
+        """Return `function(*args, *untracked_arguments)`, or the cached result of a call with equal `args`.
 
-        untracked : further arguments that do not affect the result and are not compared
+        untracked_arguments : further arguments that do not affect the result and are not compared
         caller_name : name of the caller, such as a feature, if several callers use the same function; their
             results are cached separately
         min_cache_size : least number of results to keep for this function
@@ -96,7 +96,7 @@ class Memo:
         else:
             self._mark_hits_used(key)
             results[:] = results[: self._size(key) - 1]  # before the call, which may need the space
-            found = self._call_function(function, args, untracked)
+            found = self._call_function(function, args, untracked_arguments)
             found.keys.add(key)
             self._mark_used(key, found)
         if self._pending:
@@ -146,12 +146,15 @@ class Memo:
         self._hits.clear()
 
     def _call_function(
-        self, function: Callable[..., object], args: tuple[object, ...], untracked: tuple[object, ...]
+        self,
+        function: Callable[..., object],
+        args: tuple[object, ...],
+        untracked_arguments: tuple[object, ...],
     ) -> CachedResult:
         result = CachedResult(args)
         self._pending.append(result)
         try:
-            result.value = function(*args, *untracked)
+            result.value = function(*args, *untracked_arguments)
         finally:
             self._pending.pop()
         return result

@@ -15,10 +15,10 @@ from dermis.gpu.types import Buffer
 if TYPE_CHECKING:
     from dermis.gpu.device import Device
 
-_DRIVER_LOADING_BYTES = 0.5e9, 0.15e9
+_DRIVER_BASE_AND_THREAD_BYTES = 0.5e9, 0.15e9
 """Address space for loading all drivers of Mesa 22.3, and the addition for each thread of its adapter."""
 
-_SOFTWARE_RENDERING_BYTES = 0.9e9, 0.22e9
+_RENDERING_BASE_AND_THREAD_BYTES = 0.9e9, 0.22e9
 """Address space for rendering the package's human in software, and the addition for each thread.
 
 Measured at 512x512 with an atlas of 1024.
@@ -135,15 +135,15 @@ def check_driver_address_space() -> None:
     """Raise DermisError if the address space limit (ulimit -v) is too low to load the graphics drivers."""
     if _address_space_limit() < math.inf and not _has_loaded_drivers():
         _check_address_space(
-            _bytes_for_software_threads(_DRIVER_LOADING_BYTES),
-            _bytes_for_software_threads(_SOFTWARE_RENDERING_BYTES),
+            _bytes_for_software_threads(_DRIVER_BASE_AND_THREAD_BYTES),
+            _bytes_for_software_threads(_RENDERING_BASE_AND_THREAD_BYTES),
         )
 
 
 def check_software_address_space() -> None:
     """Raise DermisError if the address space limit (ulimit -v) is too low to render in software."""
     if _address_space_limit() < math.inf:
-        _check_address_space(_bytes_for_software_threads(_SOFTWARE_RENDERING_BYTES))
+        _check_address_space(_bytes_for_software_threads(_RENDERING_BASE_AND_THREAD_BYTES))
 
 
 def available_memory() -> float:

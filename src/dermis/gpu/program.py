@@ -26,7 +26,7 @@ UniformRecords = Mapping[str, NDArray[np.generic]]
 
 P = TypeVar("P")
 
-_TOOLKIT_SHADER_FOLDER = Path(__file__).parent / "wgsl"
+_GPU_SHADER_FOLDER = Path(__file__).parent / "wgsl"
 
 _MIN_LARGE_RECORD_BYTES = 2048  # the record of a skin is smaller, and few shaders read all of it
 
@@ -70,11 +70,11 @@ class Program:
         self._group_layout = device.handle.create_bind_group_layout(entries=self._layout_entries())
         self._layout = device.handle.create_pipeline_layout(bind_group_layouts=[self._group_layout])
 
-    def record(self, struct_name: str, **values: object) -> UniformRecord:
+    def make_record(self, struct_name: str, **values: object) -> UniformRecord:
         """Return a uniform record for a struct of the shader; members without a value are 0."""
         return make_record(self.source.text, struct_name, **values)
 
-    def record_positions(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
+    def uniform_record_positions(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
         """Return the positions of the bound uniform records in uniform memory [byte].
 
         resources : resources and uniform records by their names in the shader
@@ -93,7 +93,9 @@ class Program:
             records are placed in uniform memory
         uniforms : memory in which the records are placed
         """
-        located = [uniforms.locate(position) for position in self.record_positions(resources, uniforms)]
+        located = [
+            uniforms.locate(position) for position in self.uniform_record_positions(resources, uniforms)
+        ]
         bound = [*self._bound_resources(resources), *(buffer for buffer, _ in located)]
         key = resource_key(bound)
         group = self.bind_groups.find(key)
@@ -102,7 +104,7 @@ class Program:
             self.bind_groups.add(key, bound, group)
         return group, [offset for _, offset in located]
 
-    def access(self, resources: Bindings) -> Access:
+    def resource_access(self, resources: Bindings) -> Access:
         """Return the resources that a pass with these bindings reads and writes, without uniform records."""
         bound = self._bound_resources(resources)
         key = resource_key(bound)
@@ -110,9 +112,11 @@ class Program:
         if found is None:
             named = list(zip(self._resource_bindings, bound, strict=True))
             reads = tuple(
-                resource_state(self.device, value) for one, value in named if one.has_content and one.reads
+                resource_state(self.device, value)
+                for one, value in named
+                if one.has_content and one.is_readable
             )
-            writes = tuple(resource_state(self.device, value) for one, value in named if one.writes)
+            writes = tuple(resource_state(self.device, value) for one, value in named if one.is_writable)
             found = Access(new_access_id(), reads, writes)
             self._accesses.add(key, bound, found)
         return found
@@ -149,21 +153,23 @@ class Program:
     def _unbound_error(self, key_error: KeyError) -> KeyError:
         return KeyError(f"{self.name}.wgsl declares {key_error.args[0]!r}, and nothing is bound to it")
 
-    def _make_bind_group(self, bound_resources: Sequence[Bindable], resources: Bindings) -> BindGroup:
+    def _make_bind_group(
+        self, ordered_resources: Sequence[Bindable], resources_by_name: Bindings
+    ) -> BindGroup:
         """Create the bind group of the shader.
 
-        bound_resources : resources to bind, in the order of the bindings; the last ones are the buffers that
-            contain the uniform records
-        resources : resources and uniform records by their names in the shader; only the sizes of the uniform
-            records are used
+        ordered_resources : resources to bind, in the order of the bindings; the last ones are the buffers
+            that contain the uniform records
+        resources_by_name : resources and uniform records by their names in the shader; only the sizes of the
+            uniform records are used
         """
-        records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
+        records: UniformRecords = resources_by_name  # type: ignore[assignment]  # no cast, which costs time
         sizes = [records[one.name].nbytes for one in self._uniforms]
         return make_bind_group(
             self.device,
             self._group_layout,
             (*self._resource_bindings, *self._uniforms),
-            bound_resources,
+            ordered_resources,
             sizes,
         )
 
@@ -286,7 +292,7 @@ def shader_source(path: Path, folders: Sequence[Folder]) -> ShaderSource:
 
     folders : folders in which included files are searched, before the shaders of `dermis.gpu`
     """
-    return compose_shader(path, (*folders, _TOOLKIT_SHADER_FOLDER))
+    return compose_shader(path, (*folders, _GPU_SHADER_FOLDER))
 
 
 def _binding_getter(resource_names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:

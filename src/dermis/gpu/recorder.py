@@ -112,7 +112,7 @@ class Recorder(ABC):
         """
         raise self._unsupported_error(stage)
 
-    def fill(
+    def draw_fullscreen(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
         """Add a render pass that runs a program once per texel of its targets.
@@ -123,7 +123,7 @@ class Recorder(ABC):
         """
         raise self._unsupported_error(stage)
 
-    def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
+    def add_replayable(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
         """Add the passes that `record_passes(recorder, *args)` adds, and return the result of the call.
 
         An implementation may reuse the passes and the result of an earlier call with equal `args`, so both

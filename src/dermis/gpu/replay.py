@@ -78,7 +78,7 @@ class Recording(Recorder):
         self._bind_groups.append(weakref.ref(group, invalidate))
         self._pipelines.append(program.pipeline)
         dispatches.append(make_dispatch(stage, program, group, offsets, workgroups))
-        access = program.access(resources)
+        access = program.resource_access(resources)
         for state in access.reads:
             if state not in self._writes and state not in access.writes:
                 self._reads[state] = None

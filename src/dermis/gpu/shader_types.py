@@ -64,12 +64,12 @@ class Binding:
         return "sampler" not in self.entry
 
     @property
-    def writes(self) -> bool:
+    def is_writable(self) -> bool:
         """Return whether the binding allows the shader to write the resource."""
         return "storage_texture" in self.entry or self.entry.get("buffer") == {"type": "storage"}
 
     @property
-    def reads(self) -> bool:
+    def is_readable(self) -> bool:
         """Return whether the shader may read the resource; write-only textures cannot be read."""
         return bool(self.entry.get("storage_texture", {}).get("access") != "write-only")
 

@@ -160,7 +160,7 @@ def download(device: Device, texture: Texture, *, mip: int = 0, layer: int = 0) 
     return texels.reshape((height, width, channels) if channels > 1 else (height, width))
 
 
-def half_store_rounding(device: Device) -> str:
+def float16_store_rounding(device: Device) -> str:
     """Return how a device rounds stores to rgba16float textures: "nearest", "toward zero" or "other"."""
     program = ComputeProgram(device, Path(__file__).parent / "wgsl" / "store_probe.wgsl")
     texture = make_texture(device, (_ROUNDING_PROBE_SIDE, _ROUNDING_PROBE_SIDE), "rgba16float")

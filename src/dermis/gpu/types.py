@@ -88,7 +88,7 @@ class NativeObject(Protocol):
 Untyped = Any
 """Objects of wgpu without a protocol here: devices, encoders, passes, query sets."""
 UniformRecord = NDArray[np.void]
-"""A struct of a shader in uniform memory: a structured array without dimensions, see `Program.record`."""
+"""Struct of a shader in uniform memory: a structured array without dimensions, see `Program.make_record`."""
 TextureOrView = Texture | TextureView
 """A texture that a pass reads or stores to, or a view of one."""
 Resource = Texture | TextureView | Buffer

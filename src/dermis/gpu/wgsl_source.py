@@ -186,7 +186,7 @@ class _Composer:
         if text := directive["filled"]:
             return [directive["indent"] + _substitute_words(text, self._numbers, shader_file)]
         members = enumerate(self._list_members(directive["list"], shader_file))
-        each = [_member_words(member, number) for number, member in members]
+        each = [_member_substitutions(member, number) for number, member in members]
         return [
             directive["indent"] + _substitute_words(directive["text"], words, shader_file) for words in each
         ]
@@ -208,7 +208,7 @@ class _Composer:
         return self._lists[list_name]
 
 
-def _member_words(member: ShaderListMember, member_number: int) -> dict[str, str]:
+def _member_substitutions(member: ShaderListMember, member_number: int) -> dict[str, str]:
     name = member.name.replace("-", "_")
     return {"name": name, "NAME": name.upper(), "number": f"{member_number}u", **dict(member.words)}
 

@@ -83,7 +83,7 @@ def angular_response(total_reflectance: ArrayLike, eta: float) -> AngularRespons
 
     Sources: [Chandrasekhar1960] for the half-space; [Jensen2001] for the separation of single scattering.
     """
-    columns = interpolate_columns(partial(_response_column, eta), total_reflectance)
+    columns = interpolate_columns(partial(_angular_response_column, eta), total_reflectance)
     table, (diffuse, single_scattering) = columns[:DIRECTION_ROWS], columns[DIRECTION_ROWS:]
     return AngularResponse(eta, table, diffuse, single_scattering, _mean_kernel(eta))
 
@@ -186,7 +186,7 @@ class _HalfSpace:
 
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
-def _response_column(eta: float, total_reflectance: float) -> Floats:
+def _angular_response_column(eta: float, total_reflectance: float) -> Floats:
     """Return fields of `AngularResponse` for one channel, as one column (DIRECTION_ROWS + 2,) of a table.
 
     The first DIRECTION_ROWS elements are `relative_reflectance`; the last two are

@@ -14,13 +14,13 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.diffusion import hankel, layered_diffusion
 from dermis.optics.diffusion.boundary import boundary_mismatch
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.half_space import half_space, tabulated_albedo, tabulated_kind_for_index
+from dermis.optics.half_space import half_space, half_space_kind_for_eta, tabulated_albedo
 from dermis.optics.media import Layer, Medium
 
 Floats = NDArray[np.float64]
 MAX_EQUIVALENT_ALBEDO, MIN_EQUIVALENT_ALBEDO = 1.0 - 1e-6, 1e-3
 _LOG_FREQUENCY_RANGE = (-14.0, 14.0)  # natural logarithms of frequencies [1/mm]
-_OFFSET_ABSORPTION_WEIGHT = 0.35  # of absorption in the published formula of the offset
+_ABSORPTION_WEIGHT_IN_OFFSET = 0.35  # of absorption in the published formula of the offset
 
 
 def equivalent_medium(profile: GaussianSum, total_reflectance: Floats, eta: float) -> Medium:
@@ -35,7 +35,7 @@ def equivalent_medium(profile: GaussianSum, total_reflectance: Floats, eta: floa
     """
     albedo, extinction = np.empty(len(total_reflectance)), np.empty(len(total_reflectance))
     for c, reflectance in enumerate(total_reflectance):
-        column = partial(_half_space_column, eta, profile.from_photons)
+        column = partial(_equivalent_half_space_column, eta, profile.from_photons)
         root, half = interpolate_table(column, float(reflectance))
         gaussians = tuple(zip(profile.variance_mm2.tolist(), profile.weight[:, c].tolist(), strict=True))
         albedo[c] = 1.0 - root**2
@@ -45,7 +45,7 @@ def equivalent_medium(profile: GaussianSum, total_reflectance: Floats, eta: floa
 
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
-def _half_space_column(eta: float, from_photons: bool, total_reflectance: float) -> Floats:
+def _equivalent_half_space_column(eta: float, use_photon_table: bool, total_reflectance: float) -> Floats:
     """Return two properties of the half-space with a given reflectance, as a column (2,) of a table.
 
     The first element is the square root of 1 minus the single-scattering albedo [-]. The second element is
@@ -53,12 +53,12 @@ def _half_space_column(eta: float, from_photons: bool, total_reflectance: float)
     path].
 
     eta : index of refraction relative to air [-]
-    from_photons : whether R(r) comes from a table of Monte Carlo results, if one exists, instead of layered
-        diffusion
+    use_photon_table : whether R(r) comes from a table of Monte Carlo results, if one exists, instead of
+        layered diffusion
     total_reflectance : reflectance for light at normal incidence [-]
     """
-    albedo = albedo_for_total(total_reflectance, eta, from_photons)
-    kind = tabulated_kind_for_index(eta) if from_photons else None
+    albedo = albedo_for_total_reflectance(total_reflectance, eta, use_photon_table)
+    kind = half_space_kind_for_eta(eta) if use_photon_table else None
     if kind is None:
         half = _half_frequency(partial(_reflectance_transform, _unit_mean_free_path_medium(albedo, eta)))
     else:
@@ -67,17 +67,19 @@ def _half_space_column(eta: float, from_photons: bool, total_reflectance: float)
     return np.array([np.sqrt(1.0 - albedo), half])
 
 
-def albedo_for_total(total_reflectance: float, eta: float, from_photons: bool = False) -> float:
+def albedo_for_total_reflectance(
+    total_reflectance: float, eta: float, use_photon_table: bool = False
+) -> float:
     """Return the single-scattering albedo of the half-space with a given total reflectance [-].
 
     total_reflectance : reflectance for light at normal incidence [-]
     eta : index of refraction relative to air [-]
-    from_photons : whether to invert a table of Monte Carlo results, if one exists, instead of layered
+    use_photon_table : whether to invert a table of Monte Carlo results, if one exists, instead of layered
         diffusion
     """
     from scipy.optimize import brentq
 
-    kind = tabulated_kind_for_index(eta) if from_photons else None
+    kind = half_space_kind_for_eta(eta) if use_photon_table else None
     if kind is not None:
         return float(tabulated_albedo(kind, total_reflectance))
 
@@ -157,5 +159,5 @@ def oblique_offset_mm(medium: Medium) -> float:
     """
     layer = medium.layers[0]
     return float(
-        np.mean(1.0 / (layer.sigma_s_prime + _OFFSET_ABSORPTION_WEIGHT * layer.sigma_a)) / medium.eta
+        np.mean(1.0 / (layer.sigma_s_prime + _ABSORPTION_WEIGHT_IN_OFFSET * layer.sigma_a)) / medium.eta
     )

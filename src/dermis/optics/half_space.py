@@ -28,8 +28,8 @@ PHOTON_TABLE_SOURCES = ("Wang1995",)
 TABULATED_ALBEDO_RANGE = 0.02, 0.99999
 """Smallest and largest single-scattering albedo of the tables [-]."""
 _HALF_SPACE_COLUMNS = ("kind", "albedo", "total")
-CountedModel = Literal["counted"]
-COUNTED_MODEL: CountedModel = "counted"
+PhotonTableModel = Literal["counted"]
+PHOTON_TABLE_MODEL: PhotonTableModel = "counted"
 """Name of the profile model that uses the Monte Carlo tables of this module."""
 _MIN_LOG_RADIUS_STEP, _MAX_LOG_RADIUS_STEP = (
     0.05,
@@ -41,19 +41,19 @@ _RELATIVE_LOG_RADIUS_STEP = 0.02  # step of log r, divided by the square root of
 class _PhotonTable(NamedTuple):
     """Monte Carlo results for half-spaces as functions of a = sqrt(1 - albedo), interpolated by splines.
 
-    root_absorption : (m,) values of a in the table, increasing [-]
+    sqrt_absorbed_fraction : (m,) values of a in the table, increasing [-]
     edges : (k,) radii of the ring edges [mean free path]
     fraction : function from a to the fraction of the emerging light within each edge
     totals : function from a to the total reflectance
     """
 
-    root_absorption: Floats
+    sqrt_absorbed_fraction: Floats
     edges: Floats
     fraction: Callable[[Floats], Floats]
     totals: Callable[[Floats], Floats]
 
 
-def tabulated_kind_for_index(eta: float) -> HalfSpaceKind | None:
+def half_space_kind_for_eta(eta: float) -> HalfSpaceKind | None:
     """Return the name of the Monte Carlo table for an index of refraction, or None if there is none.
 
     Only tables of half-spaces that are lit at normal incidence are considered.
@@ -110,18 +110,20 @@ def tabulated_albedo(half_space_kind: HalfSpaceKind, total_reflectance: ArrayLik
     half_space_kind : surface and illumination of the half-spaces
     """
     table = _photon_table(half_space_kind)
-    fine = np.linspace(table.root_absorption[0], table.root_absorption[-1], 2000)
+    fine = np.linspace(table.sqrt_absorbed_fraction[0], table.sqrt_absorbed_fraction[-1], 2000)
     root = np.interp(np.asarray(total_reflectance, np.float64), table.totals(fine)[::-1], fine[::-1])
     return np.asarray(1.0 - root**2)
 
 
 def _table_position(photon_table: _PhotonTable, albedo: ArrayLike) -> Floats:
     return np.clip(
-        _root_absorption(albedo), photon_table.root_absorption[0], photon_table.root_absorption[-1]
+        _sqrt_absorbed_fraction(albedo),
+        photon_table.sqrt_absorbed_fraction[0],
+        photon_table.sqrt_absorbed_fraction[-1],
     )
 
 
-def _root_absorption(albedo: ArrayLike) -> Floats:
+def _sqrt_absorbed_fraction(albedo: ArrayLike) -> Floats:
     """Return sqrt(1 - albedo), on which reflectances and profiles depend smoothly up to an albedo of 1."""
     return np.sqrt(np.maximum(1.0 - np.asarray(albedo, np.float64), 0.0))
 
@@ -132,7 +134,7 @@ def _photon_table(half_space_kind: HalfSpaceKind) -> _PhotonTable:
 
     rows = [row for row in read_rows("dermis.optics", "data/half_space") if row["kind"] == half_space_kind]
     columns = [name for name in rows[0] if name not in _HALF_SPACE_COLUMNS]
-    scale = _root_absorption([float(row["albedo"]) for row in rows])
+    scale = _sqrt_absorbed_fraction([float(row["albedo"]) for row in rows])
     total = np.array([float(row["total"]) for row in rows])
     fraction = np.array([[float(row[name]) for name in columns] for row in rows])
     order = np.argsort(scale)
@@ -149,10 +151,10 @@ def has_photon_table(medium: Medium) -> bool:
     and its reduced albedos must be in the range of the table.
     """
     layer = medium.layers[0]
-    single = len(medium.layers) == 1 and medium.semi_infinite and medium.channels == 3
+    single = len(medium.layers) == 1 and medium.is_semi_infinite and medium.channels == 3
     low, high = TABULATED_ALBEDO_RANGE
     inside = (layer.alpha_prime >= low) & (layer.alpha_prime <= high)
-    return single and tabulated_kind_for_index(medium.eta) is not None and bool(inside.all())
+    return single and half_space_kind_for_eta(medium.eta) is not None and bool(inside.all())
 
 
 def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
@@ -160,7 +162,7 @@ def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
 
     The medium is taken to scatter isotropically, with its reduced coefficients.
     """
-    kind, layer = tabulated_kind_for_index(medium.eta), medium.layers[0]
+    kind, layer = half_space_kind_for_eta(medium.eta), medium.layers[0]
     if kind is None or not has_photon_table(medium):
         return None
     return half_space(kind, layer.alpha_prime, layer.mean_free_path_mm)
@@ -173,7 +175,7 @@ def tabulated_profile(medium: Medium) -> RadialProfile | None:
     """
     cumulative, kind, layer = (
         tabulated_cumulative(medium),
-        tabulated_kind_for_index(medium.eta),
+        half_space_kind_for_eta(medium.eta),
         medium.layers[0],
     )
     if cumulative is None or kind is None:
@@ -189,7 +191,7 @@ def tabulated_profile(medium: Medium) -> RadialProfile | None:
     rate = (within(radius * np.exp(step)) - within(radius * np.exp(-step))) / (2.0 * step)[:, None]
     return RadialProfile(
         name=medium.name,
-        model=COUNTED_MODEL,
+        model=PHOTON_TABLE_MODEL,
         radius_mm=radius,
         reflectance=cumulative.energy * rate / (2.0 * np.pi * radius[:, None] ** 2),
         total=cumulative.energy,

@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 SKIN_ETA = 1.4
 """Index of refraction of skin relative to air, as in most of the cited works [-]."""
 _TABLE_SOURCES = {"jensen2001": ("Jensen2001",), "donner-jensen-2005": ("DonnerJensen2005",)}
-_DJ3_NOTE = (
+_DONNER_JENSEN_UNIT_NOTE = (
     "the printed coefficients are read in 1/cm. Read in 1/mm, as the 2007 deck does, red light would "
     "travel 0.02083 mm between events in the epidermis and nearly all of it would leave within 0.1 mm. The "
     "published sum of six Gaussians follows from neither reading: it is the preset gpu-gems-3"
@@ -109,7 +109,7 @@ class Medium:
         return len(self.layers[0].sigma_a)
 
     @property
-    def semi_infinite(self) -> bool:
+    def is_semi_infinite(self) -> bool:
         """Return whether the last layer is semi-infinite."""
         return bool(np.isinf(self.layers[-1].thickness_mm))
 
@@ -158,7 +158,7 @@ def published_media() -> Mapping[str, Medium]:
     named: dict[str, Medium] = {}
     for table, sources in _TABLE_SOURCES.items():
         for name, layers in _read_media(table).items():
-            notes = (_DJ3_NOTE,) if name == "dj3" else ()
+            notes = (_DONNER_JENSEN_UNIT_NOTE,) if name == "dj3" else ()
             named[name] = Medium(name, tuple(layers), SKIN_ETA, notes, sources)
     return named
 

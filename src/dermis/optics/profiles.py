@@ -40,9 +40,9 @@ def preset_names() -> tuple[str, ...]:
     return (PUBLISHED_PRESET, *tissue_names())
 
 
-@renamed_keywords(near="initial")
+@renamed_keywords(near="similar_fit", initial="similar_fit")
 def load_profile(
-    name: str | Path, pigments: Mapping[str, float] | None = None, initial: GaussianSum | None = None
+    name: str | Path, pigments: Mapping[str, float] | None = None, similar_fit: GaussianSum | None = None
 ) -> GaussianSum:
     """Return the diffusion profile of a preset or a file as a sum of Gaussians.
 
@@ -57,7 +57,7 @@ def load_profile(
         ``dermis profile``.
     pigments : Mapping of str to float, optional
         For a skin that is defined by its pigments, values that replace fields of its `SkinParameters`.
-    initial : GaussianSum, optional
+    similar_fit : GaussianSum, optional
         Fit of a similar skin, as start of the new fit, which is then several times faster.
 
     Returns
@@ -83,7 +83,7 @@ def load_profile(
     """
     checked_path(name, "a profile")
     if pigments:
-        return fit_profile(load_tissue(name, pigments=pigments), name, initial)
+        return fit_profile(load_tissue(name, pigments=pigments), name, similar_fit)
     table = find_gaussians(name)
     if table is not None:
         return table
@@ -180,7 +180,9 @@ def fit_profile(
 
     Raises DermisError when the fit is not a valid profile.
     """
-    return _fit_rings(tissue.rings(), tissue.default_model, f"profile {profile_name}", similar_fit)
+    return _fit_rings(
+        tissue.ring_target(), tissue.default_profile_model, f"profile {profile_name}", similar_fit
+    )
 
 
 def fit_radial(
@@ -194,7 +196,7 @@ def fit_radial(
     profile_name : name of the fitted profile
     similar_fit : fit of a similar profile, as start of the new fit, which is then several times faster
     """
-    return _fit_rings(radial_profile.rings(), radial_profile.model, profile_name, similar_fit)
+    return _fit_rings(radial_profile.ring_target(), radial_profile.model, profile_name, similar_fit)
 
 
 def _fit_rings(

@@ -52,11 +52,11 @@ class RadialProfile:
         """Return whether R(r) is finite at r = 0; otherwise, fits must use the light through rings."""
         return self.model not in ("layered", "montecarlo", "counted")
 
-    def points(self) -> PointTarget:
+    def point_target(self) -> PointTarget:
         """Return the samples of R(r) as the target of a fit."""
         return PointTarget(self.radius_mm, self.reflectance, self.total)
 
-    def rings(self) -> RingTarget:
+    def ring_target(self) -> RingTarget:
         """Return the light that emerges through each ring, as the target of a fit.
 
         The light through a ring is finite even if R(r) is infinite at r = 0.

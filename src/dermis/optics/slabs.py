@@ -24,7 +24,7 @@ from dermis.optics.angular_response import (
 )
 
 Floats = NDArray[np.float64]
-DIRECTION_NODES = 16
+DIRECTION_NODE_COUNT = 16
 """Number of discrete directions that leave a slab, and of directions that are totally reflected."""
 DEEP_OPTICAL_DEPTH = 1e4
 """Thickness from which a slab is treated as a half-space [mean free paths]."""
@@ -103,7 +103,7 @@ def solve_slabs(
     albedo: float,
     optical_depth: ArrayLike,
     eta: float,
-    direction_nodes: int = DIRECTION_NODES,
+    direction_node_count: int = DIRECTION_NODE_COUNT,
     g: float = 0.0,
 ) -> Slabs:
     """Return the reflection and transmission of slabs, computed by adding and doubling.
@@ -114,14 +114,14 @@ def solve_slabs(
     optical_depth : (n,) thicknesses above 0, in mean free paths; in reduced mean free paths if scattering is
         anisotropic [-]
     eta : index of refraction relative to the air on both sides, at least 1 [-]
-    direction_nodes : number of discrete directions in which light can leave the slab; if eta is above 1, the
-        same number of directions is added in which light is totally reflected
+    direction_node_count : number of discrete directions in which light can leave the slab; if eta is above 1,
+        the same number of directions is added in which light is totally reflected
     g : mean cosine of the scattering angle, at least 0 [-]
 
     Source: [Chandrasekhar1960] section 50 for the addition of layers.
     """
     tau = np.atleast_1d(np.asarray(optical_depth, np.float64))
-    transport = _Transport.create(albedo, eta, direction_nodes, g)
+    transport = _Transport.create(albedo, eta, direction_node_count, g)
     doublings = transport.doubling_count(float(tau.max()))
     *_, (R, T, unscattered_fraction) = _doubling_steps(transport, tau / 2.0**doublings, doublings)
     return _slabs_in_air(transport, R, T, unscattered_fraction)
@@ -132,19 +132,19 @@ def solve_doubled_slabs(
     smallest_depth: ArrayLike,
     doubling_count: int,
     eta: float,
-    direction_nodes: int = DIRECTION_NODES,
+    direction_node_count: int = DIRECTION_NODE_COUNT,
     g: float = 0.0,
 ) -> Slabs:
     """Return the reflection and transmission of slabs, and of slabs that are 2, 4, 8 ... times as thick.
 
     The time is about that of `solve_slabs` for the thickest slabs alone.
 
-    albedo, eta, direction_nodes, g : as in `solve_slabs`
+    albedo, eta, direction_node_count, g : as in `solve_slabs`
     smallest_depth : (n,) optical depths before the doublings; they should be of similar size [-]
     doubling_count : number d of doublings; the result has n (d + 1) slabs, ordered by the number of
         doublings, then by `smallest_depth`
     """
-    transport = _Transport.create(albedo, eta, direction_nodes, g)
+    transport = _Transport.create(albedo, eta, direction_node_count, g)
     initial_doublings = transport.doubling_count(float(np.max(smallest_depth)))
     tau = np.asarray(smallest_depth, np.float64) / 2.0**initial_doublings
     steps = list(_doubling_steps(transport, tau, initial_doublings + doubling_count))[initial_doublings:]
@@ -153,7 +153,7 @@ def solve_doubled_slabs(
 
 
 def half_space_radiance(
-    albedo: float, eta: float, direction_nodes: int, g: float
+    albedo: float, eta: float, direction_node_count: int, g: float
 ) -> tuple[Floats, Floats, Floats]:
     """Return the radiance that emerges from a half-space in each of m discrete directions.
 
@@ -165,9 +165,9 @@ def half_space_radiance(
 
     The radiance is scaled so that the mean of each column, weighted by the fractions, is the reflectance.
 
-    The arguments are those of `solve_slabs`; m is `direction_nodes`.
+    The arguments are those of `solve_slabs`; m is `direction_node_count`.
     """
-    transport = _Transport.create(albedo, eta, direction_nodes, g)
+    transport = _Transport.create(albedo, eta, direction_node_count, g)
     doublings = transport.doubling_count(DEEP_OPTICAL_DEPTH)
     tau = np.array([DEEP_OPTICAL_DEPTH / 2.0**doublings])
     *_, (R, T, unscattered_fraction) = _doubling_steps(transport, tau, doublings)
@@ -198,10 +198,12 @@ class _Transport:
     phase: PhaseMatrices
 
     @classmethod
-    def create(cls, albedo: float, eta: float, direction_nodes: int, g: float) -> _Transport:
-        mu, weight = _direction_quadrature(eta, direction_nodes)
+    def create(cls, albedo: float, eta: float, direction_node_count: int, g: float) -> _Transport:
+        mu, weight = _direction_quadrature(eta, direction_node_count)
         internal, escapes = internal_reflectance(mu, eta), mu > critical_cosine(eta)
-        return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, direction_nodes))
+        return cls(
+            mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, direction_node_count)
+        )
 
     def doubling_count(self, depth: float) -> int:
         """Return how often a slab thin enough for single scattering must be doubled to reach a thickness.
@@ -256,14 +258,14 @@ def _unscattered_exit(unscattered_fraction: Floats, face_reflectance: Floats) ->
     return down * unscattered_fraction * face_reflectance, down
 
 
-def _direction_quadrature(eta: float, direction_nodes: int) -> tuple[Floats, Floats]:
+def _direction_quadrature(eta: float, direction_node_count: int) -> tuple[Floats, Floats]:
     """Return quadrature nodes and weights for the cosines of directions in a medium.
 
     Directions that escape come first, then those that are totally reflected at the faces, if there are any.
     """
     critical = critical_cosine(eta)
     spans = [(critical, 1.0), (0.0, critical)] if critical > 0.0 else [(0.0, 1.0)]
-    parts = [gauss_legendre(low, high, direction_nodes) for low, high in spans]
+    parts = [gauss_legendre(low, high, direction_node_count) for low, high in spans]
     mu, weight = (np.concatenate(both) for both in zip(*parts, strict=True))
     return mu, weight
 
@@ -355,7 +357,7 @@ def anisotropic_response(total_reflectance: ArrayLike, eta: float, g: float) -> 
     if g == 0.0:
         return isotropic
     columns, isotropic_columns = (
-        interpolate_columns(partial(_response_column, eta, mean_cosine), total_reflectance)
+        interpolate_columns(partial(_angular_response_column, eta, mean_cosine), total_reflectance)
         for mean_cosine in (g, 0.0)
     )
     table, (diffuse, single_scattering) = columns[:DIRECTION_ROWS], columns[DIRECTION_ROWS:]
@@ -364,7 +366,7 @@ def anisotropic_response(total_reflectance: ArrayLike, eta: float, g: float) -> 
 
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
-def _response_column(eta: float, g: float, total_reflectance: float) -> Floats:
+def _angular_response_column(eta: float, g: float, total_reflectance: float) -> Floats:
     """Return fields of `AngularResponse` for one channel, as one column (DIRECTION_ROWS + 2,) of a table.
 
     The first DIRECTION_ROWS elements are `relative_reflectance`; the last two are
@@ -375,7 +377,7 @@ def _response_column(eta: float, g: float, total_reflectance: float) -> Floats:
     total_reflectance : reflectance of the isotropic half-space for light at normal incidence [-]
     """
     a, fraction, radiance = half_space_radiance(
-        albedo_for_reflectance(total_reflectance, eta), eta, DIRECTION_NODES, g
+        albedo_for_reflectance(total_reflectance, eta), eta, DIRECTION_NODE_COUNT, g
     )
     reflectance = fraction @ radiance
     normal = float(_interpolate_over_cosines(a, reflectance, np.ones(1))[0])

@@ -20,9 +20,19 @@ from dermis.optics.angular_response import (
 from dermis.optics.diffusion import hankel
 from dermis.optics.diffusion.boundary import boundary_mismatch
 from dermis.optics.diffusion.layered_diffusion import solve_homogeneous_slabs
-from dermis.optics.equivalent_medium import MAX_EQUIVALENT_ALBEDO, MIN_EQUIVALENT_ALBEDO, albedo_for_total
+from dermis.optics.equivalent_medium import (
+    MAX_EQUIVALENT_ALBEDO,
+    MIN_EQUIVALENT_ALBEDO,
+    albedo_for_total_reflectance,
+)
 from dermis.optics.media import Layer, Medium
-from dermis.optics.slabs import DEEP_OPTICAL_DEPTH, DIRECTION_NODES, Slabs, solve_doubled_slabs, solve_slabs
+from dermis.optics.slabs import (
+    DEEP_OPTICAL_DEPTH,
+    DIRECTION_NODE_COUNT,
+    Slabs,
+    solve_doubled_slabs,
+    solve_slabs,
+)
 
 Floats = NDArray[np.float64]
 THICKNESS_ROWS = 32
@@ -30,7 +40,7 @@ THICKNESS_ROWS = 32
 _DEEP_SLAB_OPTICAL_DEPTH = (
     10.0  # thickness beyond which relative transmittance by direction is constant [mean free paths]
 )
-_DIRECTION_NODES = 8  # number of discrete directions for uniform light
+_DIRECTION_NODE_COUNT = 8  # number of discrete directions for uniform light
 # Thickness of the thinnest slabs that are solved [mean free paths], and how often they are doubled.
 _MIN_OPTICAL_DEPTHS, _DOUBLING_COUNT = 1e-4 * np.array([1.0, 2.0**0.5]), 25
 _OPTICAL_DEPTHS = (_MIN_OPTICAL_DEPTHS * 2.0 ** np.arange(_DOUBLING_COUNT + 1)[:, None]).ravel()
@@ -82,11 +92,11 @@ def solve_thin_parts(
     thickness_mm = max_thickness_mm * np.linspace(0.0, 1.0, THICKNESS_ROWS) ** 2
     transmitted, lost = np.zeros((2, THICKNESS_ROWS, len(variance_mm2), medium.channels))
     directionality, weight = np.zeros((2, THICKNESS_ROWS, medium.channels))
-    for c, totals in enumerate(_slab_totals(medium.layers[0], thickness_mm[1:], medium.eta, g)):
+    for c, response in enumerate(_uniform_light_responses(medium.layers[0], thickness_mm[1:], medium.eta, g)):
         spread = _spread_weights(medium.channel(c), thickness_mm[1:], variance_mm2)
-        transmitted[1:, :, c] = totals.relative_transmittance[:, None] * spread
-        lost[1:, :, c] = totals.lost[:, None] * spread
-        directionality[1:, c], weight[1:, c] = totals.directionality, totals.transmittance
+        transmitted[1:, :, c] = response.relative_transmittance[:, None] * spread
+        lost[1:, :, c] = response.lost[:, None] * spread
+        directionality[1:, c], weight[1:, c] = response.directionality, response.transmittance
         lost[0, :, c] = spread[0]
     directionality[0], weight[0] = directionality[1], weight[1]
     mean = (weight * directionality).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-12)
@@ -94,7 +104,7 @@ def solve_thin_parts(
 
 
 def oblique_transmittance(
-    total_reflectance: Floats, eta: float, from_photons: bool = False, g: float = 0.0
+    total_reflectance: Floats, eta: float, use_photon_table: bool = False, g: float = 0.0
 ) -> Floats:
     """Return the relative transmittance (DIRECTION_ROWS, c) of optically thick slabs by direction [-].
 
@@ -105,31 +115,37 @@ def oblique_transmittance(
 
     total_reflectance : (c,) reflectance of the half-space for light at normal incidence [-]
     eta : index of refraction relative to air [-]
-    from_photons : whether the albedo for this reflectance comes from a table of Monte Carlo results, if one
-        exists, instead of layered diffusion
+    use_photon_table : whether the albedo for this reflectance comes from a table of Monte Carlo results, if
+        one exists, instead of layered diffusion
     g : mean cosine of the scattering angle [-]
     """
-    return interpolate_columns(partial(_oblique_column, eta, from_photons, g), total_reflectance)
+    return interpolate_columns(
+        partial(_oblique_transmittance_column, eta, use_photon_table, g), total_reflectance
+    )
 
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
-def _oblique_column(eta: float, from_photons: bool, g: float, total_reflectance: float) -> Floats:
+def _oblique_transmittance_column(
+    eta: float, use_photon_table: bool, g: float, total_reflectance: float
+) -> Floats:
     cosine = refracted_cosine(np.linspace(0.0, 1.0, DIRECTION_ROWS) ** 2, eta)
     half_space, relative = _deep_transmittance(
-        albedo_for_total(total_reflectance, eta, from_photons), eta, DIRECTION_NODES, g
+        albedo_for_total_reflectance(total_reflectance, eta, use_photon_table), eta, DIRECTION_NODE_COUNT, g
     )
     return np.interp(cosine, half_space.cosine, relative)
 
 
-def _deep_transmittance(albedo: float, eta: float, direction_nodes: int, g: float) -> tuple[Slabs, Floats]:
+def _deep_transmittance(
+    albedo: float, eta: float, direction_node_count: int, g: float
+) -> tuple[Slabs, Floats]:
     """Return the reflection of a half-space, and the relative transmittance (m,) of thick slabs [-].
 
     Both are for m incident directions. Relative transmittance is defined as in `oblique_transmittance`.
 
-    albedo, eta, direction_nodes, g : as in `solve_slabs`
+    albedo, eta, direction_node_count, g : as in `solve_slabs`
     """
-    half_space = solve_slabs(albedo, DEEP_OPTICAL_DEPTH, eta, direction_nodes, g)
-    deep = solve_slabs(albedo, _DEEP_SLAB_OPTICAL_DEPTH, eta, direction_nodes, g)
+    half_space = solve_slabs(albedo, DEEP_OPTICAL_DEPTH, eta, direction_node_count, g)
+    deep = solve_slabs(albedo, _DEEP_SLAB_OPTICAL_DEPTH, eta, direction_node_count, g)
     return half_space, _relative_transmittance(deep, half_space)[0]
 
 
@@ -143,7 +159,7 @@ def _relative_transmittance(slabs: Slabs, half_space: Slabs) -> Floats:
     return np.asarray(slabs.transmitted / transmitted / reflected)
 
 
-class _SlabTotals(NamedTuple):
+class _UniformLightResponse(NamedTuple):
     """Transmittance and lost reflectance of n slabs in one channel under uniform light.
 
     transmittance : (n,) transmitted fraction of the power that enters [-]
@@ -159,8 +175,10 @@ class _SlabTotals(NamedTuple):
     directionality: Floats
 
 
-def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> Iterator[_SlabTotals]:
-    """Yield the `_SlabTotals` of each channel for slabs of n thicknesses.
+def _uniform_light_responses(
+    layer: Layer, thickness_mm: Floats, eta: float, g: float
+) -> Iterator[_UniformLightResponse]:
+    """Yield the `_UniformLightResponse` of each channel for slabs of n thicknesses.
 
     They are interpolated by cubic splines between the optical thicknesses `_OPTICAL_DEPTHS`, for which they
     are solved once.
@@ -173,26 +191,26 @@ def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> It
     from scipy.interpolate import CubicSpline
 
     roots = np.sqrt(1.0 - layer.alpha_prime).tolist()
-    columns = [interpolate_table(partial(_totals_column, eta, g), root) for root in roots]
+    columns = [interpolate_table(partial(_uniform_light_response_column, eta, g), root) for root in roots]
     spline = CubicSpline(np.log(_OPTICAL_DEPTHS), np.stack(columns, axis=1))
     for c, extinction in enumerate(layer.sigma_t_prime.tolist()):
         depth = np.clip(extinction * thickness_mm, _OPTICAL_DEPTHS[0], _OPTICAL_DEPTHS[-1])
-        yield _SlabTotals(*spline(np.log(depth))[:, c].T)
+        yield _UniformLightResponse(*spline(np.log(depth))[:, c].T)
 
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
-def _totals_column(eta: float, g: float, root_absorption: float) -> Floats:
-    """Return the fields of `_SlabTotals` as columns (n, 4), for one albedo and n optical depths.
+def _uniform_light_response_column(eta: float, g: float, sqrt_absorbed_fraction: float) -> Floats:
+    """Return the fields of `_UniformLightResponse` as columns (n, 4), for one albedo and n optical depths.
 
     The optical depths are `_OPTICAL_DEPTHS`.
 
     eta : index of refraction relative to air [-]
     g : mean cosine of the scattering angle [-]
-    root_absorption : square root of 1 minus the reduced albedo, the coordinate of the table [-]
+    sqrt_absorbed_fraction : square root of 1 minus the reduced albedo, the coordinate of the table [-]
     """
-    albedo = min(max(1.0 - root_absorption**2, MIN_EQUIVALENT_ALBEDO), MAX_EQUIVALENT_ALBEDO)
-    slabs = solve_doubled_slabs(albedo, _MIN_OPTICAL_DEPTHS, _DOUBLING_COUNT, eta, _DIRECTION_NODES, g)
-    half_space, deep = _deep_transmittance(albedo, eta, _DIRECTION_NODES, g)
+    albedo = min(max(1.0 - sqrt_absorbed_fraction**2, MIN_EQUIVALENT_ALBEDO), MAX_EQUIVALENT_ALBEDO)
+    slabs = solve_doubled_slabs(albedo, _MIN_OPTICAL_DEPTHS, _DOUBLING_COUNT, eta, _DIRECTION_NODE_COUNT, g)
+    half_space, deep = _deep_transmittance(albedo, eta, _DIRECTION_NODE_COUNT, g)
     reflectance, deep_change = half_space.reflected @ half_space.flux, deep - 1.0
     weight = half_space.flux * half_space.reflected[0]
     slab_change = _relative_transmittance(slabs, half_space) - 1.0

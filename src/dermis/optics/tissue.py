@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from dermis.base.errors import DermisError, format_value, refuse
 from dermis.base.reading import checked_path, read_toml
+from dermis.base.renamed import renamed_attribute
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import (
     DiffusionModel,
@@ -22,7 +23,7 @@ from dermis.optics.diffusion.models import (
 from dermis.optics.diffusion.multipole import Clamp
 from dermis.optics.fits.targets import RingTarget
 from dermis.optics.half_space import (
-    COUNTED_MODEL,
+    PHOTON_TABLE_MODEL,
     TABULATED_ALBEDO_RANGE,
     has_photon_table,
     tabulated_profile,
@@ -55,13 +56,15 @@ class Tissue:
     --------
     >>> from dermis import load_tissue
     >>> tissue = load_tissue("skin1")
-    >>> tissue.medium.channels, tissue.default_model
+    >>> tissue.medium.channels, tissue.default_profile_model
     (3, 'counted')
     """
 
     medium: Medium
     rgb: Floats | None = None
     parameters: SkinParameters | None = None
+    default_model = renamed_attribute("default_model", "default_profile_model")
+    rings = renamed_attribute("rings", "ring_target")
 
     def __repr__(self) -> str:
         """Return a text of three lines with the name, the layers and the ranges of the coefficients."""
@@ -104,13 +107,13 @@ class Tissue:
         return replace(self, medium=replace(self.medium, layers=tuple(layers)))
 
     @property
-    def default_model(self) -> ProfileModel:
+    def default_profile_model(self) -> ProfileModel:
         """Return the default profile model: "counted" or "layered".
 
         "counted" uses tables of Monte Carlo results. It is the default for media whose channels are colours
         and which the tables cover, see `half_space.has_photon_table`.
         """
-        return COUNTED_MODEL if self.rgb is None and has_photon_table(self.medium) else "layered"
+        return PHOTON_TABLE_MODEL if self.rgb is None and has_photon_table(self.medium) else "layered"
 
     def profile(self, model: ProfileModel | None = None, clamp: Clamp = "layer") -> RadialProfile:
         """Return the diffusion profile R(r) of the tissue in linear Rec. 709.
@@ -118,26 +121,28 @@ class Tissue:
         R(r) is relative to the incident power for a skin that is defined by its pigments, and relative to the
         power that enters for other media.
 
-        model : model that computes the profile; by default `default_model`
+        model : model that computes the profile; by default `default_profile_model`
         clamp : whether the multipole's source stays inside thin layers ("layer") or not ("none"), see `Slab`
 
         Raises DermisError when the model is not valid for the medium.
         """
-        model = model or self.default_model
-        if model != COUNTED_MODEL:
+        model = model or self.default_profile_model
+        if model != PHOTON_TABLE_MODEL:
             return diffusion_profile(self.medium, model, clamp, self.rgb)
         profile = tabulated_profile(self.medium) if self.rgb is None else None
         if profile is None:
             low, high = TABULATED_ALBEDO_RANGE
             expected = f"one semi-infinite layer of index 1 or {SKIN_ETA} and reduced albedo {low} to {high}"
-            refuse(f"model {COUNTED_MODEL}", expected, f"got {self.medium.name}", "Use the model layered")
+            refuse(
+                f"model {PHOTON_TABLE_MODEL}", expected, f"got {self.medium.name}", "Use the model layered"
+            )
         return profile
 
-    def rings(self) -> RingTarget:
+    def ring_target(self) -> RingTarget:
         """Return the light through concentric rings by the default model, as the target of a fit."""
-        model = self.default_model
-        if model == COUNTED_MODEL:
-            return self.profile().rings()
+        model = self.default_profile_model
+        if model == PHOTON_TABLE_MODEL:
+            return self.profile().ring_target()
         return diffusion_rings(self.medium, model, rgb_weights=self.rgb)
 
     def transmittance(self, thickness_mm: ArrayLike) -> Floats:

@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from dermis.scene.frozen_model import Colour, Heading
-from dermis.specular.models import EnergyName
+from dermis.specular.models import EnergyConservationName
 
 COMPARISONS_HEADING = Heading("Comparisons of the 2007 talk")
 
@@ -24,7 +24,7 @@ SpecularColour = Annotated[
 
 _ENERGY_HELP = """Energy conservation of diffuse light: "full" subtracts what the surface reflects,
 "published" subtracts pi times too much, as the talk does, "none" subtracts nothing."""
-EnergyConservation = Annotated[EnergyName, COMPARISONS_HEADING, Field(description=_ENERGY_HELP)]
+EnergyConservation = Annotated[EnergyConservationName, COMPARISONS_HEADING, Field(description=_ENERGY_HELP)]
 
 _STRETCH_HELP = """Correction of blur kernels for the uv layout: "full" for stretch and shear, "axes" for
 stretch alone, "none" for the same kernel everywhere."""

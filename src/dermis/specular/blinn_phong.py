@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
-from dermis.specular.models import Model
+from dermis.specular.models import SpecularModel
 
 
 def blinn_phong_exponent(m: ArrayLike) -> Floats:
@@ -61,10 +61,10 @@ def _power_of_n_h(cosines: Cosines, exponent: Floats) -> Floats:
     return np.asarray(np.clip(cosines.n_h, 0.0, 1.0) ** exponent)
 
 
-BLINN_PHONG = Model(
+BLINN_PHONG = SpecularModel(
     blinn_phong, "normalised power of n.h", reciprocal=True, sources=("Blinn1977", "Walter2007")
 )
-BLINN_PHONG_PLAIN = Model(
+BLINN_PHONG_PLAIN = SpecularModel(
     blinn_phong_plain,
     "original power of n.h; not reciprocal, as its highlight lacks the cosine of the light",
     reciprocal=False,

@@ -65,7 +65,7 @@ def hemispherical_reflectance(fresnel: Fresnel = dielectric, node_count: int = 6
 
 
 @dataclass(frozen=True)
-class EnergyScheme:
+class EnergyConservationScheme:
     """Energy conservation scheme: reduces diffuse light by the light that the specular lobe reflects.
 
     The diffuse BRDF is albedo / pi times (1 - k rho_dt(n.l)) (1 - k rho_dt(n.v)) / c. Here rho_dt is the
@@ -114,10 +114,10 @@ class EnergyScheme:
         )
 
 
-ENERGY_SCHEMES: dict[str, EnergyScheme] = {
-    "none": EnergyScheme(0.0, returns_internal_light=False),
-    "published": EnergyScheme(np.pi, returns_internal_light=False),
-    "full": EnergyScheme(1.0, returns_internal_light=True),
+ENERGY_SCHEMES: dict[str, EnergyConservationScheme] = {
+    "none": EnergyConservationScheme(0.0, returns_internal_light=False),
+    "published": EnergyConservationScheme(np.pi, returns_internal_light=False),
+    "full": EnergyConservationScheme(1.0, returns_internal_light=True),
 }
 """Energy conservation schemes by their names in scene files.
 

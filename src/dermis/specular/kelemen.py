@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from dermis.specular.beckmann import beckmann
 from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
-from dermis.specular.models import Model
+from dermis.specular.models import SpecularModel
 
 
 def kelemen(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
@@ -29,7 +29,7 @@ def kelemen(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Float
     return np.asarray(np.where(cosines.is_above, lobe, 0.0))
 
 
-KELEMEN = Model(
+KELEMEN = SpecularModel(
     kelemen,
     "Beckmann distribution over the squared length of l + v, evaluated with a table",
     reciprocal=True,

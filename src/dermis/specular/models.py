@@ -6,9 +6,10 @@ import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 
 from dermis.base.registry import RegisteredName, Registry
+from dermis.base.renamed import successor
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -34,7 +35,7 @@ class Lobe(Protocol):
 
 
 @dataclass(frozen=True)
-class Model:
+class SpecularModel:
     """Specular model: a lobe, its shader and its description.
 
     The shader file is named after the lobe's Python module. It defines `fn NAME(a: Angles, m: f32) -> f32`,
@@ -72,7 +73,7 @@ class Model:
         return Path(inspect.getfile(self.lobe)).with_suffix(".wgsl")
 
 
-MODELS: Registry[Model] = Registry(
+MODELS: Registry[SpecularModel] = Registry(
     "surface model",
     {
         "two-lobe": "dermis.specular.two_lobe:TWO_LOBE",
@@ -90,4 +91,11 @@ MODELS: Registry[Model] = Registry(
 
 SpecularName = Annotated[str, RegisteredName(MODELS, "none")]
 FresnelName = Literal["schlick", "exact"]
-EnergyName = Literal["none", "published", "full"]
+EnergyConservationName = Literal["none", "published", "full"]
+
+
+def __getattr__(name: str) -> Any:
+    """Return an object of this module by the name that it had in the last release, for compatibility."""
+    if new := successor(__name__, name):
+        return globals()[new]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from dermis.specular.blinn_phong import blinn_phong_exponent
 from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
-from dermis.specular.models import Model
+from dermis.specular.models import SpecularModel
 
 
 def phong(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
@@ -50,10 +50,10 @@ def _power_of_r_v(cosines: Cosines, exponent: Floats) -> Floats:
     return np.asarray(np.clip(r_v, 0.0, 1.0) ** exponent)
 
 
-PHONG = Model(
+PHONG = SpecularModel(
     phong, "normalised power of r.v", reciprocal=True, sources=("Phong1975", "LafortuneWillems1994")
 )
-PHONG_PLAIN = Model(
+PHONG_PLAIN = SpecularModel(
     phong_plain,
     "original power of r.v; not reciprocal, as its highlight lacks the cosine of the light and its "
     "Fresnel reflectance is that of the angle of incidence",

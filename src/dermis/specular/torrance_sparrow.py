@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from dermis.specular.beckmann import beckmann
 from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
-from dermis.specular.models import Model
+from dermis.specular.models import SpecularModel
 
 _MIN_COSINE = 1e-6
 
@@ -85,13 +85,13 @@ def _microfacet_brdf(
     return np.where(cosines.is_above, lobe, 0.0)
 
 
-TORRANCE_SPARROW = Model(
+TORRANCE_SPARROW = SpecularModel(
     torrance_sparrow,
     "Beckmann distribution with V-cavity masking",
     reciprocal=True,
     sources=("TorranceSparrow1967", "CookTorrance1982", "Beckmann1963"),
 )
-TORRANCE_SPARROW_SMITH = Model(
+TORRANCE_SPARROW_SMITH = SpecularModel(
     torrance_sparrow_smith,
     "Beckmann distribution with Smith masking",
     reciprocal=True,

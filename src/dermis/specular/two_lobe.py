@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from dermis.specular.beckmann import beckmann
 from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
-from dermis.specular.models import Model
+from dermis.specular.models import SpecularModel
 from dermis.specular.torrance_sparrow import masked_lobe, smith_masking
 
 NARROW_FACTOR, WIDE_FACTOR = 0.75**2, 1.3**2
@@ -61,7 +61,7 @@ def _weighted_lobe_mean(lobe_quantity: Callable[[Floats], Floats], roughness: Ar
     return np.asarray(NARROW_WEIGHT * lobe_quantity(narrow) + (1.0 - NARROW_WEIGHT) * lobe_quantity(wide))
 
 
-TWO_LOBE = Model(
+TWO_LOBE = SpecularModel(
     two_lobe,
     "narrow and wide Beckmann distributions with Smith masking",
     reciprocal=True,

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
-from dermis.specular.models import Model
+from dermis.specular.models import SpecularModel
 
 ALBEDO = 0.5
 
@@ -18,4 +18,4 @@ def chalk(cosines: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     return np.where(cosines.is_above, value, 0.0)
 
 
-CHALK = Model(chalk, "the same in all directions", True, ("Phong1975",), {"chalk_albedo": ALBEDO})
+CHALK = SpecularModel(chalk, "the same in all directions", True, ("Phong1975",), {"chalk_albedo": ALBEDO})

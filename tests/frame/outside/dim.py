@@ -25,17 +25,17 @@ class Dim(AtlasTechnique):
         """Return one Gaussian with all of the profile's light."""
         return single_gaussian(profile)
 
-    def relights_narrowest(self, profile: GaussianSum) -> bool:
+    def leaves_narrowest_unblurred(self, profile: GaussianSum) -> bool:
         """Return False."""
         return False
 
-    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
+    def level_halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return 0 for both levels."""
         return (0, 0)
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
         """Declare the pass that halves the light."""
-        shader = program(graph.device, Path(__file__).parent / "dim.wgsl", store_format=levels.texel)
+        shader = program(graph.device, Path(__file__).parent / "dim.wgsl", store_format=levels.texel_format)
         bound = {"light": levels.layer(0), "stored": levels.layer(1)}
         graph.compute("dim", shader, bound, (levels.size, levels.size), TILE_SIDE)
 

@@ -6,13 +6,13 @@ from typing import Any
 
 from outside.glow_light import GlowLight
 
-from dermis.frame.lights.kind import Kind
+from dermis.frame.lights.kind import LightKind
 from dermis.frame.projection import Triple
 
 
-class _Glow(Kind[GlowLight]):
-    def members(self, light: GlowLight, centre: Triple, distance: float) -> dict[str, Any]:
+class _GlowLightKind(LightKind[GlowLight]):
+    def shader_members(self, light: GlowLight, head_centre: Triple, target_distance: float) -> dict[str, Any]:
         return {"cos_inner": light.power}
 
 
-GLOW = _Glow()
+GLOW = _GlowLightKind()

@@ -11,7 +11,7 @@ from tolerances import PUBLISHED
 
 from dermis.optics.diffusion.boundary import (
     boundary_mismatch,
-    diffuse_reflectance,
+    diffuse_fresnel_reflectance,
     fresnel,
     internal_moment,
     normal_reflectance,
@@ -25,7 +25,9 @@ def test_fresnel_of_the_table(sample_folder: Path) -> None:
 
 def test_hemispherical_means_of_the_table(sample_folder: Path) -> None:
     for row in table(sample_folder, "fresnel_hemispherical.csv"):
-        assert diffuse_reflectance(row["eta"], "exact") == pytest.approx(row["Fdr_internal_exact"], abs=1e-12)
+        assert diffuse_fresnel_reflectance(row["eta"], "exact") == pytest.approx(
+            row["Fdr_internal_exact"], abs=1e-12
+        )
         assert boundary_mismatch(row["eta"], "exact") == pytest.approx(row["A_exact"], rel=1e-12)
         # The table rounds the polynomial's coefficients to three digits.
         assert boundary_mismatch(row["eta"]) == pytest.approx(row["A_egan"], rel=1e-3)
@@ -33,7 +35,7 @@ def test_hemispherical_means_of_the_table(sample_folder: Path) -> None:
 
 def test_marble_of_the_notebook() -> None:
     """Intermediates of the fit that comes with [dEonLuebke2007]."""
-    assert diffuse_reflectance(1.5) == pytest.approx(0.59681111, abs=1e-8)
+    assert diffuse_fresnel_reflectance(1.5) == pytest.approx(0.59681111, abs=1e-8)
     assert boundary_mismatch(1.5) == pytest.approx(3.96045416, abs=1e-8)
 
 

@@ -209,7 +209,7 @@ def test_a_near_fit_leads_to_the_cold_optimum(
 def test_a_slider_over_all_melanin_stays_near_the_cold_optima() -> None:
     initial = None
     for melanin in np.linspace(0.0, 0.5, 21):
-        target = load_tissue("spectral", pigments={"melanin": float(melanin)}).profile().rings()
+        target = load_tissue("spectral", pigments={"melanin": float(melanin)}).profile().ring_target()
         warm, cold = fit_gaussians(target, 6, similar_fit=initial), fit_gaussians(target, 6)
         assert mean_error(warm) < 1.2 * mean_error(cold)
         initial = warm.profile

@@ -45,7 +45,7 @@ def layer(structure: Structure, name: str, parameters: SkinParameters) -> Layer:
 def test_a_channel_for_each_wavelength(structure: Structure) -> None:
     medium = spectral_medium(structure, SKIN)
     assert medium.channels == len(WAVELENGTHS_NM) == 31
-    assert medium.semi_infinite and medium.eta == 1.4
+    assert medium.is_semi_infinite and medium.eta == 1.4
     assert spectral_medium(structure, SKIN, np.array([550.0])).channels == 1
     assert medium.notes and cite.bibtex(medium.sources)
 

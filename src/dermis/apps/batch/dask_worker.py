@@ -22,7 +22,7 @@ from dermis.apps.batch.spec import parse_spec
 from dermis.apps.batch.worker import RunOptions, WorkerEvent, WorkerSlot, run_worker
 from dermis.base.errors import DermisError, DermisWarning
 from dermis.base.private import cache_folder, make_private_folder
-from dermis.gpu.adapters import similar_adapters
+from dermis.gpu.adapters import adapters_like_best_match
 
 _MALLOC_TRIM_VARIABLE = "MALLOC_TRIM_THRESHOLD_"
 """Environment variable by which dask's nannies make workers return freed memory to the system at once; large
@@ -128,7 +128,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
         """Start the rendering process, on an adapter chosen by the rank of this dask worker on its host."""
         cleanup = self._state.cleanup
         rank = cleanup.enter_context(hold_local_rank())
-        adapters = similar_adapters(self.adapter)
+        adapters = adapters_like_best_match(self.adapter)
         spec = parse_spec(tomllib.loads(self.spec_toml), self.folder)
         slot = WorkerSlot(f"#{adapters[rank % len(adapters)].number}")
         child = start_process(run_worker, slot, RunOptions(spec, self.out, self.encoders, self.keep_going))

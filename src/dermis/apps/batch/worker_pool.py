@@ -13,7 +13,7 @@ from dermis.apps.batch.child_processes import ChildProcess, start_process
 from dermis.apps.batch.shards import Shard
 from dermis.apps.batch.worker import RunOptions, WorkerEvent, WorkerSlot, run_worker
 from dermis.base.errors import DermisError
-from dermis.gpu.adapters import Adapter, similar_adapters
+from dermis.gpu.adapters import Adapter, adapters_like_best_match
 
 MAX_TASK_ATTEMPTS = 3
 """Attempts to render a part before the run fails."""
@@ -44,8 +44,8 @@ class SlotRequest:
         Raises DermisError if a requested adapter does not exist.
         """
         if not self.numbers:
-            return similar_adapters(self.adapter)
-        return [similar_adapters(f"#{number}")[0] for number in self.numbers]
+            return adapters_like_best_match(self.adapter)
+        return [adapters_like_best_match(f"#{number}")[0] for number in self.numbers]
 
     def worker_slots(self) -> tuple[list[WorkerSlot], int]:
         """Return one slot per worker, and the number of encoder processes per worker.

@@ -145,7 +145,7 @@ class ViewRenderer:
 
     def __init__(self, adapter: str = "auto") -> None:
         self.is_preparing = False
-        self.renderer = Renderer(adapter, cache_size=_CACHED_RESOURCE_SETS, reopens=False)
+        self.renderer = Renderer(adapter, cache_size=_CACHED_RESOURCE_SETS, reopens_lost_device=False)
         self.quality_controller = QualityController(
             is_software_adapter=self.renderer.device.adapter.kind == "CPU"
         )

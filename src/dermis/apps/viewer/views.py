@@ -75,7 +75,7 @@ class IntermediateViews:
         shader = program(self._renderer.device, _INTERMEDIATE_SHADER_PATH, constants)
         layer, scale = self._atlas_layer(inputs, view_name, settings)
         view_fields = ("eye", "forward", "right", "up", "shift", "samples", "jitter")
-        record = shader.record("ViewParameters", **{name: inputs.view[name] for name in view_fields})
+        record = shader.make_record("ViewParameters", **{name: inputs.view[name] for name in view_fields})
         record["quantity"], record["scale"] = _SHADER_QUANTITY_NUMBERS.get(view_name, 0), scale
         bindings = {
             **inputs.bindings,
@@ -99,7 +99,7 @@ class IntermediateViews:
         layer, scale = self._atlas_layer(inputs, atlas_view.layer, settings)
         values = {"centre": atlas_view.centre, "span": atlas_view.span, "scale": scale}
         quantity = _SHADER_QUANTITY_NUMBERS.get(atlas_view.layer, 0)
-        record = self._atlas_shader.record("AtlasView", quantity=quantity, **values)
+        record = self._atlas_shader.make_record("AtlasView", quantity=quantity, **values)
         return self._run_image_shader(
             self._atlas_shader, {"atlas_view": record, "layer": layer}, settings.size
         )
@@ -185,7 +185,7 @@ def draw_thickness(device: Device, translucency: Translucency, target_texture: T
     pairs, shader = translucency.pairs, program(device, Path(__file__).parent / "thickness.wgsl")
     count = pairs.receivers[1]
     bindings: Bindings = {
-        "parameters": shader.record("ThicknessParameters", radius_mm=pairs.cells.radius_mm, count=count),
+        "parameters": shader.make_record("ThicknessParameters", radius_mm=pairs.cells.radius_mm, count=count),
         "receiver_ranges": pairs.receiver_ranges,
         "pairs": pairs.pairs,
         "receiver_points": translucency.receiver_points,

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 
-from dermis.frame.lights.kind import Kind, Members
+from dermis.frame.lights.kind import LightKind, StructMembers
 from dermis.frame.projection import Triple
 from dermis.scene.lights import DirectionalLight
 
 
-class _Directional(Kind[DirectionalLight]):
+class _DirectionalLightKind(LightKind[DirectionalLight]):
     always = True
 
-    def has_size(self, light: DirectionalLight) -> bool:
+    def has_penumbra(self, light: DirectionalLight) -> bool:
         return light.angle_degrees > 0
 
-    def members(self, light: DirectionalLight, centre: Triple, distance: float) -> Members:
+    def shader_members(
+        self, light: DirectionalLight, head_centre: Triple, target_distance: float
+    ) -> StructMembers:
         return {"extent": math.tan(0.5 * math.radians(light.angle_degrees))}
 
 
-KIND = _Directional()
+KIND = _DirectionalLightKind()

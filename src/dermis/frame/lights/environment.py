@@ -127,9 +127,9 @@ def environment_record(
     has_occlusion : whether the head hides parts of the environment from its own skin
     """
     if environment is None:
-        return shading_program.record("Environment")
+        return shading_program.make_record("Environment")
     angle = np.radians(environment.rotation_degrees)
-    return shading_program.record(
+    return shading_program.make_record(
         "Environment",
         turn=(np.cos(angle), np.sin(angle)),
         exposure=environment.exposure,

@@ -9,17 +9,18 @@ from typing import Any, Generic, TypeVar
 from numpy.typing import ArrayLike
 
 from dermis.base.registry import Registry
+from dermis.base.renamed import successor
 from dermis.frame.projection import Triple, vector_between, view_axes
 from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.mesh.head import Head
 from dermis.scene.lights import Light, PointLight
 
-Members = dict[str, ArrayLike]
-"""Members of a shader struct, by name."""
+StructMembers = dict[str, ArrayLike]
+"""StructMembers of a shader struct, by name."""
 LightT = TypeVar("LightT", bound=Light)
 
 
-class Kind(Generic[LightT]):
+class LightKind(Generic[LightT]):
     """Kind of light. This base class is a punctual light that needs no additional shader members.
 
     The shader has the name of the module, with the suffix .wgsl. It defines the following function, where
@@ -27,7 +28,7 @@ class Kind(Generic[LightT]):
 
         fn NAME_incident(light: Light, p: vec3f, part: u32) -> Incident
 
-    The function returns the light that arrives at the point p from one part of the light, see `parts`.
+    The function returns the light that arrives at the point p from one part of the light, see `divide_light`.
 
     Attributes
     ----------
@@ -58,7 +59,7 @@ class Kind(Generic[LightT]):
         """Return the path of the WGSL file that computes the light at a point."""
         return Path(inspect.getfile(type(self))).with_suffix(".wgsl")
 
-    def has_size(self, light: LightT) -> bool:
+    def has_penumbra(self, light: LightT) -> bool:
         """Return whether shadows of the light soften with the distance from the occluder.
 
         Parameters
@@ -68,7 +69,7 @@ class Kind(Generic[LightT]):
         """
         return not self.punctual
 
-    def parts(self, light: LightT) -> list[Light]:
+    def divide_light(self, light: LightT) -> list[Light]:
         """Divide a light into parts that together equal the light; each part gets a shadow map of its own.
 
         Parameters
@@ -101,16 +102,16 @@ class Kind(Generic[LightT]):
             When the position is invalid, for example when a spherical light overlaps the head.
         """
 
-    def members(self, light: LightT, centre: Triple, distance: float) -> Members:
+    def shader_members(self, light: LightT, head_centre: Triple, target_distance: float) -> StructMembers:
         """Return the members of the shader struct `Light` that only this kind sets.
 
         Parameters
         ----------
         light : Light
             Light of the scene.
-        centre : tuple of float
+        head_centre : tuple of float
             Centre of the head [mm].
-        distance : float
+        target_distance : float
             Distance from the light to its target, 1 for parallel light [mm].
 
         Returns
@@ -121,20 +122,20 @@ class Kind(Generic[LightT]):
         return {}
 
 
-KINDS: Registry[Kind[Any]] = Registry(
+KINDS: Registry[LightKind[Any]] = Registry(
     "light of the frame",
     {
         shader.stem.replace("_", "-"): f"{__package__}.{shader.stem}:KIND"
         for shader in sorted(Path(__file__).parent.glob("*.wgsl"))
     },
-    f"Register its Kind in {__name__}.KINDS",
+    f"Register its LightKind in {__name__}.KINDS",
 )
 """Kinds of lights by their names in scene files; each has a module and a shader in this folder."""
 
 
 def area_light_members(
     light: PointLight, radiance: float, half_width_mm: float, half_height_mm: float
-) -> Members:
+) -> StructMembers:
     """Return the members of the shader struct `Light` for an area light that faces its target.
 
     radiance : radiance that gives an irradiance of 1 at the target [1/sr]
@@ -165,3 +166,10 @@ def light_shaders() -> list[ShaderListMember]:
         )
         for name, kind in KINDS.items()
     ]
+
+
+def __getattr__(name: str) -> Any:
+    """Return an object of this module by the name that it had in the last release, for compatibility."""
+    if new := successor(__name__, name):
+        return globals()[new]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dermis.frame.lights.kind import Kind
+from dermis.frame.lights.kind import LightKind
 from dermis.scene.lights import PointLight
 
 
-class _Point(Kind[PointLight]):
+class _PointLightKind(LightKind[PointLight]):
     always = True
 
 
-KIND = _Point()
+KIND = _PointLightKind()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.environment.panorama import Sun
-from dermis.frame.lights.kind import KINDS, Members, kind_constant_name
+from dermis.frame.lights.kind import KINDS, StructMembers, kind_constant_name
 from dermis.frame.projection import (
     ShadowView,
     Triple,
@@ -66,7 +66,7 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
     each = [(KINDS[light.kind], light) for light in scene.lights]
     used_kinds = sorted({light.kind for kind, light in each if not kind.always})
     flags = {
-        "SHAPES": any(kind.has_size(light) for kind, light in each),
+        "SHAPES": any(kind.has_penumbra(light) for kind, light in each),
         **dict.fromkeys(map(kind_constant_name, used_kinds), True),
         "ENVIRONMENT": scene.environment,
         "HALF_SPACE": scene.skin.direction != "lambertian",
@@ -74,7 +74,7 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
     return tuple((name, 1) for name, value in flags.items() if value)
 
 
-def with_oblique_constant(constants: Constants) -> Constants:
+def with_oblique_incidence_constant(constants: Constants) -> Constants:
     """Return `constants`, with OBLIQUE added if they contain HALF_SPACE.
 
     HALF_SPACE makes the response of skin to light depend on direction. OBLIQUE adds a further effect: the
@@ -91,7 +91,7 @@ def light_part_counts(scene: Scene) -> tuple[int, ...]:
     Large rectangular lights are divided into several parts, each with its own shadow map; for all other
     lights the number is 1.
     """
-    return tuple(len(KINDS[light.kind].parts(light)) for light in scene.lights)
+    return tuple(len(KINDS[light.kind].divide_light(light)) for light in scene.lights)
 
 
 def light_shadow_views(scene: Scene, outline: Outline, map_side: int) -> list[ShadowView | None]:
@@ -106,7 +106,7 @@ def light_shadow_views(scene: Scene, outline: Outline, map_side: int) -> list[Sh
     numbered = [
         (f"light {number}", part)
         for number, light in enumerate(scene.lights, start=1)
-        for part in KINDS[light.kind].parts(light)
+        for part in KINDS[light.kind].divide_light(light)
     ]
     if len(numbered) > _MAX_LIGHTS:
         actual = f"there are {len(numbered)}, with the environment's suns and each part of a large rectangle"
@@ -134,9 +134,9 @@ def light_records(
     shading_program : program of the shading pass, which declares the record
     shadow_views : result of `light_shadow_views`
     """
-    record = shading_program.record("Lights", sample_points=light_sample_points())
+    record = shading_program.make_record("Lights", sample_points=light_sample_points())
     lights = record["light"]
-    each = [KINDS[light.kind].parts(light) for light in scene.lights]
+    each = [KINDS[light.kind].divide_light(light) for light in scene.lights]
     divided = [(part, len(parts)) for parts in each for part in parts]
     none, layers = dict.fromkeys(lights.dtype.names or (), 0), count()
     rows = []
@@ -160,7 +160,9 @@ def light_sample_points() -> Floats:
     return np.hstack([disc, 2.0 * even - 1.0])
 
 
-def _light_members(light: Light, centre: Triple, shadow_view: ShadowView | None, part_count: int) -> Members:
+def _light_members(
+    light: Light, centre: Triple, shadow_view: ShadowView | None, part_count: int
+) -> StructMembers:
     """Return the members of the shader struct `Light` for a light; members that are left out are 0.
 
     light : light, or one part of a divided light
@@ -175,7 +177,7 @@ def _light_members(light: Light, centre: Triple, shadow_view: ShadowView | None,
     else:
         along, position = vector_between(light.position, light.target), world_position(light.position, centre)
         distance = math.hypot(*along)
-    shadow: Members = {}
+    shadow: StructMembers = {}
     if shadow_view:
         clip, texel, position, right, up, near, far = shadow_view
         shadow = {"to_map": clip.T, "map_right": right, "map_up": up, "map_near": near, "map_far": far}
@@ -199,5 +201,5 @@ def _light_members(light: Light, centre: Triple, shadow_view: ShadowView | None,
         else max(_MIN_SHADOW_RAY_COUNT, _SHADOW_RAY_COUNT // part_count),
         "side": 1 if kind.punctual else _PART_SAMPLES_PER_SIDE if part_count > 1 else _LIGHT_SAMPLES_PER_SIDE,
         **shadow,
-        **kind.members(light, centre, distance),
+        **kind.shader_members(light, centre, distance),
     }

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from dermis.frame.lights.kind import Kind, Members, area_light_members
+from dermis.frame.lights.kind import LightKind, StructMembers, area_light_members
 from dermis.frame.projection import Triple, vector_between, view_axes
 from dermis.scene.lights import Light, RectangleLight
 
@@ -14,11 +14,11 @@ _MAX_PART_SIDE_PER_DISTANCE = 0.35  # largest ratio of a part's side to the ligh
 _MAX_PARTS_PER_SIDE = 3  # largest number of parts along each side
 
 
-class _Rectangle(Kind[RectangleLight]):
+class _RectangleLightKind(LightKind[RectangleLight]):
     punctual = False
     round = False
 
-    def parts(self, light: RectangleLight) -> list[Light]:
+    def divide_light(self, light: RectangleLight) -> list[Light]:
         """Divide the rectangle into parts whose sides are at most 0.35 of the distance from light to target.
 
         There are at most 3 parts along each side, even if their sides then exceed this limit.
@@ -51,12 +51,14 @@ class _Rectangle(Kind[RectangleLight]):
             for offset in offsets
         ]
 
-    def members(self, light: RectangleLight, centre: Triple, distance: float) -> Members:
-        radiance = 1.0 / facing_irradiance(light.width_mm, light.height_mm, distance)
+    def shader_members(
+        self, light: RectangleLight, head_centre: Triple, target_distance: float
+    ) -> StructMembers:
+        radiance = 1.0 / facing_irradiance(light.width_mm, light.height_mm, target_distance)
         return area_light_members(light, radiance, 0.5 * light.width_mm, 0.5 * light.height_mm)
 
 
-KIND = _Rectangle()
+KIND = _RectangleLightKind()
 
 
 def _part_count(side_mm: float, distance_mm: float) -> int:

@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from dermis.base.errors import refuse
-from dermis.frame.lights.kind import Kind, Members, area_light_members
+from dermis.frame.lights.kind import LightKind, StructMembers, area_light_members
 from dermis.frame.projection import Triple, world_position
 from dermis.mesh.head import Head
 from dermis.scene.lights import SphereLight
 
 
-class _Sphere(Kind[SphereLight]):
+class _SphereLightKind(LightKind[SphereLight]):
     punctual = False
 
     def check(self, light: SphereLight, head: Head, culprit: str) -> None:
@@ -23,9 +23,11 @@ class _Sphere(Kind[SphereLight]):
             actual = f"the head is {near:.0f} mm from its middle"
             refuse(culprit, f"a head outside the sphere of {light.radius_mm:g} mm", actual, "Move it away")
 
-    def members(self, light: SphereLight, centre: Triple, distance: float) -> Members:
-        radiance = 1.0 / (math.pi * (light.radius_mm / distance) ** 2)
+    def shader_members(
+        self, light: SphereLight, head_centre: Triple, target_distance: float
+    ) -> StructMembers:
+        radiance = 1.0 / (math.pi * (light.radius_mm / target_distance) ** 2)
         return area_light_members(light, radiance, light.radius_mm, light.radius_mm)
 
 
-KIND = _Sphere()
+KIND = _SphereLightKind()

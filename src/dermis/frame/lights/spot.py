@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 
-from dermis.frame.lights.kind import Kind, Members
+from dermis.frame.lights.kind import LightKind, StructMembers
 from dermis.frame.projection import Triple
 from dermis.scene.lights import SpotLight
 
 
-class _Spot(Kind[SpotLight]):
+class _SpotLightKind(LightKind[SpotLight]):
     always = True
 
-    def members(self, light: SpotLight, centre: Triple, distance: float) -> Members:
+    def shader_members(self, light: SpotLight, head_centre: Triple, target_distance: float) -> StructMembers:
         inner, outer = math.radians(light.inner_degrees), math.radians(light.outer_degrees)
         return {"cos_inner": math.cos(inner), "cos_outer": math.cos(outer)}
 
 
-KIND = _Spot()
+KIND = _SpotLightKind()

@@ -70,7 +70,7 @@ class GpuGems3(AtlasTechnique):
         """Return the memory per atlas texel of the pyramid levels and the blurred stretch map [bytes]."""
         return float(TEXEL_FORMAT_BYTES[HALF_TEXEL_FORMAT] * (blur_count + 4))
 
-    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
+    def level_halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return the number of halvings of each level's resolution: 0, as all levels have full resolution."""
         return (0,) * (len(split.blurred_mm2) + 1)
 
@@ -84,7 +84,7 @@ class GpuGems3(AtlasTechnique):
         before, (stretch, spare) = 0.0, levels.stretch
         source: TextureOrView = atlas.resources["stretch_map"]
         for k, variance in enumerate(blur.variance_mm2, start=1):
-            record = shaders[0].record(
+            record = shaders[0].make_record(
                 "Spread", sigma_mm=np.sqrt(variance - before), clear=blur.scale * np.asarray(blur.clear)
             )
             passes = (

@@ -24,7 +24,7 @@ class OneBlur(TextureSpace):
         """Return the single Gaussian that replaces a profile."""
         return single_gaussian(profile)
 
-    def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
+    def split_profile(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
         """Return the split of a profile: a single Gaussian with which light is blurred.
 
         Unlike that of the base class, the split has no correction for light that varies within a texel.
@@ -32,13 +32,13 @@ class OneBlur(TextureSpace):
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
         """
-        return AtlasTechnique.split(self, profile, normalise_weights)
+        return AtlasTechnique.split_profile(self, profile, normalise_weights)
 
-    def relights_narrowest(self, profile: GaussianSum) -> bool:
+    def leaves_narrowest_unblurred(self, profile: GaussianSum) -> bool:
         """Return False: even if the only Gaussian is very narrow, light is blurred with it."""
         return False
 
-    def stretch(self, settings: Settings) -> str:
+    def stretch_correction(self, settings: Settings) -> str:
         """Return the stretch correction "none": blurs assume the same texel density over the whole map."""
         return "none"
 

@@ -52,7 +52,7 @@ class PreIntegratedSkin(Technique):
     needs_curvature = True
     shade_constants = (("PRE_INTEGRATED", 1),)
 
-    def make(
+    def make_resources(
         self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum
     ) -> PreIntegratedTables:
         """Return the tables of scattered light for the profile."""
@@ -68,7 +68,7 @@ class PreIntegratedSkin(Technique):
 
         view : uniform record of the shading pass
         shade : program of the shading pass
-        resources : result of `make`
+        resources : result of `make_resources`
         """
         assert isinstance(resources, PreIntegratedTables)
         scales = {
@@ -76,7 +76,7 @@ class PreIntegratedSkin(Technique):
             "penumbra": resources.penumbra_width_mm,
             "relief": resources.relief_mm,
         }
-        view["pre"] = shade.record("PreIntegrated", **scales)
+        view["pre"] = shade.make_record("PreIntegrated", **scales)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
         """Declare the passes that compute curvature, and return the texture of the tables.
@@ -86,7 +86,7 @@ class PreIntegratedSkin(Technique):
         """
         resources, tables = inputs.resources, inputs.resources.technique
         assert resources.shape.curvature is not None and isinstance(tables, PreIntegratedTables)
-        graph.repeat(curvature.draw, resources.head, resources.shape.curvature)
+        graph.add_replayable(curvature.draw, resources.head, resources.shape.curvature)
         return tables.table
 
 

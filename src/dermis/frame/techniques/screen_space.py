@@ -77,7 +77,9 @@ class ScreenSpace(Technique):
     pixel_bytes = 64
     subsurface_layer_bytes = 48
 
-    def make(self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum) -> SubsurfaceLayers:
+    def make_resources(
+        self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum
+    ) -> SubsurfaceLayers:
         """Return the textures in which the picture's light is diffused, and the kernel of the profile."""
         layers = memo.get(make_subsurface_layers, device, settings.size)
         return replace(layers, kernel=memo.get(make_kernel, device, profile))
@@ -93,7 +95,7 @@ class ScreenSpace(Technique):
         """Return the texture of subsurface light, which is `SubsurfaceLayers.layers`."""
         return resources.layers if isinstance(resources, SubsurfaceLayers) else None
 
-    def finish(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:
+    def add_subsurface_light(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:
         """Declare the passes that diffuse the subsurface light, and return the picture with this light."""
         layers = inputs.resources.technique
         assert isinstance(layers, SubsurfaceLayers) and layers.kernel is not None
@@ -180,7 +182,7 @@ def draw_blur(
     programs = [
         program(device, TECHNIQUES_FOLDER / "screen_space.wgsl", (("AXIS", axis),)) for axis in (0, 1)
     ]
-    record = programs[0].record("Blur", half=window.half, shift=window.shift, reach=kernel.reach_mm)
+    record = programs[0].make_record("Blur", half=window.half, shift=window.shift, reach=kernel.reach_mm)
     passes: tuple[tuple[TextureOrView, TextureOrView], ...] = (
         (subsurface_layers.subsurface, subsurface_layers.scratch),
         (subsurface_layers.scratch, subsurface_layers.subsurface),

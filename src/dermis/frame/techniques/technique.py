@@ -11,7 +11,7 @@ from dermis.frame.features.atlas.passes import draw_blend, draw_stretch
 from dermis.frame.features.atlas.textures import MAX_ATLAS_HALVINGS, AtlasTextures
 from dermis.frame.features.diffusion import combine
 from dermis.frame.features.diffusion import mixture as mix
-from dermis.frame.features.diffusion.mixture import Mixture
+from dermis.frame.features.diffusion.mixture import ProfileMixture
 from dermis.frame.features.diffusion.pyramid import (
     Blur,
     Halvings,
@@ -32,8 +32,8 @@ from dermis.gpu.textures import TEXEL_FORMAT_BYTES
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.settings import Settings
 
-# Narrower Gaussians are finer than texels and pores: they are relit in the picture, not blurred.
-_MAX_RELIT_VARIANCE_MM2 = 0.1**2
+# Narrower Gaussians are finer than texels and pores: their light is computed in the picture, not blurred.
+_MAX_UNBLURRED_VARIANCE_MM2 = 0.1**2
 
 
 class Technique(TechniqueTraits):
@@ -76,7 +76,7 @@ class Technique(TechniqueTraits):
         """
         return split, ()
 
-    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
+    def level_halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
         split : Gaussians with which light is blurred
@@ -85,7 +85,7 @@ class Technique(TechniqueTraits):
         """
         return (0,) * (1 + len(split.blurred_mm2))
 
-    def make(
+    def make_resources(
         self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum
     ) -> TechniqueResources | None:
         """Return the tables and textures of the technique from the cache `memo`, None if there are none."""
@@ -108,7 +108,7 @@ class Technique(TechniqueTraits):
 
         view : uniform record of the shading pass
         shade : program of the shading pass
-        resources : result of `make`
+        resources : result of `make_resources`
         """
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
@@ -123,7 +123,7 @@ class Technique(TechniqueTraits):
         """
         return inputs.resources.scattered
 
-    def finish(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:
+    def add_subsurface_light(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:
         """Declare the passes after shading, and return the texture of the radiance of the picture."""
         return radiance
 
@@ -161,14 +161,14 @@ class AtlasTechnique(Technique):
         """Return the Gaussians with which the technique approximates a profile; here the profile itself."""
         return profile
 
-    def relights_narrowest(self, profile: GaussianSum) -> bool:
+    def leaves_narrowest_unblurred(self, profile: GaussianSum) -> bool:
         """Return whether the narrowest Gaussian is so narrow that light need not be blurred with it.
 
         Its share of the light is then computed at each pixel of the picture instead.
         """
-        return bool(profile.variance_mm2[0] <= _MAX_RELIT_VARIANCE_MM2)
+        return bool(profile.variance_mm2[0] <= _MAX_UNBLURRED_VARIANCE_MM2)
 
-    def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
+    def split_profile(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
         """Split a profile into its narrowest Gaussian and the Gaussians with which light is blurred.
 
         The narrowest Gaussian is not blurred: its share of the light leaves the skin where it enters, and is
@@ -181,7 +181,7 @@ class AtlasTechnique(Technique):
         profile = self.gaussians(profile)
         weight = channel_weights(profile, normalise_weights)
         total = weight.sum(axis=0)
-        if self.relights_narrowest(profile):
+        if self.leaves_narrowest_unblurred(profile):
             return ProfileSplit(weight[0], total, profile.variance_mm2[1:], weight[1:])
         return ProfileSplit(np.zeros(3), total, profile.variance_mm2, weight)
 
@@ -205,7 +205,7 @@ class AtlasTechnique(Technique):
             blur_count + 2 * mips
         )  # upper bound, as if no level were halved
 
-    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
+    def level_halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
         split : Gaussians with which light is blurred
@@ -225,26 +225,26 @@ class AtlasTechnique(Technique):
         if not inputs.blurs:
             return resources.scattered
         for index, (layout, blur) in enumerate(zip(layouts, inputs.blurs, strict=True)):
-            into = levels.layer(0), levels.size, levels.texel, blur.scale, LIGHT_FILTER_SIGMA_TEXELS
-            graph.repeat(draw_stretch, layout.head, layout.atlas)
+            into = levels.layer(0), levels.size, levels.texel_format, blur.scale, LIGHT_FILTER_SIGMA_TEXELS
+            graph.add_replayable(draw_stretch, layout.head, layout.atlas)
             if layout.gutter_update:
-                graph.repeat(
+                graph.add_replayable(
                     gutters.draw, layout.atlas, layout.gutter_update.tracing, layout.gutter_update.head
                 )
             texels.draw(graph, layout)
             irradiance.draw(graph, layout, inputs.light_constants, *into)
             if layout.translucency:
-                graph.repeat(translucency.draw_weights, layout.translucency)
+                graph.add_replayable(translucency.draw_weights, layout.translucency)
                 if layout.translucency.uses_tables:
                     translucency.draw_direction_factors(
                         graph, layout, layout.translucency, inputs.light_constants
                     )
-            graph.repeat(self.blur_levels, levels, layout.atlas, blur)
+            graph.add_replayable(self.blur_levels, levels, layout.atlas, blur)
             target = mixture.sum_layer(0) if mixture else layout.scattered
-            graph.repeat(self.sum_exitance, levels, blur, layout.translucency, target)
+            graph.add_replayable(self.sum_exitance, levels, blur, layout.translucency, target)
             if mixture:
                 mix.draw_blend_weights(graph, layout, mixture, index)
-                graph.repeat(
+                graph.add_replayable(
                     self.add_other_profiles, levels, blur, layout.atlas, mixture, index, layout.scattered
                 )
         if len(layouts) > 1:
@@ -284,7 +284,7 @@ class AtlasTechnique(Technique):
         levels: PyramidLevels,
         blur: Blur,
         atlas: AtlasTextures,
-        mixture: Mixture,
+        mixture: ProfileMixture,
         layout_index: int,
         exitance_texture: Texture,
     ) -> None:
@@ -300,7 +300,9 @@ class AtlasTechnique(Technique):
         layout_index : index of the atlas layout
         exitance_texture : texture to which the exitance of the blend is written
         """
-        for other, (entering, weight) in enumerate(zip(mixture.entering, blur.weight_changes, strict=True)):
+        for other, (entering, weight) in enumerate(
+            zip(mixture.entering_light, blur.weight_differences, strict=True)
+        ):
             change = replace(blur, weight=weight)
             combine.draw(graph, levels, change, mixture.sum_layer(1 + 2 * other))
             mix.draw_entering_light(graph, levels, mixture, layout_index, other)

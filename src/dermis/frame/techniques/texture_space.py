@@ -10,7 +10,7 @@ from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion.kernels import add_intermediate_levels
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
-from dermis.frame.features.irradiance.irradiance import fine_light_members
+from dermis.frame.features.irradiance.irradiance import subtexel_light_members
 from dermis.frame.technique import ProfileSplit
 from dermis.frame.techniques.technique import AtlasTechnique
 from dermis.gpu import Recorder
@@ -24,7 +24,7 @@ class TextureSpace(AtlasTechnique):
     supports_translucency = True
     mixes_profiles = True
 
-    def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
+    def split_profile(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
         """Split a profile into its narrowest Gaussian and the Gaussians with which light is blurred.
 
         The narrowest Gaussian is not blurred: its share of the light leaves the skin where it enters, and is
@@ -35,9 +35,9 @@ class TextureSpace(AtlasTechnique):
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
         """
-        split = super().split(profile, normalise_weights)
-        relit_mm2 = float(profile.variance_mm2[0]) if self.relights_narrowest(profile) else 0.0
-        return replace(split, fine=fine_light_members(split.blurred_mm2, split.weight, relit_mm2))
+        split = super().split_profile(profile, normalise_weights)
+        unblurred_mm2 = float(profile.variance_mm2[0]) if self.leaves_narrowest_unblurred(profile) else 0.0
+        return replace(split, fine=subtexel_light_members(split.blurred_mm2, split.weight, unblurred_mm2))
 
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str
@@ -56,10 +56,10 @@ class TextureSpace(AtlasTechnique):
         )
         own = [k for k in range(len(variances)) if k + 1 not in steps]
 
-        def with_intermediate_levels(one: ProfileSplit) -> ProfileSplit:
+        def with_intermediate_levels(profile_split: ProfileSplit) -> ProfileSplit:
             weight = np.zeros((len(variances), 3))
-            weight[own] = one.weight
-            return replace(one, blurred_mm2=variances, weight=weight)
+            weight[own] = profile_split.weight
+            return replace(profile_split, blurred_mm2=variances, weight=weight)
 
         return replace(
             with_intermediate_levels(split), others=tuple(map(with_intermediate_levels, split.others))

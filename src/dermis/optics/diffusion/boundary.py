@@ -55,7 +55,7 @@ def internal_moment(cosine_power: int, eta: float, node_count: int = 64) -> floa
     return float(critical ** (cosine_power + 1) / (cosine_power + 1) + 0.5 * w @ inside)
 
 
-def diffuse_reflectance(eta: float, integral_method: DiffuseIntegral = "polynomial") -> float:
+def diffuse_fresnel_reflectance(eta: float, integral_method: DiffuseIntegral = "polynomial") -> float:
     """Return the reflectance F_dr of the surface for diffuse light from inside the medium [-].
 
     eta : index of refraction relative to air [-]
@@ -74,13 +74,13 @@ def diffuse_reflectance(eta: float, integral_method: DiffuseIntegral = "polynomi
 def boundary_mismatch(eta: float, integral_method: DiffuseIntegral = "polynomial") -> float:
     """Return the boundary mismatch A = (1 + F_dr) / (1 - F_dr), which is 1 at an index-matched surface [-].
 
-    F_dr is the `diffuse_reflectance`. In diffusion theory, the fluence, extrapolated linearly beyond the
-    surface, is zero at the height 2 A D, where D is the diffusion coefficient.
+    F_dr is the `diffuse_fresnel_reflectance`. In diffusion theory, the fluence, extrapolated linearly beyond
+    the surface, is zero at the height 2 A D, where D is the diffusion coefficient.
 
     eta : index of refraction relative to air [-]
-    integral_method : "polynomial" or "exact", see `diffuse_reflectance`
+    integral_method : "polynomial" or "exact", see `diffuse_fresnel_reflectance`
 
     Source: [Jensen2001] section 2.3.
     """
-    F_dr = diffuse_reflectance(eta, integral_method)
+    F_dr = diffuse_fresnel_reflectance(eta, integral_method)
     return (1.0 + F_dr) / (1.0 - F_dr)

@@ -9,16 +9,16 @@ from dermis.optics.diffusion.boundary import internal_moment
 from dermis.optics.media import Floats, Layer
 
 
-def source_depths(layer: Layer, mismatch: float) -> tuple[Floats, Floats]:
+def source_depths(layer: Layer, boundary_mismatch: float) -> tuple[Floats, Floats]:
     """Return the depth (c,) of the point source, and the height (c,) of its image above the surface [mm].
 
     layer : absorption and scattering of the half-space
-    mismatch : boundary mismatch A of the surface, see `boundary_mismatch` [-]
+    boundary_mismatch : boundary mismatch A of the surface, see `boundary_mismatch` [-]
 
     Source: [Jensen2001] section 2.3.
     """
     z_r = layer.mean_free_path_mm
-    return z_r, z_r + 4.0 * mismatch * layer.D
+    return z_r, z_r + 4.0 * boundary_mismatch * layer.D
 
 
 def point_source_flux(radius_mm: ArrayLike, depth_mm: Floats, sigma_tr: Floats) -> Floats:
@@ -35,45 +35,45 @@ def point_source_flux(radius_mm: ArrayLike, depth_mm: Floats, sigma_tr: Floats) 
     return np.asarray(depth_mm * (1.0 + sigma_tr * rho) * attenuation / (4.0 * np.pi * rho**3))
 
 
-def reflectance(radius_mm: ArrayLike, layer: Layer, mismatch: float) -> Floats:
+def reflectance(radius_mm: ArrayLike, layer: Layer, boundary_mismatch: float) -> Floats:
     """Return the diffusion profile R(r), (n, c), of the standard dipole [1/mm2].
 
     R(r) is relative to the power that enters the medium.
 
     radius_mm : (n,) distances r from the beam [mm]
     layer : absorption and scattering of the half-space
-    mismatch : boundary mismatch A of the surface, see `boundary_mismatch` [-]
+    boundary_mismatch : boundary mismatch A of the surface, see `boundary_mismatch` [-]
 
     Source: [JensenBuhler2002] eq. 5.
     """
-    z_r, z_v = source_depths(layer, mismatch)
+    z_r, z_v = source_depths(layer, boundary_mismatch)
     fluxes = point_source_flux(radius_mm, z_r, layer.sigma_tr) + point_source_flux(
         radius_mm, z_v, layer.sigma_tr
     )
     return np.asarray(layer.alpha_prime * fluxes)
 
 
-def reflectance_hankel(frequency: ArrayLike, layer: Layer, mismatch: float) -> Floats:
+def reflectance_hankel(frequency: ArrayLike, layer: Layer, boundary_mismatch: float) -> Floats:
     """Return the Hankel transform (n, c) of the standard dipole's R(r) [-].
 
     The transform is the integral of 2 pi r R(r) J0(s r) over r, with the Bessel function J0.
 
     frequency : (n,) frequencies s [1/mm]
     layer : absorption and scattering of the half-space
-    mismatch : boundary mismatch A of the surface, see `boundary_mismatch` [-]
+    boundary_mismatch : boundary mismatch A of the surface, see `boundary_mismatch` [-]
     """
-    z_r, z_v = source_depths(layer, mismatch)
+    z_r, z_v = source_depths(layer, boundary_mismatch)
     q = np.sqrt(layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)
     return np.asarray(0.5 * layer.alpha_prime * (np.exp(-z_r * q) + np.exp(-z_v * q)))
 
 
-def total_reflectance(layer: Layer, mismatch: float) -> Floats:
+def total_reflectance(layer: Layer, boundary_mismatch: float) -> Floats:
     """Return the total reflectance (c,) of the dipole model, relative to the power that enters [-].
 
     layer : absorption and scattering of the half-space
-    mismatch : boundary mismatch A of the surface, see `boundary_mismatch` [-]
+    boundary_mismatch : boundary mismatch A of the surface, see `boundary_mismatch` [-]
     """
-    return np.asarray(reflectance_hankel(0.0, layer, mismatch))
+    return np.asarray(reflectance_hankel(0.0, layer, boundary_mismatch))
 
 
 def better_dipole_reflectance(

@@ -70,31 +70,31 @@ class _DownwardTransfer(NamedTuple):
     beta: Floats | float = 0.0
     lower: Floats | float = 0.0
 
-    def lower_fluence(self, fluence: Floats) -> Floats:
+    def fluence_at_lower_face(self, fluence: Floats) -> Floats:
         across = self.E * (1.0 + self.rho) * self.common
         return np.asarray(fluence * across + (self.beta * (1.0 - self.E * across) + self.lower))
 
 
 def solve_layers(
-    frequency: ArrayLike, medium: Medium, mismatch: float, source_kind: SourceKind = "beam"
+    frequency: ArrayLike, medium: Medium, boundary_mismatch: float, source_kind: SourceKind = "beam"
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms (n, c) of R(r) and of T(r) of a layered medium [-].
 
     R(r) and T(r) are the profiles at the upper and the lower face, relative to the power that enters.
 
     frequency : (n,) frequencies s > 0 [1/mm]
-    mismatch : boundary mismatch with air; internal interfaces are index-matched [-]
+    boundary_mismatch : boundary mismatch with air; internal interfaces are index-matched [-]
     source_kind : "beam" if light first scatters along the beam, in which case R(r) diverges logarithmically
         at r = 0; "point" if all light first scatters at a depth of one mean free path, in which case R(r) is
         finite
 
     Source: [Haskell1994] for the boundary, [Kienle1998] for layers, [Farrell1992] for the beam.
     """
-    return _solve_sublayers(frequency, _sublayers(medium, source_kind), medium.channels, mismatch)
+    return _solve_sublayers(frequency, _sublayers(medium, source_kind), medium.channels, boundary_mismatch)
 
 
 def solve_reflectance(
-    frequency: ArrayLike, medium: Medium, mismatch: float, source_kind: SourceKind = "beam"
+    frequency: ArrayLike, medium: Medium, boundary_mismatch: float, source_kind: SourceKind = "beam"
 ) -> Floats:
     """Return the Hankel transform (n, c) of R(r) of a layered medium [-].
 
@@ -102,24 +102,24 @@ def solve_reflectance(
     also computes T(r).
 
     frequency : (n,) frequencies s > 0 [1/mm]
-    mismatch : boundary mismatch with air [-]
+    boundary_mismatch : boundary mismatch with air [-]
     source_kind : where light first scatters: along the refracted beam ("beam") or at one depth ("point"),
         see `solve_layers`
     """
-    return _solve_upwards(frequency, _sublayers(medium, source_kind), medium.channels, mismatch)[0] / (
-        2.0 * mismatch
-    )
+    return _solve_upwards(frequency, _sublayers(medium, source_kind), medium.channels, boundary_mismatch)[
+        0
+    ] / (2.0 * boundary_mismatch)
 
 
 def solve_two_layers(
-    upper_layer: Layer, thickness_mm: ArrayLike, lower_layer: Layer, mismatch: float
+    upper_layer: Layer, thickness_mm: ArrayLike, lower_layer: Layer, boundary_mismatch: float
 ) -> Floats:
     """Return the total reflectance (n, c) of n skins with two layers, relative to the entering power [-].
 
     upper_layer : upper layers, with coefficients (n, c), or (c,) if they are the same for all skins
     thickness_mm : (n, 1) thicknesses of the upper layers, or one number [mm]
     lower_layer : semi-infinite lower layers, with coefficients (n, c) or (c,)
-    mismatch : boundary mismatch with air [-]
+    boundary_mismatch : boundary mismatch with air [-]
     """
     d = np.asarray(thickness_mm, dtype=np.float64)
     ones = np.ones(np.shape(upper_layer.sigma_a)[-1])
@@ -128,42 +128,44 @@ def solve_two_layers(
         _Sublayer(upper_layer, d, ones, 0.0 * ones),
         _Sublayer(lower_layer, np.inf, beam, 0.0 * ones),
     ]
-    return _solve_upwards(_NEAR_ZERO_FREQUENCY, sublayers, len(ones), mismatch)[0] / (2.0 * mismatch)
+    return _solve_upwards(_NEAR_ZERO_FREQUENCY, sublayers, len(ones), boundary_mismatch)[0] / (
+        2.0 * boundary_mismatch
+    )
 
 
 def solve_homogeneous_slabs(
-    frequency: ArrayLike, layer: Layer, thickness_mm: Floats, mismatch: float
+    frequency: ArrayLike, layer: Layer, thickness_mm: Floats, boundary_mismatch: float
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms (n, m, c) of R(r) and of T(r) of n slabs of one material [-].
 
     frequency : (m,) frequencies s > 0 [1/mm]
     layer : absorption and scattering of the slabs; its field `thickness_mm` is ignored
     thickness_mm : (n,) thicknesses of the slabs [mm]
-    mismatch : boundary mismatch with air [-]
+    boundary_mismatch : boundary mismatch with air [-]
     """
     ones = np.ones(len(layer.sigma_a))
     sublayer = _Sublayer(layer, thickness_mm[:, None, None], ones, np.zeros_like(ones))
-    return _solve_sublayers(frequency, [sublayer], len(ones), mismatch)
+    return _solve_sublayers(frequency, [sublayer], len(ones), boundary_mismatch)
 
 
 def _solve_sublayers(
-    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, mismatch: float
+    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, boundary_mismatch: float
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms (n, channel_count) of R(r) and of T(r) of a stack of sublayers [-].
 
     frequency : (n,) frequencies s > 0 [1/mm]
     sublayers : the sublayers, topmost first
-    mismatch : boundary mismatch with air [-]
+    boundary_mismatch : boundary mismatch with air [-]
     """
-    fluence, transfers = _solve_upwards(frequency, sublayers, channel_count, mismatch)
-    R = fluence / (2.0 * mismatch)
+    fluence, transfers = _solve_upwards(frequency, sublayers, channel_count, boundary_mismatch)
+    R = fluence / (2.0 * boundary_mismatch)
     for transfer in transfers:
-        fluence = transfer.lower_fluence(fluence)
-    return R, fluence / (2.0 * mismatch)
+        fluence = transfer.fluence_at_lower_face(fluence)
+    return R, fluence / (2.0 * boundary_mismatch)
 
 
 def _solve_upwards(
-    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, mismatch: float
+    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, boundary_mismatch: float
 ) -> tuple[Floats, list[_DownwardTransfer]]:
     """Return the fluence at the surface, and the `_DownwardTransfer` of each sublayer, topmost first.
 
@@ -171,11 +173,14 @@ def _solve_upwards(
     """
     s = np.asarray(frequency, dtype=np.float64)[..., None]
     zero = np.zeros((*s.shape[:-1], channel_count))
-    face, transfers = _BoundaryCondition(zero + 1.0 / (2.0 * mismatch), zero), list[_DownwardTransfer]()
+    face, transfers = (
+        _BoundaryCondition(zero + 1.0 / (2.0 * boundary_mismatch), zero),
+        list[_DownwardTransfer](),
+    )
     for sublayer in reversed(sublayers):
         face, transfer = _propagate_up(s, sublayer, face)
         transfers.insert(0, transfer)
-    return np.asarray(2.0 * mismatch * face.W / (1.0 + 2.0 * mismatch * face.Z)), transfers
+    return np.asarray(2.0 * boundary_mismatch * face.W / (1.0 + 2.0 * boundary_mismatch * face.Z)), transfers
 
 
 def _propagate_up(
@@ -213,17 +218,17 @@ def _propagate_up(
 
 
 def _sublayers(medium: Medium, source_kind: SourceKind) -> list[_Sublayer]:
-    return list(_beam_sublayers(medium) if source_kind == "beam" else _point_sublayers(medium))
+    return list(_beam_source_sublayers(medium) if source_kind == "beam" else _point_source_sublayers(medium))
 
 
-def _beam_sublayers(medium: Medium) -> Iterator[_Sublayer]:
+def _beam_source_sublayers(medium: Medium) -> Iterator[_Sublayer]:
     depth = np.zeros(medium.channels)
     for layer in medium.layers:
         yield _Sublayer(layer, layer.thickness_mm, np.exp(-depth), np.zeros(medium.channels))
         depth = depth + layer.sigma_t_prime * layer.thickness_mm
 
 
-def _point_sublayers(medium: Medium) -> Iterator[_Sublayer]:
+def _point_source_sublayers(medium: Medium) -> Iterator[_Sublayer]:
     """Yield two sublayers per layer.
 
     The layer that contains the point source is divided at the source, where the optical depth is 1. All other

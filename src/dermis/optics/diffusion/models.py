@@ -139,7 +139,7 @@ def hankel_transform(medium: Medium, model: DiffusionModel, clamp: Clamp, freque
 
 
 def _check_half_space(medium: Medium, model: DiffusionModel) -> None:
-    if len(medium.layers) > 1 or not medium.semi_infinite:
+    if len(medium.layers) > 1 or not medium.is_semi_infinite:
         last = f"the last {medium.layers[-1].thickness_mm:g} mm thick"
         actual = f"{medium.name} has {len(medium.layers)} layers, {last}"
         refuse(f"model {model}", "one semi-infinite layer", actual, "Use the model multipole or layered")
@@ -268,7 +268,7 @@ def truncated_medium(medium: Medium, thickness_mm: float) -> Medium:
 
 
 @dataclass(frozen=True)
-class ModelError:
+class ModelDeviation:
     """Relative error of a diffusion model, with Monte Carlo simulation as the reference.
 
     The compared values are the amounts of light that emerge through concentric rings around a narrow beam.
@@ -284,7 +284,7 @@ class ModelError:
     tissues: tuple[str, ...]
 
 
-def measured_model_error(model_name: str, tissue_name: str = "") -> ModelError | None:
+def measured_model_error(model_name: str, tissue_name: str = "") -> ModelDeviation | None:
     """Return the measured error of a diffusion model, or None if the model was never measured.
 
     model_name : name of the diffusion model, such as "dipole"
@@ -297,14 +297,16 @@ def measured_model_error(model_name: str, tissue_name: str = "") -> ModelError |
     if not by_tissue:
         return None
     errors = np.array(list(by_tissue.values()))
-    return ModelError(errors.min(axis=0), errors.max(axis=0), tuple(by_tissue))
+    return ModelDeviation(errors.min(axis=0), errors.max(axis=0), tuple(by_tissue))
 
 
-def error_against_photons(model_profile: RadialProfile, photon_profile: RadialProfile) -> ModelError:
+def error_against_monte_carlo(
+    model_profile: RadialProfile, monte_carlo_profile: RadialProfile
+) -> ModelDeviation:
     """Return the error of a model's profile, relative to a Monte Carlo profile of the same tissue."""
-    squares = ((model_profile.ring_energy - photon_profile.ring_energy) ** 2).sum(axis=0)
-    error = np.sqrt(squares / (photon_profile.ring_energy**2).sum(axis=0))
-    return ModelError(error, error, (model_profile.name,))
+    squares = ((model_profile.ring_energy - monte_carlo_profile.ring_energy) ** 2).sum(axis=0)
+    error = np.sqrt(squares / (monte_carlo_profile.ring_energy**2).sum(axis=0))
+    return ModelDeviation(error, error, (model_profile.name,))
 
 
 @cache

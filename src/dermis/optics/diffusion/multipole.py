@@ -174,30 +174,31 @@ class StackResponse:
 
 
 def stack_response(
-    frequency: ArrayLike, medium: Medium, mismatch: float, clamp: Clamp = "layer"
+    frequency: ArrayLike, medium: Medium, boundary_mismatch: float, clamp: Clamp = "layer"
 ) -> StackResponse:
     """Return the response of the stack of all layers of a medium, at frequencies s [1/mm].
 
-    mismatch : boundary mismatch with air, above and below; internal interfaces are index-matched [-]
+    boundary_mismatch : boundary mismatch with air, above and below; internal interfaces are index-matched [-]
     clamp : whether sources are kept inside thin layers ("layer") or not ("none"), see `Slab`
     """
-    slabs = layer_slabs(medium, mismatch, clamp)
+    slabs = layer_slabs(medium, boundary_mismatch, clamp)
     stack = _single_slab_response(frequency, slabs[-1])
     for slab in reversed(slabs[:-1]):
         stack = _single_slab_response(frequency, slab).placed_over(stack)
     return stack
 
 
-def layer_slabs(medium: Medium, mismatch: float, clamp: Clamp = "layer") -> list[Slab]:
+def layer_slabs(medium: Medium, boundary_mismatch: float, clamp: Clamp = "layer") -> list[Slab]:
     """Return one slab per layer of a medium.
 
-    mismatch : boundary mismatch of the faces that touch air; all other faces are index-matched [-]
+    boundary_mismatch : boundary mismatch of the faces that touch air; all other faces are index-matched [-]
     clamp : whether sources are kept inside thin layers ("layer") or not ("none"), see `Slab`
     """
     last = len(medium.layers) - 1
     layers = enumerate(medium.layers)
     return [
-        Slab(layer, mismatch if i == 0 else 1.0, mismatch if i == last else 1.0, clamp) for i, layer in layers
+        Slab(layer, boundary_mismatch if i == 0 else 1.0, boundary_mismatch if i == last else 1.0, clamp)
+        for i, layer in layers
     ]
 
 

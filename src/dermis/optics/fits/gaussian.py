@@ -29,7 +29,7 @@ SHARED_GAUSSIAN_COUNT = 6
 """Number of Gaussians in a fit of several profiles with shared variances."""
 _RING_EDGES_MM = np.concatenate([[0.0], np.geomspace(1e-3, 60.0, 93)])
 _MAX_CACHED_FITS = 8
-_HashableSum = tuple[str, bytes, bytes, int]
+_HashableGaussianSum = tuple[str, bytes, bytes, int]
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class GaussianFit:
     shared: bool
 
 
-@renamed_keywords(near="initial")
+@renamed_keywords(near="similar_fit", initial="similar_fit")
 def fit_gaussians(
     target: FitTarget,
     terms: int,
@@ -111,7 +111,9 @@ def _fit_channels(
     """
     norm = np.linalg.norm(target.samples, axis=0)
     design, samples = (
-        _with_energy_equation(target) if keep_energy else (target.design_and_derivatives, target.samples)
+        _with_energy_equation(target)
+        if keep_energy
+        else (target.design_matrix_and_derivatives, target.samples)
     )
     bounds = _log_variance_bounds(target)
 
@@ -161,14 +163,16 @@ def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
     it holds almost exactly.
     """
     width = target.mean_radius_at([0.5]) ** 2 / 2.0
-    stiffness = _ENERGY_EQUATION_WEIGHT * float(np.linalg.norm(target.design_and_derivatives(width)[0]))
+    stiffness = _ENERGY_EQUATION_WEIGHT * float(
+        np.linalg.norm(target.design_matrix_and_derivatives(width)[0])
+    )
 
-    def design_and_derivatives(variance_mm2: Floats) -> tuple[Floats, Floats]:
-        columns, slopes = target.design_and_derivatives(variance_mm2)
+    def design_matrix_and_derivatives(variance_mm2: Floats) -> tuple[Floats, Floats]:
+        columns, slopes = target.design_matrix_and_derivatives(variance_mm2)
         row = np.ones((1, len(variance_mm2)))
         return np.vstack([stiffness * row, columns]), np.vstack([0.0 * row, slopes])
 
-    return design_and_derivatives, np.vstack([stiffness * target.total, target.samples])
+    return design_matrix_and_derivatives, np.vstack([stiffness * target.total, target.samples])
 
 
 def _variances_of_fit(
@@ -241,18 +245,18 @@ def shared_gaussians(
     first = profiles[0].variance_mm2
     if all(np.array_equal(first, one.variance_mm2) for one in profiles):
         return tuple(profiles)
-    fitted = _fit_shared_variances(tuple(map(_hashable_sum, profiles)), gaussian_count)
+    fitted = _fit_shared_variances(tuple(map(_hashable_gaussian_sum, profiles)), gaussian_count)
     pairs = zip(fitted, profiles, strict=True)
     return tuple(replace(fit, from_photons=profile.from_photons) for fit, profile in pairs)
 
 
 @lru_cache(_MAX_CACHED_FITS)
 def _fit_shared_variances(
-    hashable_sums: tuple[_HashableSum, ...], gaussian_count: int
+    hashable_gaussian_sums: tuple[_HashableGaussianSum, ...], gaussian_count: int
 ) -> tuple[GaussianSum, ...]:
     profiles = [
         GaussianSum(name, np.frombuffer(variance), np.frombuffer(weight).reshape(-1, channels))
-        for name, variance, weight, channels in hashable_sums
+        for name, variance, weight, channels in hashable_gaussian_sums
     ]
     fit = fit_gaussians(
         _combined_ring_target(profiles), gaussian_count, keep_energy=True, profile_name="shared profiles"
@@ -263,7 +267,7 @@ def _fit_shared_variances(
     return tuple(GaussianSum(profile.name, fit.variance_mm2, part) for profile, part in pairs)
 
 
-def _hashable_sum(profile: GaussianSum) -> _HashableSum:
+def _hashable_gaussian_sum(profile: GaussianSum) -> _HashableGaussianSum:
     return profile.name, profile.variance_mm2.tobytes(), profile.weight.tobytes(), profile.weight.shape[1]
 
 

@@ -46,7 +46,7 @@ class PointTarget:
         """Return samples (n, c) of R(r), weighted so that their squares sum to the integral of r R(r)^2."""
         return self._sqrt_quadrature_weights[:, None] * self.reflectance
 
-    def design_and_derivatives(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
+    def design_matrix_and_derivatives(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
         """Return samples (n, k) of k Gaussians at the n radii of the target, and their derivatives (n, k).
 
         The integral of each Gaussian over the plane is 1. The samples are weighted like `samples`. The
@@ -65,7 +65,7 @@ class PointTarget:
 
         Source: [dEonLuebke2007] section 14.4.
         """
-        residual = self.design_and_derivatives(variance_mm2)[0] @ weight - self.samples
+        residual = self.design_matrix_and_derivatives(variance_mm2)[0] @ weight - self.samples
         return np.asarray(np.sqrt((residual**2).sum(axis=0) / (self.samples**2).sum(axis=0)))
 
     def mean_radius_at(self, light_fractions: Sequence[float]) -> Floats:
@@ -110,7 +110,7 @@ class RingTarget:
         """Return the light (n, c) through each ring; a fit minimises the sum of its squared errors [-]."""
         return self.energy
 
-    def design_and_derivatives(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
+    def design_matrix_and_derivatives(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
         """Return the light (n, k) of k Gaussians through each of the n rings, and its derivatives (n, k).
 
         The integral of each Gaussian over the plane is 1. The derivatives are those with respect to the
@@ -124,7 +124,7 @@ class RingTarget:
 
     def error(self, variance_mm2: Floats, weight: Floats) -> Floats:
         """Return the relative error (c,) of a sum of Gaussians, as defined by `ring_error` [-]."""
-        return ring_error(self, self.design_and_derivatives(variance_mm2)[0] @ weight)
+        return ring_error(self, self.design_matrix_and_derivatives(variance_mm2)[0] @ weight)
 
     def mean_radius_at(self, light_fractions: Sequence[float]) -> Floats:
         """Return the radii within which given fractions of the light emerge, on average over channels [mm].

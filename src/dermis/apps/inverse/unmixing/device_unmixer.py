@@ -126,7 +126,7 @@ def recolour(
     added_fractions : (3,) constants that are added to these products
     """
     table, shader = _table_texture(device, model), _unmixing_program(device, "recolour", model)
-    change = shader.record("Change", factors=pigment_factors, added=added_fractions)
+    change = shader.make_record("Change", factors=pigment_factors, added=added_fractions)
     output = np.empty(residual.shape, np.float32)
     for rows in row_strips(*unmixed_pigments.shape[:2]):
         maps = (_with_alpha_channel(one[rows]) for one in (unmixed_pigments, residual))
@@ -183,7 +183,7 @@ def _model_uniforms(
     priors |= {"blood_mean": skins.BLOOD_ROOT_MEAN, "blood_sd": skins.BLOOD_ROOT_SD}
     limits = {"floor": skins.COLOUR_FLOOR, "min_reflectance": skins.MIN_REFLECTANCE}
     numbers = {"third_range": model.third_range, "noise": relative_noise, "steps": step_count}
-    return shader.record("Model", **numbers, **priors, **limits)
+    return shader.make_record("Model", **numbers, **priors, **limits)
 
 
 _SHADING_MAP_SIDE = 256  # longer side of the downsampled picture [texel]

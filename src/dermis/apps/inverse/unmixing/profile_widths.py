@@ -117,7 +117,7 @@ def _ring_fractions(tissue: Tissue) -> Floats:
 
     The rings are concentric around the point where light enters.
     """
-    rings = tissue.rings()
+    rings = tissue.ring_target()
     return np.asarray(rings.energy / rings.total)
 
 

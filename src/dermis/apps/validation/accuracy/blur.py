@@ -25,7 +25,7 @@ from dermis.frame.programs import level_format
 from dermis.frame.renderer import Renderer
 from dermis.frame.seams import SEAM_METHODS
 from dermis.gpu import CommandList, Device, download, open_device, upload
-from dermis.gpu.textures import half_store_rounding
+from dermis.gpu.textures import float16_store_rounding
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh, build_mesh
@@ -65,7 +65,7 @@ def blur_error_texts(device: Device) -> dict[str, object]:
         "rows": "\n".join(lit_texel_row(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0)),
         "leaning": "\n".join(sheared_uv_row(device, degrees) for degrees in (90, 80, 60, 45)),
         "constant": f"{constant_light_error(device):.1e}",
-        "rounding": half_store_rounding(device),
+        "rounding": float16_store_rounding(device),
     }
 
 

@@ -77,7 +77,7 @@ def _model_rows(tissue_name: str, tissue: Tissue) -> Iterator[str]:
         source = {"none": ", source as printed", "layer": ", source clamped"}[clamp]
         label = model + (source if model == "multipole" else "")
         total = _percentages_text(profile.total / reference.total - 1.0)
-        rings = _percentages_text(ring_error(reference.rings(), profile.ring_energy), with_sign=False)
+        rings = _percentages_text(ring_error(reference.ring_target(), profile.ring_energy), with_sign=False)
         yield f"| | {label} | {total} | {rings} |"
 
 
@@ -95,7 +95,9 @@ def photon_counts_table() -> str:
             for model in ("counted", "layered"):
                 profile = tissue.profile(model)
                 total = " ".join(f"{100 * one:+.2f}" for one in profile.total / reference.total - 1.0)
-                rings = _percentages_text(ring_error(reference.rings(), profile.ring_energy), with_sign=False)
+                rings = _percentages_text(
+                    ring_error(reference.ring_target(), profile.ring_energy), with_sign=False
+                )
                 rows.append(f"| {name}, index {eta:g} | {model} | {total} % | {rings} |")
     return "\n".join(rows)
 
@@ -108,7 +110,7 @@ def fitted_profiles_table() -> str:
     rows = []
     for name in COMPARED_TISSUES:
         profile = tissue_by_name(name).profile()
-        rings = profile.rings()
+        rings = profile.ring_target()
         cells = [_percentages_text(fit_gaussians(rings, n).error, with_sign=False) for n in (2, 4, 6, 8)]
         cells += [_percentages_text(fit(rings).error, with_sign=False) for fit in (fit_burley, fit_separable)]
         rows.append(f"| {name} | {' | '.join(cells)} |")
@@ -129,7 +131,7 @@ def gaussian_point_fits_table() -> str:
         ("dj3", "layered-point", "layer"),
     ):
         profile = tissue_by_name(name).profile(model, clamp)  # type: ignore[arg-type]
-        points = profile.points()
+        points = profile.point_target()
         free, conserved = (fit_gaussians(points, 6, keep_energy=keep) for keep in (False, True))
         label = f"{name}, {model}" + (", source as printed" if clamp == "none" else "")
         cells = [_percentages_text(one.error, with_sign=False) for one in (free, conserved)]
@@ -143,7 +145,7 @@ def transmission_table() -> str:
     rows = []
     for name in ("skin1", "dj3"):
         tissue = tissue_by_name(name)
-        gaussian_sum = fit_gaussians(tissue.profile().rings(), 6).profile
+        gaussian_sum = fit_gaussians(tissue.profile().ring_target(), 6).profile
         for thickness in THICKNESSES_MM:
             slab = truncated_medium(tissue.medium, thickness)
             runs = trace_medium(slab, PHOTON_COUNT // 4, seed=2)

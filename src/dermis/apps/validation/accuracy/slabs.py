@@ -88,7 +88,7 @@ def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
     folder : folder in which the file of the profile is written
     """
     file = Path(folder) / f"{medium.name}_{medium.eta:g}.toml"
-    fit = fit_gaussians(diffusion_profile(medium).rings(), GAUSSIAN_TERMS, profile_name=medium.name)
+    fit = fit_gaussians(diffusion_profile(medium).ring_target(), GAUSSIAN_TERMS, profile_name=medium.name)
     write_profile(file, fit.profile, {})
     values = {"profile": str(file), "albedo": "profile", "energy": "none", "rho_s": 0.0}
     values |= {"specular": "none"} if medium.eta == 1.0 else {}
@@ -149,7 +149,7 @@ def forward_scattering_direction_rows() -> str:
 
 def _direction_pairs_error(albedo: float, eta: float, skin_anisotropy: float) -> float:
     a, weights, exact = adding_doubling.half_space_radiance(
-        albedo, eta, adding_doubling.DIRECTION_NODES, FORWARD_G
+        albedo, eta, adding_doubling.DIRECTION_NODE_COUNT, FORWARD_G
     )
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
     angular = anisotropic_response(float(directional_reflectance(1.0, albedo, eta)), eta, skin_anisotropy)

@@ -12,7 +12,12 @@ from scipy.interpolate import RegularGridInterpolator
 from dermis.apps.validation.pages import print_tables
 from dermis.specular.albedo import TABLE_COSINES, TABLE_ROUGHNESSES, albedo_table, directional_albedo
 from dermis.specular.beckmann import beckmann, beckmann_table
-from dermis.specular.fresnel import ENERGY_SCHEMES, EnergyScheme, hemispherical_reflectance, schlick
+from dermis.specular.fresnel import (
+    ENERGY_SCHEMES,
+    EnergyConservationScheme,
+    hemispherical_reflectance,
+    schlick,
+)
 from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
@@ -20,7 +25,9 @@ VIEW_COSINES = (np.arange(200) + 0.5) / 200
 ENERGY_MODELS = {
     "none": ENERGY_SCHEMES["none"],
     "published": ENERGY_SCHEMES["published"],
-    "divided by π, internally reflected light lost": EnergyScheme(1.0, returns_internal_light=False),
+    "divided by π, internally reflected light lost": EnergyConservationScheme(
+        1.0, returns_internal_light=False
+    ),
     "full": ENERGY_SCHEMES["full"],
 }
 ROUGHNESS_AND_STRENGTH = ((0.1, 0.18), (0.3, 0.18), (0.5, 0.18), (0.3, 1.0))
@@ -71,7 +78,7 @@ def beckmann_table_error() -> float:
     return float(np.abs(peak[visible] / exact[visible] - 1).max())
 
 
-def furnace_cell(energy_scheme: EnergyScheme, roughness_m: float, rho_s: float) -> str:
+def furnace_cell(energy_scheme: EnergyConservationScheme, roughness_m: float, rho_s: float) -> str:
     """Return a table cell with results of a white furnace test: a white sphere in uniform light.
 
     They are the minimum, mean and maximum ratio of outgoing to incoming light.

@@ -89,8 +89,8 @@ def _scattering_bytes(traffic: FrameTraffic, shadow_bytes: int) -> dict[str, flo
     """
     inputs, texels, levels = traffic.inputs, traffic.texels, traffic.inputs.resources.diffusion.levels
     blur = inputs.blurs[0]
-    entered = texels * TEXEL_FORMAT_BYTES[levels.texel]
-    blurred = [texels * TEXEL_FORMAT_BYTES[levels.texel] / 4**halving for halving in blur.halvings[1:]]
+    entered = texels * TEXEL_FORMAT_BYTES[levels.texel_format]
+    blurred = [texels * TEXEL_FORMAT_BYTES[levels.texel_format] / 4**halving for halving in blur.halvings[1:]]
     stages: dict[str, float] = {
         "irradiance": texels * (SURFACE_TEXEL_BYTES + shadow_bytes) + entered,
         "diffuse": entered + sum(blurred[:-1]) + sum(blurred) + _blur_surface_bytes(inputs, texels),
@@ -122,7 +122,7 @@ def _blur_surface_bytes(inputs: FrameInputs, texel_count: int) -> float:
         maps = (atlases[halving].resources[name] for name in ("stretch_map", "reach_map"))
         traffic += sum(map(texel_bytes, maps)) * texel_count / 4**halving
         if blur.edge == "repeated" and (gutter := atlases[source].gutter):
-            traffic += gutter.size * (1 + 2 * TEXEL_FORMAT_BYTES[levels.texel] / _GUTTER_ENTRY_BYTES)
+            traffic += gutter.size * (1 + 2 * TEXEL_FORMAT_BYTES[levels.texel_format] / _GUTTER_ENTRY_BYTES)
     return traffic
 
 
@@ -138,7 +138,7 @@ def _translucency_bytes(translucency: Translucency, levels: PyramidLevels, blur:
     lists = translucency.weights.size + pairs.receiver_ranges.size
     lists += (_SOURCE_INDEX_BYTES + SURFACE_TEXEL_BYTES * translucency.uses_tables) * sources
     level = (levels.size >> halving) ** 2
-    source_texels = min(_TEXELS_PER_BILINEAR_READ * sources, level) * TEXEL_FORMAT_BYTES[levels.texel]
+    source_texels = min(_TEXELS_PER_BILINEAR_READ * sources, level) * TEXEL_FORMAT_BYTES[levels.texel_format]
     return float(lists + source_texels + receivers * texel_bytes(translucency.pairs.transmitted))
 
 

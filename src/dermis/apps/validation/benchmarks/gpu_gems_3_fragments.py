@@ -74,7 +74,7 @@ class FragmentPasses(GpuGems3):
         resources = inputs.resources
         levels = resources.diffusion.levels
         for layout, blur in zip(inputs.layouts, inputs.blurs, strict=True):
-            graph.repeat(atlas_passes.draw_stretch, layout.head, layout.atlas)
+            graph.add_replayable(atlas_passes.draw_stretch, layout.head, layout.atlas)
             surface_texels.draw(graph, layout)
             self._light_atlas(graph, layout, inputs.light_constants, levels.layer(0), blur.scale)
             self.blur_levels(graph, levels, layout.atlas, blur)
@@ -113,7 +113,7 @@ class FragmentPasses(GpuGems3):
         atlas_side : ignored
         """
         assert isinstance(graph, Graph) and isinstance(shader, RenderProgram)
-        graph.fill("diffuse", shader, shader_resources, target_pair)
+        graph.draw_fullscreen("diffuse", shader, shader_resources, target_pair)
 
     def _light_atlas(
         self,
@@ -124,9 +124,9 @@ class FragmentPasses(GpuGems3):
         radiance_scale: float,
     ) -> None:
         shader = _fragment_program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALF_TEXEL_FORMAT])
-        entering = shader.record("Entering", scale=radiance_scale)
+        entering = shader.make_record("Entering", scale=radiance_scale)
         bound = {**layout.bindings, "surfaces": layout.surfaces, "entering": entering}
-        graph.fill("irradiance", shader, bound, [target_texture])
+        graph.draw_fullscreen("irradiance", shader, bound, [target_texture])
 
     def _sum_levels(
         self,
@@ -143,14 +143,14 @@ class FragmentPasses(GpuGems3):
         padded[0, 3] = 1.0
         counts = {"count": len(blur.weight), "through": transmitted_light is not None}
         bound: MutableBindings = {
-            "weights": shader.record("Weights", weight=padded, **counts),
+            "weights": shader.make_record("Weights", weight=padded, **counts),
             "levels": levels.stacks[0],
             "transmitted": placeholder_light(graph.device)
             if transmitted_light is None
             else transmitted_light,
             "lost": placeholder_light(graph.device) if lost_light is None else lost_light,
         }
-        graph.fill("combine", shader, bound, [target_texture])
+        graph.draw_fullscreen("combine", shader, bound, [target_texture])
 
 
 def _fragment_program(

@@ -41,7 +41,7 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     constants = ({"LIGHTS": lights, **one} for one in overrides)
     programs = [ComputeProgram(device, _SHADER, shader_folders(), one) for one in constants]
     bindings = {
-        "skin": programs[-1].record("Skin", f0=SKIN_F0, eta=SKIN_ETA),
+        "skin": programs[-1].make_record("Skin", f0=SKIN_F0, eta=SKIN_ETA),
         "beckmann_table": texture_from_array(device, beckmann_table(), "r32float"),
         "nearest_sampler": device.sampler(),
         "albedo_table": texture_from_array(device, albedo_table(), "rg32float"),

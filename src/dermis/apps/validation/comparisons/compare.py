@@ -178,7 +178,7 @@ def _render_technique(
     values = subject.settings.model_dump() | {"technique": technique} | disabled
     drawn = subject.renderer.draw(subject.scene, Settings(**(values | {"samples": reference.samples})))
     image = drawn.linear().astype(np.float64)
-    timed = subject.renderer.draw_warm(subject.scene, Settings(**(values | {"samples": 4})))
+    timed = subject.renderer.draw_after_warm_up(subject.scene, Settings(**(values | {"samples": 4})))
     return image, (timed.gpu_ms or {"total": timed.frame_ms})["total"]
 
 

@@ -111,7 +111,7 @@ def _part_texture(renderer: Renderer, scene: Scene, part_index: int, iris_radius
     shader = program(device, Path(__file__).parent / "person_textures.wgsl")
     texture = make_texture(device, (_PART_TEXTURE_SIDE, _PART_TEXTURE_SIDE), "rgba32float")
     radii = {"iris_radius_mm": iris_radius_mm, "eyeball_radius_mm": SCLERA_MM}
-    request = shader.record("PartRequest", part=part_index, **radii)
+    request = shader.make_record("PartRequest", part=part_index, **radii)
     eye = inputs.view["eyes"][0]
     for name in ("eumelanin", "pupil_mm", "redness", "seed"):
         request["eye"][name] = eye[name]

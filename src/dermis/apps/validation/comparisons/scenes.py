@@ -14,7 +14,7 @@ from dermis.apps.truths.slab_mc import monte_carlo_profile
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.half_space import COUNTED_MODEL
+from dermis.optics.half_space import PHOTON_TABLE_MODEL
 from dermis.optics.media import Medium
 from dermis.optics.profiles import fit_radial, write_profile
 from dermis.optics.tissue import Tissue
@@ -110,7 +110,7 @@ def medium_scene(
     profile = medium_gaussians(medium, model)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "profile.toml"
-        write_profile(file, profile, {"model": COUNTED_MODEL if profile.from_photons else "layered"})
+        write_profile(file, profile, {"model": PHOTON_TABLE_MODEL if profile.from_photons else "layered"})
         yield comparison_scene(head, light, region, str(file)), profile
 
 

@@ -204,10 +204,10 @@ def _time_frames(
         settings = Settings.model_validate(values | {"size": (comparison_plan.side, comparison_plan.side)})
         skin = Skin(**(scene.skin.model_dump() | {"direction": variant.direction}))
         variant_scene = replace(scene, skin=skin)
-        drawn = renderer.draw(variant_scene, settings, force=True)
+        drawn = renderer.draw(variant_scene, settings, run_all_passes=True)
         frames = dermis_frames.setdefault(name, FrameTimes(drawn.linear()))
         for _ in range(comparison_plan.frames):
             started, cpu_started = time.perf_counter(), time.process_time()
-            renderer.draw(variant_scene, settings, force=True)
+            renderer.draw(variant_scene, settings, run_all_passes=True)
             frames.seconds.append(time.perf_counter() - started)
             frames.core_seconds.append(time.process_time() - cpu_started)

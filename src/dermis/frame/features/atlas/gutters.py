@@ -48,7 +48,7 @@ class GutterTracing:
 def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: AtlasTextures) -> GutterTracing:
     """Upload the buffers of `GutterTracing` for an atlas that has gutters."""
     starts, sides = (
-        device.buffer(words, "STORAGE") for words in (_path_start_words(atlas), _neighbour_words(mesh))
+        device.buffer(words, "STORAGE") for words in (_packed_path_starts(atlas), _packed_neighbours(mesh))
     )
     pairs = pairwise((textures, *textures.coarser))
     halvings = tuple(_halving_buffers(device, finer, coarser) for finer, coarser in pairs if coarser.gutter)
@@ -71,7 +71,7 @@ def with_separate_gutters(device: Device, textures: AtlasTextures) -> AtlasTextu
     )
 
 
-def _path_start_words(atlas: Atlas) -> Words:
+def _packed_path_starts(atlas: Atlas) -> Words:
     """Return (a, 5) words for gutter_trace.wgsl, one row for each gutter texel.
 
     Word 0 packs the coordinates of the texel. Words 1 and 2 are the point where the traced path starts: a
@@ -89,7 +89,7 @@ def _path_start_words(atlas: Atlas) -> Words:
     return np.concatenate([start, np.ascontiguousarray(atlas.source).view(np.uint32)], axis=1)
 
 
-def _neighbour_words(mesh: Mesh) -> Words:
+def _packed_neighbours(mesh: Mesh) -> Words:
     """Return (f, 3) words for gutter_trace.wgsl: the packed neighbour across each edge of each triangle.
 
     A word packs the index of the neighbouring triangle, the index of the shared edge in that triangle, and

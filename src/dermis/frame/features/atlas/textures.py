@@ -252,7 +252,7 @@ def halve_mip(atlas_mip: AtlasMip) -> AtlasMip:
     return AtlasMip(
         covered,
         covered & ~stitched,
-        _halved_reach(atlas_mip.reach, measured),
+        _halved_edge_distances(atlas_mip.reach, measured),
         *_halved_gutter(atlas_mip, stitched),
     )
 
@@ -262,7 +262,9 @@ def _split_squares(image: NDArray[np.generic]) -> NDArray[np.generic]:
     return np.stack([image[y::2, x::2] for y in (0, 1) for x in (0, 1)])
 
 
-def _halved_reach(reach: NDArray[np.uint16], counted_texels: NDArray[np.bool_]) -> NDArray[np.uint16]:
+def _halved_edge_distances(
+    reach: NDArray[np.uint16], counted_texels: NDArray[np.bool_]
+) -> NDArray[np.uint16]:
     """Return the reach map at half the resolution, (n/2, n/2, 4), counted in squares of 2 x 2 texels.
 
     The reach of a texel is the number of texels to its left, to its right, above it and below it until its

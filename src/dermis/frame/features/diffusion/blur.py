@@ -36,7 +36,7 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
     full_first = len(variance_mm2) == 1 or first_deviation > MAX_CHAINED_SIGMA_TEXELS
     for k, members in enumerate(_level_variance_members(variance_mm2, blur.halvings), start=1):
         source_halvings, halvings = blur.halvings[k - 1 : k + 1]
-        draw_gutters(graph, "diffuse", sheets[source_halvings], source, levels.texel)
+        draw_gutters(graph, "diffuse", sheets[source_halvings], source, levels.texel_format)
         if halvings > source_halvings:
             source = _draw_halved_level(graph, levels, source, k - 1, halvings)
         # The level after an intermediate one gains most of its width in one blur.
@@ -46,8 +46,8 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
         )
         clear = blur.scale * np.asarray(blur.clear)
         for axis, blurred in enumerate((levels.scratch_view(halvings), levels.layer(k, halvings))):
-            shader = _axis_program(graph.device, levels.texel, axis, atlas.sheared, blur.edge)
-            spread = shader.record("Spread", truncation=truncation, clear=clear, **members)
+            shader = _axis_program(graph.device, levels.texel_format, axis, atlas.sheared, blur.edge)
+            spread = shader.make_record("Spread", truncation=truncation, clear=clear, **members)
             bindings: MutableBindings = {**sheets[halvings].resources, "source": source, "stored": blurred}
             bindings |= {"spread": spread, "kernel_table": _kernel_texture(graph.device)}
             _dispatch_over_level(graph, shader, bindings, levels.size >> halvings)
@@ -64,7 +64,9 @@ def _draw_halved_level(
     halvings : number of halvings from full resolution to the resolution of the copy
     """
     halved = levels.layer(level_index, halvings)
-    shader = program(graph.device, "diffusion/diffuse_halve.wgsl", (), levels.texel, levels.texel)
+    shader = program(
+        graph.device, "diffusion/diffuse_halve.wgsl", (), levels.texel_format, levels.texel_format
+    )
     _dispatch_over_level(graph, shader, {"source": finer_level, "stored": halved}, levels.size >> halvings)
     return halved
 

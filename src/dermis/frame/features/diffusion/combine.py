@@ -47,9 +47,13 @@ def draw(
             ("TRANSMITTED", added is not None),
             ("THIN", lost_fraction is not None),
         )
-        texel = levels.texel
+        texel_format = levels.texel_format
         shader = program(
-            device, "diffusion/combine.wgsl", constants, texel, texel if mip else FLOAT_TEXEL_FORMAT
+            device,
+            "diffusion/combine.wgsl",
+            constants,
+            texel_format,
+            texel_format if mip else FLOAT_TEXEL_FORMAT,
         )
         first, count = halvings.index(mip), halvings.count(mip)
         weight = np.zeros((MAX_GAUSSIANS, 4), np.float32)
@@ -61,7 +65,7 @@ def draw(
         else:
             scales = {"scale": 1.0 / blur.scale, "transmitted_scale": 1.0}
         bindings: Bindings = {
-            "weights": shader.record("Weights", **layers, **scales),
+            "weights": shader.make_record("Weights", **layers, **scales),
             "levels": levels.stacks[mip],
             "source": levels.scratch_view(mip + 1) if mip < coarsest else levels.layer(0),
             "transmitted": placeholder_light(device) if added is None else added,

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.features.diffusion.pyramid import MIN_SMOOTHNESS, choose_halvings
+from dermis.frame.features.diffusion.pyramid import MIN_SIGMA_PER_TEXEL_AREA, choose_halvings
 
 Floats = NDArray[np.float64]
 ROWS_PER_UNIT_VARIANCE = 64
@@ -90,11 +90,11 @@ def add_intermediate_levels(
     max_halvings : largest number of times that the resolution may be halved
     """
     profile_mm2 = tuple(float(v) for v in variance_mm2)
-    return _add_intermediate_levels(profile_mm2, float(texels_per_mm), max_halvings)
+    return _cached_intermediate_levels(profile_mm2, float(texels_per_mm), max_halvings)
 
 
 @cache
-def _add_intermediate_levels(
+def _cached_intermediate_levels(
     profile_variances_mm2: tuple[float, ...], texels_per_mm: float, max_halvings: int
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
     chain = list(profile_variances_mm2)
@@ -102,7 +102,7 @@ def _add_intermediate_levels(
     for side in (2.0**times / texels_per_mm for times in range(max_halvings)):  # side of a texel
         level_mm2 = (
             _HALVING_VARIANCE_MARGIN
-            * max(MIN_SMOOTHNESS * (2.0 * side) ** 2, _MIN_LEVEL_SIGMA_TEXELS * side) ** 2
+            * max(MIN_SIGMA_PER_TEXEL_AREA * (2.0 * side) ** 2, _MIN_LEVEL_SIGMA_TEXELS * side) ** 2
         )
         if level_mm2 >= profile_variances_mm2[-1]:
             continue

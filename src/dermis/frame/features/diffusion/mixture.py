@@ -24,21 +24,21 @@ _CACHED_BLEND_MAP_COUNT = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Mixture:
+class ProfileMixture:
     """Textures for skin where a map blends a first profile with one or two others.
 
     uv_weights : texture over uv of the blend weights of all profiles but the first
-    entering : for each profile but the first, the blur pyramid of the light that enters the skin, multiplied
-        by the blend weight of the profile
+    entering_light : for each profile but the first, the blur pyramid of the light that enters the skin,
+        multiplied by the blend weight of the profile
     atlas_weights : for each atlas layout, a texture over the atlas of the same blend weights
     sums : texture array. Layer 0 is the exitance of skin that has the first profile everywhere. Two layers
         follow for each other profile. Both hold the light diffused by this profile minus the light diffused
         by the first profile: the first of the two layers is computed from all light that enters the skin, the
-        second from the weighted light in `entering`
+        second from the weighted light in `entering_light`
     """
 
     uv_weights: Texture
-    entering: tuple[PyramidLevels, ...]
+    entering_light: tuple[PyramidLevels, ...]
     atlas_weights: tuple[Texture, ...]
     sums: Texture
     _views: dict[int, TextureView] = field(default_factory=dict)
@@ -50,30 +50,30 @@ class Mixture:
         return self._views[layer_index]
 
 
-def make_mixture(
-    device: Device, uv_weights: Texture, entering_pyramids: tuple[PyramidLevels, ...], layout_count: int
-) -> Mixture:
+def make_profile_mixture(
+    device: Device, uv_weights: Texture, entering_light_pyramids: tuple[PyramidLevels, ...], layout_count: int
+) -> ProfileMixture:
     """Allocate the textures of a mixture of profiles.
 
     uv_weights : texture over uv of the blend weights
-    entering_pyramids : for each profile but the first, the pyramid in which the light that enters the skin is
-        blurred, after it is multiplied by the blend weight of the profile
+    entering_light_pyramids : for each profile but the first, the pyramid in which the light that enters the
+        skin is blurred, after it is multiplied by the blend weight of the profile
     layout_count : number of atlas layouts
     """
-    side, texel = entering_pyramids[0].size, entering_pyramids[0].texel
+    side, texel_format = entering_light_pyramids[0].size, entering_light_pyramids[0].texel_format
     atlas_weights = tuple(
-        make_texture(device, (side, side), texel, texture_name="shares of profiles")
+        make_texture(device, (side, side), texel_format, texture_name="shares of profiles")
         for _ in range(layout_count)
     )
-    layers = sum_layer_count(len(entering_pyramids))
+    layers = layer_count_of_sums(len(entering_light_pyramids))
     sums = make_texture(
         device, (side, side), FLOAT_TEXEL_FORMAT, layer_count=layers, texture_name="light of mixed profiles"
     )
-    return Mixture(uv_weights, entering_pyramids, atlas_weights, sums)
+    return ProfileMixture(uv_weights, entering_light_pyramids, atlas_weights, sums)
 
 
-def sum_layer_count(other_profile_count: int) -> int:
-    """Return the number of layers of `Mixture.sums`.
+def layer_count_of_sums(other_profile_count: int) -> int:
+    """Return the number of layers of `ProfileMixture.sums`.
 
     other_profile_count : number of profiles besides the first
     """
@@ -113,51 +113,55 @@ def _load_blend_map(path: Path, _: tuple[int, ...]) -> NDArray[np.float32]:
     return mixture_map(path)
 
 
-def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, layout_index: int) -> None:
+def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: ProfileMixture, layout_index: int) -> None:
     """Declare the passes that resample the blend weights from uv to the atlas, gutters included.
 
     layout_index : index of the atlas layout
     """
-    into, texel = mixture.atlas_weights[layout_index], mixture.entering[0].texel
+    into, texel_format = mixture.atlas_weights[layout_index], mixture.entering_light[0].texel_format
     bindings: Bindings = {
         **layout.bindings,
         **layout.atlas.resources,
         "weight_map": mixture.uv_weights,
         "stored": into,
     }
-    shader = program(graph.device, "diffusion/profile_blend_weights.wgsl", store_format=texel)
+    shader = program(graph.device, "diffusion/profile_blend_weights.wgsl", store_format=texel_format)
     graph.compute("profiles", shader, bindings, into.size[:2])
-    draw_gutters(graph, "profiles", layout.atlas, into, texel)
+    draw_gutters(graph, "profiles", layout.atlas, into, texel_format)
 
 
 def draw_entering_light(
-    graph: Recorder, levels: PyramidLevels, mixture: Mixture, layout_index: int, profile_index: int
+    graph: Recorder, levels: PyramidLevels, mixture: ProfileMixture, layout_index: int, profile_index: int
 ) -> None:
     """Declare the pass that multiplies the light that enters the skin by the blend weight of a profile.
 
-    The product is stored in level 0 of that profile's own blur pyramid, in `Mixture.entering`.
+    The product is stored in level 0 of that profile's own blur pyramid, in `ProfileMixture.entering_light`.
 
     levels : blur pyramid whose level 0 is read; it holds all light that enters the skin
     layout_index : index of the atlas layout
     profile_index : index of the profile among all profiles but the first
     """
-    entering, device, texel = mixture.entering[profile_index], graph.device, levels.texel
-    shader = program(device, "diffusion/profile_entering.wgsl", (("OTHER", profile_index),), texel, texel)
+    entering, device, texel_format = mixture.entering_light[profile_index], graph.device, levels.texel_format
+    shader = program(
+        device, "diffusion/profile_entering.wgsl", (("OTHER", profile_index),), texel_format, texel_format
+    )
     linear = device.sampler(mag_filter="linear", min_filter="linear")
     light = {"source": levels.layer(0), "stored": entering.layer(0)}
     bindings: Bindings = {**light, "linear": linear, "blend_weights": mixture.atlas_weights[layout_index]}
     graph.compute("profiles", shader, bindings, (levels.size,) * 2, TILE_SIDE)
 
 
-def draw(graph: Recorder, mixture: Mixture, layout_index: int, blended_exitance: Texture) -> None:
-    """Declare the pass that combines the layers of `Mixture.sums` into the exitance of the skin.
+def draw(graph: Recorder, mixture: ProfileMixture, layout_index: int, blended_exitance: Texture) -> None:
+    """Declare the pass that combines the layers of `ProfileMixture.sums` into the exitance of the skin.
 
     The alpha channel of the result stores the blend weights, packed.
 
     layout_index : index of the atlas layout
     blended_exitance : texture for the result
     """
-    shader = program(graph.device, "diffusion/profile_mixture.wgsl", (("OTHERS", len(mixture.entering)),))
+    shader = program(
+        graph.device, "diffusion/profile_mixture.wgsl", (("OTHERS", len(mixture.entering_light)),)
+    )
     weights = mixture.atlas_weights[layout_index]
     bindings: Bindings = {"sums": mixture.sums, "blend_weights": weights, "mixed": blended_exitance}
     graph.compute("profiles", shader, bindings, blended_exitance.size[:2], TILE_SIDE)

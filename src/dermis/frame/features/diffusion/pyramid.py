@@ -12,12 +12,12 @@ from dermis.frame.programs import FLOAT_TEXEL_FORMAT
 from dermis.gpu import Device, Texture, TextureView, make_texture, mark_scratch
 from dermis.gpu.textures import make_view
 
-_SCALED_LIGHT_SUM = 16.0  # sum of all lights after scaling, 1/4000 of the largest half float
+_MAX_SCALED_IRRADIANCE = 16.0  # sum of all lights after scaling, 1/4000 of the largest half float
 _MAX_IRRADIANCE_SCALE = 2.0**100  # its inverse is a float too; for dimmer light the scale is limited
 Floats = NDArray[np.float64]
 Halvings = tuple[tuple[int, ...], ...]
 """For each layout, how often the resolution of each level is halved."""
-MIN_SMOOTHNESS = 0.45
+MIN_SIGMA_PER_TEXEL_AREA = 0.45
 """Least blur at reduced resolutions: standard deviation of the stored light [mm], divided by the squared side
 of a texel [mm^2]."""
 MIN_WEIGHT_SUM = 1e-12
@@ -34,14 +34,14 @@ class PyramidLevels:
     first : for each array in `stacks`, the index of the level that layer 0 holds
     scratch : texture for light that is blurred along u but not yet along v
     size : side of the atlas at full resolution [texels]
-    texel : texture format
+    texel_format : texture format
     """
 
     stacks: tuple[Texture, ...]
     first: tuple[int, ...]
     scratch: Texture
     size: int
-    texel: str
+    texel_format: str
     _views: dict[tuple[int, int], TextureView] = field(default_factory=dict)
 
     def layer(self, level_index: int, halvings: int = 0) -> TextureView:
@@ -76,7 +76,8 @@ class Blur:
     edge : how blurs treat texels beyond a chart and its gutter: "repeated", "cleared" or "skipped"
     clear : irradiance that blurs read from empty texels if `edge` is "cleared"
     intermediate_levels : indices of levels without weight, which only serve as the source of wider blurs
-    weight_changes : for each profile but the first, its (k, 3) weights minus the weights of the first profile
+    weight_differences : for each profile but the first, its (k, 3) weights minus the weights of the first
+        profile
     """
 
     variance_mm2: Floats
@@ -86,7 +87,7 @@ class Blur:
     edge: str = "repeated"
     clear: tuple[float, float, float] = (0.0, 0.0, 0.0)
     intermediate_levels: tuple[int, ...] = ()
-    weight_changes: tuple[Floats, ...] = ()
+    weight_differences: tuple[Floats, ...] = ()
 
     @property
     def profile_levels(self) -> tuple[int, ...]:
@@ -157,7 +158,7 @@ def half_precision_scale(texel_format: str, irradiance_sum: float) -> float:
     """
     if texel_format == FLOAT_TEXEL_FORMAT or irradiance_sum == 0.0:
         return 1.0
-    return math.ldexp(0.5, math.frexp(min(_SCALED_LIGHT_SUM / irradiance_sum, _MAX_IRRADIANCE_SCALE))[1])
+    return math.ldexp(0.5, math.frexp(min(_MAX_SCALED_IRRADIANCE / irradiance_sum, _MAX_IRRADIANCE_SCALE))[1])
 
 
 def choose_halvings(
@@ -170,11 +171,11 @@ def choose_halvings(
     max_halvings : largest number of times that the resolution of any level may be halved
 
     A level is computed by blurring the previous level. Its resolution is halved once more than that of the
-    previous level if the previous level is smooth enough, as set by `MIN_SMOOTHNESS`.
+    previous level if the previous level is smooth enough, as set by `MIN_SIGMA_PER_TEXEL_AREA`.
     """
     halvings = [0]
     for source_mm2 in (0.0, *variance_mm2[:-1]):
-        smooth = texels_per_mm * math.sqrt(math.sqrt(source_mm2) / MIN_SMOOTHNESS)
+        smooth = texels_per_mm * math.sqrt(math.sqrt(source_mm2) / MIN_SIGMA_PER_TEXEL_AREA)
         finest, coarsest = halvings[-1], min(max_halvings, halvings[-1] + 1)
         halvings.append(int(min(max(math.log2(max(smooth, 1.0)), finest), coarsest)))
     return tuple(halvings)

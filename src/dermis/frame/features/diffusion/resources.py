@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.features.atlas.textures import AtlasTextures
-from dermis.frame.features.diffusion.mixture import Mixture, make_mixture, upload_blend_weights
+from dermis.frame.features.diffusion.mixture import ProfileMixture, make_profile_mixture, upload_blend_weights
 from dermis.frame.features.diffusion.pyramid import Blur, Halvings, PyramidLevels
 from dermis.frame.request import FrameRequest
 from dermis.frame.technique import ProfileSplit
@@ -45,7 +45,7 @@ class BlurScheme(Protocol):
         edge_mode : how blurs treat texels beyond a chart, see `Blur.edge`
         """
 
-    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
+    def level_halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
         split : division of a profile into Gaussians with which the atlas is blurred, and a narrower Gaussian
@@ -66,7 +66,7 @@ class Resources:
 
     levels: PyramidLevels
     blurs: tuple[Blur, ...]
-    mixture: Mixture | None
+    mixture: ProfileMixture | None
 
 
 def make_resources(
@@ -83,7 +83,7 @@ def make_resources(
     """
     blurs = tuple(_make_blur(request, blur_scheme, one) for one in atlases) if request.blur_count else ()
     side, halvings = request.settings.atlas if blurs else 1, tuple(blur.halvings for blur in blurs) or ((0,),)
-    args = device, blur_scheme, side, halvings, request.light_key
+    args = device, blur_scheme, side, halvings, request.light_cache_key
     levels = memo.get(_make_levels, *args, caller_name=request.view_name)
     mixture = None
     if request.blend_weights is not None and blurs:
@@ -103,8 +103,8 @@ def make_resources(
 def _make_blur(request: FrameRequest, blur_scheme: BlurScheme, atlas: AtlasTextures) -> Blur:
     red, green, blue = (np.pi * c * request.seam_method.coloured for c in request.settings.seam_colour)
     edge, clear = request.seam_method.edge, (red, green, blue)
-    split, intermediate = blur_scheme.add_intermediate_levels(request.split, atlas, edge)
-    halvings = blur_scheme.halvings(split, atlas, edge)
+    split, intermediate = blur_scheme.add_intermediate_levels(request.profile_split, atlas, edge)
+    halvings = blur_scheme.level_halvings(split, atlas, edge)
     return Blur(
         split.blurred_mm2,
         split.weight,
@@ -112,7 +112,7 @@ def _make_blur(request: FrameRequest, blur_scheme: BlurScheme, atlas: AtlasTextu
         edge=edge,
         clear=clear,
         intermediate_levels=intermediate,
-        weight_changes=split.weight_changes,
+        weight_differences=split.weight_differences,
     )
 
 
@@ -125,7 +125,9 @@ def _make_levels(
 def _cached_mixture(
     device: Device,
     blend_weights: NDArray[np.float32],
-    entering_pyramids: tuple[PyramidLevels, ...],
+    entering_light_pyramids: tuple[PyramidLevels, ...],
     layout_count: int,
-) -> Mixture:
-    return make_mixture(device, upload_blend_weights(device, blend_weights), entering_pyramids, layout_count)
+) -> ProfileMixture:
+    return make_profile_mixture(
+        device, upload_blend_weights(device, blend_weights), entering_light_pyramids, layout_count
+    )

@@ -38,7 +38,9 @@ ShadingInputs = tuple[Bindings, UniformRecord, Constants]
 
 _MAX_ROWS_PER_INVOCATION, _MAX_LOOP_ITERATIONS = 8, 60_000
 _HAIR_EXTENT_MM = 100.0  # side of a square in the picture that holds all hair of a head
-_CROWDING_FACTOR = 14.0  # ratio of the number of segments in a crowded tile to the mean of all tiles
+_CROWDED_TILE_SEGMENT_RATIO = (
+    14.0  # ratio of the number of segments in a crowded tile to the mean of all tiles
+)
 _CLEARING_WORKGROUP_COUNT = 256
 _SHADOW_RAY_STRIDE = 4  # one of four rays to an area light is traced: pictures change by 0.0002 at most
 
@@ -47,7 +49,7 @@ def draw_shadows(
     graph: Graph, strands: Resources, shape: Shape, shadow_views: Views, lighting_bindings: Bindings
 ) -> None:
     """Declare the passes that move the hair with the skin, and fill the deep opacity maps for its shadows."""
-    graph.repeat(pose_guides, strands.tables, shape)
+    graph.add_replayable(pose_guides, strands.tables, shape)
     if len(shadow_views.clips):
         _draw_deep_opacity(graph, strands, shape, lighting_bindings)
 
@@ -84,13 +86,15 @@ def pose_strands(
     }
     if strand_tables.fine.hairs:
         fine: Bindings = {"strands": strand_tables.strands, "knots": strand_tables.knots}
-        _dispatch_hair(graph, "hair/strands_pose.wgsl", {**shared, **fine}, strand_tables.fine.all_knots())
+        _dispatch_hair(
+            graph, "hair/strands_pose.wgsl", {**shared, **fine}, strand_tables.fine.total_knot_count()
+        )
     if strand_tables.groom is not None:
         groom, style = strand_tables.groom, strand_tables.groom.style
         person: Bindings = {"roots": groom.roots, "parts": groom.parts, "hairline": groom.hairline}
         guides: Bindings = {"guides": style.guides, "guide_cuts": style.guide_cuts}
         _dispatch_hair(
-            graph, "hair/strands_grow.wgsl", {**shared, **person, **guides}, coarse_counts.all_knots()
+            graph, "hair/strands_grow.wgsl", {**shared, **person, **guides}, coarse_counts.total_knot_count()
         )
 
 
@@ -100,8 +104,8 @@ def _draw_deep_opacity(
     """Declare the passes that fill the deep opacity maps of all lights that cast shadows."""
     tables, posed = strands.tables, strands.tables.buffers.casters
     pose_strands(graph, tables, shape, posed, tables.casters)
-    segments = tables.fine.all_segments() + tables.casters.all_segments()
-    knots = tables.fine.all_knots() + tables.casters.all_knots()
+    segments = tables.fine.total_segment_count() + tables.casters.total_segment_count()
+    knots = tables.fine.total_knot_count() + tables.casters.total_knot_count()
     bindings: MutableBindings = {
         **lighting_bindings,
         "posed": posed,
@@ -140,27 +144,29 @@ def draw(
     pixel_mm = _pixel_footprint_mm(view, tables, height)
     coarse, posed = drawn_strand_counts(tables, pixel_mm), tables.buffers.drawn
     pose_strands(graph, tables, shape, posed, coarse)
-    segments = tables.fine.all_segments() + coarse.all_segments()
-    knots = tables.fine.all_knots() + coarse.all_knots()
+    segments = tables.fine.total_segment_count() + coarse.total_segment_count()
+    knots = tables.fine.total_knot_count() + coarse.total_knot_count()
     light_constants = (*light_constants, ("RAY_STRIDE", _SHADOW_RAY_STRIDE))
     light = program(graph.device, "hair/strands_light.wgsl", light_constants)
     record = _strand_view_record(light, strands, view, coarse.hairs)
     hairs = tables.hairs_record(coarse)
     shared: Bindings = {"strand_view": record, "projected": tables.buffers.projected, "hairs": hairs}
     graph.dispatch("strands", light, {**lighting, **shared, "posed": posed}, workgroup_grid(knots))
-    lists: Bindings = {"chains": picture.chains, "links": picture.links}
-    _dispatch_hair(graph, "hair/strands_empty.wgsl", lists, picture.chains.size // 4)
-    chains = (("CHAINS", picture.chains_per_tile),)
-    _dispatch_hair(graph, "hair/strands_bin.wgsl", {**shared, **lists}, segments, chains)
+    lists: Bindings = {"list_heads": picture.list_heads, "links": picture.links}
+    _dispatch_hair(graph, "hair/strands_empty.wgsl", lists, picture.list_heads.size // 4)
+    list_heads = (("SEGMENT_LISTS", picture.segment_lists_per_tile),)
+    _dispatch_hair(graph, "hair/strands_bin.wgsl", {**shared, **lists}, segments, list_heads)
     images: Bindings = {"visibility_buffer": visibility_buffer, "behind": radiance, "image": picture.result}
     bindings = {**head.resources, **shared, **lists, **images, **(labels or {})}
-    if picture.chains_per_tile > 1:
-        shader = program(graph.device, "hair/strands_draw_tiles.wgsl", chains, with_labels=labels is not None)
+    if picture.segment_lists_per_tile > 1:
+        shader = program(
+            graph.device, "hair/strands_draw_tiles.wgsl", list_heads, stores_hair_labels=labels is not None
+        )
         graph.compute("strands", shader, bindings, (width, height))
         return picture.result
     rows = rows_per_invocation(graph.device, _max_segments_in_tile(tables, segments, pixel_mm))
     shader = program(
-        graph.device, "hair/strands_draw.wgsl", (("ROWS", rows),), with_labels=labels is not None
+        graph.device, "hair/strands_draw.wgsl", (("ROWS", rows),), stores_hair_labels=labels is not None
     )
     graph.compute("strands", shader, bindings, (width, -(-height // rows)))
     return picture.result
@@ -175,7 +181,7 @@ def _strand_view_record(
     coarse_count : number of strands of scalp hair and beard to draw
     """
     members = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "light_factors")
-    record = shader.record("StrandView", **{name: shade_record[name] for name in members})
+    record = shader.make_record("StrandView", **{name: shade_record[name] for name in members})
     record["coarse"], record["size"] = coarse_count, strands.picture.result.size[:2]
     record["skin"] = strands.skin_albedo
     return record
@@ -203,8 +209,8 @@ def _max_segments_in_tile(strand_tables: StrandTables, segment_count: int, pixel
     pixel_mm : side of the square that a pixel covers at the depth of the strands [mm]
     """
     tiles = max(1.0, (_HAIR_EXTENT_MM / (TILE_SIDE_PIXELS * pixel_mm)) ** 2)
-    fine = strand_tables.fine.all_segments()
-    return int(fine + min(1.0, _CROWDING_FACTOR / tiles) * (segment_count - fine))
+    fine = strand_tables.fine.total_segment_count()
+    return int(fine + min(1.0, _CROWDED_TILE_SEGMENT_RATIO / tiles) * (segment_count - fine))
 
 
 def rows_per_invocation(device: Device, segment_count: int) -> int:

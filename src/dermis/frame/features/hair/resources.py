@@ -21,7 +21,9 @@ from dermis.specular.hair import hair_constants
 
 TILE_SIDE_PIXELS = 8
 """Side of a tile of the picture, for which strand segments are listed [pixels]."""
-_GPU_CHAINS_PER_TILE = 64  # linked lists of a tile on GPUs: one for each invocation of the tile's workgroup
+_GPU_SEGMENT_LISTS_PER_TILE = (
+    64  # linked lists of a tile on GPUs: one for each invocation of the tile's workgroup
+)
 DEEP_OPACITY_WIDTH = 256
 """Width of a deep opacity map, twice its height [texels]."""
 DEEP_OPACITY_LAYERS = 6
@@ -38,8 +40,8 @@ _MIN_DRAWN_STRANDS, _MIN_KNOTS = 5_000, 4
 _WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = 0.2, 1.0
 _KEPT_STYLE_COUNT = 12  # hair styles whose buffers, of at most 8 MB each, are kept for the next person
 _MIN_STRANDS_PER_PIXEL = 2.0  # where all strands are short; fewer would look like dots
-_ROOT_AREA_MM2 = 6e4  # approximate area of the skin on which scalp hair and beard grow
-_MAX_SHORT_KNOTS_FRACTION = 0.4  # largest fraction of `Detail.drawn_knots` that is spent against dots
+_HAIRY_SKIN_AREA_MM2 = 6e4  # approximate area of the skin on which scalp hair and beard grow
+_MAX_KNOT_FRACTION_FOR_SHORT_HAIR = 0.4  # largest fraction of `Detail.drawn_knots` that is spent against dots
 _DETAIL_LEVELS_PER_OCTAVE = 4  # levels of detail for each doubling of the size of a pixel
 KNOTS_PER_BOUNDS_WORKGROUP = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
@@ -87,11 +89,11 @@ class StrandCounts(NamedTuple):
     hairs: int
     knots: int
 
-    def all_knots(self, strand_count: int | None = None) -> int:
+    def total_knot_count(self, strand_count: int | None = None) -> int:
         """Return the total number of knots of the first `strand_count` strands, or of all strands."""
         return (self.hairs if strand_count is None else strand_count) * self.knots
 
-    def all_segments(self, strand_count: int | None = None) -> int:
+    def total_segment_count(self, strand_count: int | None = None) -> int:
         """Return the total number of segments of the first `strand_count` strands, or of all strands."""
         return (self.hairs if strand_count is None else strand_count) * (self.knots - 1)
 
@@ -120,16 +122,17 @@ class StrandBuffers:
 class StrandPicture:
     """Picture with hair, and linked lists of the strand segments in each of its tiles.
 
-    chains : buffer of the first link of each linked list of segments, see strands_bin.wgsl
+    list_heads : buffer of the first link of each linked list of segments, see strands_bin.wgsl
     links : buffer of the links of these lists; a link consists of a segment and the index of the next link
     result : texture of the picture with hair
-    chains_per_tile : number of linked lists per tile; the lists of a tile are filled and drawn in parallel
+    segment_lists_per_tile : number of linked lists per tile; the lists of a tile are filled and drawn in
+        parallel
     """
 
-    chains: Buffer
+    list_heads: Buffer
     links: Buffer
     result: Texture
-    chains_per_tile: int
+    segment_lists_per_tile: int
 
 
 def strand_counts(strands: Strands | None) -> StrandCounts:
@@ -171,7 +174,7 @@ def strand_capacity(fine_counts: StrandCounts, coarse_counts: StrandCounts) -> S
     fine_counts : number of strands of brows and lashes, and number of knots of each strand
     coarse_counts : largest number of strands of scalp hair and beard, and largest number of knots of each
     """
-    knots = fine_counts.all_knots() + coarse_counts.all_knots()
+    knots = fine_counts.total_knot_count() + coarse_counts.total_knot_count()
     step = _KNOT_CAPACITY_STEP if coarse_counts.hairs else _FINE_CAPACITY_STEP
     return StrandCapacity(_round_up(fine_counts.hairs, _FINE_CAPACITY_STEP), _round_up(knots, step))
 
@@ -202,21 +205,21 @@ def make_strand_picture(
     across, down = (-(-side // TILE_SIDE_PIXELS) for side in picture_size)
     links = _SEGMENT_LINKS_PER_KNOT * capacity.knots + capacity.fine * (across + down)
     links = min(links, _MAX_SEGMENT_LINKS, device.max_storage_bytes // 8)
-    per_tile = chains_per_tile(device, across * down)
-    chains = _make_word_buffer(device, 1 + per_tile * across * down)
+    per_tile = segment_lists_per_tile(device, across * down)
+    list_heads = _make_word_buffer(device, 1 + per_tile * across * down)
     result = make_texture(device, picture_size, "rgba32float")
-    return StrandPicture(chains, _make_word_buffer(device, 2 * links), result, per_tile)
+    return StrandPicture(list_heads, _make_word_buffer(device, 2 * links), result, per_tile)
 
 
-def chains_per_tile(device: Device, tile_count: int) -> int:
+def segment_lists_per_tile(device: Device, tile_count: int) -> int:
     """Return the number of linked lists of segments per tile of the picture.
 
     The number is 1 on software adapters, and if a buffer cannot hold more lists.
 
     tile_count : number of tiles of the picture
     """
-    fits = 4 * (1 + _GPU_CHAINS_PER_TILE * tile_count) <= device.max_storage_bytes
-    return _GPU_CHAINS_PER_TILE if fits and device.adapter.kind != "CPU" else 1
+    fits = 4 * (1 + _GPU_SEGMENT_LISTS_PER_TILE * tile_count) <= device.max_storage_bytes
+    return _GPU_SEGMENT_LISTS_PER_TILE if fits and device.adapter.kind != "CPU" else 1
 
 
 def make_deep_opacity_maps(device: Device, light_count: int) -> Buffer:
@@ -361,8 +364,8 @@ def drawn_strand_counts(strand_tables: StrandTables, pixel_mm: float) -> StrandC
     drawn_px = detail.width_px + _WIDTH_PER_COVER_PX * min(tables.cover, _MAX_DRAWN_COVER)
     hairs = max(_MIN_DRAWN_STRANDS, tables.possible * tables.width_mm / (drawn_px * pixel_mm))
     knots = max(_MIN_KNOTS, 1 + np.ceil(tables.length_mm / (detail.segment_px * pixel_mm)))
-    crossing = _MIN_STRANDS_PER_PIXEL * _ROOT_AREA_MM2 / (pixel_mm * tables.shortest_mm)
-    hairs = max(hairs, min(crossing, _MAX_SHORT_KNOTS_FRACTION * detail.drawn_knots / knots))
+    crossing = _MIN_STRANDS_PER_PIXEL * _HAIRY_SKIN_AREA_MM2 / (pixel_mm * tables.shortest_mm)
+    hairs = max(hairs, min(crossing, _MAX_KNOT_FRACTION_FOR_SHORT_HAIR * detail.drawn_knots / knots))
     return StrandCounts(int(min(tables.coarse.hairs, hairs)), int(min(tables.coarse.knots, knots)))
 
 

@@ -50,7 +50,7 @@ fn segment_count(coarse: u32) -> u32 {
     return hairs.fine * (hairs.fine_knots - 1u) + coarse * (hairs.coarse_knots - 1u);
 }
 
-fn all_knots(coarse: u32) -> u32 {
+fn total_knot_count(coarse: u32) -> u32 {
     return hairs.fine * hairs.fine_knots + coarse * hairs.coarse_knots;
 }
 

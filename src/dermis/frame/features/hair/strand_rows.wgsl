@@ -5,11 +5,11 @@
 
 override ROWS: u32 = 1u; // pixels of an invocation; see `rows_per_invocation`
 
-@group(0) @binding(31) var<storage, read> chains: array<u32>; // see strands_bin.wgsl
+@group(0) @binding(31) var<storage, read> list_heads: array<u32>; // see strands_bin.wgsl
 @group(0) @binding(32) var<storage, read> links: array<vec2u>;
 
 fn chain_at(pixel: vec2u) -> u32 {
-    return chains[1u + pixel.y / STRAND_TILE * tiles_across(strand_view.size) + pixel.x / STRAND_TILE];
+    return list_heads[1u + pixel.y / STRAND_TILE * tiles_across(strand_view.size) + pixel.x / STRAND_TILE];
 }
 
 // Next pixel that strands may cover.

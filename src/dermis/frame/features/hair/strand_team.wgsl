@@ -6,7 +6,7 @@
 const LANES: u32 = STRAND_TILE * STRAND_TILE; // invocations of a layer: the pixels of a tile
 const LAYERS: u32 = 4u; // more layers speed up tiles with many segments
 
-@group(0) @binding(31) var<storage, read> chains: array<u32>; // see strands_bin.wgsl
+@group(0) @binding(31) var<storage, read> list_heads: array<u32>; // see strands_bin.wgsl
 @group(0) @binding(32) var<storage, read> links: array<vec2u>;
 
 var<workgroup> segments: array<Segment, LANES>;
@@ -16,8 +16,8 @@ var<workgroup> count: u32;
 // Returns whether there is any segment.
 fn visit_segments(pixel: vec2u, tile: vec2u, lane: u32, layer: u32) -> bool {
     var link = 0u;
-    if (layer == 0u && lane < CHAINS) {
-        link = chains[1u + (tile.y * tiles_across(strand_view.size) + tile.x) * CHAINS + lane];
+    if (layer == 0u && lane < SEGMENT_LISTS) {
+        link = list_heads[1u + (tile.y * tiles_across(strand_view.size) + tile.x) * SEGMENT_LISTS + lane];
     }
     var any = false;
     loop {

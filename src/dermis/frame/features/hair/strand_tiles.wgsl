@@ -3,7 +3,7 @@
 
 //#fill const STRAND_TILE: u32 = {strand_tile}; // pixels a side
 
-override CHAINS: u32 = 1u; // linked lists of a tile: GPUs follow many side by side
+override SEGMENT_LISTS: u32 = 1u; // linked lists of a tile: GPUs follow many side by side
 
 fn tiles_across(size: vec2f) -> u32 {
     return (u32(size.x) + STRAND_TILE - 1u) / STRAND_TILE;

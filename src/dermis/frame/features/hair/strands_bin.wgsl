@@ -4,7 +4,7 @@
 //#include "strand_tiles.wgsl"
 
 @group(0) @binding(30) var<storage, read> projected: array<ProjectedKnot>;
-@group(0) @binding(31) var<storage, read_write> chains: array<atomic<u32>>; // number of links in use, then the first link + 1 of each list
+@group(0) @binding(31) var<storage, read_write> list_heads: array<atomic<u32>>; // number of links in use, then the first link + 1 of each list
 @group(0) @binding(32) var<storage, read_write> links: array<vec2u>; // packed segment, see strand_knots.wgsl, and the next link + 1
 
 // A segment and the tiles around it.
@@ -54,12 +54,12 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     if (count == 0u) {
         return;
     }
-    var link = atomicAdd(&chains[0], count);
+    var link = atomicAdd(&list_heads[0], count);
     for (var y = one.low.y; y <= one.high.y; y += 1.0) {
         for (var x = one.low.x; x <= one.high.x; x += 1.0) {
             if (link < arrayLength(&links) && covers(one, vec2f(x, y))) {
                 let tile = u32(y) * tiles_across(strand_view.size) + u32(x);
-                links[link] = vec2u(pack_segment(begin, hair), atomicExchange(&chains[1u + tile * CHAINS + segment % CHAINS], link + 1u));
+                links[link] = vec2u(pack_segment(begin, hair), atomicExchange(&list_heads[1u + tile * SEGMENT_LISTS + segment % SEGMENT_LISTS], link + 1u));
                 link += 1u;
             }
         }

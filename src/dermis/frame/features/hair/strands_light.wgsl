@@ -150,7 +150,7 @@ fn is_hidden(hair: u32) -> bool {
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
     let index = list_index(group, groups, lane);
-    if (index >= all_knots(strand_view.coarse)) {
+    if (index >= total_knot_count(strand_view.coarse)) {
         return;
     }
     let hair = hair_of_knot(index);

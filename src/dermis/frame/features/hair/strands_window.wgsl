@@ -16,7 +16,7 @@ var<workgroup> highs: array<vec3f, LANES>;
 fn find_bounds(light: Light, first: u32, lane: u32) {
     var low = vec3f(1e30);
     var high = vec3f(-1e30);
-    let end = min(first + KNOTS, all_knots(hairs.shadow_casters));
+    let end = min(first + KNOTS, total_knot_count(hairs.shadow_casters));
     for (var k = first + lane; k < end; k += LANES) {
         let at = project_to_map(light, posed[row_of_knot(k, hair_of_knot(k))].xyz);
         low = min(low, at);

@@ -15,7 +15,7 @@ from dermis.frame.programs import WORKGROUP_SIZE, program, workgroup_grid
 from dermis.gpu import Bindings, Buffer, Constants, Device, Memo, Recorder, mark_scratch
 from dermis.mesh.head import Head
 
-LinkBuffers = tuple[tuple[Buffer, int], dict[str, Buffer], dict[str, Buffer]]
+FormFactorBuffers = tuple[tuple[Buffer, int], dict[str, Buffer], dict[str, Buffer]]
 """Buffer and number of sample points, form factors of patches, and form factors of cells."""
 _FLOAT4_BYTES = 16  # bytes of four floats
 _BOUNCE_COUNT = 4  # number of bounces between patches; the gathering by cells is one more
@@ -83,23 +83,24 @@ def make_interreflection(
     atlas: Atlas,
     profile_albedo: NDArray[np.float64],
     has_occlusion: bool,
-    light_key: str,
+    light_cache_key: str,
     layout_key: str,
 ) -> Interreflection | None:
     """Return the interreflection of a head, None for a head where no skin is visible from other skin.
 
     profile_albedo : (3,) albedo of the skin's diffusion profile [-]
     has_occlusion : whether there is a map of the visible fraction of the sky
-    light_key : cache key of the scene's light; callers that draw several scenes in turn use different keys
+    light_cache_key : cache key of the scene's light; callers that draw several scenes in turn use different
+        keys
     layout_key : name of the atlas layout in the cache
     """
     form_factors = memo.get(_form_factors, head, atlas, caller_name=layout_key)
     if not len(form_factors.cell_factor):
         return None
-    uploaded = memo.get(_upload_links, device, form_factors, caller_name=layout_key)
-    key = f"{layout_key} {light_key}"
+    uploaded = memo.get(_upload_form_factors, device, form_factors, caller_name=layout_key)
+    key = f"{layout_key} {light_cache_key}"
     buffers = memo.get(
-        _make_interreflection_buffers, device, uploaded, has_occlusion, light_key, caller_name=key
+        _make_interreflection_buffers, device, uploaded, has_occlusion, light_cache_key, caller_name=key
     )
     return Interreflection(buffers, profile_albedo)
 
@@ -115,12 +116,12 @@ def _form_factors(head: Head, atlas: Atlas) -> FormFactors:
     return cached_form_factors(head.mesh, atlas.corner_uv, atlas.mapped)
 
 
-def _upload_links(device: Device, form_factors: FormFactors) -> LinkBuffers:
+def _upload_form_factors(device: Device, form_factors: FormFactors) -> FormFactorBuffers:
     points = np.stack([form_factors.sample_triangle, form_factors.sample_weights], axis=1)
-    patch_links = _upload_form_factors(
+    patch_links = _upload_form_factor_rows(
         device, form_factors.patch_first, form_factors.patch_target, form_factors.patch_factor
     )
-    cell_links = _upload_form_factors(
+    cell_links = _upload_form_factor_rows(
         device, form_factors.cell_first, form_factors.cell_target, form_factors.cell_factor
     )
     cells = np.stack([form_factors.nearest_patch, form_factors.confidence.view(np.uint32)], axis=1)
@@ -128,7 +129,7 @@ def _upload_links(device: Device, form_factors: FormFactors) -> LinkBuffers:
     return (device.buffer(points, "STORAGE"), len(points)), patch_links, cell_links
 
 
-def _upload_form_factors(
+def _upload_form_factor_rows(
     device: Device,
     row_start: NDArray[np.uint32],
     patch_index: NDArray[np.uint32],
@@ -140,9 +141,9 @@ def _upload_form_factors(
 
 
 def _make_interreflection_buffers(
-    device: Device, link_buffers: LinkBuffers, stores_means: bool, _: str
+    device: Device, form_factor_buffers: FormFactorBuffers, stores_means: bool, _: str
 ) -> InterreflectionBuffers:
-    sample_points, patch_links, cell_links = link_buffers
+    sample_points, patch_links, cell_links = form_factor_buffers
     count = sample_points[1]
     direct, uniform, *bounced = (
         mark_scratch(device, device.storage_buffer(_FLOAT4_BYTES * (count // SAMPLES_PER_PATCH)))
@@ -176,13 +177,13 @@ def draw(
     buffers, albedo = interreflection
     (points, count), footprint = buffers.sample_points, 2.0 / (CELLS_PER_SIDE * SAMPLES_PER_PATCH**0.5)
     own: Bindings = {
-        "samples": shader.record("Samples", count=count, footprint=footprint, albedo=albedo),
+        "samples": shader.make_record("Samples", count=count, footprint=footprint, albedo=albedo),
         "sample_points": points,
         "sample_exitance": buffers.sample_exitance,
         "from_skin": buffers.no_light,
     }
     graph.dispatch("interreflection", shader, {**lighting_bindings, **own}, workgroup_grid(count))
-    graph.repeat(_draw_bounces, buffers)
+    graph.add_replayable(_draw_bounces, buffers)
 
 
 def _draw_bounces(graph: Recorder, buffers: InterreflectionBuffers) -> None:

@@ -1,6 +1,6 @@
 // Exitance at the sample points of the patches under direct light, and under uniform light.
 //#include "irradiance/lighting.wgsl"
-//#include "irradiance/fine_light.wgsl"
+//#include "irradiance/subtexel_light.wgsl"
 //#include "each.wgsl"
 
 const AREA_DEVIATION: f32 = 0.5; // standard deviation of the area over which fine stripes of light are averaged, over the footprint

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
-from dermis.frame.lights.records import with_oblique_constant
+from dermis.frame.lights.records import with_oblique_incidence_constant
 from dermis.frame.programs import FLOAT_TEXEL_FORMAT, program
 from dermis.gpu import Constants, Recorder, TextureOrView
 
@@ -16,19 +16,19 @@ LIGHT_FILTER_SIGMA_TEXELS = 0.5
 """Standard deviation of the filter that keeps light on the atlas from aliasing [texels]."""
 
 
-def fine_light_constants() -> dict[str, float]:
-    """Return the named values that the shader preprocessor inserts at `//#fill` in fine_light.wgsl."""
+def subtexel_light_constants() -> dict[str, float]:
+    """Return the named values that the shader preprocessor inserts at `//#fill` in subtexel_light.wgsl."""
     return {"fine_levels": MAX_FINE_GAUSSIANS}
 
 
-def fine_light_members(
-    variance_mm2: NDArray[np.float64], weight: NDArray[np.float64], relit_mm2: float
+def subtexel_light_members(
+    variance_mm2: NDArray[np.float64], weight: NDArray[np.float64], unblurred_mm2: float
 ) -> dict[str, float | NDArray[np.floating]]:
     """Return the members of the shader struct `Fine`, which corrects light that varies within a texel.
 
     variance_mm2 : (k,) variances of the Gaussians with which the atlas is blurred [mm^2]
     weight : (k, 3) weights of these Gaussians for red, green and blue [-]
-    relit_mm2 : variance of the narrowest Gaussian of the profile [mm^2]. This Gaussian is too narrow
+    unblurred_mm2 : variance of the narrowest Gaussian of the profile [mm^2]. This Gaussian is too narrow
         for a blur over the atlas; its light is evaluated at each pixel instead
     """
     count = min(len(variance_mm2), MAX_FINE_GAUSSIANS)
@@ -37,7 +37,7 @@ def fine_light_members(
     return {
         "count": count,
         "texel_variance": LIGHT_FILTER_SIGMA_TEXELS**2,
-        "relit_mm2": relit_mm2,
+        "unblurred_mm2": unblurred_mm2,
         "level": level,
     }
 
@@ -67,9 +67,9 @@ def draw(
         surface
     """
     if filter_sigma_texels:  # neighbouring texels are neighbours on the surface
-        constants = with_oblique_constant(constants)
+        constants = with_oblique_incidence_constant(constants)
     shader = program(graph.device, "irradiance/irradiance.wgsl", constants, store_format=texel_format)
-    entering = shader.record("Entering", scale=irradiance_scale, area=filter_sigma_texels)
+    entering = shader.make_record("Entering", scale=irradiance_scale, area=filter_sigma_texels)
     bound = {
         **layout.bindings,
         "surfaces": layout.surfaces,

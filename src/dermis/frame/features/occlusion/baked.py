@@ -84,7 +84,7 @@ def bake_occlusion(
             for d in to_sky[first : first + _DEPTH_MAPS_PER_BATCH]
         ]
         draw_layers(commands, "occlusion", layers, shadow_map_views(views), geometry)
-        sky = shader.record("Sky", directions=len(views), side=result_side, vertices=len(mesh.positions))
+        sky = shader.make_record("Sky", directions=len(views), side=result_side, vertices=len(mesh.positions))
         lights: Bindings = {
             "lights": _depth_views_as_lights(shader, views),
             "shadow_maps": layers.texture,
@@ -105,7 +105,7 @@ def bake_occlusion(
 
 
 def _depth_views_as_lights(shader: ComputeProgram, shadow_views: list[ShadowView]) -> UniformRecord:
-    record = shader.record("Lights")
+    record = shader.make_record("Lights")
     for layer, view in enumerate(shadow_views):
         light = record["light"][layer]
         light["parallel"], light["layer"], light["half_width"] = 1, layer, 1

@@ -30,8 +30,10 @@ DEPTH_MAP_SIDE = 256
 """Side of a depth map [texels]."""
 _VIEW_MARGIN_MM = 1.0  # free space around the head in a view
 _VIEW_BORDER_TEXELS = 2.0  # empty texels around the head, so that points lifted off its surface stay inside
-_ANCHOR_RADIUS_MM = 100.0  # distance from the middle of the head at which the weight of anchors falls to 1/e
-_MAX_ANCHOR_COUNT = 512
+_ROTATION_POINT_RADIUS_MM = (
+    100.0  # distance from the middle of the head at which the weight of rotation_points falls to 1/e
+)
+_MAX_ROTATION_POINT_COUNT = 512
 _VERTEX_VISIBILITY_SHADER = "occlusion/moving_occlusion_vertices.wgsl"
 # Arguments of `coarse_triangles`: least number of faces, and largest distance of omitted vertices from the
 # simplified surface [mm], a quarter of a texel.
@@ -55,7 +57,7 @@ class SkyViews(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class RotationAnchors:
+class HeadRotationPoints:
     """Control points whose motion determines the estimated rotation of a head.
 
     points : (s,) indices of the control points
@@ -106,30 +108,32 @@ def _sky_view_axes() -> Floats:
     return np.array([view_axes_array(-to_sky, up) for to_sky in fibonacci_sphere(SKY_VIEW_COUNT)])
 
 
-def make_rotation_anchors(head: Head) -> RotationAnchors:
+def make_head_rotation_points(head: Head) -> HeadRotationPoints:
     """Choose control points from whose motion the rotation of a head is estimated.
 
     Their weights decrease with the distance from the centre of the head, so that moving shoulders have little
     effect.
     """
     rig = head.control
-    points = np.unique(np.linspace(0, len(rig.positions_mm) - 1, _MAX_ANCHOR_COUNT).astype(np.intp))
+    points = np.unique(np.linspace(0, len(rig.positions_mm) - 1, _MAX_ROTATION_POINT_COUNT).astype(np.intp))
     positions = rig.positions_mm[points].astype(np.float64)
     distance2 = ((positions - head.centre_mm) ** 2).sum(axis=1)
-    weight = np.exp(-distance2 / _ANCHOR_RADIUS_MM**2)[:, None]
+    weight = np.exp(-distance2 / _ROTATION_POINT_RADIUS_MM**2)[:, None]
     offsets = weight * (positions - (weight * positions).sum(axis=0) / weight.sum())
-    return RotationAnchors(points, offsets, rig_outline(rig.positions_mm, no_targets(), rig.skeleton, points))
+    return HeadRotationPoints(
+        points, offsets, rig_outline(rig.positions_mm, no_targets(), rig.skeleton, points)
+    )
 
 
-def head_rotation(anchors: RotationAnchors, motion: Motion) -> Floats:
-    """Return the (3, 3) rotation that best fits the motion of the control points in `anchors` [Kabsch1976].
+def head_rotation(rotation_points: HeadRotationPoints, motion: Motion) -> Floats:
+    """Return the (3, 3) rotation that best fits the motion of the `rotation_points` [Kabsch1976].
 
     Morph targets do not rotate a head and are ignored.
     """
-    rest = anchors.outline.rest_mm.copy()
-    rest[:3] = motion.positions_mm[anchors.points].T
-    posed = replace(anchors.outline, rest_mm=rest).pose(np.zeros(0, np.float32), motion.matrices)
-    left, _, right = np.linalg.svd(posed.T.astype(np.float64) @ anchors.offsets)
+    rest = rotation_points.outline.rest_mm.copy()
+    rest[:3] = motion.positions_mm[rotation_points.points].T
+    posed = replace(rotation_points.outline, rest_mm=rest).pose(np.zeros(0, np.float32), motion.matrices)
+    left, _, right = np.linalg.svd(posed.T.astype(np.float64) @ rotation_points.offsets)
     left[:, 2] *= np.sign(np.linalg.det(left @ right))
     return np.asarray(left @ right)
 
@@ -248,7 +252,7 @@ def sky_views_record(device: Device, views: SkyViews, vertex_count: int) -> Unif
 
     vertex_count : number of vertices of the mesh
     """
-    record = program(device, _VERTEX_VISIBILITY_SHADER).record("Sky", vertices=vertex_count)
+    record = program(device, _VERTEX_VISIBILITY_SHADER).make_record("Sky", vertices=vertex_count)
     members = record["views"]
     members["column"], members["row"], members["depth"] = views.to_map.swapaxes(0, 1)
     members["to_sky"] = views.to_sky

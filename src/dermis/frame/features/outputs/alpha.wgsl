@@ -1,5 +1,5 @@
 // Coverage of each pixel by head and hair, over all samples.
-//#include "planes.wgsl"
+//#include "output_images.wgsl"
 
 //#include <alpha_outputs>
 //#each alpha_outputs: override {NAME}_FIRST: u32 = NOT_REQUESTED;
@@ -16,5 +16,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if (any(id.xy >= size)) {
         return;
     }
-    //#each alpha_outputs: write_{type}({NAME}_FIRST, plane_slot(id.xy, size), {name}_output(id.xy));
+    //#each alpha_outputs: write_{type}({NAME}_FIRST, pixel_slot(id.xy, size), {name}_output(id.xy));
 }

@@ -29,6 +29,6 @@ fn barycentric_output(hit: SurfaceHit) -> vec3f {
     return hit.weights;
 }
 
-fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PlaneSlot) {
+fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PixelSlot) {
     //#each geometry_outputs: if ({NAME}_FIRST != NOT_REQUESTED) {{ write_{type}({NAME}_FIRST, slot, select({nothing}, {name}_output(hit), found_hit)); }}
 }

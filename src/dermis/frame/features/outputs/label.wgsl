@@ -41,7 +41,7 @@ fn label_face_synthetics_output(hit: SurfaceHit, found_hit: bool, hairs: u32) ->
     return label_classes[label_at(hit, found_hit, hairs >> 8u)];
 }
 
-fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PlaneSlot) {
+fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PixelSlot) {
     var hairs = 0u;
     if (HAIRS) {
         hairs = hair_labels[slot.index];

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dermis.frame.features.hair.resources import has_strands
-from dermis.frame.features.outputs.planes import Planes, draw_planes, stage_program
+from dermis.frame.features.outputs.output_images import OutputImages, draw_output_images, stage_program
 from dermis.frame.features.outputs.stage_inputs import StageInputs
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Bindings, Buffer, Device, Memo, MutableBindings, Recorder, Texture
@@ -71,12 +71,14 @@ def shader_constants() -> dict[str, int]:
     return {f"class_{name}": class_number(name) for name in names} | {"class_count": len(label_classes())}
 
 
-def draw_labels(graph: Recorder, output_planes: Planes, buffers: LabelBuffers, inputs: StageInputs) -> None:
+def draw_labels(
+    graph: Recorder, output_images: OutputImages, buffers: LabelBuffers, inputs: StageInputs
+) -> None:
     """Declare the pass that writes the label class of each pixel."""
     constants = ("FIELDS", buffers.field_count), ("HAIRS", buffers.hair_classes is not None)
-    shader = stage_program(graph.device, output_planes, constants)
+    shader = stage_program(graph.device, output_images, constants)
     bindings = inputs.bindings(shader) | buffers.tables | {"hair_labels": buffers.hair_labels}
-    draw_planes(graph, output_planes, shader, bindings)
+    draw_output_images(graph, output_images, shader, bindings)
 
 
 def _upload_label_tables(device: Device, labels: MeshLabels) -> MutableBindings:

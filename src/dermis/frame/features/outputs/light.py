@@ -9,7 +9,7 @@ import numpy as np
 
 from dermis.base.errors import DermisError, refuse
 from dermis.frame.features.diffusion.combine import make_blur_sum
-from dermis.frame.features.outputs.planes import Planes, draw_planes, stage_program
+from dermis.frame.features.outputs.output_images import OutputImages, draw_output_images, stage_program
 from dermis.frame.features.outputs.stage_inputs import StageInputs
 from dermis.frame.features.shading.shade import placeholder_subsurface_layers
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
@@ -83,57 +83,63 @@ def make_light_outputs(
     )
 
 
-def draw_light(graph: Recorder, output_planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
+def draw_light(
+    graph: Recorder, output_images: OutputImages, resources: LightOutputs, inputs: StageInputs
+) -> None:
     """Declare the passes that shade the surface at pixel centres, for outputs such as albedo.
 
     Screen-space techniques also diffuse the subsurface light over the picture.
     """
     device, diffusion = graph.device, inputs.picture_diffusion
-    shader = stage_program(device, output_planes, inputs.constants)
+    shader = stage_program(device, output_images, inputs.constants)
     layers = diffusion.layers if diffusion else placeholder_subsurface_layers(device)
-    draw_planes(graph, output_planes, shader, _shading_bindings(shader, inputs) | {"subsurface": layers})
-    if diffusion is not None and "diffuse" in output_planes.channels:
+    draw_output_images(
+        graph, output_images, shader, _shading_bindings(shader, inputs) | {"subsurface": layers}
+    )
+    if diffusion is not None and "diffuse" in output_images.channels:
         below, leaving = diffusion.diffuse()
-        add = program(device, "outputs/spread.wgsl", output_planes.first_channel_constant("diffuse"))
-        draw_planes(graph, output_planes, add, {"below": below, "leaving": leaving})
-    if "translucent" in output_planes.channels:
+        add = program(device, "outputs/spread.wgsl", output_images.first_channel_constant("diffuse"))
+        draw_output_images(graph, output_images, add, {"below": below, "leaving": leaving})
+    if "translucent" in output_images.channels:
         transmitted = inputs.sum_transmitted(resources.transmitted)
         multiply = program(
-            device, "outputs/transmitted.wgsl", output_planes.first_channel_constant("translucent")
+            device, "outputs/transmitted.wgsl", output_images.first_channel_constant("translucent")
         )
         bindings = inputs.bindings(multiply) | {"transmitted": transmitted}
-        draw_planes(graph, output_planes, multiply, bindings)
+        draw_output_images(graph, output_images, multiply, bindings)
 
 
 def draw_visibility(
-    graph: Recorder, output_planes: Planes, resources: LightOutputs, inputs: StageInputs
+    graph: Recorder, output_images: OutputImages, resources: LightOutputs, inputs: StageInputs
 ) -> None:
     """Declare the pass that computes how much of each light is visible from the surface at each pixel."""
-    shader, counts = stage_program(graph.device, output_planes, inputs.constants), resources.light_part_counts
+    shader, counts = stage_program(graph.device, output_images, inputs.constants), resources.light_part_counts
     ends = np.zeros(_MAX_VISIBILITY_LIGHTS, np.uint32)
     ends[: len(counts)] = np.cumsum(counts)
-    parts = shader.record("LightParts", count=len(counts), end=ends.reshape(-1, 4))
-    draw_planes(graph, output_planes, shader, _shading_bindings(shader, inputs) | {"light_parts": parts})
+    parts = shader.make_record("LightParts", count=len(counts), end=ends.reshape(-1, 4))
+    draw_output_images(
+        graph, output_images, shader, _shading_bindings(shader, inputs) | {"light_parts": parts}
+    )
 
 
 def draw_pigments(
-    graph: Recorder, output_planes: Planes, resources: LightOutputs, inputs: StageInputs
+    graph: Recorder, output_images: OutputImages, resources: LightOutputs, inputs: StageInputs
 ) -> None:
     """Declare the pass that writes the melanin and blood fractions of the skin at each pixel."""
-    shader, uniform = stage_program(graph.device, output_planes), resources.pigments
-    record = shader.record("Pigments", uniform_pigments=uniform or (0.0, 0.0), painted=uniform is None)
-    draw_planes(graph, output_planes, shader, inputs.bindings(shader) | {"pigments": record})
+    shader, uniform = stage_program(graph.device, output_images), resources.pigments
+    record = shader.make_record("Pigments", uniform_pigments=uniform or (0.0, 0.0), painted=uniform is None)
+    draw_output_images(graph, output_images, shader, inputs.bindings(shader) | {"pigments": record})
 
 
 def draw_thickness(
-    graph: Recorder, output_planes: Planes, resources: LightOutputs, inputs: StageInputs
+    graph: Recorder, output_images: OutputImages, resources: LightOutputs, inputs: StageInputs
 ) -> None:
     """Declare the passes that measure the tissue thickness of thin parts, and write it for each pixel."""
     assert inputs.translucency is not None and resources.thickness is not None
     measure_thickness(graph, inputs.translucency, resources.thickness)
-    shader = stage_program(graph.device, output_planes)
+    shader = stage_program(graph.device, output_images)
     bindings = inputs.bindings(shader) | {"thickness_map": resources.thickness}
-    draw_planes(graph, output_planes, shader, bindings)
+    draw_output_images(graph, output_images, shader, bindings)
 
 
 def make_thickness_map(device: Device, pair_buffers: PairBuffers) -> Texture:
@@ -161,7 +167,7 @@ def measure_thickness(graph: Recorder, translucency: Translucency, thickness_map
     count, cells = pairs.receivers[1], pairs.cells
     reach = {"count": count, "radius_mm": cells.radius_mm, "cell_mm2": cells.cell_mm**2}
     bindings: Bindings = {
-        "reach": shader.record("Reach", **reach),
+        "reach": shader.make_record("Reach", **reach),
         "receiver_ranges": pairs.receiver_ranges,
         "pairs": pairs.pairs,
         "receiver_points": translucency.receiver_points,
@@ -203,7 +209,12 @@ def _uniform_pigments(request: FrameRequest) -> tuple[float, float] | None:
     Raises DermisError for skin that is not made of pigments.
     """
     maps = request.head.maps
-    if request.painted_side and request.albedo_from_map and maps.colour is None and maps.roughness is None:
+    if (
+        request.painted_map_side
+        and request.takes_albedo_from_map
+        and maps.colour is None
+        and maps.roughness is None
+    ):
         return None
     parameters = _pigment_parameters(request.skin)
     if parameters is None:

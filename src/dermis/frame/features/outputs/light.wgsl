@@ -1,7 +1,7 @@
 // Outputs of light at the centre of each pixel, computed by the functions that shade the picture.
 //#include "shading/shading.wgsl"
 //#include "surface_hit.wgsl"
-//#include "planes.wgsl"
+//#include "output_images.wgsl"
 
 //#include <light_outputs>
 //#each light_outputs: override {NAME}_FIRST: u32 = NOT_REQUESTED;
@@ -53,7 +53,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let found_hit = is_hit(id.xy);
-    let slot = plane_slot(id.xy, size);
+    let slot = pixel_slot(id.xy, size);
     var shaded_pixel: ShadedPixel;
     if (found_hit) {
         shaded_pixel = shade_centre(id.xy, size);

@@ -32,6 +32,6 @@ fn motion_output(hit: SurfaceHit) -> vec2f {
     return vec2f(0.5, -0.5) * offset * vec2f(textureDimensions(centres));
 }
 
-fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PlaneSlot) {
+fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PixelSlot) {
     //#each motion_outputs: if ({NAME}_FIRST != NOT_REQUESTED) {{ write_{type}({NAME}_FIRST, slot, select({nothing}, {name}_output(hit), found_hit)); }}
 }

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.frame.features.outputs.landmarks import LandmarkPositions
-from dermis.frame.features.outputs.planes import PlaneArray
+from dermis.frame.features.outputs.output_images import OutputArray
 from dermis.frame.features.outputs.resources import Resources
 from dermis.frame.features.post.picture import Picture, encoding_members
 from dermis.frame.programs import program
@@ -51,18 +51,18 @@ class Readback:
         This method can be called only once."""
         return self._decode_picture(self.fetched.array())
 
-    def image_and_outputs(self) -> tuple[PictureArray, dict[str, PlaneArray], LandmarkPositions]:
+    def image_and_outputs(self) -> tuple[PictureArray, dict[str, OutputArray], LandmarkPositions]:
         """Wait for the readback; return the picture, and dictionaries of the outputs and of the landmarks.
 
         The keys are the names of the outputs and of the landmark sets. Call either this method or `image`,
         and only once.
         """
-        raw, start, arrays = self.fetched.array(), _WORD_BYTES * self.words, dict[str, PlaneArray]()
+        raw, start, arrays = self.fetched.array(), _WORD_BYTES * self.words, dict[str, OutputArray]()
         if self.outputs is None:
             return self._decode_picture(raw), {}, {}
-        for planes in self.outputs.planes:
-            end = start + planes.buffer.size
-            arrays |= planes.decode_outputs(raw[start:end])
+        for images in self.outputs.images:
+            end = start + images.buffer.size
+            arrays |= images.decode_outputs(raw[start:end])
             start = end
         buffers = self.outputs.landmarks
         landmarks = buffers.decode_positions(raw[start : start + buffers.results.size]) if buffers else {}
@@ -100,7 +100,7 @@ def start_readback(
     elif alpha_settings:
         shader, count, words = program(device, "outputs/pack_straight.wgsl"), pixels, pixels
         bindings["exposed"] = picture.exposed
-        bindings["settings"] = shader.record("Straight", **encoding_members(alpha_settings))
+        bindings["settings"] = shader.make_record("Straight", **encoding_members(alpha_settings))
     else:
         count = -(-pixels // _PIXELS_PER_INVOCATION)
         shader, words = program(device, "outputs/pack.wgsl"), _WORDS_PER_INVOCATION * count

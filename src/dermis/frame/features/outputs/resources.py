@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dermis.frame.features.outputs.labels import LabelBuffers, make_label_buffers
 from dermis.frame.features.outputs.landmarks import LandmarkBuffers, make_landmark_buffers
 from dermis.frame.features.outputs.light import LightOutputs, make_light_outputs
-from dermis.frame.features.outputs.planes import Planes, make_planes
+from dermis.frame.features.outputs.output_images import OutputImages, make_output_images
 from dermis.frame.features.shape.shape import Shape, ShapeTables, make_shape
 from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.features.visibility.layers import ViewLayers, make_layers
@@ -22,7 +22,7 @@ class Resources:
     """Resources of the outputs of a frame.
 
     names : names of the outputs in the order of the request
-    planes : buffers of the outputs, one for each shader that computes outputs
+    images : buffers of the outputs, one for each shader that computes outputs
     centres : texture with the index of the triangle that covers each pixel centre; None without multisampling
     previous : shape of the head in the previous scene, None if no motion vectors are requested
     light : resources for outputs of light and skin
@@ -31,7 +31,7 @@ class Resources:
     """
 
     names: tuple[str, ...]
-    planes: tuple[Planes, ...]
+    images: tuple[OutputImages, ...]
     centres: ViewLayers | None
     previous: Shape | None
     light: LightOutputs
@@ -42,11 +42,11 @@ class Resources:
     def buffers(self) -> list[Buffer]:
         """Return the buffers to read back after the picture, in the order that `Readback` expects."""
         landmarks = [self.landmarks.results] if self.landmarks else []
-        return [*(planes.buffer for planes in self.planes), *landmarks]
+        return [*(images.buffer for images in self.images), *landmarks]
 
-    def planes_of_output(self, output_name: str) -> Planes:
+    def images_with_output(self, output_name: str) -> OutputImages:
         """Return the buffer that holds an output and the other outputs of the same shader."""
-        return next(planes for planes in self.planes if output_name in planes.channels)
+        return next(images for images in self.images if output_name in images.channels)
 
 
 def make_resources(
@@ -73,8 +73,8 @@ def make_resources(
     sets, bare = request.landmarks, request.head.bare
     return Resources(
         names=request.outputs,
-        planes=tuple(
-            cached(make_planes, device, stage, tuple(outputs), settings.size, caller_name=stage)
+        images=tuple(
+            cached(make_output_images, device, stage, tuple(outputs), settings.size, caller_name=stage)
             for stage, outputs in stages.items()
         ),
         centres=None if settings.samples == 1 else cached(_make_centre_layers, device, settings.size),

@@ -1,5 +1,5 @@
 // Adds light that was diffused over the picture to the output of diffuse light.
-//#include "planes.wgsl"
+//#include "output_images.wgsl"
 
 override DIFFUSE_FIRST: u32 = NOT_REQUESTED;
 
@@ -12,7 +12,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if (any(id.xy >= size)) {
         return;
     }
-    let slot = plane_slot(id.xy, size);
+    let slot = pixel_slot(id.xy, size);
     let light = textureLoad(below, id.xy, 0).rgb * textureLoad(leaving, id.xy, 0).rgb;
     write_vec3f(DIFFUSE_FIRST, slot, read_vec3f(DIFFUSE_FIRST, slot) + light);
 }

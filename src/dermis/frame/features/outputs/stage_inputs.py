@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dermis.frame.features.post.picture import Picture
 from dermis.frame.features.shading.view import ray_record
 from dermis.frame.features.shape.mesh import HeadGeometry
-from dermis.frame.features.shape.shape import MotionBytes, Shape
+from dermis.frame.features.shape.shape import PoseBytes, Shape
 from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.features.visibility.layers import ViewLayers
 from dermis.frame.projection import Triple, Views
@@ -31,7 +31,7 @@ class PreviousScene:
     view : uniform record of the shading pass with the rays of the previous camera
     """
 
-    motion: MotionBytes | None
+    motion: PoseBytes | None
     view: UniformRecord
 
 
@@ -98,5 +98,5 @@ class StageInputs:
 
         shader : shader whose struct OutputCamera determines the format of the camera's uniform record
         """
-        camera = shader.record("OutputCamera", rays=ray_record(shader, self.view), centre=self.centre_mm)
+        camera = shader.make_record("OutputCamera", rays=ray_record(shader, self.view), centre=self.centre_mm)
         return {**self.lighting, "camera": camera, "centres": self.centres.texture}

@@ -9,7 +9,7 @@ from dermis.base.registry import Registry
 from dermis.frame.features.outputs import light
 from dermis.frame.features.outputs.labels import draw_labels
 from dermis.frame.features.outputs.landmarks import draw_landmarks
-from dermis.frame.features.outputs.planes import Planes, draw_planes, stage_program
+from dermis.frame.features.outputs.output_images import OutputImages, draw_output_images, stage_program
 from dermis.frame.features.outputs.resources import Resources
 from dermis.frame.features.outputs.stage_inputs import StageInputs
 from dermis.frame.features.shading.view import ray_record
@@ -20,7 +20,7 @@ from dermis.gpu import Bindings, Graph
 from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.scene.outputs import OUTPUTS, Output
 
-DrawStage = Callable[[Graph, Planes, Resources, StageInputs], None]
+DrawStage = Callable[[Graph, OutputImages, Resources, StageInputs], None]
 _SURFACE_CONSTANT_NAMES = ("DETAIL",)  # pipeline constants of surface.wgsl
 
 
@@ -39,8 +39,8 @@ def draw(graph: Graph, resources: Resources | None, inputs: StageInputs) -> None
         return
     if not _needs_hair_labels(resources, inputs):  # else `hair_label_bindings` has drawn the centres
         _draw_centre_triangles(graph, inputs)
-    for planes in resources.planes:
-        DRAW_STAGES[planes.stage](graph, planes, resources, inputs)
+    for images in resources.images:
+        DRAW_STAGES[images.stage](graph, images, resources, inputs)
     if resources.landmarks:
         draw_landmarks(graph, resources.landmarks, inputs)
 
@@ -56,48 +56,54 @@ def _draw_centre_triangles(graph: Graph, inputs: StageInputs) -> None:
         draw_layers(graph, "outputs", inputs.centres, Views(inputs.camera.clips, PIXEL_CENTRE), inputs.head)
 
 
-def _draw_geometry(graph: Graph, output_planes: Planes, resources: Resources, inputs: StageInputs) -> None:
-    shader = stage_program(graph.device, output_planes)
-    draw_planes(graph, output_planes, shader, inputs.bindings(shader))
+def _draw_geometry(
+    graph: Graph, output_images: OutputImages, resources: Resources, inputs: StageInputs
+) -> None:
+    shader = stage_program(graph.device, output_images)
+    draw_output_images(graph, output_images, shader, inputs.bindings(shader))
 
 
-def _draw_surface(graph: Graph, output_planes: Planes, resources: Resources, inputs: StageInputs) -> None:
+def _draw_surface(
+    graph: Graph, output_images: OutputImages, resources: Resources, inputs: StageInputs
+) -> None:
     constants = tuple(one for one in inputs.constants if one[0] in _SURFACE_CONSTANT_NAMES)
-    shader = stage_program(graph.device, output_planes, constants)
-    draw_planes(graph, output_planes, shader, inputs.bindings(shader))
+    shader = stage_program(graph.device, output_images, constants)
+    draw_output_images(graph, output_images, shader, inputs.bindings(shader))
 
 
-def _draw_motion(graph: Graph, output_planes: Planes, resources: Resources, inputs: StageInputs) -> None:
+def _draw_motion(
+    graph: Graph, output_images: OutputImages, resources: Resources, inputs: StageInputs
+) -> None:
     previous, vertices = inputs.previous, inputs.shape.vertices
     assert previous is not None
     if previous.motion is not None:
         assert resources.previous is not None
         shape.draw(graph, resources.previous, previous.motion)
         vertices = resources.previous.vertices
-    shader = stage_program(graph.device, output_planes)
+    shader = stage_program(graph.device, output_images)
     bindings = inputs.bindings(shader) | {
-        "previous": shader.record("Previous", rays=ray_record(shader, previous.view)),
+        "previous": shader.make_record("Previous", rays=ray_record(shader, previous.view)),
         "previous_table": vertices["vertex_table"],
         "previous_buffer": vertices["vertex_buffer"],
     }
-    draw_planes(graph, output_planes, shader, bindings)
+    draw_output_images(graph, output_images, shader, bindings)
 
 
-def _draw_alpha(graph: Graph, output_planes: Planes, resources: Resources, inputs: StageInputs) -> None:
-    draw_planes(
-        graph, output_planes, stage_program(graph.device, output_planes), {"exposed": inputs.picture.exposed}
+def _draw_alpha(graph: Graph, output_images: OutputImages, resources: Resources, inputs: StageInputs) -> None:
+    draw_output_images(
+        graph, output_images, stage_program(graph.device, output_images), {"exposed": inputs.picture.exposed}
     )
 
 
-def _draw_label(graph: Graph, output_planes: Planes, resources: Resources, inputs: StageInputs) -> None:
+def _draw_label(graph: Graph, output_images: OutputImages, resources: Resources, inputs: StageInputs) -> None:
     assert resources.labels is not None
-    draw_labels(graph, output_planes, resources.labels, inputs)
+    draw_labels(graph, output_images, resources.labels, inputs)
 
 
 def _light_stage(
-    draw_light_outputs: Callable[[Graph, Planes, light.LightOutputs, StageInputs], None],
+    draw_light_outputs: Callable[[Graph, OutputImages, light.LightOutputs, StageInputs], None],
 ) -> DrawStage:
-    return lambda graph, planes, resources, inputs: draw_light_outputs(graph, planes, resources.light, inputs)
+    return lambda graph, images, resources, inputs: draw_light_outputs(graph, images, resources.light, inputs)
 
 
 DRAW_STAGES: Registry[DrawStage] = Registry(
@@ -128,13 +134,13 @@ def shader_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
 
 def _stage_members(stage_name: str) -> list[ShaderListMember]:
     return [
-        ShaderListMember(one.name, one.shader, _wgsl_type(one))
+        ShaderListMember(one.name, one.shader, _wgsl_type_and_background(one))
         for one in OUTPUTS.values()
         if one.stage == stage_name
     ]
 
 
-def _wgsl_type(output: Output) -> tuple[tuple[str, str], ...]:
+def _wgsl_type_and_background(output: Output) -> tuple[tuple[str, str], ...]:
     """Return the WGSL type of an output, and the literal that the shader writes where there is no surface."""
     kind = output.wgsl_type if output.channels == 1 else f"vec{output.channels}f"
     nothing = output.background if kind == "f32" else int(output.background)

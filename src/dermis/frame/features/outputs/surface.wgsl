@@ -19,6 +19,6 @@ fn normal_camera_output(hit: SurfaceHit) -> vec3f {
     return vec3f(dot(n, normalize(camera.rays.right)), -dot(n, normalize(camera.rays.up)), dot(n, camera.rays.forward));
 }
 
-fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PlaneSlot) {
+fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PixelSlot) {
     //#each surface_outputs: if ({NAME}_FIRST != NOT_REQUESTED) {{ write_{type}({NAME}_FIRST, slot, select({nothing}, {name}_output(hit), found_hit)); }}
 }

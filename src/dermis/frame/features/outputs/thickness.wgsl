@@ -12,6 +12,6 @@ fn thickness_output(hit: SurfaceHit) -> f32 {
     return select(0.0, sampled.x / max(sampled.a, 1e-6), (hit.point.flags & MAPPED) != 0u);
 }
 
-fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PlaneSlot) {
+fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PixelSlot) {
     //#each thickness_outputs: if ({NAME}_FIRST != NOT_REQUESTED) {{ write_{type}({NAME}_FIRST, slot, select({nothing}, {name}_output(hit), found_hit)); }}
 }

@@ -2,7 +2,7 @@
 // towards the eye.
 //#include "bilinear.wgsl"
 //#include "surface_hit.wgsl"
-//#include "planes.wgsl"
+//#include "output_images.wgsl"
 
 override TRANSLUCENT_FIRST: u32 = NOT_REQUESTED;
 
@@ -14,7 +14,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if (any(id.xy >= size)) {
         return;
     }
-    let slot = plane_slot(id.xy, size);
+    let slot = pixel_slot(id.xy, size);
     let point = hit_at(id.xy, size).point;
     let light = select(vec3f(0.0), load_bilinear(transmitted, point.atlas_uv).rgb, (point.flags & MAPPED) != 0u);
     write_vec3f(TRANSLUCENT_FIRST, slot, read_vec3f(TRANSLUCENT_FIRST, slot) * light);

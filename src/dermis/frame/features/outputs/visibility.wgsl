@@ -1,7 +1,7 @@
 // Fraction of each light that is visible at the centre of each pixel, where head and hair may cast shadows.
 //#include "shading/shading.wgsl"
 //#include "surface_hit.wgsl"
-//#include "planes.wgsl"
+//#include "output_images.wgsl"
 
 //#each visibility_outputs: override {NAME}_FIRST: u32 = NOT_REQUESTED;
 
@@ -32,7 +32,7 @@ fn write_visibility(shading_point: ShadingPoint, found_hit: bool, index: u32) {
         for (; part < end; part++) {
             sum += part_visibility(lights.light[part], shading_point);
         }
-        write_f32(0u, PlaneSlot(VISIBILITY_FIRST + index * light_parts.count + k, 0u), select(0.0, sum / f32(end - first), found_hit));
+        write_f32(0u, PixelSlot(VISIBILITY_FIRST + index * light_parts.count + k, 0u), select(0.0, sum / f32(end - first), found_hit));
     }
 }
 
@@ -44,5 +44,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let triangle = max(textureLoad(centres, id.xy, 0, 0).x, 1u) - 1u;
     let shading_point = shading_point_at(triangle, vec2f(id.xy) + 0.5, 1.0, vec2f(size));
-    write_visibility(shading_point, is_hit(id.xy), plane_slot(id.xy, size).index);
+    write_visibility(shading_point, is_hit(id.xy), pixel_slot(id.xy, size).index);
 }

@@ -43,7 +43,7 @@ def draw(
     (lighting, view), background = shading_inputs, settings.background
     exposure, metered = exposure_inputs(graph.device, settings, meter)
     shader = program(graph.device, "post/background.wgsl")
-    record = shader.record(
+    record = shader.make_record(
         "Background",
         rays=ray_record(shader, view),
         kind=1 + _DRAWN_BACKGROUNDS.index(background) if isinstance(background, str) else 0,

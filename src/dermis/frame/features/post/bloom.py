@@ -62,7 +62,7 @@ def _draw_bloom_step(
     *factors: float,
 ) -> None:
     shader = program(graph.device, "post/bloom.wgsl", (("WIDEN", widening_factor),))
-    record = shader.record("Bloom", own=factors[0], wider=factors[1])
+    record = shader.make_record("Bloom", own=factors[0], wider=factors[1])
     bindings: Bindings = {
         "bloom": record,
         "picture": picture,

@@ -59,7 +59,7 @@ def draw(
     """
     lighting, view, constants = shading_inputs
     shader = program(graph.device, "post/meter.wgsl", constants)
-    camera = shader.record("MeterCamera", rays=ray_record(shader, view), sample=view["jitter"][0, :2])
+    camera = shader.make_record("MeterCamera", rays=ray_record(shader, view), sample=view["jitter"][0, :2])
     images = {"visibility_buffer": visibility_buffer, "image": radiance_image}
     bindings = {**lighting, **images, "camera": camera, "points": meter.points}
     graph.compute("meter", shader, bindings, (METER_GRID_SIDE, METER_GRID_SIDE))

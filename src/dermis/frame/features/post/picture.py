@@ -52,7 +52,7 @@ def draw(
     """
     shader = program(graph.device, "post/post.wgsl")
     exposure, metered = exposure_inputs(graph.device, settings, meter)
-    record = shader.record("Post", exposure=exposure, **encoding_members(settings))
+    record = shader.make_record("Post", exposure=exposure, **encoding_members(settings))
     bindings: MutableBindings = {"settings": record, "image": radiance, "metered": metered}
     bindings |= {"exposed": picture.exposed, "bytes": picture.bytes}
     graph.compute("post", shader, bindings, picture.size)

@@ -72,7 +72,7 @@ def bake(
     count, size = len(packed_points), 4 * BAKED_CHANNEL_COUNT * len(packed_points)
     baked = device.storage_buffer(size, "baked")
     uniform = pigments or (0.0, 0.0)
-    record = shader.record(
+    record = shader.make_record(
         "Baking", count=count, footprint=texel_side_uv, painted=pigments is None, uniform_pigments=uniform
     )
     own: Bindings = {"baking": record, "points": device.buffer(packed_points, "STORAGE"), "baked": baked}

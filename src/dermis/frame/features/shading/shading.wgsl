@@ -8,7 +8,7 @@
 //#include "footprint.wgsl"
 //#include "pre_integrated.wgsl"
 //#include "diffusion/packed_blend_weights.wgsl"
-//#include "irradiance/fine_light.wgsl"
+//#include "irradiance/subtexel_light.wgsl"
 
 override SPLIT: bool = false; // whether light below the skin is stored in layers of its own, to be diffused over the picture
 override MIXED: bool = false; // whether a map mixes profiles: the alpha of `scattered` then holds their blend weights
@@ -21,8 +21,8 @@ struct Shade {
     right: vec3f, // scaled so that forward + (x + shift) right + (y + shift) up spans the image for x, y in -1..1
     up: vec3f,
     shift: vec2f, // offset of the middle of the picture from the axis
-    relit: vec3f, // weight of the unblurred level
-    relit_changes: array<vec4f, 2>, // difference for each of the other profiles
+    unblurred_weight: vec3f, // weight of the unblurred level
+    unblurred_differences: array<vec4f, 2>, // difference for each of the other profiles
     total: vec3f, // sum of the weights of all levels
     light_factors: vec2f, // factors of light from below the skin and of reflected light
     pre: PreIntegrated,
@@ -64,9 +64,9 @@ fn is_opaque(point: Point) -> bool {
 }
 
 // Weight of the unblurred level at a position of the atlas.
-fn relit_at(uv: vec2f) -> vec3f {
+fn unblurred_weight_at(uv: vec2f) -> vec3f {
     if (!MIXED) {
-        return shade.relit;
+        return shade.unblurred_weight;
     }
     let last = vec2i(textureDimensions(scattered)) - 1;
     let position = uv * vec2f(last + 1) - 0.5;
@@ -74,7 +74,7 @@ fn relit_at(uv: vec2f) -> vec3f {
     let b = clamp(vec2i(floor(position)) + 1, vec2i(0), last);
     let w = bilinear_weights(position);
     let weights = w.x * blend_weights_at(a) + w.y * blend_weights_at(vec2i(b.x, a.y)) + w.z * blend_weights_at(vec2i(a.x, b.y)) + w.w * blend_weights_at(b);
-    return shade.relit + weights.x * shade.relit_changes[0].rgb + weights.y * shade.relit_changes[1].rgb;
+    return shade.unblurred_weight + weights.x * shade.unblurred_differences[0].rgb + weights.y * shade.unblurred_differences[1].rgb;
 }
 
 fn blend_weights_at(at: vec2i) -> vec2f {
@@ -89,11 +89,11 @@ fn shaded_skin(shading_point: ShadingPoint, lit: Lit, exit_factor: f32) -> Shade
     if (PRE_INTEGRATED) {
         below = shade.total * pre_integrated(point, surface, shading_point.footprint, shading_point.open) * entering;
     } else if ((point.flags & MAPPED) != 0u) {
-        let relit = relit_at(point.atlas_uv);
-        below = relit * below + load_bilinear(scattered, point.atlas_uv).rgb;
+        let unblurred_weight = unblurred_weight_at(point.atlas_uv);
+        below = unblurred_weight * below + load_bilinear(scattered, point.atlas_uv).rgb;
         if (STRIPE_LIGHT) {
             let side = vec2f(textureDimensions(scattered));
-            below += entering * light_finer_than_texels(point, surface, shading_point.texel, shade.fine, relit, side);
+            below += entering * light_finer_than_texels(point, surface, shading_point.texel, shade.fine, unblurred_weight, side);
             below = max(below, vec3f(0.0));
         }
     } else {

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.frame.features.surface.record import fill_eye
+from dermis.frame.features.surface.record import fill_eye_records
 from dermis.frame.projection import (
     Axes,
     Triple,
     Views,
     depth_range,
     perspective_rows,
-    pixel_samples,
+    pixel_sample_positions,
     vector_between,
     view_axes,
     view_rows,
@@ -31,7 +31,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import MAX_OTHER_PROFILES
 
 _MAX_MATERIALS = 64
-_WET_MATERIAL_ROUGHNESS = -1.0  # roughness of plain materials, see parts.wgsl
+_WET_MATERIAL_MARKER = -1.0  # roughness of plain materials, see parts.wgsl
 # Factors of light from below the surface and of reflected light, by `Settings.parts`.
 _LIGHT_FACTORS = {"all": (1.0, 1.0), "diffuse": (1.0, 0.0), "specular": (0.0, 1.0)}
 _CAMERA_RAY_MEMBERS = ("eye", "forward", "right", "up", "shift")
@@ -62,7 +62,7 @@ class EyePoses(NamedTuple):
     edges_mm: NDArray[np.float64] | None
 
 
-def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
+def world_space_pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
     """Return the pinhole camera of a scene in world space, for the aspect ratio of the settings."""
     eye = world_position(camera.position, head.centre_mm)
     forward = vector_between(camera.position, camera.target)
@@ -77,7 +77,7 @@ def camera_views(pinhole: Pinhole, outline: Outline, sample_count: int) -> Views
     """
     rows = view_rows(pinhole.eye, pinhole.axes)
     clip = perspective_rows(rows, pinhole.window, *depth_range(outline, rows))
-    return Views(np.array([clip]), pixel_samples(sample_count))
+    return Views(np.array([clip]), pixel_sample_positions(sample_count))
 
 
 def view_record(
@@ -91,7 +91,7 @@ def view_record(
     Raises DermisError for a head with too many materials.
     """
     jitter = np.zeros((64, 4), np.float32)
-    jitter[: settings.samples, :2] = pixel_samples(settings.samples)
+    jitter[: settings.samples, :2] = pixel_sample_positions(settings.samples)
     colours = np.zeros((_MAX_MATERIALS, 4), np.float32)
     materials = head.mesh.materials
     if len(materials) > _MAX_MATERIALS:
@@ -100,12 +100,12 @@ def view_record(
     for index, material in enumerate(materials):
         colours[index, :3] = material.colour
         colours[index, 3] = 1 + MOUTH_PARTS.index(material.part) if material.part else 0
-    record = shading_program.record(
+    record = shading_program.make_record(
         "Shade",
         samples=settings.samples,
-        relit=profile_split.relit,
-        relit_changes=np.pad(
-            profile_split.relit_changes, ((0, MAX_OTHER_PROFILES - len(profile_split.others)), (0, 1))
+        unblurred_weight=profile_split.unblurred_weight,
+        unblurred_differences=np.pad(
+            profile_split.unblurred_differences, ((0, MAX_OTHER_PROFILES - len(profile_split.others)), (0, 1))
         ),
         total=profile_split.total,
         light_factors=_LIGHT_FACTORS[settings.parts],
@@ -115,12 +115,12 @@ def view_record(
     for index, material in enumerate(materials):
         part = record["part_materials"][index]
         part["emission"], part["metalness"] = material.emission, material.metalness
-        part["roughness"] = _WET_MATERIAL_ROUGHNESS if material.roughness is None else material.roughness
+        part["roughness"] = _WET_MATERIAL_MARKER if material.roughness is None else material.roughness
         part["has_maps"] = material.has_maps
     for name, value in profile_split.fine.items():
         record["fine"][name] = value
     if head.eyes is not None:
-        fill_eye(record["eyes"], head.eyes.look)
+        fill_eye_records(record["eyes"], head.eyes.look)
         record["eyes"]["material"] = head.eyes.material
         record["eyes"]["middle_mm"] = head.eyes.centre_offset_mm
     return record
@@ -152,4 +152,4 @@ def with_camera(shade_record: UniformRecord, pinhole: Pinhole, eyes: EyePoses | 
 
 def ray_record(shader: ComputeProgram, shade_record: UniformRecord) -> UniformRecord:
     """Return a record of the struct Rays, for shaders that need only the camera rays of a Shade record."""
-    return shader.record("Rays", **{name: shade_record[name] for name in _CAMERA_RAY_MEMBERS})
+    return shader.make_record("Rays", **{name: shade_record[name] for name in _CAMERA_RAY_MEMBERS})

@@ -286,7 +286,7 @@ def _run_offsets(sorted_index: NDArray[np.integer], run_count: int) -> Words:
     return np.concatenate([[0], np.cumsum(np.bincount(sorted_index, minlength=run_count))]).astype(np.uint32)
 
 
-class MotionBytes(NamedTuple):
+class PoseBytes(NamedTuple):
     """Pose of a shape as bytes for the shaders.
 
     positions : position of each control point at rest, three floats [mm]
@@ -302,12 +302,12 @@ class MotionBytes(NamedTuple):
     displacements: bytes = b""
 
     @property
-    def at_rest(self) -> MotionBytes:
+    def at_rest(self) -> PoseBytes:
         """Return the pose at rest: only the control points, with neither morph weights nor bone matrices."""
-        return MotionBytes(self.positions)
+        return PoseBytes(self.positions)
 
 
-def draw(graph: Recorder, shape: Shape, motion: MotionBytes) -> None:
+def draw(graph: Recorder, shape: Shape, motion: PoseBytes) -> None:
     """Write the pose to buffers, and declare the passes that compute the vertices of the posed surface."""
     graph.write("shape", shape.rest, motion.positions)
     if motion.weights:
@@ -316,7 +316,7 @@ def draw(graph: Recorder, shape: Shape, motion: MotionBytes) -> None:
         graph.write("shape", shape.matrices, motion.matrices)
     if motion.displacements:
         graph.write("shape", shape.morphs["displacements"], motion.displacements)
-    graph.repeat(_evaluate_surface, shape)
+    graph.add_replayable(_evaluate_surface, shape)
 
 
 def make_rest_shape(device: Device, shape_tables: ShapeTables) -> Shape:
@@ -332,18 +332,18 @@ def evaluate_rest_shape(
     positions_mm : (p, 3) control points [mm]
     """
     shape, frame = make_rest_shape(device, shape_tables), CommandList(device, timed=False)
-    draw(frame, shape, MotionBytes(positions_mm.tobytes()))
+    draw(frame, shape, PoseBytes(positions_mm.tobytes()))
     frame.submit()
     return shape
 
 
-def rest_motion(rig: Rig) -> MotionBytes:
+def rest_pose_bytes(rig: Rig) -> PoseBytes:
     """Return the rest pose of a rig as bytes for the shaders."""
     weights, matrices, positions = (array.tobytes() for array in rig.rest)
     if rig.template is None or not rig.targets.names:
-        return MotionBytes(positions, weights, matrices)
+        return PoseBytes(positions, weights, matrices)
     own = displacement_rows(rig.targets, rig.template.targets)
-    return MotionBytes(positions, weights, matrices, own.tobytes())
+    return PoseBytes(positions, weights, matrices, own.tobytes())
 
 
 def _evaluate_surface(graph: Recorder, shape: Shape) -> None:

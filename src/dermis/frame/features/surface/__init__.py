@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from dermis.frame.features.surface.painting.paint import painting_constants, painting_lists
+from dermis.frame.features.surface.painting.paint import painting_constants, painting_shader_lists
 from dermis.frame.features.surface.record import eye_constants, lobe_constants, lobe_shaders
 from dermis.gpu.wgsl_source import ShaderListMember
 
@@ -20,4 +20,4 @@ def shader_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
 
     It loops at `//#each` directives.
     """
-    return {"lobes": lobe_shaders, **painting_lists()}
+    return {"lobes": lobe_shaders, **painting_shader_lists()}

@@ -46,7 +46,7 @@ def upload_maps(
     head: Head,
     use_colour: bool,
     decode_srgb: bool = True,
-    painted_side: int = 0,
+    painted_map_side: int = 0,
     has_expressions: bool = False,
 ) -> UploadedMaps:
     """Upload or paint the maps of a head, with their sampler and the table of Beckmann's distribution.
@@ -55,17 +55,19 @@ def upload_maps(
         the colour of the skin
     decode_srgb : False treats the sRGB values of the colour map as linear, to reproduce a mistake that the
         talk [dEonLuebke2007] shows
-    painted_side : side of painted maps [texels]
+    painted_map_side : side of painted maps [texels]
     has_expressions : whether expressions change painted maps
     """
     maps = head.maps
     if not isinstance(maps, PaintedMaps):
         return UploadedMaps(_upload_file_maps(device, head, use_colour, decode_srgb), None)
     if not decode_srgb and use_colour and maps.colour is None:  # a painted map has no sRGB encoding
-        found = paint.paint_arrays(device, _painted_surface(head), maps.look, painted_side)
+        found = paint.paint_arrays(device, _painted_surface(head), maps.look, painted_map_side)
         maps = replace(maps, colour=found.colour)
         head = replace(head, maps=maps)
-    painted, expression_maps = _paint_maps(device, head, maps, use_colour, (painted_side, has_expressions))
+    painted, expression_maps = _paint_maps(
+        device, head, maps, use_colour, (painted_map_side, has_expressions)
+    )
     return UploadedMaps(_upload_file_maps(device, head, use_colour, decode_srgb) | painted, expression_maps)
 
 

@@ -62,7 +62,7 @@ def eye_constants() -> dict[str, float]:
     }
 
 
-def fill_eye(eye_records: UniformRecord, look: EyeLook) -> None:
+def fill_eye_records(eye_records: UniformRecord, look: EyeLook) -> None:
     """Write the appearance of eyes to the members of one or more records of the shader struct `Eye`."""
     for name in ("eumelanin", "pupil_mm", "redness"):
         eye_records[name] = getattr(look, name)
@@ -88,7 +88,7 @@ def skin_record(
     """
     members = struct_dtype(shading_program.source.text, "Skin").names or ()
     values = {name: getattr(skin, name) for name in members if hasattr(skin, name)}
-    return shading_program.record(
+    return shading_program.make_record(
         "Skin", **values, **_derived_skin_members(skin, maps, profile), light_count=light_count
     )
 

@@ -56,7 +56,7 @@ def thin_part_tables(memo: Memo, request: FrameRequest) -> ThinParts | None:
     """
     if request.skin.direction != "half-space":
         return None
-    split, maps = request.split, request.head.maps
+    split, maps = request.profile_split, request.head.maps
     half_space = surface_record.mean_half_space(request.skin, maps, request.profile)
     g = request.skin.anisotropy
     levels = split.total, split.blurred_mm2, split.weight
@@ -208,8 +208,8 @@ def make_pair_buffers(device: Device, cells: Cells, pair_table: PairTable) -> Pa
         pairs=pair_table.pairs,
         count=int(pair_table.first[-1]),
         receiver_ranges=device.buffer(_receiver_ranges(cells, pair_table), "STORAGE"),
-        transmitted=mark_scratch(device, _black_light_texture(device, cells.receiver_mask)),
-        lost=_black_light_texture(device, cells.receiver_mask),
+        transmitted=mark_scratch(device, _zero_light_texture(device, cells.receiver_mask)),
+        lost=_zero_light_texture(device, cells.receiver_mask),
     )
 
 
@@ -226,7 +226,7 @@ def _receiver_ranges(cells: Cells, pair_table: PairTable) -> NDArray[np.uint32]:
     return rows if len(rows) else np.zeros((1, 3), np.uint32)
 
 
-def _black_light_texture(device: Device, surface_mask: NDArray[np.bool_]) -> Texture:
+def _zero_light_texture(device: Device, surface_mask: NDArray[np.bool_]) -> Texture:
     """Return a black texture with one texel per cell of the atlas; alpha is 1 where `surface_mask` is set."""
     light = np.zeros((*surface_mask.shape, 4), np.float32)
     light[..., 3] = surface_mask

@@ -56,7 +56,7 @@ def pair_positions_mm(memo: Memo, request: FrameRequest) -> Floats | None:
     most `MAX_SHARED_PAIR_STRAIN`.
     """
     positions = request.rest_positions_mm
-    if positions is None or request.is_shared:
+    if positions is None or request.has_shared_mesh:
         return None
-    gauge = memo.get(StrainGauge, request.topology)
+    gauge = memo.get(StrainGauge, request.atlas_head)
     return positions if gauge.strain(positions) > MAX_SHARED_PAIR_STRAIN else None

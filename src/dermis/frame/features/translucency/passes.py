@@ -9,7 +9,7 @@ from dermis.atlas.translucency.cells import Cells
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
-from dermis.frame.lights.records import with_oblique_constant
+from dermis.frame.lights.records import with_oblique_incidence_constant
 from dermis.frame.programs import program, workgroup_grid
 from dermis.gpu import Bindings, Buffer, ComputeProgram, Constants, Device, Recorder, Texture
 from dermis.optics.gaussians import MAX_GAUSSIANS
@@ -60,7 +60,7 @@ def draw_cell_points(
     """
     name, (buffer, count) = f"translucency/translucency_{cell_role}s.wgsl", cell_table
     shader = program(graph.device, name, (("FACETS", 1),) if metric_from_triangles else ())
-    record = shader.record("Cells", size=cells.size, side=cells.side, stride=cells.stride, count=count)
+    record = shader.make_record("Cells", size=cells.size, side=cells.side, stride=cells.stride, count=count)
     own: Bindings = {"cells": record, f"{cell_role}s": buffer, f"{cell_role}_points": point_buffer}
     graph.dispatch("pairs", shader, {**surface_bindings, **own}, workgroup_grid(count))
 
@@ -83,7 +83,7 @@ def draw(
     )
     halvings = blur.halvings[level]
     gather = program(device, "translucency/translucency_gather.wgsl")
-    record = gather.record(
+    record = gather.make_record(
         "Entering",
         layer=level - levels.first[halvings],
         sources=pairs.sources[1],
@@ -115,13 +115,13 @@ def draw_direction_factors(
     constants : pipeline constants of the lights
     """
     shader = program(
-        graph.device, "translucency/translucency_directions.wgsl", with_oblique_constant(constants)
+        graph.device, "translucency/translucency_directions.wgsl", with_oblique_incidence_constant(constants)
     )
     count = translucency.pairs.sources[1]
     bindings: Bindings = {
         **layout.bindings,
         "surfaces": layout.surfaces,
-        "source_count": shader.record("SourceCount", sources=count),
+        "source_count": shader.make_record("SourceCount", sources=count),
         "source_points": translucency.source_points,
         "direction_factors": translucency.direction_factors,
     }
@@ -216,7 +216,7 @@ def pair_weight_bindings(
     """
     gaussian = np.zeros((MAX_GAUSSIANS, 4), np.float32)
     gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
-    record = _weights_program(device, len(weight), thickness_tables is not None).record(
+    record = _weights_program(device, len(weight), thickness_tables is not None).make_record(
         "PairProfile",
         reach_mm=1.0 if thickness_tables is None else thickness_tables.max_thickness_mm,
         radius_mm=pair_buffers.cells.radius_mm,

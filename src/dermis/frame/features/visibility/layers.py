@@ -36,7 +36,9 @@ _TARGET_WORKGROUP_COUNT = (
     2048  # number of workgroups that occupy a GPU; for large meshes each takes more triangles
 )
 _TRIANGLES_PER_WORKGROUP_RANGE = (8, 128)  # least and most triangles of a workgroup of visibility_buffer.wgsl
-_CONSECUTIVE_TRIANGLES = 16  # consecutive triangles per workgroup of a mesh with many small triangles
+_CONSECUTIVE_TRIANGLES_PER_WORKGROUP = (
+    16  # consecutive triangles per workgroup of a mesh with many small triangles
+)
 _WORKGROUPS_PER_ROW = 32768
 _TILE_PIXELS = (64, 32)  # width and height of a tile, as in tiles.wgsl
 _RECORD_DEPTH, _RECORD_TRIANGLE, _RECORD_BOTH = 0, 1, 2  # modes of visibility_buffer.wgsl: what it records
@@ -104,7 +106,7 @@ def draw_layers(
     if layers.nearness is not None:
         _draw_with_compute_pass(graph, stage_name, layers, views, head)
     else:
-        _draw_with_rasteriser(graph, stage_name, layers, views.sample_matrices(layers.size), head)
+        _draw_with_rasteriser(graph, stage_name, layers, views.clip_matrices_of_samples(layers.size), head)
 
 
 def draw(graph: Recorder, visibility_layers: ViewLayers, views: Views, head: HeadGeometry) -> None:
@@ -139,11 +141,11 @@ def _make_raster_layers(
 ) -> ViewLayers:
     name = "visibility buffer" if store_triangles else "shadow maps"
 
-    def make_layered_texture(texel: str, layer_count: int) -> tuple[Texture, list[TextureView]]:
+    def make_layered_texture(texel_format: str, layer_count: int) -> tuple[Texture, list[TextureView]]:
         texture = make_texture(
             device,
             layer_size,
-            texel,
+            texel_format,
             layer_count=max(2, layer_count),
             content_source="raster",
             texture_name=name,
@@ -251,7 +253,7 @@ def _raster_program(device: Device, store_triangles: bool, has_cutouts: bool) ->
 def _views_record(
     shader: Program, layers: ViewLayers, clip_matrices: Matrix, head: HeadGeometry
 ) -> UniformRecord:
-    record = shader.record("Views", triangles=head.triangles)
+    record = shader.make_record("Views", triangles=head.triangles)
     record["width"], record["height"] = layers.size
     record["clip"][: len(clip_matrices)] = clip_matrices.swapaxes(1, 2)
     return record
@@ -295,7 +297,7 @@ def _divide_triangles_into_workgroups(
     )
     many = per_group == most  # meshes of many triangles have small ones
     threads = 256 if many or sample_count > 1 else 128
-    run, small = (_CONSECUTIVE_TRIANGLES, 32) if many else (1, 16)
+    run, small = (_CONSECUTIVE_TRIANGLES_PER_WORKGROUP, 32) if many else (1, 16)
     constants = ("TRIANGLES", per_group), ("RUN", run), ("SMALL", small), ("THREADS", threads)
     return constants, -(-triangle_count // per_group)
 

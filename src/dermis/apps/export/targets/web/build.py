@@ -20,7 +20,7 @@ from dermis.apps.export.targets.web.maps import (
 from dermis.apps.export.targets.web.packing import ByteRunCollector
 from dermis.apps.export.targets.web.sliders import Slider, slider_frame_changes, slider_frame_inputs
 from dermis.frame.capture import ADAPTER_KINDS, capture_frame, capture_renderer, reduce_hair
-from dermis.frame.features.shading.view import pinhole
+from dermis.frame.features.shading.view import world_space_pinhole
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.renderer import Renderer
 from dermis.gpu.capture import FrameCapture
@@ -265,7 +265,7 @@ def _interaction_json(scene: Scene, frame_inputs: FrameInputs) -> Json:
     The JSON also contains the points of the head's outline, around which the page fits shadow maps.
     """
     camera, settings = scene.camera, frame_inputs.settings
-    projection, outline = pinhole(camera, scene.head, settings), scene.head.mesh.outline
+    projection, outline = world_space_pinhole(camera, scene.head, settings), scene.head.mesh.outline
     return {
         "centre": [*flat_tuple(scene.head.centre_mm)],
         "camera": {

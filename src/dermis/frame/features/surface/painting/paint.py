@@ -66,7 +66,7 @@ _PAINTED_MAP_NAMES = ("colour", "specular", "roughness")
 _FOLDING_VALUE_COUNT = FOLD_MOVEMENT_COUNT + 1  # numbers in `folding` of the shader: fold movements and flush
 
 
-def painting_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
+def painting_shader_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
     """Return the lists over which the shader preprocessor loops, such as the list of noises.
 
     It loops at `//#each` directives in painting shaders.
@@ -305,11 +305,11 @@ def draw_expression(
     """
     shader, side = program(graph.device, "surface/painting/expression.wgsl"), expression_maps.colour.size[0]
     folding = movement_strengths[:_FOLDING_VALUE_COUNT].reshape(2, 4)
-    record = shader.record(
+    record = shader.make_record(
         "Expression", folding=folding, pressed=movement_strengths[_FOLDING_VALUE_COUNT], side=side
     )
     graph.compute("maps", shader, expression_maps.bindings | {"expression": record}, (side, side))
-    graph.repeat(_fill_expression_maps, expression_maps)
+    graph.add_replayable(_fill_expression_maps, expression_maps)
 
 
 def _fill_expression_maps(graph: Recorder, expression_maps: ExpressionMaps) -> None:

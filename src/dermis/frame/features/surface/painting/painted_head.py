@@ -8,7 +8,7 @@ import numpy as np
 
 from dermis.base.errors import refuse
 from dermis.frame.features.surface.painting import paint
-from dermis.frame.features.surface.record import fill_eye
+from dermis.frame.features.surface.record import fill_eye_records
 from dermis.frame.programs import program
 from dermis.gpu import CommandList, Device, download, make_texture
 from dermis.human.skin.painted import MAX_SIDE, MIN_SIDE, PaintedMaps
@@ -27,8 +27,8 @@ def paint_eye(device: Device, look: EyeLook, picture_side: int = EYE_PICTURE_SID
     picture_side : side of the pictures [pixels]
     """
     shader = program(device, "surface/painting/eye_pictures.wgsl")
-    picture = shader.record("EyePicture", rim=UV_RADIUS_OF_BACK, falling=UV_DECAY_ANGLE_RADIANS)
-    fill_eye(picture["eye"], look)
+    picture = shader.make_record("EyePicture", rim=UV_RADIUS_OF_BACK, falling=UV_DECAY_ANGLE_RADIANS)
+    fill_eye_records(picture["eye"], look)
     textures = {
         name: make_texture(device, (picture_side, picture_side), "rgba32float")
         for name in ("colours", "normals")

@@ -61,7 +61,7 @@ class SearchPasses:
         shader_name : name of the shader in this folder, without its suffix
         """
         shader = program(self.device, f"translucency/pair_search/{shader_name}.wgsl", constants)
-        record = shader.record("Search", **self._parameters, count=invocation_count)
+        record = shader.make_record("Search", **self._parameters, count=invocation_count)
         self.commands.dispatch(
             "pair search", shader, {**bindings, "search": record}, workgroup_grid(invocation_count)
         )
@@ -73,7 +73,7 @@ class SearchPasses:
         words = np.frombuffer(self.device.handle.queue.read_buffer(buffer), np.uint32)
         return words[:word_count].astype(np.int64)
 
-    def upload_table(self, *columns: NDArray[np.integer]) -> Buffer:
+    def upload_columns(self, *columns: NDArray[np.integer]) -> Buffer:
         """Upload integer columns as a table of 32-bit words; an empty table becomes one row of zeros."""
         return upload_words(self.device, *columns)
 
@@ -122,13 +122,13 @@ def find_tile_pairs(passes: SearchPasses, surface_bindings: Bindings, cells: Cel
     device, count = passes.device, cells.tiles_per_side**2
     tiles, counts = make_element_buffer(device, count, _TILE_BOUNDS_BYTES), make_element_buffer(device, count)
     bindings = {"tiles": tiles, "block_pairs": _find_block_pairs(passes, surface_bindings, cells, tiles)}
-    every_tile = passes.upload_table(np.arange(count), np.zeros(count, np.int64))
+    every_tile = passes.upload_columns(np.arange(count), np.zeros(count, np.int64))
     passes.add_pass("tile_pairs", count, {**bindings, "queries": every_tile, "partners": counts})
     partner_count = passes.submit_and_read(counts, count)
     tile = np.flatnonzero(partner_count)
     first = list_offsets(partner_count[tile])
     partners = make_element_buffer(device, int(first[-1]))
-    bindings |= {"queries": passes.upload_table(tile, first[:-1]), "partners": partners}
+    bindings |= {"queries": passes.upload_columns(tile, first[:-1]), "partners": partners}
     passes.add_pass("tile_pairs", len(tile), bindings, (("LISTED", 1),))
     return TilePairs(tiles, tile, first, partners)
 
@@ -147,8 +147,8 @@ def _find_block_pairs(
     bounds = make_element_buffer(passes.device, blocks, _TILE_BOUNDS_BYTES)
     block_pairs = make_element_buffer(passes.device, words)
     triangles = {
-        "triangle_first": passes.upload_table(cells.triangle_first),
-        "triangles": passes.upload_table(cells.triangles),
+        "triangle_first": passes.upload_columns(cells.triangle_first),
+        "triangles": passes.upload_columns(cells.triangles),
     }
     passes.add_pass("tiles", cells.tiles_per_side**2, {**surface_bindings, **triangles, "tiles": tile_bounds})
     passes.add_pass("blocks", blocks, {"tiles": tile_bounds, "blocks": bounds})
@@ -242,8 +242,8 @@ def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple
     unused = np.zeros(len(candidates.receiver), np.int64)
     ranges = candidates.sources_first, candidates.sources_end
     bindings = {
-        "receiver_ranges": passes.upload_table(candidates.first, candidates.end, word[:-1], unused),
-        "source_ranges": passes.upload_table(*ranges),
+        "receiver_ranges": passes.upload_columns(candidates.first, candidates.end, word[:-1], unused),
+        "source_ranges": passes.upload_columns(*ranges),
     }
     return bindings, int(word[-1])
 
@@ -266,7 +266,7 @@ def list_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, 
         end = cells.gutter_copy_first[begin + np.minimum(x + 1, side - 1) + 1]
         ranges += [first, np.where(within, end, first)]
     copies = make_element_buffer(passes.device, _MAX_GUTTER_COPIES * len(source_cells))
-    resources = {**bindings, "rows": passes.upload_table(*ranges), "copies": copies}
+    resources = {**bindings, "rows": passes.upload_columns(*ranges), "copies": copies}
     passes.add_pass("gutter_copies", len(source_cells), resources)
     return copies
 
@@ -329,7 +329,7 @@ def search_pairs(device: Device, surface_bindings: Bindings, cells: Cells) -> Pa
     pair_count = passes.submit_and_read(counts, count)
     if _PAIR_BYTES * pair_count.sum() > device.max_storage_bytes:
         return None
-    gutters = passes.upload_table(*cells.gutter_copies.T)
+    gutters = passes.upload_columns(*cells.gutter_copies.T)
     gutter_copy_bindings = {**points, "reach_map": surface_bindings["reach_map"], "gutters": gutters}
     return _make_pair_table(passes, cells, candidates, pair_count, hit_bindings, gutter_copy_bindings)
 
@@ -349,18 +349,18 @@ def _make_pair_table(
     gutter_copy_bindings : resources that gutter_copies.wgsl and offsets.wgsl share
     """
     device, sources, first = passes.device, len(candidates.source), list_offsets(pair_count)
-    count, first_pair = int(first[-1]), passes.upload_table(first)
+    count, first_pair = int(first[-1]), passes.upload_columns(first)
     pairs, used = make_element_buffer(device, count, _PAIR_BYTES), make_element_buffer(device, sources)
     passes.add_pass(
         "pairs", len(pair_count), {**hit_bindings, "first": first_pair, "pairs": pairs, "used": used}
     )
     is_receiver, is_source = pair_count > 0, passes.submit_and_read(used, sources) > 0
     chosen = np.flatnonzero(is_source)
-    copy_bindings = {**gutter_copy_bindings, "queries": passes.upload_table(chosen)}
+    copy_bindings = {**gutter_copy_bindings, "queries": passes.upload_columns(chosen)}
     bindings = {
         **gutter_copy_bindings,
-        "receiver_index": passes.upload_table(np.cumsum(is_receiver) - is_receiver),
-        "source_index": passes.upload_table(np.cumsum(is_source) - is_source),
+        "receiver_index": passes.upload_columns(np.cumsum(is_receiver) - is_receiver),
+        "source_index": passes.upload_columns(np.cumsum(is_source) - is_source),
         "copies": list_gutter_copies(passes, cells, candidates.source[chosen], copy_bindings),
         "pairs": pairs,
     }

@@ -15,18 +15,18 @@ from dermis.gpu import Bindings, Buffer, ComputeProgram, Constants, Device, Reco
 from dermis.scene.outputs import OUTPUTS
 
 _WORD_BYTES = 4  # size of a word [bytes]
-PlaneArray = NDArray[Any]  # callers know the dtype by the output's name
+OutputArray = NDArray[Any]  # callers know the dtype by the output's name
 """Array of an output: float32, int32 or uint8, see `OUTPUTS`."""
 
 
 @dataclass(frozen=True, eq=False)
-class Planes:
+class OutputImages:
     """Buffer for the outputs of a shader: one image after another, with interleaved channels.
 
     stage : name of the shader that fills the buffer
     channels : number of channels of each output, in the order of the buffer
     size : (width, height) [pixel]
-    buffer : one word per pixel and channel, see planes.wgsl
+    buffer : one word per pixel and channel, see output_images.wgsl
     """
 
     stage: str
@@ -48,7 +48,7 @@ class Planes:
         plane = _WORD_BYTES * self.size[0] * self.size[1]
         return plane * self._first_channels()[output_name], plane * self.channels[output_name]
 
-    def decode_outputs(self, buffer_bytes: NDArray[np.uint8]) -> dict[str, PlaneArray]:
+    def decode_outputs(self, buffer_bytes: NDArray[np.uint8]) -> dict[str, OutputArray]:
         """Return each output as an (h, w) or (h, w, channels) array.
 
         buffer_bytes : bytes of the whole buffer
@@ -59,14 +59,14 @@ class Planes:
             for name, (start, size) in ranges.items()
         }
 
-    def decode_output(self, output_name: str, output_bytes: NDArray[np.uint8]) -> PlaneArray:
+    def decode_output(self, output_name: str, output_bytes: NDArray[np.uint8]) -> OutputArray:
         """Return one output as an (h, w) or (h, w, channels) array.
 
         output_bytes : bytes of the buffer in the range that `byte_range` returns
         """
         output, (width, height) = OUTPUTS[output_name], self.size
         kind = np.dtype(output.kind).kind
-        words: PlaneArray = output_bytes.view({"f": np.float32, "i": np.int32, "u": np.uint32}[kind])
+        words: OutputArray = output_bytes.view({"f": np.float32, "i": np.int32, "u": np.uint32}[kind])
         shape = (height, width) if output.channels == 1 else (height, width, self.channels[output_name])
         return words.reshape(shape).astype(output.kind, copy=False)
 
@@ -78,12 +78,12 @@ class Planes:
         return firsts
 
 
-def make_planes(
+def make_output_images(
     device: Device,
     stage_name: str,
     channel_counts: tuple[tuple[str, int], ...],
     picture_size: tuple[int, int],
-) -> Planes:
+) -> OutputImages:
     """Allocate the buffer for the outputs of a shader, for a picture of size (width, height).
 
     stage_name : name of the shader that fills the buffer
@@ -99,7 +99,7 @@ def make_planes(
         refuse(
             "size", f"{limit} at once from {device.adapter.name}", actual, "Ask for fewer, or a smaller one"
         )
-    return Planes(
+    return OutputImages(
         stage_name,
         dict(channel_counts),
         picture_size,
@@ -107,22 +107,24 @@ def make_planes(
     )
 
 
-def stage_program(device: Device, output_planes: Planes, constants: Constants = ()) -> ComputeProgram:
+def stage_program(device: Device, output_images: OutputImages, constants: Constants = ()) -> ComputeProgram:
     """Return the program that computes the requested outputs of a shader.
 
-    output_planes : buffer of these outputs
+    output_images : buffer of these outputs
     constants : pipeline constants of the surface and the lights, for shaders that need them
     """
     return program(
-        device, f"outputs/{output_planes.stage}.wgsl", (*output_planes.first_channel_constants, *constants)
+        device, f"outputs/{output_images.stage}.wgsl", (*output_images.first_channel_constants, *constants)
     )
 
 
-def draw_planes(graph: Recorder, output_planes: Planes, shader: ComputeProgram, bindings: Bindings) -> None:
+def draw_output_images(
+    graph: Recorder, output_images: OutputImages, shader: ComputeProgram, bindings: Bindings
+) -> None:
     """Declare the pass that computes the outputs of a shader for each pixel.
 
-    output_planes : buffer to fill with the outputs
+    output_images : buffer to fill with the outputs
     shader : program that computes the outputs
     bindings : resources of the shader, apart from the buffer for the outputs
     """
-    graph.compute("outputs", shader, {**bindings, "planes": output_planes.buffer}, output_planes.size)
+    graph.compute("outputs", shader, {**bindings, "output_images": output_images.buffer}, output_images.size)

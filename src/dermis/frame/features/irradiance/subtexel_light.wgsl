@@ -4,7 +4,7 @@
 struct Fine {
     count: u32, // number of levels, 0 for none
     texel_variance: f32, // of the filter of light on the atlas [texels^2]
-    relit_mm2: f32, // variance of the Gaussian that is relit [mm^2]
+    unblurred_mm2: f32, // variance of the unblurred Gaussian [mm^2]
     //#fill level: array<vec4f, {fine_levels}>, // weight, variance [mm^2]
 }
 
@@ -27,8 +27,8 @@ fn texel_axes(triangle: u32, a: Corner, b: Corner, c: Corner, side: f32) -> Texe
 }
 
 // Scattered irradiance minus its value on the atlas.
-// relit : weight of the Gaussian that is relit
-fn light_finer_than_texels(point: Point, surface: Surface, axes: TexelAxes, fine: Fine, relit: vec3f, side: vec2f) -> vec3f {
+// unblurred_weight : weight of the unblurred Gaussian
+fn light_finer_than_texels(point: Point, surface: Surface, axes: TexelAxes, fine: Fine, unblurred_weight: vec3f, side: vec2f) -> vec3f {
     var sum = vec3f(0.0);
     let f = fract(point.atlas_uv * side - 0.5);
     var i = 0u;
@@ -44,14 +44,14 @@ fn light_finer_than_texels(point: Point, surface: Surface, axes: TexelAxes, fine
             if (HALF_SPACE) {
                 entering *= relative_reflectance(cosine);
             }
-            sum += entering * stripe_finer_than_texels(light, point, axes, fine, relit, f);
+            sum += entering * stripe_finer_than_texels(light, point, axes, fine, unblurred_weight, f);
         }
         i++;
     }
     return sum;
 }
 
-fn stripe_finer_than_texels(light: Light, point: Point, axes: TexelAxes, fine: Fine, relit: vec3f, f: vec2f) -> vec3f {
+fn stripe_finer_than_texels(light: Light, point: Point, axes: TexelAxes, fine: Fine, unblurred_weight: vec3f, f: vec2f) -> vec3f {
     let here = dot(point.position - light.position, light.half_u);
     let step = vec2f(dot(axes.u, light.half_u), dot(axes.v, light.half_u));
     let along = light.half_u - dot(light.half_u, point.normal) * point.normal;
@@ -60,7 +60,7 @@ fn stripe_finer_than_texels(light: Light, point: Point, axes: TexelAxes, fine: F
     let texel = fine.texel_variance * dot(step, step);
     let first = here - dot(f, step);
     let w = bilinear_weights(f);
-    var sum = relit * (stripe_across(here, seen + fine.relit_mm2 * per_mm2) - stripe_across(here, seen));
+    var sum = unblurred_weight * (stripe_across(here, seen + fine.unblurred_mm2 * per_mm2) - stripe_across(here, seen));
     var k = 0u;
     loop {
         let level = fine.level[k];
