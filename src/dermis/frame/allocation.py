@@ -235,13 +235,11 @@ def _make_layout(
         )
     if request.has_occlusion:
         inputs = bindings, textures.resources["atlas"]
-        hair = request.head.hair if settings.strands else None
         occlusion = cached(
             cached_occlusion_map,
             device,
             head,
             atlas,
-            hair,
             untracked_arguments=inputs,
             caller_name=layout_key,
         )

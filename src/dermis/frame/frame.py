@@ -35,8 +35,10 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
         draw_expression(graph, resources.expression_maps, inputs.face_movements)
     area_lights = ("SHAPES", 1) in inputs.light_constants
     shadows.draw(graph, resources.shadow_maps, inputs.shadow_views, resources.head, area_lights)
+    hair_geometry = resources.shape.shape, resources.head
     if resources.hair:
-        hair.draw_shadows(graph, resources.hair, resources.shape.shape, inputs.shadow_views, bindings)
+        has_sky = ("ENVIRONMENT", 1) in inputs.light_constants
+        hair.draw_shadows(graph, resources.hair, hair_geometry, inputs.shadow_views, bindings, has_sky)
     if resources.sky and inputs.sky_view:
         maps = [(layout, layout.occlusion) for layout in inputs.layouts]
         occlusion.draw(graph, resources.sky, *inputs.sky_view, maps)
@@ -54,8 +56,7 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
     shared, triangles = (bindings, view, inputs.light_constants), resources.visibility.texture
     if resources.hair:
         labels = outputs.hair_label_bindings(graph, resources.outputs, stage_inputs)
-        geometry = resources.shape.shape, resources.head
-        radiance = hair.draw(graph, resources.hair, geometry, shared, triangles, radiance, labels)
+        radiance = hair.draw(graph, resources.hair, hair_geometry, shared, triangles, radiance, labels)
     post.draw(graph, resources.post, inputs.settings, radiance, *shared, triangles)
     outputs.draw(graph, resources.outputs, stage_inputs)
 

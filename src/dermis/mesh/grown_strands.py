@@ -11,7 +11,7 @@ from dermis.base.arrays import Doubles, Ints
 from dermis.mesh.groom import GUIDE_KNOTS, Groom
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Roots, Strands, hair_cover_of_points, offsets_in_frames, root_frames
+from dermis.mesh.strands import Roots, Strands, offsets_in_frames, root_frames
 
 UInt32s = NDArray[np.uint32]
 MAX_EXPORTED_STRANDS = 40_000
@@ -68,19 +68,6 @@ def hair_strands(head: Head, points_mm: NDArray[np.floating] | None = None) -> S
     if head.hair is None:
         return None
     return grow_strands(head.hair, head.mesh, head.mesh.points_mm if points_mm is None else points_mm)
-
-
-def hair_cover(groom: Groom, mesh: Mesh) -> Doubles:
-    """Return the projected area of the hair rooted around each mesh point (p,), per area of skin [-]."""
-    index = _growing_root_indices(groom, len(groom.roots))
-    part = groom.parameters[groom.roots.part[index]]
-    strand_number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
-    length = part["guide_mm"] * _length_fractions(
-        groom, index, part, strand_number, _heights_above_hairline(groom, index)
-    )
-    roots = groom.roots.roots
-    kept = Roots(roots.quad.take(index), roots.position.take(index, axis=0))
-    return hair_cover_of_points(mesh, kept, 2.0 * part["radius_mm"] * np.minimum(length, _COVERING_LENGTH_MM))
 
 
 def mean_hair_absorptance(groom: Groom) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Ints
 from dermis.base.summary import ShortRepr
-from dermis.mesh.geometry import cross_columns, dot_columns, triangle_areas
+from dermis.mesh.geometry import cross_columns, dot_columns
 from dermis.mesh.mesh import Mesh
 
 _MIN_LENGTH_MM = 1e-9
@@ -107,25 +107,6 @@ def quad_weights(bilinear_position: NDArray[np.floating]) -> Doubles:
     """
     s, t = bilinear_position.astype(np.float64).T
     return np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
-
-
-def hair_cover_of_points(mesh: Mesh, roots: Roots, area_mm2: Doubles) -> Doubles:
-    """Return the projected area of the strands rooted around each mesh point (p,), per area of skin [-].
-
-    The projected area is that seen from above the skin. Because hair is inclined, it is taken as half the
-    area seen from the side. All of it is assigned to the corners of the root's quad, although the strand also
-    covers other skin.
-
-    area_mm2 : (n,) area of each strand seen from the side [mm2]
-    """
-    area = 0.5 * area_mm2
-    corners, weights = quad_corners(mesh, roots.quad), quad_weights(roots.position)
-    count = len(mesh.points_mm)
-    hair = np.bincount(corners.ravel(), (weights * area[:, None]).ravel(), minlength=count)
-    points = mesh.point[mesh.triangles]
-    thirds = np.repeat(triangle_areas(mesh.points_mm[points].astype(np.float64)) / 3.0, 3)
-    skin = np.bincount(points.ravel(), thirds, minlength=count)
-    return np.asarray(hair / np.maximum(skin, 1e-9))
 
 
 def root_frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:

@@ -79,12 +79,13 @@ def spectral_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_N
     The wavelengths are `WAVELENGTHS_NM`. The parameters and the grid are those of `colour_table`.
     """
     epidermis, dermis = dj2006_layers(parameters, np.linspace(0.0, 1.0, node_count) ** 2)
+    dermis, thickness_mm = _with_axis(dermis, 0), parameters.epidermis_mm
     mismatch = boundary_mismatch(SKIN_ETA, "exact")
-    rows = [
-        solve_two_layers(_with_axis(epidermis, 1, rows), parameters.epidermis_mm, _with_axis(dermis, 0), mismatch)
+    spectra = [
+        solve_two_layers(_with_axis(epidermis, 1, rows), thickness_mm, dermis, mismatch)
         for rows in np.array_split(np.arange(node_count), -(-node_count // _TABLE_ROWS_PER_BATCH))
     ]
-    return np.asarray((1.0 - normal_reflectance(SKIN_ETA)) * np.concatenate(rows))
+    return np.asarray((1.0 - normal_reflectance(SKIN_ETA)) * np.concatenate(spectra))
 
 
 def _with_axis(layer: Layer, axis: int, rows: NDArray[np.int64] | None = None) -> Layer:

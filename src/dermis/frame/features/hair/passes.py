@@ -10,11 +10,13 @@ import numpy as np
 
 from dermis.frame.features.hair.resources import (
     KNOTS_PER_BOUNDS_WORKGROUP,
+    SKY_CELLS,
     TILE_SIDE_PIXELS,
     Resources,
     StrandCounts,
     StrandTables,
     drawn_strand_counts,
+    sky_cell_count,
 )
 from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.frame.features.shape.shape import Shape
@@ -42,16 +44,29 @@ _CROWDED_TILE_SEGMENT_RATIO = (
     14.0  # ratio of the number of segments in a crowded tile to the mean of all tiles
 )
 _CLEARING_WORKGROUP_COUNT = 256
+_SKY_CELLS_PER_WORKGROUP = 2
 _SHADOW_RAY_STRIDE = 4  # one of four rays to an area light is traced: pictures change by 0.0002 at most
 
 
 def draw_shadows(
-    graph: Graph, strands: Resources, shape: Shape, shadow_views: Views, lighting_bindings: Bindings
+    graph: Graph,
+    strands: Resources,
+    geometry: tuple[Shape, HeadGeometry],
+    shadow_views: Views,
+    lighting_bindings: Bindings,
+    has_environment: bool,
 ) -> None:
-    """Declare the passes that move the hair with the skin, and fill the deep opacity maps for its shadows."""
-    graph.add_replayable(pose_guides, strands.tables, shape)
-    if len(shadow_views.clips):
-        _draw_deep_opacity(graph, strands, shape, lighting_bindings)
+    """Declare the passes that move the hair with the skin, and compute the shadows of the hair.
+
+    The shadows are the deep opacity maps of lights, and the grid of sky transmittance for an environment.
+
+    geometry : current shape of the head, and its vertices and triangles
+    """
+    graph.add_replayable(pose_guides, strands.tables, geometry[0])
+    if len(shadow_views.clips) or has_environment:
+        _draw_deep_opacity(graph, strands, geometry[0], lighting_bindings)
+    if has_environment:
+        _draw_sky_transmittance(graph, strands, geometry[1], lighting_bindings)
 
 
 def pose_guides(graph: Recorder, strand_tables: StrandTables, shape: Shape) -> None:
@@ -118,6 +133,22 @@ def _draw_deep_opacity(
     graph.dispatch("strands", windows, bindings, (max(1, -(-knots // KNOTS_PER_BOUNDS_WORKGROUP)), 1, 1))
     for adds_cover in (0, 1):
         _dispatch_hair(graph, "hair/strands_shadow.wgsl", bindings, segments, (("ADDS_COVER", adds_cover),))
+
+
+def _draw_sky_transmittance(
+    graph: Recorder, strands: Resources, head: HeadGeometry, lighting_bindings: Bindings
+) -> None:
+    """Declare the passes that compute the grid of sky transmittance from the strands that cast shadows."""
+    tables = strands.tables
+    bindings: MutableBindings = {**lighting_bindings, **head.resources, "posed": tables.buffers.casters}
+    bindings |= {"hairs": tables.hairs_record(tables.casters), "opacity": strands.shadows}
+    segments = tables.fine.total_segment_count() + tables.casters.total_segment_count()
+    _dispatch_hair(graph, "hair/sky_strands.wgsl", bindings, segments)
+    triangles = (("TRIANGLES", head.triangles),)
+    _dispatch_hair(graph, "hair/sky_head.wgsl", bindings, head.triangles, triangles)
+    march = program(graph.device, "hair/sky_transmittance.wgsl")
+    rows = -(-sky_cell_count() // (SKY_CELLS[0] * _SKY_CELLS_PER_WORKGROUP))
+    graph.dispatch("strands", march, bindings, (SKY_CELLS[0], rows, 1))
 
 
 def draw(

@@ -13,6 +13,7 @@ from dermis.frame.features.surface.record import DEFAULT_COLOUR
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Buffer, Constants, Device, Memo, Texture, UniformRecord, make_texture
 from dermis.mesh.groom import GUIDE_ANCHORS, GUIDE_KNOTS, Groom, Guides, StrandRoots
+from dermis.mesh.grown_strands import mean_hair_absorptance
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Strands, quad_corners, quad_weights
@@ -30,6 +31,9 @@ DEEP_OPACITY_LAYERS = 6
 """Number of depth intervals of a deep opacity map, each with the cover of the hair within it."""
 DEEP_OPACITY_HEADER_WORDS = 8
 """Number of words that precede the texels of each light's deep opacity map."""
+SKY_CELLS = 24, 32, 24
+"""Number of cells of the grid of sky transmittance, along x, y and z, see strand_sky.wgsl."""
+_SKY_HEADER_WORDS, _SKY_CELL_WORDS = 6, 5
 _SEGMENT_LINKS_PER_KNOT = 4
 _MAX_SEGMENT_LINKS = 1 << 22
 # Steps to which capacities for fine strands and for knots are rounded up, so that most heads share them.
@@ -54,7 +58,9 @@ _ROOT_DTYPE = np.dtype(
     [*_ROOT_MEMBERS, ("place", "f4", 4), ("clump", "u4"), ("part", "u4"), ("along_mm", "f4"), ("pad", "u4")]
 )
 _HAIR_COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
-_HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _HAIR_COUNT_MEMBERS), ("width_scale", "f4")])
+_HAIRS_DTYPE = np.dtype(
+    [*((name, "u4") for name in _HAIR_COUNT_MEMBERS), ("width_scale", "f4"), ("absorptance", "f4")]
+)
 
 
 class StrandDetail(NamedTuple):
@@ -223,9 +229,18 @@ def segment_lists_per_tile(device: Device, tile_count: int) -> int:
 
 
 def make_deep_opacity_maps(device: Device, light_count: int) -> Buffer:
-    """Allocate a buffer for the deep opacity maps of strands, one map for each of `light_count` lights."""
+    """Allocate a buffer for the shadows of strands.
+
+    It holds the grid of sky transmittance, then a deep opacity map for each of `light_count` lights.
+    """
     texels = (1 + DEEP_OPACITY_LAYERS) * DEEP_OPACITY_WIDTH**2 // 2
-    return _make_word_buffer(device, (DEEP_OPACITY_HEADER_WORDS + texels) * max(1, light_count))
+    sky_words = _SKY_HEADER_WORDS + _SKY_CELL_WORDS * sky_cell_count()
+    return _make_word_buffer(device, sky_words + (DEEP_OPACITY_HEADER_WORDS + texels) * max(1, light_count))
+
+
+def sky_cell_count() -> int:
+    """Return the number of cells of the grid of sky transmittance."""
+    return int(np.prod(SKY_CELLS))
 
 
 def placeholder_strand_shadows(device: Device) -> Buffer:
@@ -278,6 +293,7 @@ class StrandTables:
     shortest_mm : length of the shorter of the two, at least 1 [mm]
     width_mm : width of one strand of the longer of the two [mm]
     cover : projected area of hair per area of skin, where the longer of the two grows [-]
+    absorptance : fraction of diffuse light that a hair absorbs, mean of all colours [-]
     """
 
     strands: Buffer
@@ -294,6 +310,7 @@ class StrandTables:
     shortest_mm: float
     width_mm: float
     cover: float
+    absorptance: float
 
     def hairs_record(self, coarse_counts: StrandCounts) -> UniformRecord:
         """Return the numbers of strands as a uniform record of the struct Hairs in strand_knots.wgsl.
@@ -308,6 +325,7 @@ class StrandTables:
             self.fine.knots,
             coarse_counts.knots,
             width_scale,
+            self.absorptance,
         )
         return np.array(values, _HAIRS_DTYPE)
 
@@ -335,8 +353,10 @@ def shader_constants() -> dict[str, float]:
         "strand_window_words": DEEP_OPACITY_HEADER_WORDS,
         "strand_window_knots": KNOTS_PER_BOUNDS_WORKGROUP,
     }
+    sky: dict[str, float] = {f"sky_cells_{axis}": n for axis, n in zip("xyz", SKY_CELLS, strict=True)}
+    sky |= {"sky_head_words": _SKY_HEADER_WORDS, "sky_cell_words": _SKY_CELL_WORDS}
     guides = {"guide_anchors": GUIDE_ANCHORS, "guide_knots": GUIDE_KNOTS}
-    return {"strand_tile": TILE_SIDE_PIXELS, **opacity, **words, **guides, **hair_constants()}
+    return {"strand_tile": TILE_SIDE_PIXELS, **opacity, **words, **sky, **guides, **hair_constants()}
 
 
 def has_strands(head: Head, settings: Settings) -> bool:
@@ -402,6 +422,7 @@ def make_strand_tables(
         shortest_mm=1.0 if parts is None else max(1.0, float(parts["length_mm"].min(initial=500.0))),
         width_mm=0.0 if largest is None else 2.0 * float(largest["radius_mm"]),
         cover=0.0 if largest is None else float(largest["cover"]),
+        absorptance=1.0 if hair is None else mean_hair_absorptance(hair),
     )
 
 

@@ -11,6 +11,7 @@ struct Hairs {
     fine_knots: u32, // knots per strand
     coarse_knots: u32,
     width_scale: f32, // factor of the width of coarse strands, so that they cover the area of all
+    absorptance: f32, // fraction of diffuse light that a hair absorbs, mean of all colours
 }
 
 @group(0) @binding(41) var<uniform> hairs: Hairs;

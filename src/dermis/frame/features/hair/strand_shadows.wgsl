@@ -50,6 +50,57 @@ fn strand_cover(light: Light, p: vec3f) -> f32 {
     return mix(mix(a, b, f.x), mix(c, d, f.x), f.y);
 }
 
+// Transmittances of hair as linear functions of direction, see sky_transmittance.wgsl.
+struct SkyTransmittance {
+    hair: vec4f, // past hair alone
+    all: vec4f, // past hair and head
+}
+
+fn sky_transmittance_of(cell: vec3u) -> SkyTransmittance {
+    let word = transmittance_word(sky_cell_index(cell));
+    let hair = vec4f(unpack2x16float(strand_shadows[word]), unpack2x16float(strand_shadows[word + 1u]));
+    let all = vec4f(unpack2x16float(strand_shadows[word + 2u]), unpack2x16float(strand_shadows[word + 3u]));
+    return SkyTransmittance(hair, all);
+}
+
+fn sky_grid() -> SkyGrid {
+    let low = vec3u(strand_shadows[0], strand_shadows[1], strand_shadows[2]);
+    let high = vec3u(strand_shadows[3], strand_shadows[4], strand_shadows[5]);
+    return make_sky_grid(low, high);
+}
+
+// Transmittances at a point; positions outside the grid are moved to its border.
+fn sky_transmittance_at(grid: SkyGrid, p: vec3f) -> SkyTransmittance {
+    let last = vec3f(SKY_CELLS) - 1.0;
+    let at = clamp((p - grid.low) / grid.cell - 0.5, vec3f(0.0), last);
+    let low = min(vec3u(at), SKY_CELLS - 2u);
+    let f = at - vec3f(low);
+    var sum = SkyTransmittance(vec4f(0.0), vec4f(0.0));
+    for (var k = 0u; k < 8u; k += 1u) {
+        let corner = vec3u(k & 1u, (k >> 1u) & 1u, k >> 2u);
+        let w = mix(1.0 - f, f, vec3f(corner));
+        let one = sky_transmittance_of(low + corner);
+        sum.hair += w.x * w.y * w.z * one.hair;
+        sum.all += w.x * w.y * w.z * one.all;
+    }
+    return sum;
+}
+
+// Fraction of the light of the sky that hair transmits to a surface. The transmittance is read below the surface, so that
+// directions from there pass through the whole layer of hair on it.
+// mean_direction: mean of the unit vectors of the directions from which light is collected
+fn sky_past_hair(p: vec3f, normal: vec3f, mean_direction: vec3f) -> f32 {
+    if (!STRANDS) {
+        return 1.0;
+    }
+    let grid = sky_grid();
+    if (any(grid.cell <= vec3f(0.0))) {
+        return 1.0;
+    }
+    let hair = sky_transmittance_at(grid, p - grid.cell * normal).hair;
+    return clamp(hair.w + dot(hair.xyz, mean_direction), 0.0, 1.0);
+}
+
 // Fraction of a light that strands transmit to a point.
 fn strand_transmittance(light: Light, p: vec3f) -> f32 {
     return exp(-strand_cover(light, p));

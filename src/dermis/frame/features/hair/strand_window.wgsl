@@ -1,6 +1,7 @@
 // Deep opacity map of each light: the cover by strands in several layers of depth, within the window of the light's shadow map
 // that contains all strands. Source: [YukselKeyser2008].
 //#include "lights.wgsl"
+//#include "strand_sky.wgsl"
 
 //#fill const STRAND_WINDOW: u32 = {strand_window}; // texels across, half as many down
 //#fill const WINDOW_HEAD: u32 = {strand_window_words}; // words of a light before its texels: bounds of the strands
@@ -48,7 +49,7 @@ fn make_window(low: vec3u, high: vec3u) -> Window {
 
 // Index of the first word of a light's map.
 fn first_word(layer: i32) -> u32 {
-    return u32(layer) * (WINDOW_HEAD + TEXEL_WORDS * STRAND_WINDOW * STRAND_WINDOW / 2u);
+    return sky_words() + u32(layer) * (WINDOW_HEAD + TEXEL_WORDS * STRAND_WINDOW * STRAND_WINDOW / 2u);
 }
 
 fn texel_word(layer: i32, texel: vec2u) -> u32 {

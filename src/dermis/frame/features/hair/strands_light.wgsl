@@ -11,7 +11,6 @@ const HORIZON_WIDTH: f32 = 0.2; // half-width of the soft horizon of the skin, a
 const HORIZON_DROP: f32 = 0.3; // amount by which the horizon sinks per millimetre of height above the skin, as a cosine
 const REFLECTION_ROUGHNESS: f32 = 0.7; // roughness of the reflection of the environment by strands
 const SKY_WIDTH: f32 = 0.5; // half-width of the transition from skin to sky at the horizon, as a cosine
-const DIFFUSIVITY: f32 = 1.66; // path of diffuse light through a plane layer relative to the thickness of the layer, on average
 const BACKSCATTER_DENSITY: f32 = 0.7; // density factor of backscattering by the strands behind, as published
 const WIDE_VARIANCE: f32 = 0.3; // longitudinal variance of light that other strands have scattered
 const HEAD_MM: f32 = 85.0; // radius of a head
@@ -29,7 +28,6 @@ struct Knot {
     eye: vec3f, // unit
     depth: vec3f, // optical depth of a radius
     height: f32, // above the skin at the root [mm]
-    above: f32, // cover by hair farther from the skin
     below: f32, // cover by hair nearer to the skin
 }
 
@@ -43,7 +41,7 @@ fn knot_at(hair: u32, k: u32) -> Knot {
     let cover = posed[row + 1u].w;
     let along_strand = f32(k) / f32(knots_of(hair) - 1u);
     let eye = normalize(strand_view.eye - here.xyz);
-    return Knot(here.xyz, posed[row].xyz, along, eye, depth, height, cover * (1.0 - along_strand), cover * along_strand);
+    return Knot(here.xyz, posed[row].xyz, along, eye, depth, height, cover * along_strand);
 }
 
 // Component of a direction across a fibre, as a unit vector.
@@ -77,13 +75,20 @@ fn light_visibility(light: Light, knot: Knot, l: vec3f) -> f32 {
     return above_horizon(knot, l) * visibility(light, point, l);
 }
 
-// Mean radiance around a direction: of the sky through the hair above, and from below the horizon of the skin.
-fn environment_around(direction: vec3f, knot: Knot, below: vec3f, through: vec3f) -> vec3f {
-    let up = smoothstep(-SKY_WIDTH, SKY_WIDTH, dot(direction, knot.normal));
+// Fraction of diffuse light that passes through hair, by colour. passing: the same for the mean of all colours
+fn tinted(passing: f32, absorbed: vec3f) -> vec3f {
+    return pow(vec3f(clamp(passing, 1e-6, 1.0)), absorbed / max(hairs.absorptance, 1e-3));
+}
+
+// Mean radiance around a direction: of the sky through other hair, and of the skin. sky: transmittances at the knot; below:
+// radiance of the skin; absorbed: fraction of light that a hair absorbs
+fn environment_around(direction: vec3f, knot: Knot, sky: SkyTransmittance, below: vec3f, absorbed: vec3f) -> vec3f {
     if (!ENVIRONMENT) {
-        return (1.0 - up) * below;
+        return (1.0 - smoothstep(-SKY_WIDTH, SKY_WIDTH, dot(direction, knot.normal))) * below;
     }
-    return mix(below, through * reflection(direction, REFLECTION_ROUGHNESS), up);
+    let from_sky = sky.all.w + dot(sky.all.xyz, direction);
+    let from_skin = sky.hair.w + dot(sky.hair.xyz, direction) - from_sky;
+    return tinted(from_sky, absorbed) * reflection(direction, REFLECTION_ROUGHNESS) + max(from_skin, 0.0) * below;
 }
 
 // Fraction of light that the strands behind a strand scatter back. Source: [Zinke2008] equations 14 to 16.
@@ -124,14 +129,17 @@ fn radiance_of(knot: Knot) -> vec3f {
         total += e * wide * (scattered * (forth + back) + (direct + scattered) * 2.0 * returned);
         skin_irradiance += e * (direct + scattered) * max(dot(l, knot.normal), 0.0);
     }
-    let through = exp(-DIFFUSIVITY * knot.above * (1.0 - forth - back));
+    let absorbed = 1.0 - forth - back;
+    var sky = SkyTransmittance(vec4f(0.0), vec4f(0.0));
     if (ENVIRONMENT) {
-        skin_irradiance += through * panorama_at(knot.normal, 0u);
+        sky = sky_transmittance_at(sky_grid(), knot.position);
+        let past_hair = clamp(sky.all.w + COSINE_MEAN * dot(sky.all.xyz, knot.normal), 0.0, 1.0);
+        skin_irradiance += tinted(past_hair, absorbed) * panorama_at(knot.normal, 0u);
     }
     let below = skin_irradiance / PI * mix(strand_view.skin, dense_hair_reflectance(forth + back), dense);
     let cone = sqrt(max(1.0 - sin_o * sin_o, 0.0)) * side;
-    let behind = environment_around(cone - sin_o * knot.along, knot, below, through);
-    let ahead = environment_around(-cone - sin_o * knot.along, knot, below, through);
+    let behind = environment_around(cone - sin_o * knot.along, knot, sky, below, absorbed);
+    let ahead = environment_around(-cone - sin_o * knot.along, knot, sky, below, absorbed);
     total += (albedo.reflected + albedo.internal) * behind + albedo.transmitted * ahead;
     return total + albedo.residual * 0.5 * (behind + ahead);
 }

@@ -16,6 +16,8 @@ override SKIPS_UNLIT: bool = false;
 
 const MIN_OBLIQUE_COSINE: f32 = -0.75; // least cosine of oblique light at the point where it enters
 
+const COSINE_MEAN: f32 = 0.6667; // length of the mean of all directions above a surface, weighted by their cosines
+
 struct Lit {
     entered: vec3f, // irradiance that enters the skin, times its reflectance relative to normal incidence
     reflected: vec3f, // radiance reflected by the surface
@@ -73,6 +75,14 @@ fn total_visibility(light: Light, point: Point, l: vec3f) -> f32 {
     return visibility(light, point, l) * strand_transmittance(light, point.position);
 }
 
+// Fraction of the light of the sky that hair transmits to a point, see `sky_past_hair`; 1 without occlusion.
+fn sky_past_hair_at(point: Point, mean_direction: vec3f) -> f32 {
+    if (environment.occluded == 0u) {
+        return 1.0;
+    }
+    return sky_past_hair(point.position, point.normal, mean_direction);
+}
+
 // Irradiance that enters from the environment and from other skin. With interreflection, the fit of `ambient` to the light from
 // other skin is left out.
 fn ambient_entering(point: Point, surface: Surface, open: f32) -> vec3f {
@@ -81,6 +91,7 @@ fn ambient_entering(point: Point, surface: Surface, open: f32) -> vec3f {
     if (ENVIRONMENT) {
         let albedo = select(surface.colour * environment.albedo, vec3f(0.0), has_cells);
         entering = ambient(surface.normal, open, albedo) * enters_uniform(surface.roughness, surface.rho_s);
+        entering *= sky_past_hair_at(point, COSINE_MEAN * point.normal);
     }
     if (has_cells) {
         // with occlusion, cells give only the brightness of the occluded part
@@ -157,7 +168,7 @@ fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f
         //#if PARTS
         albedo = mix(albedo, 1.0, metalness);
         //#end
-        lit.reflected += albedo * mirrored(point, mirror, v, surface.roughness, open);
+        lit.reflected += albedo * mirrored(point, mirror, v, surface.roughness, open) * sky_past_hair_at(point, mirror);
     }
     return lit;
 }

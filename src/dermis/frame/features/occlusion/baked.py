@@ -20,23 +20,16 @@ from dermis.gpu import (
     Device,
     Texture,
     UniformRecord,
-    download,
     make_texture,
 )
 from dermis.gpu.textures import texture_from_array
 from dermis.mesh.geometry import fibonacci_sphere
-from dermis.mesh.groom import Groom
-from dermis.mesh.grown_strands import hair_cover, mean_hair_absorptance
 from dermis.mesh.head import Head
-from dermis.mesh.mesh import Mesh
 
 SKY_DIRECTION_COUNT = 128
 """Number of directions from which a depth map of the head is drawn."""
 DEPTH_MAP_SIDE = 512
 """Side of a depth map [texels]."""
-DIFFUSIVITY_FACTOR = 1.66
-"""Path of diffuse light through a plane layer relative to its thickness, on average; also in
-strands_light.wgsl."""
 OCCLUSION_CACHE_VERSION = f"1 {SKY_DIRECTION_COUNT} {DEPTH_MAP_SIDE}"
 """Version of baked maps on disk; change it when baking gives other results."""
 _DEPTH_MAPS_PER_BATCH = 32  # number of depth maps that are drawn at a time
@@ -138,13 +131,11 @@ def cached_occlusion_map(
     device: Device,
     head: Head,
     atlas: Atlas,
-    hair: Groom | None,
     bindings: Bindings,
     surface_texels: Texture,
 ) -> Texture:
     """Return a texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
 
-    hair : hair of the head, which hides a part of the sky from the skin below it
     bindings : resources that lighting shaders read; the geometry and the lights among them are replaced by
         those of the bake
     surface_texels : texture that maps each atlas texel to a surface point
@@ -159,37 +150,7 @@ def cached_occlusion_map(
 
     integers = cached_occlusion(head.mesh, atlas, f"{OCCLUSION_CACHE_VERSION} {side}", bake_as_integers)
     visible = integers / np.float32(65535.0)
-    if hair is not None and len(hair):
-        visible = visible * _hair_transmittance(head.mesh, hair, download(device, surface_texels), side)
     return texture_from_array(device, visible, "r32float")
-
-
-def _hair_transmittance(
-    mesh: Mesh, hair: Groom, packed_texels: NDArray[np.uint32], result_side: int
-) -> NDArray[np.float32]:
-    """Return the fraction of the sky's light that passes through the hair to each point of the skin [-].
-
-    Scalp hair and beard are modelled as a plane layer over the roots, which absorbs some of the diffuse
-    light and scatters the rest towards the skin. The points are ordered as in the result of
-    `fill_occlusion_gaps`: rows of texels, then vertices.
-
-    packed_texels : (s, s, 2) words of the atlas texels: triangle index plus 1, and packed barycentric weights
-    result_side : side of the atlas in the result [texels]
-    """
-    absorbed = mean_hair_absorptance(hair)
-    passing = np.exp(-DIFFUSIVITY_FACTOR * absorbed * hair_cover(hair, mesh))[mesh.point].astype(np.float32)
-    rows = ((np.arange(result_side) + 0.5) * len(packed_texels) / result_side).astype(int)
-    chosen = packed_texels[np.ix_(rows, rows)]
-    corners, triangle = passing[mesh.triangles], chosen[..., 0].astype(np.int64) - 1
-    is_hairy = np.asarray((corners < 1.0).any(axis=1))
-    covered = (triangle >= 0) & is_hairy[triangle]
-    b, c = ((chosen[covered, 1] >> shift & 0xFFFF).astype(np.float32) / 65535.0 for shift in (0, 16))
-    first, second, third = corners[triangle[covered]].T
-    atlas = np.ones(chosen.shape[:2], np.float32)
-    atlas[covered] = first * (1.0 - b - c) + second * b + third * c
-    rest = np.ones(-(-len(passing) // result_side) * result_side, np.float32)
-    rest[: len(passing)] = passing
-    return np.vstack([atlas, atlas[-1:], rest.reshape(-1, result_side)]).astype(np.float32)
 
 
 def placeholder_occlusion(device: Device) -> Texture:

@@ -1,0 +1,76 @@
+// Marches from each cell of the grid of strand_sky.wgsl in directions all around, and fits linear functions of direction to the
+// transmittances: T(d) = c0 + c . d.
+//#include "sky_grid.wgsl"
+
+const DIRECTIONS: u32 = 32u;
+const CELLS: u32 = 2u; // of a workgroup
+const RANDOM_CYLINDER: f32 = 0.7854; // mean extinction of a cylinder in all orientations, relative to its length times width
+
+var<workgroup> of_hair: array<array<vec4f, DIRECTIONS>, CELLS>;
+var<workgroup> of_all: array<array<vec4f, DIRECTIONS>, CELLS>;
+
+// Direction of a Fibonacci lattice on the sphere.
+fn direction_at(k: u32) -> vec3f {
+    let z = 1.0 - (2.0 * f32(k) + 1.0) / f32(DIRECTIONS);
+    let turn = 2.3999632 * f32(k);
+    return vec3f(sqrt(1.0 - z * z) * vec2f(cos(turn), sin(turn)), z);
+}
+
+// Transmittance past hair alone, and past hair and head.
+fn march(grid: SkyGrid, cell: vec3u, direction: vec3f) -> vec2f {
+    let step = min(grid.cell.x, min(grid.cell.y, grid.cell.z));
+    let absorption = RANDOM_CYLINDER * hairs.absorptance / (AREA_SCALE * grid.cell.x * grid.cell.y * grid.cell.z);
+    let forward = step * direction / grid.cell;
+    var at = vec3f(cell) + 0.5;
+    var depth = 0.0;
+    var open = 1.0;
+    var length = 0.5; // of the first step, from the middle of the cell
+    var k = 0u;
+    loop {
+        if (!in_grid(at)) {
+            break;
+        }
+        let content = atomicLoad(&opacity[content_word(sky_cell_index(vec3u(at)))]);
+        depth += length * step * absorption * f32(content & ~HEAD_FLAG);
+        if (k > 1u && (content & HEAD_FLAG) != 0u) {
+            open = 0.0;
+        }
+        length = 1.0;
+        at += forward;
+        k++;
+    }
+    let passing = exp(-depth);
+    return vec2f(passing, open * passing);
+}
+
+@compute @workgroup_size(DIRECTIONS, CELLS)
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_id) id: vec3u) {
+    let index = (group.y * groups.x + group.x) * CELLS + id.y;
+    let grid = sky_grid();
+    let cell = vec3u(index % SKY_CELLS.x, index / SKY_CELLS.x % SKY_CELLS.y, index / (SKY_CELLS.x * SKY_CELLS.y));
+    let inside = index < sky_cell_count() && all(grid.cell > vec3f(0.0));
+    var passing = vec2f(1.0);
+    let direction = direction_at(id.x);
+    if (inside) {
+        passing = march(grid, cell, direction);
+    }
+    of_hair[id.y][id.x] = passing.x * vec4f(3.0 * direction, 1.0);
+    of_all[id.y][id.x] = passing.y * vec4f(3.0 * direction, 1.0);
+    for (var step = DIRECTIONS / 2u; step > 0u; step /= 2u) {
+        workgroupBarrier();
+        if (id.x < step) {
+            of_hair[id.y][id.x] += of_hair[id.y][id.x + step];
+            of_all[id.y][id.x] += of_all[id.y][id.x + step];
+        }
+    }
+    workgroupBarrier();
+    if (inside && id.x == 0u) {
+        let word = transmittance_word(index);
+        let hair = of_hair[id.y][0] / f32(DIRECTIONS);
+        let all = of_all[id.y][0] / f32(DIRECTIONS);
+        atomicStore(&opacity[word], pack2x16float(hair.xy));
+        atomicStore(&opacity[word + 1u], pack2x16float(hair.zw));
+        atomicStore(&opacity[word + 2u], pack2x16float(all.xy));
+        atomicStore(&opacity[word + 3u], pack2x16float(all.zw));
+    }
+}

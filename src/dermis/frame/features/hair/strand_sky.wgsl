@@ -1,0 +1,44 @@
+// Grid of the transmittance of hair in all directions, for light of the sky. It fills a box around all strands, and precedes the
+// deep opacity maps of the lights in their buffer. In each cell, transmittance is a linear function of direction.
+
+//#fill const SKY_CELLS: vec3u = vec3u({sky_cells_x}u, {sky_cells_y}u, {sky_cells_z}u);
+//#fill const SKY_HEAD: u32 = {sky_head_words}; // words before the cells: bounds of the strands, as in strand_window.wgsl
+//#fill const SKY_CELL_WORDS: u32 = {sky_cell_words}; // words of a cell: its content, then its transmittances
+
+const HEAD_FLAG: u32 = 0x80000000u; // of the content of a cell through which a triangle passes; the rest is area of strands
+const AREA_SCALE: f32 = 16.0; // integer of an area of 1 mm2
+
+// Box around all strands.
+struct SkyGrid {
+    low: vec3f, // [mm]
+    cell: vec3f, // size of a cell [mm], 0 without strands
+}
+
+fn sky_cell_count() -> u32 {
+    return SKY_CELLS.x * SKY_CELLS.y * SKY_CELLS.z;
+}
+
+// Words before the first deep opacity map.
+fn sky_words() -> u32 {
+    return SKY_HEAD + SKY_CELL_WORDS * sky_cell_count();
+}
+
+// Box with a margin of a cell on each side. low, high: bounds of all strands as `sortable` integers
+fn make_sky_grid(low: vec3u, high: vec3u) -> SkyGrid {
+    let first = from_sortable(low);
+    let cell = max(from_sortable(high) - first, vec3f(0.0)) / vec3f(SKY_CELLS - 2u);
+    return SkyGrid(first - cell, cell);
+}
+
+fn sky_cell_index(cell: vec3u) -> u32 {
+    return (cell.z * SKY_CELLS.y + cell.y) * SKY_CELLS.x + cell.x;
+}
+
+fn content_word(index: u32) -> u32 {
+    return SKY_HEAD + index;
+}
+
+// First of the four words with the transmittances of a cell: past hair alone, then past hair and head.
+fn transmittance_word(index: u32) -> u32 {
+    return SKY_HEAD + sky_cell_count() + 4u * index;
+}
