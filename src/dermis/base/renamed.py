@@ -18,6 +18,8 @@ from typing import Any, ParamSpec, TypeVar, cast
 RENAMED_OBJECTS: Mapping[str, str] = {
     "profile": "side",
     "scene.profile": "scene.side",
+    "apps.truths.lights.CYCLES": "apps.truths.lights.CYCLES_LIGHTS",
+    "apps.truths.lights.MITSUBA": "apps.truths.lights.MITSUBA_LIGHTS",
     "apps.inverse.unmixing.unmix.Change": "apps.inverse.unmixing.unmix.PigmentChange",
     "apps.inverse.unmixing.unmix.Share": "apps.inverse.unmixing.unmix.FractionChange",
 }

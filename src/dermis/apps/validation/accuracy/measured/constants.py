@@ -161,18 +161,18 @@ def fit_constants(
     """
     separate = [UNKNOWNS[name] for name in unknowns]
     shared = [CONSTANTS[name] for name in free_constants]
-    z = np.array([one.coordinate(dict(fixed_constants or {}).get(one.name, one.start)) for one in shared])
+    z = np.array([one.scaled_value(dict(fixed_constants or {}).get(one.name, one.start)) for one in shared])
 
-    def constants_at(coordinates: Floats) -> dict[str, float]:
+    def constants_from(scaled_values: Floats) -> dict[str, float]:
         values = {
-            one.name: float(one.parameter_values(coordinates[i : i + 1])[0]) for i, one in enumerate(shared)
+            one.name: float(one.parameter_values(scaled_values[i : i + 1])[0]) for i, one in enumerate(shared)
         }
         return dict(fixed_constants or {}) | values
 
     def fit_unknowns(
-        coordinates: Floats, start_fit: SpectralFit | None, iteration_count: int
+        scaled_values: Floats, start_fit: SpectralFit | None, iteration_count: int
     ) -> tuple[SpectralFit, Floats]:
-        model = extended_model(constants_at(coordinates))
+        model = extended_model(constants_from(scaled_values))
         first = None if start_fit is None else start_fit.values
         found = invert_spectra(spectra, model, separate, criterion, first, iteration_count)
         return found, found.weighted_residual(criterion).ravel()
@@ -191,8 +191,8 @@ def fit_constants(
             step = np.clip(np.linalg.solve(H + damping * np.diag(np.diag(H) + 1e-12), g), -0.7, 0.7)
             trial = np.clip(
                 z + step,
-                [one.coordinate(one.low) for one in shared],
-                [one.coordinate(one.high) for one in shared],
+                [one.scaled_value(one.low) for one in shared],
+                [one.scaled_value(one.high) for one in shared],
             )
             trial_fit, trial_r = fit_unknowns(trial, fit, 2 * _UNKNOWN_ITERATIONS)
             if trial_r @ trial_r < r @ r:
@@ -204,7 +204,7 @@ def fit_constants(
         z, fit, r, damping = trial, trial_fit, trial_r, 0.3 * damping
         if gain < _MIN_ERROR_REDUCTION:
             break
-    return SharedFit(constants_at(z), fit, _confounded_pairs(free_constants, H))
+    return SharedFit(constants_from(z), fit, _confounded_pairs(free_constants, H))
 
 
 def _confounded_pairs(

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from dermis.apps.inverse.unmixing.spectral_inversion import (
-    FIVE_UNKNOWNS,
-    THREE_UNKNOWNS,
-    TWO_UNKNOWNS,
+    PIGMENT_AND_OXYGEN_UNKNOWNS,
+    PIGMENT_UNKNOWNS,
+    TISSUE_UNKNOWNS,
     UNKNOWNS,
     ParameterValues,
     SpectralFit,
@@ -137,19 +137,23 @@ def _default_skin_errors(archive: Archive) -> JsonObject:
     subsets = {"all": np.ones(len(archive.spectra), bool), "cheek and forehead": face}
     results: JsonObject = {}
     for name, skin in skins.items():
-        two, three = (fit_skin(archive.spectra, n, "colour", skin) for n in (TWO_UNKNOWNS, THREE_UNKNOWNS))
-        five = fit_skin(archive.spectra, FIVE_UNKNOWNS, "spectrum", skin)
+        two, three = (
+            fit_skin(archive.spectra, n, "colour", skin)
+            for n in (PIGMENT_UNKNOWNS, PIGMENT_AND_OXYGEN_UNKNOWNS)
+        )
+        five = fit_skin(archive.spectra, TISSUE_UNKNOWNS, "spectrum", skin)
         two_spectra, three_spectra = (
-            fit_skin(archive.spectra, n, "spectrum", skin) for n in (TWO_UNKNOWNS, THREE_UNKNOWNS)
+            fit_skin(archive.spectra, n, "spectrum", skin)
+            for n in (PIGMENT_UNKNOWNS, PIGMENT_AND_OXYGEN_UNKNOWNS)
         )
         results[name] = {
             label: {
                 "two": _percentiles(two.delta_e()[chosen]),
                 "above_2": float((two.delta_e()[chosen] > 2.0).mean()),
                 "three": _percentiles(three.delta_e()[chosen]),
-                "rms_two": _percentiles(two_spectra.rms[chosen]),
-                "rms_three": _percentiles(three_spectra.rms[chosen]),
-                "rms_five": _percentiles(five.rms[chosen]),
+                "rms_two": _percentiles(two_spectra.rms_residual[chosen]),
+                "rms_three": _percentiles(three_spectra.rms_residual[chosen]),
+                "rms_five": _percentiles(five.rms_residual[chosen]),
             }
             for label, chosen in subsets.items()
         }
@@ -219,7 +223,7 @@ def _implausible_fit_fractions(archive: Archive) -> JsonObject:
     The keys are "none" for a fitted oxygenation of 0, "all" for an oxygenation of 1, and "unmatched" for fits
     that do not reproduce the measured colour.
     """
-    fit = fit_skin(archive.spectra, THREE_UNKNOWNS, "colour")
+    fit = fit_skin(archive.spectra, PIGMENT_AND_OXYGEN_UNKNOWNS, "colour")
     oxygen = fit.values["oxygen"]
     return {
         "none": float((oxygen <= _OXYGEN_LIMIT_TOLERANCE).mean()),
@@ -248,7 +252,7 @@ def _category_errors(
     for category in categories:
         chosen = category_by_spectrum == category
         medians = [float(np.median(one.delta_e()[chosen])) for one in (two_unknown_fit, three_unknown_fit)]
-        rows.append([int(chosen.sum()), *medians, float(np.median(five_unknown_fit.rms[chosen]))])
+        rows.append([int(chosen.sum()), *medians, float(np.median(five_unknown_fit.rms_residual[chosen]))])
     return rows
 
 
@@ -271,19 +275,22 @@ def _fold_errors(archive: Archive) -> list[JsonObject]:
     for fold in range(FOLD_COUNT):
         known = archive.select_rows(archive.fold != fold).sample_rows(_CONSTANTS_SAMPLE_COUNT, fold)
         held = archive.select_rows(archive.fold == fold)
-        spectral = fit_constants(known.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
-        colour = fit_constants(known.spectra, TWO_UNKNOWNS, ("oxygen",), "colour", spectral.constants)
+        spectral = fit_constants(known.spectra, PIGMENT_AND_OXYGEN_UNKNOWNS, ("baseline", "epidermis_mm"))
+        colour = fit_constants(known.spectra, PIGMENT_UNKNOWNS, ("oxygen",), "colour", spectral.constants)
         skin = replace(DEFAULT_SKIN, **colour.constants | {"oxygen": min(1.0, colour.constants["oxygen"])})
         row: JsonObject = {"constants": colour.constants, "people": len(held.spectra)}
         for label, one in (("fitted", skin), ("default", DEFAULT_SKIN)):
-            two, three = (fit_skin(held.spectra, n, "colour", one) for n in (TWO_UNKNOWNS, THREE_UNKNOWNS))
-            five = fit_skin(held.spectra, FIVE_UNKNOWNS, "spectrum", one)
+            two, three = (
+                fit_skin(held.spectra, n, "colour", one)
+                for n in (PIGMENT_UNKNOWNS, PIGMENT_AND_OXYGEN_UNKNOWNS)
+            )
+            five = fit_skin(held.spectra, TISSUE_UNKNOWNS, "spectrum", one)
             face = np.isin(held.site, CHEEK_AND_FOREHEAD)
             row[label] = {
                 "two": float(np.median(two.delta_e())),
                 "two_face": float(np.median(two.delta_e()[face])),
                 "three": float(np.median(three.delta_e())),
-                "five": float(np.median(five.rms)),
+                "five": float(np.median(five.rms_residual)),
             }
         rows.append(row)
     return rows
@@ -294,7 +301,7 @@ def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObjec
 
     bioskin : file of BioSkin's weights, see `bioskin_model`; None to leave out this model
     """
-    sets = (TWO_UNKNOWNS, THREE_UNKNOWNS, FIVE_UNKNOWNS)
+    sets = (PIGMENT_UNKNOWNS, PIGMENT_AND_OXYGEN_UNKNOWNS, TISSUE_UNKNOWNS)
 
     def model_errors(
         model: SpectralModel | None, skin: SkinParameters, unknown_sets: Sequence[Sequence[str]]
@@ -310,7 +317,7 @@ def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObjec
                     if model is None
                     else invert_spectra(archive.spectra, model, [known[n] for n in one], criterion)
                 )
-                error = fit.rms if criterion == "spectrum" else fit.delta_e()
+                error = fit.rms_residual if criterion == "spectrum" else fit.delta_e()
                 result[f"{criterion}_{len(one)}"] = _percentiles(error)
         return result
 
@@ -365,7 +372,7 @@ def _additional_constant_errors(archive_sample: Archive) -> list[JsonObject]:
     rows = []
     for name, free in _CONSTANTS_BY_ADDITION.items():
         row: JsonObject = {"name": name}
-        for label, unknowns in (("three", THREE_UNKNOWNS), ("five", FIVE_UNKNOWNS)):
+        for label, unknowns in (("three", PIGMENT_AND_OXYGEN_UNKNOWNS), ("five", TISSUE_UNKNOWNS)):
             shared = ("baseline", "epidermis_mm") if label == "three" else ("baseline",)
             if label == "five" and free == ("scattering",):
                 continue
@@ -388,8 +395,10 @@ def _site_fits(archive: Archive) -> list[JsonObject]:
     for site in range(len(SITES)):
         sample = archive.select_rows(archive.site == site).sample_rows(_SITE_SAMPLE_COUNT, site)
         fixed = {"baseline": DEFAULT_SKIN.baseline}
-        spectral = fit_constants(sample.spectra, THREE_UNKNOWNS, ("epidermis_mm",), fixed_constants=fixed)
-        colour = fit_constants(sample.spectra, TWO_UNKNOWNS, ("epidermis_mm", "oxygen"), "colour", fixed)
+        spectral = fit_constants(
+            sample.spectra, PIGMENT_AND_OXYGEN_UNKNOWNS, ("epidermis_mm",), fixed_constants=fixed
+        )
+        colour = fit_constants(sample.spectra, PIGMENT_UNKNOWNS, ("epidermis_mm", "oxygen"), "colour", fixed)
         oxygen = spectral.fit.values["oxygen"]
         rows.append(
             {
@@ -417,8 +426,8 @@ def _site_fold_errors(archive: Archive) -> JsonObject:
             held = here & (archive.fold == fold)
             sample = archive.select_rows(here & (archive.fold != fold)).sample_rows(_SITE_SAMPLE_COUNT, site)
             free = ("epidermis_mm", "oxygen")
-            constants = fit_constants(sample.spectra, TWO_UNKNOWNS, free, "colour", fixed).constants
-            unknowns = [UNKNOWNS[name] for name in TWO_UNKNOWNS]
+            constants = fit_constants(sample.spectra, PIGMENT_UNKNOWNS, free, "colour", fixed).constants
+            unknowns = [UNKNOWNS[name] for name in PIGMENT_UNKNOWNS]
             found = invert_spectra(archive.spectra[held], ExtendedModel(constants), unknowns, "colour")
             error[held] = found.delta_e()
     face = error[np.isin(archive.site, CHEEK_AND_FOREHEAD)]
@@ -451,13 +460,17 @@ def _edge_loss_errors(archive_sample: Archive) -> JsonObject:
             [1.0 - np.interp(archive_sample.spectra[:, k], seen[::-1, k], loss[::-1, k]) for k in range(31)],
             axis=-1,
         )
-        found = fit_constants(archive_sample.spectra / factor, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
+        found = fit_constants(
+            archive_sample.spectra / factor, PIGMENT_AND_OXYGEN_UNKNOWNS, ("baseline", "epidermis_mm")
+        )
         results[name] = {
             "loss": [one[name] for one in losses],
             "constants": found.constants,
             "rms": float(np.sqrt((found.fit.residual**2).mean())),
         }
-    uncorrected = fit_constants(archive_sample.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
+    uncorrected = fit_constants(
+        archive_sample.spectra, PIGMENT_AND_OXYGEN_UNKNOWNS, ("baseline", "epidermis_mm")
+    )
     results["uncorrected"] = {
         "constants": uncorrected.constants,
         "rms": float(np.sqrt((uncorrected.fit.residual**2).mean())),
