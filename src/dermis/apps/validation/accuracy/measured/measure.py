@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from cyclopts import Parameter
 
 from dermis.apps.inverse.unmixing.spectral_inversion import (
     PIGMENT_AND_OXYGEN_UNKNOWNS,
@@ -48,7 +50,7 @@ from dermis.optics.skin_spectra import two_layer_reflectance
 
 CHEEK_AND_FOREHEAD = SITES.index("cheek"), SITES.index("forehead")
 """Indices of the two facial sites that most people have."""
-FORMER_SKIN = replace(DEFAULT_SKIN, baseline=1.0, epidermis_mm=0.05, oxygen=0.75)
+PREVIOUS_DEFAULT_SKIN = replace(DEFAULT_SKIN, baseline=1.0, epidermis_mm=0.05, oxygen=0.75)
 """Default skin before it was compared with the archive."""
 _SPECTRA_SAMPLE_COUNT, _CONSTANTS_SAMPLE_COUNT = (
     1500,
@@ -64,7 +66,7 @@ _ERROR_PERCENTILES = 50.0, 95.0
 _DONNER_JENSEN_SKIN = SkinParameters(baseline=1.0, epidermis_mm=0.25, oxygen=0.75)
 _EDGE_LOSS_MELANIN = 0.01, 0.03, 0.1, 0.3
 _EDGE_LOSS_WAVELENGTHS_NM = np.arange(400.0, 701.0, 50.0)
-_CONSTANTS_BY_ADDITION: dict[str, tuple[str, ...]] = {
+_ADDED_CONSTANTS_BY_NAME: dict[str, tuple[str, ...]] = {
     "none": (),
     "scattering, both layers": ("scattering",),
     "scattering of the dermis": ("dermis",),
@@ -78,17 +80,20 @@ _CONSTANTS_BY_ADDITION: dict[str, tuple[str, ...]] = {
 }
 
 
-def measured(bioskin: Path | None = None, only: str | None = None) -> None:
+def fit_measured_spectra(
+    bioskin_weights: Annotated[Path | None, Parameter(name="--bioskin")] = None,
+    only_part: Annotated[str | None, Parameter(name="--only")] = None,
+) -> None:
     """Fit the spectral model of skin to all measured spectra, and write docs/measured.md.
 
     Takes ten minutes.
 
     Parameters
     ----------
-    only:
+    only_part:
         Part to measure again (models, surface, limits, folds, alternatives, additions, sites, site_folds or
         edge); the other parts keep their last results.
-    bioskin:
+    bioskin_weights:
         File pretrained_models/BioSkin.pt of facebookresearch/BioSkin; with it, BioSkin's decoder is also
         compared.
     """
@@ -98,24 +103,24 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
         "models": lambda: _default_skin_errors(archive),
         "surface": lambda: _smooth_surface_errors(archive),
         "limits": lambda: _implausible_fit_fractions(archive),
-        "folds": lambda: _fold_errors(archive),
+        "folds": lambda: _cross_validation_errors(archive),
         "alternatives": lambda: _published_model_errors(
-            archive.sample_rows(_SPECTRA_SAMPLE_COUNT, 2), bioskin
+            archive.sample_rows(_SPECTRA_SAMPLE_COUNT, 2), bioskin_weights
         ),
         "additions": lambda: _additional_constant_errors(archive.sample_rows(_CONSTANTS_SAMPLE_COUNT, 3)),
         "sites": lambda: _site_fits(archive),
-        "site_folds": lambda: _site_fold_errors(archive),
+        "site_folds": lambda: _site_cross_validation_errors(archive),
         "edge": lambda: _edge_loss_errors(archive.sample_rows(_CONSTANTS_SAMPLE_COUNT, 3)),
     }
-    results: JsonObject = {} if only is None else read_results(RESULT_FILE)
-    for name in parts if only is None else [only]:
+    results: JsonObject = {} if only_part is None else read_results(RESULT_FILE)
+    for name in parts if only_part is None else [only_part]:
         results[name] = parts[name]()
         print_lines(f"{name} measured")
     write_results(RESULT_FILE, results, digits=4)
     write_measured_page()
 
 
-def measured_page() -> None:
+def rewrite_measured_page() -> None:
     """Write docs/measured.md from the last measurement."""
     write_measured_page()
 
@@ -124,13 +129,14 @@ def _default_skin_errors(archive: Archive) -> JsonObject:
     """Return the errors of fits with two, three and five unknowns, for four choices of the fixed parameters.
 
     Fixed parameters are those that are not fitted. The keys name their values: "present" for those of the
-    default skin, "former" for those of `FORMER_SKIN`, the default skin of earlier versions; "half" and
-    "quarter" for those of `FORMER_SKIN` with a half and a quarter of the absorption by bloodless tissue.
+    default skin, "former" for those of `PREVIOUS_DEFAULT_SKIN`, the default skin of earlier versions; "half"
+    and "quarter" for those of `PREVIOUS_DEFAULT_SKIN` with a half and a quarter of the absorption by
+    bloodless tissue.
     """
     skins = {
-        "former": FORMER_SKIN,
-        "half": replace(FORMER_SKIN, baseline=0.5),
-        "quarter": replace(FORMER_SKIN, baseline=0.25),
+        "former": PREVIOUS_DEFAULT_SKIN,
+        "half": replace(PREVIOUS_DEFAULT_SKIN, baseline=0.5),
+        "quarter": replace(PREVIOUS_DEFAULT_SKIN, baseline=0.25),
         "present": DEFAULT_SKIN,
     }
     face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
@@ -264,7 +270,7 @@ def _illuminant_errors(fits_by_unknown_count: dict[str, SpectralFit]) -> JsonObj
     }
 
 
-def _fold_errors(archive: Archive) -> list[JsonObject]:
+def _cross_validation_errors(archive: Archive) -> list[JsonObject]:
     """Return one object for each fold of the cross-validation, with fitted constants and median errors.
 
     The measured people are divided into folds. For each fold, the constants are fitted to the spectra of the
@@ -296,10 +302,10 @@ def _fold_errors(archive: Archive) -> list[JsonObject]:
     return rows
 
 
-def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObject:
+def _published_model_errors(archive: Archive, bioskin_weights: Path | None) -> JsonObject:
     """Return fit errors of published models of skin, with two, three and five unknowns per spectrum.
 
-    bioskin : file of BioSkin's weights, see `bioskin_model`; None to leave out this model
+    bioskin_weights : file of BioSkin's weights, see `bioskin_model`; None to leave out this model
     """
     sets = (PIGMENT_UNKNOWNS, PIGMENT_AND_OXYGEN_UNKNOWNS, TISSUE_UNKNOWNS)
 
@@ -323,12 +329,12 @@ def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObjec
 
     results = {
         "present": model_errors(None, DEFAULT_SKIN, sets),
-        "former": model_errors(None, FORMER_SKIN, sets),
+        "former": model_errors(None, PREVIOUS_DEFAULT_SKIN, sets),
         "donner": model_errors(None, _DONNER_JENSEN_SKIN, sets),
-        "jacques": model_errors(_jacques_model, FORMER_SKIN, sets),
+        "jacques": model_errors(_jacques_model, PREVIOUS_DEFAULT_SKIN, sets),
     }
-    if bioskin is not None:
-        results["bioskin"] = model_errors(bioskin_model(bioskin), DEFAULT_SKIN, BIOSKIN_UNKNOWN_SETS)
+    if bioskin_weights is not None:
+        results["bioskin"] = model_errors(bioskin_model(bioskin_weights), DEFAULT_SKIN, BIOSKIN_UNKNOWN_SETS)
     return results
 
 
@@ -365,12 +371,12 @@ def _jacques_model(parameter_values: ParameterValues) -> Floats:
 def _additional_constant_errors(archive_sample: Archive) -> list[JsonObject]:
     """Return errors of fits in which one more constant of the skin model is fitted, such as carotene.
 
-    Each of the fits has a constant of `_CONSTANTS_BY_ADDITION`, which all spectra share. The fit named "none"
-    has none of these constants. The key "three" has the errors for three unknowns per spectrum, "five" those
-    for five.
+    Each of the fits has a constant of `_ADDED_CONSTANTS_BY_NAME`, which all spectra share. The fit named
+    "none" has none of these constants. The key "three" has the errors for three unknowns per spectrum, "five"
+    those for five.
     """
     rows = []
-    for name, free in _CONSTANTS_BY_ADDITION.items():
+    for name, free in _ADDED_CONSTANTS_BY_NAME.items():
         row: JsonObject = {"name": name}
         for label, unknowns in (("three", PIGMENT_AND_OXYGEN_UNKNOWNS), ("five", TISSUE_UNKNOWNS)):
             shared = ("baseline", "epidermis_mm") if label == "three" else ("baseline",)
@@ -412,7 +418,7 @@ def _site_fits(archive: Archive) -> list[JsonObject]:
     return rows
 
 
-def _site_fold_errors(archive: Archive) -> JsonObject:
+def _site_cross_validation_errors(archive: Archive) -> JsonObject:
     """Return colour errors of fits with two unknowns per spectrum and two constants per site of the body.
 
     The constants are the epidermis thickness and the oxygenation. The errors are cross-validated: the
