@@ -150,7 +150,13 @@ def test_without_mitsuba_there_is_no_reference(
 def test_progress_bar_ends_with_the_work(peers: Any) -> None:
     done: list[int] = []
     renderer = FakeRenderer()
-    rendering.render_peers(BALL, "front", peers.QUICK_SETTINGS, renderer, done.append)  # type: ignore[arg-type]
+    rendering.render_with_all_renderers(
+        BALL,
+        "front",
+        peers.QUICK_SETTINGS,
+        renderer,
+        done.append,  # type: ignore[arg-type]
+    )
     assert sum(done) == peers.QUICK_SETTINGS.progress_steps
     assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count(FRAGMENT_TECHNIQUE)
     assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count("screen-space")

@@ -103,7 +103,7 @@ class FrameTimes:
 
 
 @dataclass
-class PeerRenders:
+class SceneRenders:
     """Pictures and times of all renderers for one scene.
 
     light : name of the scene's light
@@ -125,13 +125,13 @@ class PeerRenders:
     reference_core_seconds: float
 
 
-def render_peers(
+def render_with_all_renderers(
     head: Head,
     light: str,
     comparison_settings: ComparisonSettings,
     renderer: Renderer,
     on_progress: Callable[[int], None] = lambda step_count: None,
-) -> PeerRenders:
+) -> SceneRenders:
     """Render a head under one light with all renderers.
 
     Frames of dermis are timed before, between and after the other renderers.
@@ -170,7 +170,7 @@ def render_peers(
         _time_frames(ours, renderer, scene, comparison_settings)
         on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
     complete = {method: turns for method, turns in cycles.items() if method not in left_out}
-    return PeerRenders(light, default_region(light), ours, complete, left_out, reference, core_seconds)
+    return SceneRenders(light, default_region(light), ours, complete, left_out, reference, core_seconds)
 
 
 def _cycles_passes(

@@ -18,7 +18,7 @@ from dermis.apps.truths.mitsuba_scene import load_mitsuba
 from dermis.apps.validation.comparisons.scenes import LIGHTS as SCENES
 from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, fill_page, write_results
 from dermis.apps.validation.peers.figures import scene_results
-from dermis.apps.validation.peers.rendering import ComparisonSettings, PeerRenders, render_peers
+from dermis.apps.validation.peers.rendering import ComparisonSettings, SceneRenders, render_with_all_renderers
 from dermis.base.atomic_write import check_output
 from dermis.base.console import note, print_lines, progress_bar
 from dermis.base.errors import DermisError, refuse
@@ -64,7 +64,7 @@ def write_peer_report(
         check_output(target, (".json",), "Choose such a name")
     comparison_settings = QUICK_SETTINGS if quick else ComparisonSettings()
     comparison_settings = comparison_settings if side is None else replace(comparison_settings, side=side)
-    report = compare_peers(head, lights.split(","), comparison_settings, adapter)
+    report = compare_renderers(head, lights.split(","), comparison_settings, adapter)
     machine, scenes = machine_text(report), scenes_text(report)
     if target is not None:
         write_results(target, report)
@@ -73,7 +73,7 @@ def write_peer_report(
     print_lines(machine, "", scenes)
 
 
-def compare_peers(
+def compare_renderers(
     head: str, lights: list[str], comparison_settings: ComparisonSettings, adapter: str
 ) -> JsonObject:
     """Render and compare all scenes, and return the report as a JSON object.
@@ -91,7 +91,7 @@ def compare_peers(
     except DermisError as fault:
         note(f"Cycles is skipped. {fault}")
     loaded, renderer = dermis.load_head(head, subdivide=0), dermis.Renderer(adapter)
-    scenes: list[PeerRenders] = []
+    scenes: list[SceneRenders] = []
     with progress_bar("measuring") as bar:
         done = 0
 
@@ -101,7 +101,8 @@ def compare_peers(
             bar(done, len(lights) * comparison_settings.progress_steps)
 
         scenes = [
-            render_peers(loaded, light, comparison_settings, renderer, advance_progress) for light in lights
+            render_with_all_renderers(loaded, light, comparison_settings, renderer, advance_progress)
+            for light in lights
         ]
     return {
         "date": date.today().isoformat(),
@@ -116,7 +117,7 @@ def compare_peers(
     }
 
 
-def software_versions(scene_renders: list[PeerRenders]) -> dict[str, str]:
+def software_versions(scene_renders: list[SceneRenders]) -> dict[str, str]:
     """Return the versions of Python, NumPy and all renderers, by name."""
     versions = {name: version(name) for name in ("dermis", "wgpu", "mitsuba", "numpy")}
     passes = [turns[0][0] for one in scene_renders for turns in one.cycles.values() if turns]
