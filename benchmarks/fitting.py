@@ -245,9 +245,13 @@ def _compared_with_truth(one: Case, found: FitResult) -> JsonObject:
     figures: JsonObject = {}
     for name in ("melanin", "blood", "roughness"):
         true = float(getattr(one, name))
-        figures[name] = {"true": true, "found": found.values[name], "relative_sd": found.uncertainty.sd[name]}
+        figures[name] = {
+            "true": true,
+            "found": found.skin_values[name],
+            "relative_sd": found.uncertainty.sd[name],
+        }
     sun_direction = found.suns[0][0]
-    figures["rho_s"] = found.values["rho_s"]
+    figures["rho_s"] = found.skin_values["rho_s"]
     figures["sun_degrees"] = float(np.degrees(np.arccos(np.clip(sun_direction @ one.towards, -1.0, 1.0))))
     figures["sun_share"] = one.sun
     return figures

@@ -20,8 +20,8 @@ from scipy.ndimage import gaussian_filter
 
 from dermis.apps.inverse.unmixing.device_unmixer import Unmixer
 from dermis.apps.inverse.unmixing.skin_model import (
+    ExtraUnknown,
     SkinModel,
-    ThirdUnknown,
     inverse_variances,
     skin_model,
     solve_pigments,
@@ -162,7 +162,7 @@ def model_error_cases() -> JsonObject:
     return results
 
 
-def _median_errors(third: ThirdUnknown, colours: Floats, m: Floats, b: Floats) -> dict[str, float]:
+def _median_errors(third: ExtraUnknown, colours: Floats, m: Floats, b: Floats) -> dict[str, float]:
     found = solve_pigments(skin_model(DEFAULT_SKIN, third), colours, NOISE)
     ratios = {"melanin": found.melanin / m, "blood": found.blood / b}
     left = delta_e_2000(colours, colours / found.residual)

@@ -11,7 +11,7 @@ Slider: mesh alone | with its maps
 from dataclasses import replace
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.scene.camera import cheek
 
 
@@ -24,4 +24,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

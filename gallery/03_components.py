@@ -9,7 +9,7 @@ Sources: Dudash2007, Tuchin2000
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 PARTS = {"reflected": "specular", "scattered": "diffuse", "both": "all"}
 
@@ -21,4 +21,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

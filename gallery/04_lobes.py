@@ -10,7 +10,7 @@ Columns: 5
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.scene.camera import cheek
 
 MODELS = ("phong", "blinn-phong", "torrance-sparrow", "kelemen", "two-lobe")
@@ -31,4 +31,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

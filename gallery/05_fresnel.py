@@ -12,7 +12,7 @@ import numpy as np
 
 import dermis
 from dermis.apps.gallery.panels import plot_panel
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.specular.fresnel import dielectric, schlick
 
 
@@ -20,7 +20,7 @@ def draw(studio):
     head = studio.head()
     skins = [dermis.Skin(fresnel=name) for name in ("schlick", "exact")]
     scenes = [dermis.Scene(head, camera=dermis.three_quarter(head), skin=skin) for skin in skins]
-    curve, exact = (studio.linear(scene) for scene in scenes)
+    curve, exact = (studio.render_linear(scene) for scene in scenes)
     heads = {"Schlick": curve, "exact": exact, "20 × |difference|": 20 * np.abs(exact - curve)}
     return {"reflectance by angle": plot_panel(curves)} | heads
 
@@ -36,4 +36,4 @@ def curves(axes):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 ALONE = {"parts": "specular", "exposure": 3}
 
@@ -37,4 +37,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

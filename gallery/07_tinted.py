@@ -9,7 +9,7 @@ Slider: white (correct) | tinted (wrong)
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 
 def draw(studio):
@@ -25,4 +25,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

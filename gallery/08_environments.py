@@ -10,7 +10,7 @@ Columns: 3
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 SEEN = {"background": "environment", "background_blur": 0.05}
 
@@ -27,4 +27,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

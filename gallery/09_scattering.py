@@ -8,7 +8,7 @@ Slider: dry and hard | scattered
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 
 def draw(studio):
@@ -24,4 +24,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -9,7 +9,7 @@ Sources: Jensen2001, DonnerJensen2005, dEonLuebke2007
 
 import dermis
 from dermis.apps.gallery.panels import plot_panel
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 MODELS = {"one layer (skin1)": ("skin1", "dipole"), "three layers (dj3)": ("dj3", "multipole")}
 INKS = ("#ff6b5e", "#58d68d", "#5dade2")
@@ -37,4 +37,4 @@ def curves(axes):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -11,7 +11,7 @@ Sources: DonnerJensen2005, Wang1995
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.apps.truths.slab_mc import monte_carlo_profile
 
 HALF_MM, EXPOSED_MM, PHOTONS = 4.0, 1.0, 400_000
@@ -35,4 +35,4 @@ def spot(counted, fitted, side):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

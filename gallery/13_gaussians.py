@@ -12,7 +12,7 @@ from functools import partial
 
 import dermis
 from dermis.apps.gallery.panels import plot_panel
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.optics.fits.gaussian import single_gaussian
 
 INKS = {"red": "#ff6b5e", "green": "#58d68d", "blue": "#5dade2"}
@@ -35,4 +35,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

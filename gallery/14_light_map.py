@@ -10,7 +10,7 @@ Sources: Borshukov2003, Green2004, dEonLuebke2007
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 LEVELS = {"light that enters": 0, "blurred, third level": 3, "blurred, widest level": 5}
 
@@ -21,4 +21,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -11,7 +11,7 @@ Columns: 4
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 VIEWS = ("irradiance", "blur 1", "blur 2", "blur 3", "blur 4", "blur 5", "diffuse", "picture")
 
@@ -21,8 +21,8 @@ def draw(studio):
     key = dermis.PointLight(position=(-620, 420, 620), irradiance=(3.4, 3.3, 3.1))
     near = dermis.portrait(head).model_copy(update={"target": (14.0, -28.0, 90.0), "frame_mm": 120.0})
     scene = dermis.Scene(head, lights=[key], camera=near)
-    return {view: studio.view(scene, view) for view in VIEWS}
+    return {view: studio.render_view(scene, view) for view in VIEWS}
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

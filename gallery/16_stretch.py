@@ -11,7 +11,7 @@ Columns: 4
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 MODES = {"uniform": "none", "corrected along u and v": "axes", "full metric": "full"}
 
@@ -25,8 +25,8 @@ def draw(studio):
     skin = dermis.Skin(profile="skin1", specular="none")
     scene = dermis.Scene(head, lights=stripes, camera=camera, skin=skin)
     panels = {name: studio.render(scene, stretch=mode, transmission="none") for name, mode in MODES.items()}
-    return panels | {"stretch": studio.view(scene, "stretch")}
+    return panels | {"stretch": studio.render_view(scene, "stretch")}
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

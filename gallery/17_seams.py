@@ -12,7 +12,7 @@ Columns: 6
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 TREATMENTS = ("none", "clear-colour", "stretch-map", "alpha", "multi-uv", "stitch")
 
@@ -23,10 +23,10 @@ def draw(studio):
     behind = dermis.Camera(position=(900, -200, -500), target=(52, -62, -28), frame_mm=105)
     skin = dermis.Skin(profile="skin1", specular="none")
     scene = dermis.Scene(head, lights=[light], camera=behind, skin=skin)
-    panels = {name: studio.linear(scene, 0.6, seams=name) for name in TREATMENTS}
+    panels = {name: studio.render_linear(scene, 0.6, seams=name) for name in TREATMENTS}
     right = panels["stitch"]
     return panels | {f"{name}: difference": 4 * np.abs(panels[name] - right) for name in TREATMENTS}
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.apps.validation.comparisons.compare import compare
 
 
@@ -26,4 +26,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -10,7 +10,7 @@ Columns: 3
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.scene.camera import cheek
 
 MIXES = {"after (mix 0)": 0.0, "half and half (0.5)": 0.5, "before (1)": 1.0}
@@ -28,4 +28,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

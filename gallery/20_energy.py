@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib import colormaps
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 TERMS = ("none", "published", "full")
 
@@ -30,11 +30,11 @@ def draw(studio):
     panels = {name: studio.render(scene) for name, scene in heads.items()}
     for name, skin in skins.items():
         furnace = dermis.Scene(white, camera=camera, skin=skin, environment=even)
-        returned = studio.linear(furnace, occlusion="none")[..., 1]
+        returned = studio.render_linear(furnace, occlusion="none")[..., 1]
         tinted = colormaps["coolwarm"](np.clip((returned - 0.9) / 0.2, 0, 1))[..., :3]
         panels[f"{name}: light returned"] = np.uint8(255 * tinted * (returned > 0.2)[..., None])
     return panels
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

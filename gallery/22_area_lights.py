@@ -9,7 +9,7 @@ Columns: 3
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 PLACE = {"position": (-520.0, 760.0, 760.0), "irradiance": (3.3, 3.1, 2.8)}
 FILL = dermis.RectangleLight(position=(900, 0, 900), irradiance=(0.3, 0.3, 0.32), width_mm=300, height_mm=300)
@@ -31,4 +31,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -10,7 +10,7 @@ Sources: Borshukov2003, Green2004, dEonLuebke2007, Jimenez2015, Penner2011, Jens
 Columns: 4
 """
 
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.apps.validation.comparisons.compare import compare
 from dermis.scene.techniques import TECHNIQUES
 
@@ -25,4 +25,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -10,7 +10,7 @@ import numpy as np
 
 import dermis
 from dermis.apps.gallery.panels import plot_panel
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.images.colour import encode_srgb8
 
 MELANIN = [0.0, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32]
@@ -36,4 +36,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

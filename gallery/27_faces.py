@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.profiles import write_profile
 
@@ -37,4 +37,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

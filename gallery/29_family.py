@@ -7,7 +7,7 @@ Columns: 3
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 AFRICAN = {"african": 1, "asian": 0, "caucasian": 0}
 ASIAN = {"african": 0, "asian": 1, "caucasian": 0}
@@ -31,4 +31,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

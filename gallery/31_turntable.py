@@ -9,7 +9,7 @@ Sources: dEonLuebke2007
 import math
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 FRAMES = 36
 
@@ -26,4 +26,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -11,7 +11,7 @@ Sources: Chandrasekhar1960, Jensen2001, Jakob2022
 
 from importlib.util import find_spec
 
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.apps.validation.comparisons.compare import compare
 
 TECHNIQUE = "texture-space"
@@ -31,4 +31,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -9,7 +9,7 @@ Sources: Ekman1971
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.human.expressions import expression
 
 WOMAN = dermis.Human(caucasian=0.5, african=0, asian=0.5, age=40)
@@ -24,4 +24,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

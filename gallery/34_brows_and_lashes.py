@@ -10,7 +10,7 @@ Columns: 2
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.human.expressions import expression
 
 BLINK = expression("closed-eyes")
@@ -36,4 +36,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

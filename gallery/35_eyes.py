@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.mesh.eye_look import EyeLook
 
 BESIDE = (-0.75, 0.1, 1.0)
@@ -36,4 +36,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

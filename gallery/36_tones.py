@@ -10,7 +10,7 @@ Sources: DonnerJensen2006, Jacques1998
 from dataclasses import replace
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 MELANIN = (0.003, 0.008, 0.02, 0.045, 0.09, 0.16, 0.26, 0.4)
 PERSON = dermis.Human(age=32)
@@ -27,4 +27,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

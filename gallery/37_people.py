@@ -8,7 +8,7 @@ Columns: 3
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.scene.gaze import looking_at
 
 PEOPLE = {
@@ -30,4 +30,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -10,7 +10,7 @@ Columns: 4
 """
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 GROUPS = {  # by ancestry: curl, eumelanin and pheomelanin of the styles
     "asian": (0.0, 5.0, 0.3, "bob fringe bun swept-back"),
@@ -36,4 +36,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -9,7 +9,7 @@ Columns: 7
 
 import dermis
 from dermis.apps.gallery.panels import output_image
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.scene.outputs import OUTPUTS
 
 NAMES = [name for name in OUTPUTS if name not in ("normal_geometric", "label_face_synthetics")]
@@ -27,4 +27,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -9,7 +9,7 @@ Columns: 3
 
 import dermis
 from dermis.apps.gallery.panels import draw_landmarks, output_image
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 SET = "face-synthetics-70"
 PEOPLE = {
@@ -31,4 +31,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

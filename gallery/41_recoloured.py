@@ -11,7 +11,7 @@ Sources: DonnerJensen2006, Jacques1998
 from dataclasses import replace
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.apps.inverse.unmixing.unmix import FractionChange, PigmentChange
 
 SKINS = {
@@ -25,7 +25,7 @@ for median in (0.05, 0.12, 0.25, 0.4):
 
 
 def draw(studio):
-    head = studio.coloured_head()
+    head = studio.head_with_colour_map()
     skin, panels = dermis.unmix(head.maps.colour, adapter=studio.adapter), {}
     for name, change in SKINS.items():
         colour = skin.recoloured(change, studio.adapter).clip(0.0, 1.0)
@@ -35,4 +35,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

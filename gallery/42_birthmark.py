@@ -12,12 +12,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.apps.inverse.unmixing.profile_widths import profile_mixture, save_mixture
 
 
 def draw(studio):
-    head = studio.coloured_head()
+    head = studio.head_with_colour_map()
     pigments, positions = dermis.unmix(head.maps.colour, adapter=studio.adapter), head.mesh.positions
     u, v = head.mesh.uv[np.linalg.norm(positions - head.centre_mm - (36, -22, 75), axis=1).argmin()]
     y, x = (np.linspace(0.0, 1.0, side) for side in pigments.blood.shape)
@@ -37,4 +37,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -13,15 +13,15 @@ from pathlib import Path
 
 import dermis
 from dermis.apps.gallery import example_files as examples
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 
 
 def draw(studio):
-    scan = studio.coloured_head()
+    scan = studio.head_with_colour_map()
     with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # notes on what is skin, and of which size
         folder = Path(name)
-        files = [examples.write_avatar(studio, folder), examples.write_three_meshes(scan, folder)]
+        files = [examples.write_avatar(studio, folder), examples.write_skin_as_three_meshes(scan, folder)]
         files += [examples.write_vertex_colours(scan, folder), examples.unpack_mesh("hand", folder)]
         files.append(examples.unpack_mesh("body", folder))
         avatar, three, coloured, hand, body = (studio.head(str(file)) for file in files)
@@ -37,4 +37,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

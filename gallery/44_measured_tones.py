@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 import dermis
-from dermis.apps.gallery.script import draw_script
+from dermis.apps.gallery.script import run_gallery_script
 from dermis.frame.features.post.meter import METERED_IRRADIANCE
 from dermis.human.skin.measured import measured_cells
 from dermis.images.colour import encode_srgb8, linear_of_lab
@@ -37,4 +37,4 @@ def draw(studio):
 
 
 if __name__ == "__main__":
-    draw_script(draw)
+    run_gallery_script(draw)

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from dermis import DermisError, DirectionalLight, Environment, Human, Renderer, Scene, Settings
 from dermis.apps.inverse.fitting import light_basis
-from dermis.apps.inverse.fitting.fit import InitialGuess, fit
+from dermis.apps.inverse.fitting.fit import CoarseSearch, fit
 from dermis.apps.inverse.fitting.inputs import fit_subject, read_photograph
 from dermis.apps.inverse.fitting.light_basis import solve_light_strengths
 from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult, save_fit
 from dermis.apps.inverse.fitting.solve import SYSTEMATIC_SD
-from dermis.apps.inverse.fitting.unknowns import SKIN_UNKNOWNS, prior_point
-from dermis.apps.inverse.unmixing.unknown_skin import unknown_skin_sd
+from dermis.apps.inverse.fitting.unknowns import SKIN_UNKNOWNS, prior_unknowns
+from dermis.apps.inverse.unmixing.unknown_skin import sd_from_assumed_parameters
 from dermis.human.landmarks.points import landmark_points
 from dermis.human.skin.measured import measured_cells
 from dermis.images.colour import encode_srgb8
@@ -67,9 +67,9 @@ def fitted(person: Human, scene: Scene, photo: NDArray[np.float32]) -> FitResult
 
 
 def test_fit_recovers_skin_and_light(fitted: FitResult) -> None:
-    assert fitted.values["melanin"] == pytest.approx(0.05, rel=0.05)
-    assert fitted.values["blood"] == pytest.approx(0.012, rel=0.1)
-    assert fitted.values["roughness"] == pytest.approx(0.25, abs=0.05)
+    assert fitted.skin_values["melanin"] == pytest.approx(0.05, rel=0.05)
+    assert fitted.skin_values["blood"] == pytest.approx(0.012, rel=0.1)
+    assert fitted.skin_values["roughness"] == pytest.approx(0.25, abs=0.05)
     ((towards, strength),) = fitted.suns
     true = np.array([0.5, 0.4, 0.77])
     assert towards @ true / np.linalg.norm(true) > np.cos(np.radians(3.0))
@@ -84,7 +84,7 @@ def test_written_files_form_a_loadable_scene(fitted: FitResult, tmp_path: Path) 
     save_fit(tmp_path, fitted)
     scene, settings = load_scene(tmp_path / "scene.toml")
     assert settings.size == SIZE and settings.exposure == 0.5
-    assert scene.head.maps.look.melanin == pytest.approx(fitted.values["melanin"])  # type: ignore[attr-defined]
+    assert scene.head.maps.look.melanin == pytest.approx(fitted.skin_values["melanin"])  # type: ignore[attr-defined]
     red, green, _ = scene.lights[0].irradiance
     assert red / green == pytest.approx(1.2, rel=1e-6)
     message = json.loads((tmp_path / "fit.json").read_text())
@@ -167,7 +167,7 @@ def test_invalid_arguments_are_refused(
 
 def test_deviations_include_errors_of_the_renderer_and_what_is_assumed(fitted: FitResult) -> None:
     """Oxygen and thickness of the person are not stated, and differ between people."""
-    assumed = unknown_skin_sd(fitted.values["melanin"], fitted.values["blood"])
+    assumed = sd_from_assumed_parameters(fitted.skin_values["melanin"], fitted.skin_values["blood"])
     for name in ("melanin", "blood"):
         least = np.hypot(SYSTEMATIC_SD[name], assumed[name])
         assert 0.9 * least < fitted.uncertainty.sd[name] < 2.0 * least, name
@@ -191,14 +191,14 @@ def test_priors_of_pigments_are_those_of_measured_people() -> None:
         assert (np.abs(score) < 1.0).mean() > 0.68, unknown.name
 
 
-class TwoWells(InitialGuess):
+class TwoWells(CoarseSearch):
     """Coarse search whose squared residual has minima at melanin fractions of 0.4 and 0.05.
 
     ratio : squared residual of the second minimum relative to that of the first
     """
 
     def __init__(self, ratio: float) -> None:
-        self.point, self.ratio = prior_point(np.array([[0.0, 0.0, 1.0]])), ratio
+        self.unknowns, self.ratio = prior_unknowns(np.array([[0.0, 0.0, 1.0]])), ratio
 
     def _squared_residual(self, logs: NDArray[np.float64], suns: list[int]) -> float:
         dark, pale = (abs(logs[0] - np.log(melanin)) for melanin in (0.4, 0.05))
@@ -206,9 +206,9 @@ class TwoWells(InitialGuess):
 
 
 def test_fits_start_from_dark_and_from_pale_skin_that_look_alike() -> None:
-    dark, pale = TwoWells(1.3).melanin_ranges(TwoWells(1.3).best_point(1))
+    dark, pale = TwoWells(1.3).melanin_ranges(TwoWells(1.3).best_unknowns(1))
     assert dark[0] > 0.1 and dark[-1] == pytest.approx(0.4)
     assert pale[0] < 0.05 < pale[-1] < 0.2
-    assert np.exp(TwoWells(1.3).best_point(1, pale).logs[0]) == pytest.approx(0.05, rel=0.2)
-    (everything,) = TwoWells(3.0).melanin_ranges(TwoWells(3.0).best_point(1))
+    assert np.exp(TwoWells(1.3).best_unknowns(1, pale).logs[0]) == pytest.approx(0.05, rel=0.2)
+    (everything,) = TwoWells(3.0).melanin_ranges(TwoWells(3.0).best_unknowns(1))
     assert (everything[0], everything[-1]) == pytest.approx((0.002, 0.4))

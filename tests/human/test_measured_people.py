@@ -9,7 +9,7 @@ import pytest
 from tolerances import SITE_MEDIAN
 
 from dermis import DermisError, Human
-from dermis.apps.validation.people.drawn import DrawnPeople, draw_random_people
+from dermis.apps.validation.people.drawn import RandomPeople, sample_people
 from dermis.apps.validation.people.inversion import model_lab
 from dermis.base.tables import Rows, read_rows
 from dermis.human.skin.colours import skin_colour_table
@@ -35,8 +35,8 @@ def cells() -> Rows:
 
 
 @pytest.fixture(scope="module")
-def drawn() -> dict[str, DrawnPeople]:
-    return {group: draw_random_people(group, range(120)) for group in ("caucasian", "south asian", "african")}
+def drawn() -> dict[str, RandomPeople]:
+    return {group: sample_people(group, range(120)) for group in ("caucasian", "south asian", "african")}
 
 
 def ita(person: Human) -> float:
@@ -63,7 +63,7 @@ def test_medians_of_all_sites_of_the_head_are_those_of_the_archive(group: str, c
     assert checked >= 3
 
 
-def test_people_are_drawn_from_these_distributions(drawn: dict[str, DrawnPeople], cells: Rows) -> None:
+def test_people_are_drawn_from_these_distributions(drawn: dict[str, RandomPeople], cells: Rows) -> None:
     """Compare medians of 120 people within three standard errors of the median."""
     for group, people in drawn.items():
         cell = next(one for one in cells if (one["group"], one["site"]) == (group, "cheek"))
@@ -75,7 +75,7 @@ def test_people_are_drawn_from_these_distributions(drawn: dict[str, DrawnPeople]
     assert lightness == sorted(lightness, reverse=True)
 
 
-def test_women_are_lighter_and_old_people_darker(drawn: dict[str, DrawnPeople]) -> None:
+def test_women_are_lighter_and_old_people_darker(drawn: dict[str, RandomPeople]) -> None:
     for people in drawn.values():
         L = people.cielab[:, 0, 0]
         assert np.median(L[people.sex < 0.5]) > np.median(L[people.sex > 0.5]) + 2.0

@@ -12,8 +12,8 @@ from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
 from dermis.apps.truths.person.person import HairFibres
 from dermis.apps.truths.person.shapes import (
     MAX_HAIR_GROUPS,
-    absorption_groups,
     bspline_control_points,
+    group_by_optical_depth,
     hair_shapes,
     write_curves,
 )
@@ -47,11 +47,11 @@ def test_files_contain_a_block_for_each_curve(tmp_path: Path) -> None:
 
 def test_hairs_are_grouped_by_absorption() -> None:
     depth = np.random.default_rng(1).random((100, 3))
-    parts = absorption_groups(depth)
+    parts = group_by_optical_depth(depth)
     assert len(parts) == MAX_HAIR_GROUPS and sorted(np.concatenate(parts)) == list(range(100))
     ends = [(depth[part].sum(axis=1).min(), depth[part].sum(axis=1).max()) for part in parts]
     assert all(first[1] <= second[0] for first, second in itertools.pairwise(ends))
-    assert len(absorption_groups(depth[:1])) == 1
+    assert len(group_by_optical_depth(depth[:1])) == 1
 
 
 @pytest.mark.parametrize("radius_mm", [0.04, 0.5])

@@ -10,9 +10,9 @@ import pytest
 
 from dermis.apps.inverse.unmixing.spectra_file import read_spectra
 from dermis.apps.inverse.unmixing.spectral_inversion import (
-    FIVE_UNKNOWNS,
-    THREE_UNKNOWNS,
-    TWO_UNKNOWNS,
+    PIGMENT_AND_OXYGEN_UNKNOWNS,
+    PIGMENT_UNKNOWNS,
+    TISSUE_UNKNOWNS,
     colour_metric,
     fit_skin,
     skin_model_spectra,
@@ -57,18 +57,18 @@ def test_spectra_of_many_skins_are_those_of_single_skins() -> None:
 
 def test_five_parameters_are_found_in_spectra() -> None:
     values, spectra = known_skins()
-    found = fit_skin(spectra, FIVE_UNKNOWNS)
-    assert np.median(found.rms) < 1e-8 and found.rms.max() < 5e-4
-    for name in TWO_UNKNOWNS:
+    found = fit_skin(spectra, TISSUE_UNKNOWNS)
+    assert np.median(found.rms_residual) < 1e-8 and found.rms_residual.max() < 5e-4
+    for name in PIGMENT_UNKNOWNS:
         assert np.median(np.abs(found.values[name] / values[name] - 1.0)) < 0.02, name
 
 
 def test_three_parameters_are_found_in_colours() -> None:
     values, _ = known_skins()
-    fixed = {name: values[name] for name in THREE_UNKNOWNS}
-    found = fit_skin(skin_model_spectra()(fixed), THREE_UNKNOWNS, "colour")
+    fixed = {name: values[name] for name in PIGMENT_AND_OXYGEN_UNKNOWNS}
+    found = fit_skin(skin_model_spectra()(fixed), PIGMENT_AND_OXYGEN_UNKNOWNS, "colour")
     assert found.delta_e().max() < 1e-3
-    for name in THREE_UNKNOWNS:
+    for name in PIGMENT_AND_OXYGEN_UNKNOWNS:
         assert np.abs(found.values[name] / values[name] - 1.0).max() < 0.01, name
 
 
@@ -135,9 +135,12 @@ def test_other_tables_are_refused(tmp_path: Path, text: str, told: str) -> None:
 def test_measured_people_have_the_colours_of_the_model(archive: Archive) -> None:
     """The limits are the goals of the model: without half of the baseline absorption all are exceeded."""
     sample = archive.select_rows(np.isin(archive.site, CHEEK_AND_FOREHEAD)).sample_rows(500)
-    two, three = (fit_skin(sample.spectra, n, "colour").delta_e() for n in (TWO_UNKNOWNS, THREE_UNKNOWNS))
+    two, three = (
+        fit_skin(sample.spectra, n, "colour").delta_e()
+        for n in (PIGMENT_UNKNOWNS, PIGMENT_AND_OXYGEN_UNKNOWNS)
+    )
     assert np.median(two) < 0.85 and np.median(three) < 0.25
-    assert np.median(fit_skin(sample.spectra, FIVE_UNKNOWNS).rms) < 0.006
+    assert np.median(fit_skin(sample.spectra, TISSUE_UNKNOWNS).rms_residual) < 0.006
 
 
 def test_people_are_in_one_part_only(archive: Archive) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dermis.apps.inverse.unmixing.skin_model import skin_model, solve_pigments
-from dermis.apps.inverse.unmixing.unknown_skin import unknown_skin_sd
+from dermis.apps.inverse.unmixing.unknown_skin import sd_from_assumed_parameters
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 from dermis.optics.pigments.priors import PRIOR_NAMES, prior_points, skin_prior
 from dermis.optics.pigments.spectra import rgb_weights
@@ -46,7 +46,7 @@ def test_two_thirds_of_people_are_within_one_stated_deviation() -> None:
     inside = {"melanin": [], "blood": []}
     for k in range(len(spectra)):
         values = {"melanin": float(found.melanin[k]), "blood": float(found.blood[k])}
-        stated = unknown_skin_sd(**values)
+        stated = sd_from_assumed_parameters(**values)
         for name, value in values.items():
             error = np.log(max(value, 1e-4) / true[name][k])
             inside[name].append(abs(error) <= stated[name])
@@ -57,8 +57,8 @@ def test_two_thirds_of_people_are_within_one_stated_deviation() -> None:
 
 
 def test_known_parameters_leave_less_deviation() -> None:
-    nothing = unknown_skin_sd(0.05, 0.01)
-    thickness = unknown_skin_sd(0.05, 0.01, known_parameters=["epidermis_mm"])
+    nothing = sd_from_assumed_parameters(0.05, 0.01)
+    thickness = sd_from_assumed_parameters(0.05, 0.01, known_parameters=["epidermis_mm"])
     assert thickness["melanin"] < 0.5 * nothing["melanin"] and thickness["blood"] < nothing["blood"]
-    everything = unknown_skin_sd(0.05, 0.01, known_parameters=["epidermis_mm", "oxygen"])
+    everything = sd_from_assumed_parameters(0.05, 0.01, known_parameters=["epidermis_mm", "oxygen"])
     assert everything == {"melanin": 0.0, "blood": 0.0}

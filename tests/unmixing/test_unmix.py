@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.inverse.unmixing.device_unmixer import Unmixer
 from dermis.apps.inverse.unmixing.skin_model import (
-    ThirdUnknown,
+    ExtraUnknown,
     inverse_variances,
     skin_model,
     solve_pigments,
@@ -73,7 +73,7 @@ def test_errors_with_noise_match_the_stated_deviations() -> None:
 
 def test_jacobian_matches_the_colours() -> None:
     for third in ("none", "oxygen", "shade"):
-        model = skin_model(third_unknown=third)
+        model = skin_model(extra_unknown=third)
         x = np.random.default_rng(1).uniform(0.11, 0.89, (30, 3))
         log_colours, slopes = model.evaluate(x)
         for k in range(3):
@@ -83,13 +83,17 @@ def test_jacobian_matches_the_colours() -> None:
 
 
 @pytest.mark.parametrize("third", ["none", "oxygen"])
-def test_device_result_matches_float64(device: Device, colours: Pixels, third: ThirdUnknown) -> None:
+def test_device_result_matches_float64(device: Device, colours: Pixels, third: ExtraUnknown) -> None:
     noisy = colours * (1.0 + 0.01 * np.random.default_rng(2).standard_normal(colours.shape))
     noisy = noisy.astype(np.float32)
-    model = skin_model(third_unknown=third)
+    model = skin_model(extra_unknown=third)
     estimate, sd, residual = Unmixer(device, model, 0.01).unmix(noisy)
     twin = solve_pigments(model, noisy.reshape(-1, 3).astype(np.float64), 0.01)
-    pairs = [(estimate[..., 0], twin.melanin), (estimate[..., 1], twin.blood), (estimate[..., 2], twin.third)]
+    pairs = [
+        (estimate[..., 0], twin.melanin),
+        (estimate[..., 1], twin.blood),
+        (estimate[..., 2], twin.extra_value),
+    ]
     pairs += [(sd[..., 0], twin.melanin_sd), (sd[..., 1], twin.blood_sd)]
     for got, wanted in pairs:
         assert np.percentile(np.abs(got.ravel() - wanted) / (np.abs(wanted) + 1e-4), 99.0) < 2e-3
@@ -108,8 +112,8 @@ def test_invisible_blood_stays_at_its_prior() -> None:
 def test_oxygen_is_recovered_where_blood_is_visible() -> None:
     pale = replace(DEFAULT_SKIN, oxygen=0.4)
     colour = skin_model(pale).colours(np.array([0.01]), np.array([0.03]))
-    fixed, free = (solve_pigments(skin_model(third_unknown=one), colour) for one in ("none", "oxygen"))
-    assert 0.35 < free.third[0] < 0.6
+    fixed, free = (solve_pigments(skin_model(extra_unknown=one), colour) for one in ("none", "oxygen"))
+    assert 0.35 < free.extra_value[0] < 0.6
     assert abs(np.log(free.residual)).max() < 0.3 * abs(np.log(fixed.residual)).max()
 
 

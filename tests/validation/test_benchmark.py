@@ -227,10 +227,10 @@ def test_report_without_the_base_frame_is_written(benchmark_of_one_row: Benchmar
 
 def test_slow_frames_are_drawn_less_often() -> None:
     effort = FrameCounts()
-    assert effort.limited_to(30.0, frame_ms=1.0) == effort
-    half = effort.limited_to(0.5 * 1e-3 * (100 + 2 * 100 + 2 * 9 * 6), frame_ms=1.0)
+    assert effort.with_max_duration(30.0, frame_ms=1.0) == effort
+    half = effort.with_max_duration(0.5 * 1e-3 * (100 + 2 * 100 + 2 * 9 * 6), frame_ms=1.0)
     assert half == FrameCounts(warmup=50, between=2, timed=4, sequence=50)
-    assert CPU_FRAME_COUNTS.limited_to(1.0, frame_ms=1e6) == FrameCounts(
+    assert CPU_FRAME_COUNTS.with_max_duration(1.0, frame_ms=1e6) == FrameCounts(
         warmup=0, between=0, timed=1, sequence=1
     )
 

@@ -74,7 +74,7 @@ def peers(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(report, "load_mitsuba", lambda: None)
     monkeypatch.setattr(report, "blender_python", lambda: Path("python"))
     monkeypatch.setattr(report, "version", lambda name: "1.0")
-    monkeypatch.setattr(report, "QUICK_PLAN", rendering.PeerPlan(SIDE, (4, 64), 16, 3))
+    monkeypatch.setattr(report, "QUICK_SETTINGS", rendering.ComparisonSettings(SIDE, (4, 64), 16, 3))
     monkeypatch.setattr(dermis, "load_head", lambda name, subdivide: BALL)
     monkeypatch.setattr(dermis, "Renderer", FakeRenderer)
     return report
@@ -82,7 +82,7 @@ def peers(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 def test_noise_bias_and_time_are_separated(peers: Any, tmp_path: Path, capsys: Any) -> None:
     out = tmp_path / "peers.json"
-    peers.peers(lights="front", quick=True, output=out)
+    peers.write_peer_report(lights="front", quick=True, output=out)
     (results,) = json.loads(out.read_text())["scenes"]
     rows = {(row["renderer"], row["setting"]): row for row in results["rows"]}
     ours = rows["dermis", "texture space, atlas 1024"]
@@ -100,7 +100,7 @@ def test_noise_bias_and_time_are_separated(peers: Any, tmp_path: Path, capsys: A
 
 def test_time_to_equal_error_follows_from_noise_and_bias(peers: Any, tmp_path: Path) -> None:
     out = tmp_path / "peers.json"
-    peers.peers(lights="front", quick=True, output=out)
+    peers.write_peer_report(lights="front", quick=True, output=out)
     (results,) = json.loads(out.read_text())["scenes"]
     near = results["as_near"]["texture space, atlas 1024"]["same_error"]
     assert near["samples"] == pytest.approx(NOISE**2 / (OURS**2 - BIAS**2), rel=0.05)
@@ -112,7 +112,7 @@ def test_time_to_equal_error_follows_from_noise_and_bias(peers: Any, tmp_path: P
 def test_results_except_times_are_reproducible(peers: Any, tmp_path: Path) -> None:
     files = [tmp_path / name for name in ("first.json", "second.json")]
     for file in files:
-        peers.peers(lights="front,back", quick=True, output=file)
+        peers.write_peer_report(lights="front,back", quick=True, output=file)
     first, second = (json.loads(file.read_text())["scenes"] for file in files)
     for one, other in zip(first, second, strict=True):
         del one["as_near"], other["as_near"], one["published"], other["published"]
@@ -126,7 +126,7 @@ def test_without_blender_its_rows_are_skipped_with_a_note(
 ) -> None:
     monkeypatch.setattr(report, "blender_python", no_blender)
     monkeypatch.setattr(rendering, "cycles_passes", no_blender)
-    peers.peers(lights="front", quick=True)
+    peers.write_peer_report(lights="front", quick=True)
     printed = capsys.readouterr()
     assert "Cycles is skipped. Cycles: expected a Python that has Blender's module bpy" in printed.err
     assert "Cycles, random walk" not in printed.out and "Mitsuba, volpathmis" in printed.out
@@ -141,24 +141,30 @@ def test_without_mitsuba_there_is_no_reference(
 
     monkeypatch.setattr(report, "load_mitsuba", missing)
     with pytest.raises(DermisError, match="path tracing: expected the package mitsuba"):
-        peers.peers(quick=True, output=tmp_path / "peers.json")
+        peers.write_peer_report(quick=True, output=tmp_path / "peers.json")
     assert not list(tmp_path.iterdir())
     with pytest.raises(DermisError, match=r"peers\.txt"):
-        peers.peers(quick=True, output=tmp_path / "peers.txt")
+        peers.write_peer_report(quick=True, output=tmp_path / "peers.txt")
 
 
 def test_progress_bar_ends_with_the_work(peers: Any) -> None:
     done: list[int] = []
     renderer = FakeRenderer()
-    rendering.render_peers(BALL, "front", peers.QUICK_PLAN, renderer, done.append)  # type: ignore[arg-type]
-    assert sum(done) == peers.QUICK_PLAN.progress_steps
+    rendering.render_with_all_renderers(
+        BALL,
+        "front",
+        peers.QUICK_SETTINGS,
+        renderer,
+        done.append,  # type: ignore[arg-type]
+    )
+    assert sum(done) == peers.QUICK_SETTINGS.progress_steps
     assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count(FRAGMENT_TECHNIQUE)
     assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count("screen-space")
 
 
 def test_passes_of_2007_are_listed_beside_ours(peers: Any, tmp_path: Path, capsys: Any) -> None:
     out = tmp_path / "peers.json"
-    peers.peers(lights="front", quick=True, output=out)
+    peers.write_peer_report(lights="front", quick=True, output=out)
     (results,), printed = json.loads(out.read_text())["scenes"], capsys.readouterr().out
     seconds = {row["setting"]: row["seconds"] for row in results["rows"]}
     for name in ("passes of 2007 as compute", "passes of 2007 as fragments"):
@@ -170,7 +176,7 @@ def test_passes_of_2007_are_listed_beside_ours(peers: Any, tmp_path: Path, capsy
 
 def test_unknown_lights_are_named(peers: Any) -> None:
     with pytest.raises(DermisError, match="--lights: expected names of front, back, laser with commas"):
-        peers.peers(lights="front,moon", quick=True)
+        peers.write_peer_report(lights="front,moon", quick=True)
 
 
 def test_a_bias_above_our_error_is_reported(peers: Any, tmp_path: Path, capsys: Any) -> None:
@@ -179,7 +185,7 @@ def test_a_bias_above_our_error_is_reported(peers: Any, tmp_path: Path, capsys: 
             return SimpleNamespace(linear=lambda: picture(1.0 + 0.5 * BIAS))
 
     dermis.Renderer = Nearer  # type: ignore[misc]  # put back by the fixture's patch
-    peers.peers(lights="front", quick=True)
+    peers.write_peer_report(lights="front", quick=True)
     assert "never has as small an error, because its bias is larger" in capsys.readouterr().out
 
 
@@ -191,8 +197,8 @@ def test_page_is_written_with_all_placeholders_filled(
     (tmp_path / "templates" / "peers.md").write_text(template, encoding="utf-8")
     monkeypatch.setattr(report, "PAGE", tmp_path / "peers.md")
     monkeypatch.setattr(report, "RESULTS_FILE", tmp_path / "results" / "peers.json")
-    monkeypatch.setattr(report, "PeerPlan", lambda: peers.QUICK_PLAN)
-    peers.peers()
+    monkeypatch.setattr(report, "ComparisonSettings", lambda: peers.QUICK_SETTINGS)
+    peers.write_peer_report()
     page = (tmp_path / "peers.md").read_text(encoding="utf-8")
     assert page.count("| dermis | texture space, atlas 1024 |") == 2 and "{" not in page
     assert json.loads((tmp_path / "results" / "peers.json").read_text())["denoising"] is False

@@ -20,7 +20,7 @@ from dermis.apps.validation.comparisons.person import (
     person_comparison,
     render_frame,
     shared_skin,
-    without_cause,
+    without_feature,
 )
 from dermis.apps.validation.comparisons.person_textures import person_textures
 from dermis.apps.validation.comparisons.person_views import EYE_FRAME_MM, VIEWS, as_softbox, view_scene
@@ -117,14 +117,14 @@ def test_an_eye_is_close_to_its_path_traced_image(
 
 def test_a_cause_is_left_out_on_both_sides(renderer: Renderer, paint: SkinTextures) -> None:
     subject = PersonSubject(view_scene(head(), VIEWS["portrait"]), paint)
-    plain = without_cause(subject, "pigments")
+    plain = without_feature(subject, "pigments")
     assert np.ptp(plain.textures.colour[..., 0]) == 0.0 < np.ptp(paint.colour[..., 0])
     assert np.array_equal(plain.scene.head.maps.colour, plain.textures.colour)
-    flat = without_cause(subject, "relief")
+    flat = without_feature(subject, "relief")
     assert flat.textures.height_mm.max() == 0.0 == flat.scene.head.maps.height.max()
-    bald = without_cause(subject, "hair").scene.head
+    bald = without_feature(subject, "hair").scene.head
     assert bald.hair is None and bald.strands is None
-    matte = without_cause(subject, "reflection")
+    matte = without_feature(subject, "reflection")
     assert matte.textures.strength.max() == 0.0
 
 

@@ -24,11 +24,13 @@ def noisy(name: str, side: int) -> PersonComparison:
     return PersonComparison(name, image, image, 0 * image, mask, ONE, ONE, (ONE,) * 3, 40, 12.0)
 
 
-def measured(view: str, truth: page.TruthName = "matched", cause: page.Cause | None = None) -> page.Figures:
+def measured(
+    view: str, skin_kind: page.SharedSkinKind = "matched", omitted_feature: page.OmittedFeature | None = None
+) -> page.ComparisonResult:
     """Return figures of one comparison, keyed as in the file of results."""
-    figures = page.comparison_figures(noisy(view, 8))
+    figures = page.comparison_result(noisy(view, 8))
     figures |= {"regions": {"ear": [0.9, 0.01]}, "default": [0.3, 0.01, 0.8, 0.01]}
-    return {page.Measurement("human", view, truth, cause).key: figures}
+    return {page.ComparisonCase("human", view, skin_kind, omitted_feature).key: figures}
 
 
 def test_row_states_view_light_and_errors() -> None:
@@ -39,13 +41,13 @@ def test_row_states_view_light_and_errors() -> None:
 
 def test_tables_state_regions_and_causes() -> None:
     assert "| ear | 0.90 |" in page.region_table(measured("profile"))
-    causes = page.cause_table(measured("portrait", cause="relief")).splitlines()
+    causes = page.omitted_feature_table(measured("portrait", omitted_feature="relief")).splitlines()
     assert causes[2].startswith("| nothing | not measured")
     assert any(line.startswith("| relief | 1.000 ± 0.010 | 1.000 |") for line in causes)
 
 
 def test_all_comparisons_have_keys_of_their_own() -> None:
-    keys = [one.key for one in page.list_measurements()]
+    keys = [one.key for one in page.list_comparison_cases()]
     assert len(set(keys)) == len(keys)
 
 

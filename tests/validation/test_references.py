@@ -13,8 +13,8 @@ from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 from dermis.apps.validation.comparisons.compare import comparison_subject
 from dermis.apps.validation.comparisons.references import (
     ComparisonSubject,
+    heat_equation_patch_reference,
     irradiance_samples,
-    surface_heat_around,
     surface_integral,
 )
 from dermis.mesh.head import Head
@@ -58,7 +58,7 @@ def test_heat_and_integral_agree_on_gently_curved_surfaces(stripe_subject: Compa
     stripe = subject.scene.lights[0]
     lit_point = np.array(stripe.position) - 17.2 * np.array(stripe.direction)
     straight = surface_integral(subject, 0)
-    heat = surface_heat_around(subject, tuple(lit_point), 12.0, irradiance_samples(subject))
+    heat = heat_equation_patch_reference(subject, tuple(lit_point), 12.0, irradiance_samples(subject))
     assert 100 < heat.mask.sum() < straight.mask.sum()
     assert relative_rmse(heat.image, straight.image, heat.mask).value < 0.01
     assert energy_ratio(heat.image, straight.image, heat.mask).value == pytest.approx(1.0, abs=0.002)

@@ -68,19 +68,20 @@ def run_app(cyclopts_app: App, arguments: Sequence[str] | None = None) -> int:
 
 
 def run_script(
-    function_or_commands: Callable[..., int | None] | Mapping[str, str], program_name: str | None = None
+    function_or_commands: Callable[..., int | None] | Mapping[str, tuple[str, str]],
+    program_name: str | None = None,
 ) -> NoReturn:
     """Run a script as a command-line program, with its docstring as help, and exit.
 
     function_or_commands : function of the program; for a program with several commands, a mapping from the
-        function of each command, as "module:function", to the summary of the command
+        name of each command to its function, as "module:function", and its summary
     program_name : name of the program; by default the name of the script's file
     """
     program_name, help_text = program_name or Path(sys.argv[0]).name, reflow(sys.modules["__main__"].__doc__)
     if isinstance(function_or_commands, Mapping):
         app = make_app(program_name, help_text)
-        for target, summary in function_or_commands.items():
-            add_command(app, target.partition(":")[2].replace("_", "-"), target, summary)
+        for command_name, (function_path, summary) in function_or_commands.items():
+            add_command(app, command_name, function_path, summary)
     else:
         app = make_app(program_name, help_text)
         app.default(function_or_commands)

@@ -20,6 +20,8 @@ RENAMED_OBJECTS: Mapping[str, str] = {
     "scene.profile": "scene.side",
     "frame.lights.kind.Kind": "frame.lights.kind.LightKind",
     "specular.models.Model": "specular.models.SpecularModel",
+    "apps.truths.lights.CYCLES": "apps.truths.lights.CYCLES_LIGHTS",
+    "apps.truths.lights.MITSUBA": "apps.truths.lights.MITSUBA_LIGHTS",
     "apps.inverse.unmixing.unmix.Change": "apps.inverse.unmixing.unmix.PigmentChange",
     "apps.inverse.unmixing.unmix.Share": "apps.inverse.unmixing.unmix.FractionChange",
 }

@@ -125,7 +125,7 @@ def unmix(
     check_folder(output, UNMIX_SUMMARY_FILE)
     change = _parse_pigment_change(melanin, blood, oxygen, eumelanin)
     with progress_bar("unmixing") as report_progress:
-        options: Options = {"third": find, "noise": noise, "shading": shading, "adapter": adapter}
+        options: Options = {"extra_unknown": find, "noise": noise, "shading": shading, "adapter": adapter}
         result = unmixed(colour_map, skin=skin, progress=report_progress, **options)
     recoloured = None if change is None else result.recoloured(change, adapter)
     written = save_maps(output, result, recoloured, linear=colour_map.suffix.lower() in (".exr", ".hdr"))

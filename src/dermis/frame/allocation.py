@@ -304,4 +304,4 @@ def _lobe_albedo_texture(device: Device, lobe_name: str, fresnel_name: str) -> T
 
 
 def _make_exitance_texture(device: Device, technique: Technique, atlas_side: int, _: str) -> Texture:
-    return technique.make_sum(device, atlas_side)
+    return technique.make_exitance_texture(device, atlas_side)

@@ -254,8 +254,8 @@ LIGHTS: Registry[type[Light]] = Registry(
 )
 """Classes of lights by their names in scene files.
 
-`dermis.frame.lights.kind.KINDS` draws them, MITSUBA and CYCLES of `dermis.apps.truths.lights` render the
-reference; exports write a registered light as the class that it derives from."""
+`dermis.frame.lights.kind.KINDS` draws them, MITSUBA_LIGHTS and CYCLES_LIGHTS of `dermis.apps.truths.lights`
+render the reference; exports write a registered light as the class that it derives from."""
 
 
 # Reach of a typical head, and largest reach for which the lights of presets are not moved away.

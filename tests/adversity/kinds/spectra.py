@@ -32,7 +32,7 @@ def _take(plan: Plan) -> None:
     from dermis.apps.inverse.unmixing.spectra_file import unmix_spectra
 
     found = unmix_spectra(plan["file"], "oxygen")
-    for values in (*found.fit.values.values(), found.fit.rms):
+    for values in (*found.fit.values.values(), found.fit.rms_residual):
         if not np.isfinite(values).all():
             raise FoundError(WRONG, "a result is not finite")
 

@@ -71,8 +71,9 @@ assert any(line.startswith('LightSource "point"') for line in lines)
 try:
     cycles_lamp(glow, 1)
 except DermisError as error:
-    assert "got 'after-glow'. Leave the light out, or register in dermis.apps.truths.lights.CYCLES" in str(
-        error
+    assert (
+        "got 'after-glow'. Leave the light out, or register in dermis.apps.truths.lights.CYCLES_LIGHTS"
+        in str(error)
     )
 else:
     raise AssertionError("a truth takes a light that it does not know")

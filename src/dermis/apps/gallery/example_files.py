@@ -123,14 +123,14 @@ def write_avatar(studio: Studio, folder: Path) -> Path:
     return file.write(folder / "avatar.glb")
 
 
-def write_three_meshes(head: Head, folder: Path) -> Path:
+def write_skin_as_three_meshes(head: Head, folder: Path) -> Path:
     """Write a head's skin as a .glb file with three meshes, each with its own part of the colour map.
 
     Returns the path of the file.
     """
     mesh, colour = head.mesh, _colour_map_srgb(head)
     file = _Glb()
-    corner = mesh.triangles[_is_skin(head)]
+    corner = mesh.triangles[_skin_triangle_mask(head)]
     middle = mesh.positions[corner].mean(axis=1)
     kind = np.where(middle[:, 1] < -110.0, "neck", np.where(middle[:, 2] > -60.0, "face", "ears"))
     size = np.array(colour.shape[1::-1])
@@ -172,7 +172,7 @@ def unpack_mesh(mesh_name: str, folder: Path) -> Path:
     return path
 
 
-def _is_skin(head: Head) -> Mask:
+def _skin_triangle_mask(head: Head) -> Mask:
     """Return a mask (f,) of the triangles that are skin."""
     return np.array([one.kind == "skin" for one in head.mesh.materials])[head.mesh.material]
 

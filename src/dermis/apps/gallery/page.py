@@ -47,7 +47,7 @@ def write_page(path: Path, pictures: Sequence[GalleryPicture], head: str, adapte
         adapter=html.escape(adapter),
         contents="".join(_contents_entry_html(picture) for picture in pictures),
         pictures="\n".join(_section_html(picture) for picture in pictures),
-        deck=_deck_rows(pictures),
+        deck=_slide_rows(pictures),
         works=_bibliography_html(pictures),
     )
     with atomic_file(path) as file:
@@ -123,7 +123,7 @@ def _format_number(number: float) -> str:
     return f"{number:.0f}" if number >= 100 else f"{number:.3g}"
 
 
-def _deck_rows(pictures: Sequence[GalleryPicture]) -> str:
+def _slide_rows(pictures: Sequence[GalleryPicture]) -> str:
     """Return HTML table rows for the slides of the talk "Advanced Skin Rendering" (2007).
 
     Each row has links to the pictures that show the slide, and a command that draws them.
@@ -131,10 +131,10 @@ def _deck_rows(pictures: Sequence[GalleryPicture]) -> str:
     rows = csv.DictReader(
         line for line in _read_resource("deck.csv").splitlines() if not line.startswith("#")
     )
-    return "".join(_deck_row(row, pictures) for row in rows)
+    return "".join(_slide_row(row, pictures) for row in rows)
 
 
-def _deck_row(slide: dict[str, str], pictures: Sequence[GalleryPicture]) -> str:
+def _slide_row(slide: dict[str, str], pictures: Sequence[GalleryPicture]) -> str:
     scripts = [picture.script for picture in pictures if slide["row"] in picture.script.deck]
     links = ", ".join(f'<a href="#{script.name}">{html.escape(script.title)}</a>' for script in scripts)
     command = slide["command"] or " ".join(["dermis gallery", *(f"--only {one.name}" for one in scripts)])

@@ -106,7 +106,7 @@ def _matches_selection(script: Script, number_or_text: str) -> bool:
     return number_or_text != "" and number_or_text in script.name
 
 
-def draw_script(draw_panels: Callable[[Studio], Panels]) -> None:
+def run_gallery_script(draw_panels: Callable[[Studio], Panels]) -> None:
     """Draw the picture of the gallery script that calls this function, and write it as PNG.
 
     The file and the head are read from the command line: python gallery/NN_name.py OUTPUT [HEAD].

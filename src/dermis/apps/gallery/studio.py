@@ -50,7 +50,7 @@ class Studio:
         """
         return self._load(head_name or self.name, subdivide=1, **options)
 
-    def coloured_head(self) -> Head:
+    def head_with_colour_map(self) -> Head:
         """Return the gallery's head with a colour map; procedural maps are first painted into textures."""
         head = self.head()
         return with_painted_maps(self.renderer.device, head, 1024) if head.maps.is_painted else head
@@ -63,7 +63,7 @@ class Studio:
         """
         return self._draw(scene, scale, settings).srgb8()
 
-    def linear(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.float32]:
+    def render_linear(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.float32]:
         """Render a scene to linear Rec. 709, (h, w, 3).
 
         scale : width and height of the image, relative to those of a gallery panel [-]
@@ -71,10 +71,12 @@ class Studio:
         """
         return self._draw(scene, scale, settings).linear()
 
-    def view(self, scene: Scene, view: str, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
+    def render_view(
+        self, scene: Scene, view_name: str, scale: float = 1.0, **settings: Any
+    ) -> NDArray[np.uint8]:
         """Render an intermediate result of a frame to 8-bit sRGB, (h, w, 3), as the viewer does.
 
-        view : name of the view in the viewer, such as "blur 3"
+        view_name : name of the view in the viewer, such as "blur 3"
         scale : width and height of the image, relative to those of a gallery panel [-]
         settings : fields of `Settings`
         """
@@ -82,12 +84,14 @@ class Studio:
         from dermis.apps.viewer.views import IntermediateViews
         from dermis.gpu import download
 
-        if view in ("picture", *LIGHT_COMPONENT_VIEWS):
-            return self.render(scene, scale, parts=LIGHT_COMPONENT_VIEWS.get(view, "all"), **settings)
+        if view_name in ("picture", *LIGHT_COMPONENT_VIEWS):
+            return self.render(scene, scale, parts=LIGHT_COMPONENT_VIEWS.get(view_name, "all"), **settings)
 
         def draw_view() -> NDArray[np.uint8]:
             self._draw(scene, scale, settings)
-            texture = IntermediateViews(self.renderer).draw(scene, self.settings(scale, **settings), view)
+            texture = IntermediateViews(self.renderer).draw(
+                scene, self.settings(scale, **settings), view_name
+            )
             return np.asarray(download(self.renderer.device, texture), np.uint8)[..., :3]
 
         return self.renderer.reopening_device.run(draw_view)
@@ -100,7 +104,7 @@ class Studio:
         """
         from dermis.gpu import download
 
-        def read_light() -> NDArray[np.float32]:
+        def download_light_level() -> NDArray[np.float32]:
             self._draw(scene, 1.0, settings)
             inputs = self.renderer.prepare(scene, self.settings(**settings))
             levels, blur = inputs.resources.diffusion.levels, inputs.blurs[0]
@@ -109,7 +113,7 @@ class Studio:
             light = download(self.renderer.device, levels.stacks[halved], layer=layer - levels.first[halved])
             return np.asarray(light, np.float32)[..., :3] / np.float32(blur.scale)
 
-        return self.renderer.reopening_device.run(read_light)
+        return self.renderer.reopening_device.run(download_light_level)
 
     def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
         """Return the settings for rendering a gallery panel.

@@ -157,11 +157,11 @@ def add_light(light_description: dict[str, Any]) -> None:
     for name, value in light_description["set"].items():
         setattr(light, name, value)
     if "stripe" in light_description:
-        shape_stripe(light, light_description["stripe"])
+        turn_into_stripe_light(light, light_description["stripe"])
     add_object("light", light).matrix_world = Matrix(light_description["to_world"])
 
 
-def shape_stripe(light: Any, stripe: dict[str, Any]) -> None:
+def turn_into_stripe_light(light: Any, stripe: dict[str, Any]) -> None:
     """Turn a distant point light into a stripe light by shader nodes.
 
     The irradiance is then Gaussian across the stripe and, up to its ends, constant along the stripe.

@@ -21,6 +21,7 @@ from dermis.apps.truths.scene_description import (
 )
 from dermis.base.errors import refuse
 from dermis.base.registry import Registry
+from dermis.base.renamed import successor
 from dermis.scene.lights import (
     DirectionalLight,
     Light,
@@ -35,10 +36,10 @@ Floats = NDArray[np.float64]
 _DISTANT_LIGHT_DISTANCE_MM = 2e5
 """Distance of the source of nearly parallel light: irradiance changes by 0.1 % in 100 mm, and a stripe is
 positioned within 0.02 mm in single precision."""
-_SPOT_SLIDE_SIDE = 1024
-_STRIPE_SLIDE_HALF_WIDTHS = 1.25  # in widths; the Gaussian is 4e-6 there
-_MIN_STRIPE_SLIDE_TEXELS = 40, 64  # smallest numbers of texels across a width and along the length
-_MAX_STRIPE_SLIDE_TEXELS = 2**23
+_SPOT_TEXTURE_SIDE = 1024
+_STRIPE_TEXTURE_HALF_WIDTHS = 1.25  # in widths; the Gaussian is 4e-6 there
+_MIN_STRIPE_TEXELS = 40, 64  # smallest numbers of texels across a width and along the length
+_MAX_STRIPE_TEXELS = 2**23
 
 
 def mitsuba_emitter(mi: Mitsuba, light: Light, light_number: int) -> SceneDict:
@@ -51,7 +52,7 @@ def mitsuba_emitter(mi: Mitsuba, light: Light, light_number: int) -> SceneDict:
     light that this module does not convert.
     """
     _check_shadows(light, light_number, "path tracing")
-    return MITSUBA[light.kind](mi, light, f"light {light_number}")
+    return MITSUBA_LIGHTS[light.kind](mi, light, f"light {light_number}")
 
 
 def cycles_lamp(light: Light, light_number: int) -> SceneDict:
@@ -60,7 +61,7 @@ def cycles_lamp(light: Light, light_number: int) -> SceneDict:
     light_number : number of the light in the scene, counted from 1, for error messages
     """
     _check_shadows(light, light_number, "Cycles")
-    return CYCLES[light.kind](light)
+    return CYCLES_LIGHTS[light.kind](light)
 
 
 def _check_shadows(light: Light, light_number: int, renderer: str) -> None:
@@ -80,7 +81,7 @@ def mitsuba_point(mi: Mitsuba, light: PointLight, light_label: str) -> SceneDict
 def mitsuba_spot(mi: Mitsuba, light: SpotLight, light_label: str) -> SceneDict:
     """Return a Mitsuba projector in place of a spot light; Mitsuba's own spot light has no smooth edge."""
     tangent = np.tan(np.radians(light.outer_degrees))
-    along = tangent * ((np.arange(_SPOT_SLIDE_SIDE) + 0.5) / _SPOT_SLIDE_SIDE * 2.0 - 1.0)
+    along = tangent * ((np.arange(_SPOT_TEXTURE_SIDE) + 0.5) / _SPOT_TEXTURE_SIDE * 2.0 - 1.0)
     cosine = 1.0 / np.sqrt(1.0 + along[:, None] ** 2 + along[None, :] ** 2)
     outer, inner = (np.cos(np.radians(a)) for a in (light.outer_degrees, light.inner_degrees))
     falloff = _smoothstep((cosine - outer) / (inner - outer))
@@ -126,9 +127,9 @@ def mitsuba_stripe(mi: Mitsuba, light: StripeLight, light_label: str) -> SceneDi
     light_label : name of the light in error messages
     """
     width, length = light.width_mm, light.length_mm
-    size = np.array([2.0 * _STRIPE_SLIDE_HALF_WIDTHS * width, length])
-    texel = min(width / _MIN_STRIPE_SLIDE_TEXELS[0], length / _MIN_STRIPE_SLIDE_TEXELS[1])
-    texel = max(texel, float(np.sqrt(size.prod() / _MAX_STRIPE_SLIDE_TEXELS)))
+    size = np.array([2.0 * _STRIPE_TEXTURE_HALF_WIDTHS * width, length])
+    texel = min(width / _MIN_STRIPE_TEXELS[0], length / _MIN_STRIPE_TEXELS[1])
+    texel = max(texel, float(np.sqrt(size.prod() / _MAX_STRIPE_TEXELS)))
     if width < 10.0 * texel:
         actual = f"it is {length:g} mm long and {width:g} mm wide"
         refuse(light_label, "a stripe less slender, for path tracing", actual, "Shorten it")
@@ -231,7 +232,7 @@ def _smoothstep(fraction: Floats) -> Floats:
 
 
 # Any, because each function has a parameter of its own kind of light.
-MITSUBA: Registry[Callable[[Mitsuba, Any, str], SceneDict]] = Registry(
+MITSUBA_LIGHTS: Registry[Callable[[Mitsuba, Any, str], SceneDict]] = Registry(
     "light of Mitsuba",
     {
         "point": mitsuba_point,
@@ -241,12 +242,12 @@ MITSUBA: Registry[Callable[[Mitsuba, Any, str], SceneDict]] = Registry(
         "directional": mitsuba_directional,
         "stripe": mitsuba_stripe,
     },
-    f"Leave the light out, or register in {__name__}.MITSUBA its replacement",
+    f"Leave the light out, or register in {__name__}.MITSUBA_LIGHTS its replacement",
 )
 """Functions that describe a light for Mitsuba, by kind of light. Their arguments are the module `mitsuba`
 with a variant set, the light, and its name for messages."""
 
-CYCLES: Registry[Callable[[Any], SceneDict]] = Registry(
+CYCLES_LIGHTS: Registry[Callable[[Any], SceneDict]] = Registry(
     "light of Cycles",
     {
         "point": cycles_point,
@@ -256,6 +257,13 @@ CYCLES: Registry[Callable[[Any], SceneDict]] = Registry(
         "directional": cycles_directional,
         "stripe": cycles_stripe,
     },
-    f"Leave the light out, or register in {__name__}.CYCLES its replacement",
+    f"Leave the light out, or register in {__name__}.CYCLES_LIGHTS its replacement",
 )
 """Functions that describe a light for Cycles (type, fields and transform), by kind of light."""
+
+
+def __getattr__(name: str) -> Any:
+    """Return an object of this module by the name that it had in the last release, for compatibility."""
+    if new := successor(__name__, name):
+        return globals()[new]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

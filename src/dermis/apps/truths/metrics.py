@@ -49,7 +49,7 @@ def relative_rmse(
     image: ArrayLike,
     reference: ArrayLike,
     mask: Mask | None = None,
-    variance: ArrayLike | None = None,
+    reference_variance: ArrayLike | None = None,
     image_variance: ArrayLike | None = None,
 ) -> Estimate:
     """Return the relative root mean square error of an image, corrected for the noise of the reference [-].
@@ -60,8 +60,8 @@ def relative_rmse(
 
     image, reference : (h, w) or (h, w, c) linear images; all channels are summed
     mask : (h, w) pixels to compare
-    variance : (h, w) or (h, w, c) unbiased estimate of the variance of each value of `reference`: the
-        variance between its samples, divided by the number of samples
+    reference_variance : (h, w) or (h, w, c) unbiased estimate of the variance of each value of `reference`:
+        the variance between its samples, divided by the number of samples
     image_variance : variance of each value of `image`; when given, the noise of the image is removed too
     """
     # Let the reference be T = t + n with noise n of mean 0 and variance s², and let D = I - T. On average, D²
@@ -81,7 +81,7 @@ def relative_rmse(
     # Noise of variance v in the image adds v to D², and 4 v D² - 4 v s² - 2 v² to the estimate of the
     # variance of U. Only 4 v D² is counted, because v² is poorly known after few passes; the standard error
     # is then too large rather than too small.
-    I, T, s2 = _masked_pixels(image, reference, mask, variance)
+    I, T, s2 = _masked_pixels(image, reference, mask, reference_variance)
     v = _masked_pixels(image, reference, mask, image_variance)[2]
     D, energy = I - T, float((T**2 - s2).sum())
     if energy <= 0:
@@ -95,7 +95,10 @@ def relative_rmse(
 
 
 def energy_ratio(
-    image: ArrayLike, reference: ArrayLike, mask: Mask | None = None, variance: ArrayLike | None = None
+    image: ArrayLike,
+    reference: ArrayLike,
+    mask: Mask | None = None,
+    reference_variance: ArrayLike | None = None,
 ) -> Estimate:
     """Return the sum of an image's values, divided by the sum of the reference's values [-].
 
@@ -103,7 +106,7 @@ def energy_ratio(
     reference's sum. In each channel, the variances of the pixels are added; the standard deviations of the
     channels are then added, because all channels may be computed from the same light paths.
     """
-    I, T, s2 = _masked_pixels(image, reference, mask, variance)
+    I, T, s2 = _masked_pixels(image, reference, mask, reference_variance)
     total = float(T.sum())
     if total <= 0:
         refuse("energy ratio", "a reference with light in it", "its sum is not above 0", "Check the mask")

@@ -35,7 +35,7 @@ class GaussianSum:
     variance_mm2: Floats
 
     @property
-    def end_mm(self) -> float:
+    def max_radius_mm(self) -> float:
         """Return the radius beyond which the profile is taken as 0 [mm]."""
         return float(np.sqrt(-2 * np.log(_RELATIVE_GAUSSIAN_CUTOFF) * np.max(self.variance_mm2)))
 
@@ -61,7 +61,7 @@ class RadialTable:
     reflectance: Floats
 
     @property
-    def end_mm(self) -> float:
+    def max_radius_mm(self) -> float:
         """Return the radius beyond which the profile is taken as 0 [mm]."""
         return float(self.radius_mm[-1])
 
@@ -108,8 +108,8 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
     over the radii in proportion to the square root of the profile's second derivative, with which few patches
     are needed for a given total error. The rest is spread widely, so that distant patches can be large.
     """
-    end = profile.end_mm
-    root = np.linspace(0.0, np.sqrt(end), PROFILE_TABLE_ROWS)
+    max_radius_mm = profile.max_radius_mm
+    root = np.linspace(0.0, np.sqrt(max_radius_mm), PROFILE_TABLE_ROWS)
     r = root**2
     # The tangential second derivative is R'/r, which tends to R'' on the axis.
     off_axis = np.maximum(r, r[1])
@@ -123,7 +123,7 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
     curvature = _bound_beyond_radius(0.5 * bend, energy, nonzero)
     R[-1] = 0.0
     return ProfileTable(
-        (PROFILE_TABLE_ROWS - 1) / np.sqrt(end),
+        (PROFILE_TABLE_ROWS - 1) / np.sqrt(max_radius_mm),
         np.ascontiguousarray(R),
         slope,
         curvature,

@@ -18,7 +18,7 @@ _POINTS_PER_CALL = 1024  # between two checks for Ctrl-C
 _OBSERVED_ERROR_PER_BOUND = 1e-3
 """Actual error where the error bound is 1, measured on waves, spheres, bumps and the scan. The errors of
 three points are of third order in the size of a patch, their bound is of second order."""
-_UNCANCELLED_ERROR_WEIGHT = 50.0
+_CHANNEL_ERROR_WEIGHT = 50.0
 """Factor for errors caused by different light in the channels; they are of second order and cancel less."""
 
 
@@ -51,7 +51,7 @@ def integrate_exitance(
     from dermis.apps.truths.octree_gather import gather_exitance
 
     bound = (relative_error / _OBSERVED_ERROR_PER_BOUND) ** (2 / 3)
-    tree = _weight_error_bounds(build_octree(samples), bound / (_UNCANCELLED_ERROR_WEIGHT * relative_error))
+    tree = _weight_error_bounds(build_octree(samples), bound / (_CHANNEL_ERROR_WEIGHT * relative_error))
     table = tabulate_profile(profile)
     exitance = np.zeros_like(positions)
     slices = [slice(i, i + _POINTS_PER_CALL) for i in range(0, len(positions), _POINTS_PER_CALL)]

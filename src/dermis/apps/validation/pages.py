@@ -22,7 +22,12 @@ JsonObject = dict[str, Any]
 CHECKOUT = Path(str(files("dermis"))).resolve().parents[1]
 DOCS, RESULTS = CHECKOUT / "docs", CHECKOUT / "benchmarks" / "results"
 _CHECKOUT_HINT = "Install the package from a clone of the project (make setup) and run the command there"
-SOFTWARE_WEBGL = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+SOFTWARE_WEBGL_FLAGS = (
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+)
 
 
 def require_in_checkout(path: Path) -> Path:
@@ -120,7 +125,7 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def chromium_page(page_side: int, flags: Sequence[str] = SOFTWARE_WEBGL) -> Iterator[Page]:
+def chromium_page(page_side: int, flags: Sequence[str] = SOFTWARE_WEBGL_FLAGS) -> Iterator[Page]:
     """Open an empty web page in headless Chromium without a network, for the duration of a context.
 
     page_side : side of the square page [pixel]

@@ -58,7 +58,7 @@ class Technique(TechniqueTraits):
         """
         return make_levels(device, atlas_side, halvings, FLOAT_TEXEL_FORMAT)
 
-    def make_sum(self, device: Device, atlas_side: int) -> Texture:
+    def make_exitance_texture(self, device: Device, atlas_side: int) -> Texture:
         """Create the square texture for the exitance of scattered light, as large as the atlas."""
         return combine.make_blur_sum(device, atlas_side)
 

@@ -23,15 +23,15 @@ from dermis.apps.inverse.fitting.light_basis import (
 from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult
 from dermis.apps.inverse.fitting.solve import (
-    ROBUST_LIMIT,
+    ROBUST_LIMIT_SD,
     FitProblem,
-    block_residual,
     fit_uncertainty,
     light_tint,
+    median_block_residual,
     solve_fit,
 )
-from dermis.apps.inverse.fitting.unknowns import FitPoint, prior_point, tangents
-from dermis.apps.inverse.unmixing.unknown_skin import FIXED_PARAMETERS, unknown_skin_sd
+from dermis.apps.inverse.fitting.unknowns import FitUnknowns, prior_unknowns, tangents
+from dermis.apps.inverse.unmixing.unknown_skin import FIXED_PARAMETERS, sd_from_assumed_parameters
 from dermis.base.errors import format_value, notify, refuse
 from dermis.base.quantities import checked_array, checked_integer, checked_number
 from dermis.frame.renderer import Renderer
@@ -82,7 +82,7 @@ def neighbouring_suns(sun_directions: Floats) -> Floats:
     return np.asarray((suns / np.linalg.norm(suns, axis=2, keepdims=True)).reshape(-1, 3))
 
 
-class InitialGuess:
+class CoarseSearch:
     """Coarse search for suns and pigments; its result is the start of a fit.
 
     The diffuse and the specular radiance under each light alone are rendered once. Other pigments and
@@ -90,16 +90,20 @@ class InitialGuess:
     rendering.
 
     face_renderer : renderer of the face
-    fit_point : pigments and candidate suns for which the frames are rendered
+    fit_unknowns : pigments and candidate suns for which the frames are rendered
     photo_radiance : (p, 3) radiance of the photograph's pixels in the mask
     pixel_weight : (p, 3) inverse standard deviations of these pixels
     """
 
     def __init__(
-        self, face_renderer: FaceRenderer, fit_point: FitPoint, photo_radiance: Floats, pixel_weight: Floats
+        self,
+        face_renderer: FaceRenderer,
+        fit_unknowns: FitUnknowns,
+        photo_radiance: Floats,
+        pixel_weight: Floats,
     ) -> None:
-        self.point = fit_point
-        diffuse, specular = face_renderer.diffuse_and_specular_radiance(fit_point)
+        self.unknowns = fit_unknowns
+        diffuse, specular = face_renderer.diffuse_and_specular_radiance(fit_unknowns)
         weighted = np.concatenate([diffuse, specular]) * pixel_weight
         weighted_target = photo_radiance * pixel_weight
         self._grams = np.einsum("apc,bpc->cab", weighted, weighted, optimize=True)
@@ -111,29 +115,29 @@ class InitialGuess:
         fixed = pigments.overrides()
         self._table = skin_colour_table(fixed["eumelanin"], fixed["oxygen"], fixed["epidermis_mm"])
 
-    def best_point(self, sun_count: int, melanin_grid: Floats = _MELANIN_GRID) -> FitPoint:
-        """Return the point whose pigments, specular strength and `sun_count` suns have the smallest residual.
+    def best_unknowns(self, sun_count: int, melanin_grid: Floats = _MELANIN_GRID) -> FitUnknowns:
+        """Return the pigments, specular strength and `sun_count` suns that have the smallest residual.
 
         melanin_grid : melanin fractions to try
         """
-        log_skin, suns = self.point.logs, self._select_suns(self.point.logs, sun_count)
+        log_parameters, suns = self.unknowns.logs, self._select_suns(self.unknowns.logs, sun_count)
         for _ in range(2):
-            trials, residuals = self._try_skins(log_skin, suns, melanin_grid)
-            log_skin = trials[int(np.argmin(residuals))]
-            suns = self._select_suns(log_skin, sun_count)
-        return replace(self.point, logs=log_skin, suns=self.point.suns[suns])
+            trials, residuals = self._try_skins(log_parameters, suns, melanin_grid)
+            log_parameters = trials[int(np.argmin(residuals))]
+            suns = self._select_suns(log_parameters, sun_count)
+        return replace(self.unknowns, logs=log_parameters, suns=self.unknowns.suns[suns])
 
-    def melanin_ranges(self, best_point: FitPoint) -> list[Floats]:
+    def melanin_ranges(self, best_unknowns: FitUnknowns) -> list[Floats]:
         """Return a range of melanin fractions around each local minimum of the residual, best first.
 
         There can be several minima, such as dark skin in strong light and pale skin in weak light. Minima
         with a residual much larger than the smallest residual are left out. If only one minimum remains, its
         range is the whole grid of melanin fractions.
 
-        best_point : result of the method `best_point`, whose suns are used
+        best_unknowns : result of the method `best_unknowns`, whose suns are used
         """
-        suns = [int(np.argmax(self.point.suns @ one)) for one in best_point.suns]
-        _, residuals = self._try_skins(best_point.logs, suns, _MELANIN_GRID)
+        suns = [int(np.argmax(self.unknowns.suns @ one)) for one in best_unknowns.suns]
+        _, residuals = self._try_skins(best_unknowns.logs, suns, _MELANIN_GRID)
         profile = residuals.reshape(len(_MELANIN_GRID), -1).min(axis=1)
         padded = np.concatenate([[np.inf], profile, [np.inf]])
         is_minimum = (profile <= padded[:-2]) & (profile <= padded[2:])
@@ -147,46 +151,49 @@ class InitialGuess:
         ]
 
     def _try_skins(
-        self, log_skin: Floats, sun_indices: list[int], melanin_grid: Floats
+        self, log_parameters: Floats, sun_indices: list[int], melanin_grid: Floats
     ) -> tuple[list[Floats], Floats]:
         """Return n trial skins, each as 4 logarithms (4,), and the squared residual (n,) of each skin.
 
         The skins are the nodes of a grid of melanin, blood and specular strength.
 
-        log_skin : (4,) logarithms of the skin parameters (see `FitPoint`); only the roughness is used
+        log_parameters : (4,) logarithms of the skin parameters (see `FitUnknowns`); only the roughness is
+            used
         sun_indices : indices of the candidate suns
         melanin_grid : melanin fractions to try
         """
         grid = product(np.log(melanin_grid), np.log(_BLOOD_GRID), np.log(_SPECULAR_STRENGTH_GRID))
-        trials = [np.array([m, b, log_skin[2], s]) for m, b, s in grid]
+        trials = [np.array([m, b, log_parameters[2], s]) for m, b, s in grid]
         return trials, np.array([self._squared_residual(one, sun_indices) for one in trials])
 
-    def _select_suns(self, log_skin: Floats, sun_count: int) -> list[int]:
+    def _select_suns(self, log_parameters: Floats, sun_count: int) -> list[int]:
         """Return the indices of `sun_count` candidate suns, chosen greedily one after the other.
 
         Each of them is the candidate that lowers the residual more than any other candidate would, together
         with the suns that are already chosen.
 
-        log_skin : (4,) logarithms of the skin parameters, see `FitPoint`
+        log_parameters : (4,) logarithms of the skin parameters, see `FitUnknowns`
         """
         selected: list[int] = []
         for _ in range(sun_count):
-            remaining = [k for k in range(len(self.point.suns)) if k not in selected]
-            selected.append(min(remaining, key=lambda k: self._squared_residual(log_skin, [*selected, k])))
+            remaining = [k for k in range(len(self.unknowns.suns)) if k not in selected]
+            selected.append(
+                min(remaining, key=lambda k: self._squared_residual(log_parameters, [*selected, k]))
+            )
         return selected
 
-    def _squared_residual(self, log_skin: Floats, sun_indices: list[int]) -> float:
+    def _squared_residual(self, log_parameters: Floats, sun_indices: list[int]) -> float:
         """Return the squared residual for a skin and a set of suns, minimised over the light strengths.
 
         The rendered diffuse radiance is scaled to the colour of the skin, and the rendered specular radiance
         to its specular strength.
 
-        log_skin : (4,) logarithms of the skin parameters, see `FitPoint`
+        log_parameters : (4,) logarithms of the skin parameters, see `FitUnknowns`
         sun_indices : indices of the candidate suns
         """
         lights = np.array([*range(AMBIENT_LOBE_COUNT), *(AMBIENT_LOBE_COUNT + k for k in sun_indices)])
-        n, strength = self._lights, float(np.exp(log_skin[3] - self.point.logs[3]))
-        ratio = self._skin_colour(log_skin) / self._skin_colour(self.point.logs)
+        n, strength = self._lights, float(np.exp(log_parameters[3] - self.unknowns.logs[3]))
+        ratio = self._skin_colour(log_parameters) / self._skin_colour(self.unknowns.logs)
         gram, right = np.zeros((len(lights),) * 2), np.zeros(len(lights))
         for c in range(3):
             G, r, s = self._grams[c], self._rights[c], ratio[c]
@@ -196,8 +203,8 @@ class InitialGuess:
             right += s * r[lights] + strength * r[n + lights]
         return squared_residual(gram, right, self._total, solve_normal_equations(gram, right))
 
-    def _skin_colour(self, log_skin: Floats) -> Floats:
-        melanin, blood = np.exp(log_skin[:1]), np.exp(log_skin[1:2])
+    def _skin_colour(self, log_parameters: Floats) -> Floats:
+        melanin, blood = np.exp(log_parameters[:1]), np.exp(log_parameters[1:2])
         return np.asarray(self._table.lookup(melanin, blood)[0], np.float64)
 
 
@@ -211,7 +218,7 @@ def fit(
     exposure: float = 1.0,
     white: WhitePoint = (1.0, 1.0, 1.0),
     noise: float = DEFAULT_NOISE,
-    robust: float = ROBUST_LIMIT,
+    robust: float = ROBUST_LIMIT_SD,
     side: int = DEFAULT_SIDE,
     atlas: int = DEFAULT_ATLAS,
     adapter: str = "auto",
@@ -273,7 +280,7 @@ def fit(
     --------
     >>> import dermis
     >>> result = dermis.fit("portrait.jpg", "human", landmarks="landmarks.csv")  # doctest: +SKIP
-    >>> sorted(result.values)  # doctest: +SKIP
+    >>> sorted(result.skin_values)  # doctest: +SKIP
     ['blood', 'melanin', 'rho_s', 'roughness']
     """
     started = time.perf_counter()
@@ -292,21 +299,23 @@ def fit(
         frames = FaceRenderer(Renderer(adapter, cache_size=2), subject.scene, settings, Path(folder))
         candidate = _find_skin(frames, small)
         problem = FitProblem(frames, small.linear[frames.mask] / scale, noise, white == "specular", robust)
-        starts = _start_points(problem, candidate, suns)
+        starts = _start_unknowns(problem, candidate, suns)
         found = [solve_fit(problem, start, progress) for start in starts]
-        state, derivatives = min(found, key=lambda one: block_residual(problem, one[0]))
-        scene = frames.lit_scene(state.point, state.strengths)
-        picture = frames.render_picture(scene) * scale * light_tint(state.point)
+        state, derivatives = min(found, key=lambda one: median_block_residual(problem, one[0]))
+        scene = frames.lit_scene(state.unknowns, state.strengths)
+        picture = frames.render_picture(scene) * scale * light_tint(state.unknowns)
     relative_residual = np.abs(state.residual) / np.maximum(problem.target, 1e-6)
-    warn_of_poor_fit(photo if isinstance(photo, str | Path) else "photo", block_residual(problem, state))
+    warn_of_poor_fit(
+        photo if isinstance(photo, str | Path) else "photo", median_block_residual(problem, state)
+    )
     return FitResult(
         subject,
-        state.point,
+        state.unknowns,
         state.strengths,
-        white_point * light_tint(state.point),
+        white_point * light_tint(state.unknowns),
         exposure,
         photograph.size,
-        fit_uncertainty(problem, state, derivatives, _sd_from_assumed_parameters(subject, state.point)),
+        fit_uncertainty(problem, state, derivatives, _sd_from_assumed_parameters(subject, state.unknowns)),
         small.linear,
         picture,
         frames.mask,
@@ -316,7 +325,7 @@ def fit(
     )
 
 
-def _sd_from_assumed_parameters(subject: FitSubject, best_point: FitPoint) -> dict[str, float]:
+def _sd_from_assumed_parameters(subject: FitSubject, best_unknowns: FitUnknowns) -> dict[str, float]:
     """Return standard deviations of melanin and blood due to skin parameters that are not fitted.
 
     The values assumed for these parameters can differ from those of the person. The result is a dictionary
@@ -326,8 +335,8 @@ def _sd_from_assumed_parameters(subject: FitSubject, best_point: FitPoint) -> di
     assert pigments is not None
     fixed = {name: getattr(pigments, name) for name in ("eumelanin", *FIXED_PARAMETERS)}
     skin = replace(DEFAULT_SKIN, **fixed)
-    values = best_point.values()
-    return unknown_skin_sd(values["melanin"], values["blood"], skin, subject.known)
+    values = best_unknowns.skin_values()
+    return sd_from_assumed_parameters(values["melanin"], values["blood"], skin, subject.known)
 
 
 def warn_of_poor_fit(photo_source: object, median_residual: float) -> None:
@@ -345,14 +354,14 @@ def warn_of_poor_fit(photo_source: object, median_residual: float) -> None:
         )
 
 
-def _find_skin(face_renderer: FaceRenderer, photo: Photograph) -> FitPoint:
+def _find_skin(face_renderer: FaceRenderer, photo: Photograph) -> FitUnknowns:
     """Set the renderer's mask to the pixels of lit skin; return the unknowns with which the search starts.
 
     They are the median skin parameters of the priors, and the directions of all candidate suns.
     """
     camera = face_renderer.scene.camera
     view_direction = np.subtract(camera.position, camera.target)
-    candidate = prior_point(candidate_suns(view_direction / np.linalg.norm(view_direction)))
+    candidate = prior_unknowns(candidate_suns(view_direction / np.linalg.norm(view_direction)))
     face_renderer.find_mask(candidate, photo.unclipped)
     face_renderer.mask &= photo.linear.max(axis=2) > 0.0
     if face_renderer.mask.sum() < _MIN_SKIN_PIXELS:
@@ -363,24 +372,26 @@ def _find_skin(face_renderer: FaceRenderer, photo: Photograph) -> FitPoint:
     return candidate
 
 
-def _start_points(problem: FitProblem, candidate_point: FitPoint, sun_count: int) -> list[FitPoint]:
-    """Return points at which to start fits, found by a coarse search for suns and a finer search around them.
+def _start_unknowns(
+    problem: FitProblem, candidate_unknowns: FitUnknowns, sun_count: int
+) -> list[FitUnknowns]:
+    """Return unknowns at which to start fits, found by a coarse search for suns and a finer one around them.
 
-    There is one point for each melanin fraction at which the residual of the coarse search has a local
-    minimum, see `InitialGuess.melanin_ranges`.
+    There is one result for each melanin fraction at which the residual of the coarse search has a local
+    minimum, see `CoarseSearch.melanin_ranges`.
 
-    candidate_point : skin parameters and all candidate suns of the coarse search
-    sun_count : number of these candidate suns that each start point keeps
+    candidate_unknowns : skin parameters and all candidate suns of the coarse search
+    sun_count : number of these candidate suns that each result keeps
     """
     frames, target, weight = problem.frames, problem.target, problem.initial_weights()
-    coarse = InitialGuess(frames, candidate_point, target, weight)
-    best = coarse.best_point(sun_count)
+    coarse = CoarseSearch(frames, candidate_unknowns, target, weight)
+    best = coarse.best_unknowns(sun_count)
     starts = []
     for melanin in coarse.melanin_ranges(best):
-        start = coarse.best_point(sun_count, melanin)
+        start = coarse.best_unknowns(sun_count, melanin)
         if sun_count:
             nearer = replace(start, suns=neighbouring_suns(start.suns))
-            start = InitialGuess(frames, nearer, target, weight).best_point(sun_count, melanin)
+            start = CoarseSearch(frames, nearer, target, weight).best_unknowns(sun_count, melanin)
         starts.append(start)
     return starts
 

@@ -80,17 +80,17 @@ def solve_light_strengths(A: Floats, b: Floats) -> Floats:
     return solve_normal_equations(A.T @ A, A.T @ b)
 
 
-def solve_normal_equations(gram: Floats, right_side: Floats) -> Floats:
+def solve_normal_equations(gram: Floats, right_hand_side: Floats) -> Floats:
     """Return the result (9 + k,) of `solve_light_strengths`, computed from the normal equations of A and b.
 
     gram : (9 + k, 9 + k) product A' A
-    right_side : (9 + k,) product A' b
+    right_hand_side : (9 + k,) product A' b
     """
     from scipy.optimize import nnls
 
     R = np.linalg.cholesky(gram + _GRAM_REGULARISATION * np.trace(gram) * np.eye(len(gram)))
     mixing = lobe_mixing_matrix(len(gram) - AMBIENT_LOBE_COUNT)
-    solution = nnls(R.T @ mixing, np.linalg.solve(R, right_side))[0]
+    solution = nnls(R.T @ mixing, np.linalg.solve(R, right_hand_side))[0]
     return np.asarray(mixing @ solution)
 
 
@@ -111,13 +111,13 @@ def lobe_mixing_matrix(sun_count: int) -> Floats:
 
 
 def squared_residual(
-    gram: Floats, right_side: Floats, target_square_sum: float, light_strengths: Floats
+    gram: Floats, right_hand_side: Floats, target_square_sum: float, light_strengths: Floats
 ) -> float:
     """Return the squared residual |A x - b|^2 of light strengths x, computed from the normal equations.
 
-    gram, right_side, target_square_sum : A' A, A' b and b' b for the A and b of `solve_light_strengths`
+    gram, right_hand_side, target_square_sum : A' A, A' b and b' b for the A and b of `solve_light_strengths`
     light_strengths : (9 + k,) strengths x
     """
     return float(
-        target_square_sum - 2.0 * right_side @ light_strengths + light_strengths @ gram @ light_strengths
+        target_square_sum - 2.0 * right_hand_side @ light_strengths + light_strengths @ gram @ light_strengths
     )

@@ -23,8 +23,8 @@ _LANDMARK_SD_FRACTION = 0.004
 """Standard deviation of a landmark's position, relative to the height of the photograph [-]."""
 _LOG_FOCAL_SD = 0.3
 """Prior standard deviation of the logarithm of the focal length; the prior mean is that of a portrait."""
-_MACRO_PARAMETERS = ("african", "asian", "caucasian", "sex", "age", "weight", "muscle")
-_MACRO_PARAMETER_SD = 0.3
+_PERSON_PARAMETERS = ("african", "asian", "caucasian", "sex", "age", "weight", "muscle")
+_PERSON_PARAMETER_SD = 0.3
 _SHAPE_TARGET_SD = 0.15
 _SHAPE_TARGET_FOLDERS = ("head/", "forehead/", "eyes/", "nose/", "mouth/", "cheek/", "chin/")
 _SHAPE_TARGET_SUFFIXES = ("-incr", "-up", "-out", "-forward", "-convex")
@@ -114,7 +114,7 @@ class _LandmarkModel:
             )
 
         model = cls(names, person_landmarks(person), np.zeros((0, 0, 3)), person, details)
-        unknowns = range(len(_MACRO_PARAMETERS) + len(details))
+        unknowns = range(len(_PERSON_PARAMETERS) + len(details))
         return replace(
             model, derivatives=np.stack([_landmark_derivative(model, person_landmarks, k) for k in unknowns])
         )
@@ -131,16 +131,19 @@ class _LandmarkModel:
             deviations of their priors
         """
         assert self.prior is not None
-        macro: dict[str, Any] = {
+        person_parameters: dict[str, Any] = {
             name: float(
-                np.clip(getattr(self.prior, name) + _macro_prior_sd(name) * step, *_macro_limits(name))
+                np.clip(
+                    getattr(self.prior, name) + _person_parameter_sd(name) * step,
+                    *_person_parameter_limits(name),
+                )
             )
-            for name, step in zip(_MACRO_PARAMETERS, identity, strict=False)
+            for name, step in zip(_PERSON_PARAMETERS, identity, strict=False)
         }
         targets = dict(self.prior.targets)
-        for name, step in zip(self.details, identity[len(_MACRO_PARAMETERS) :], strict=True):
+        for name, step in zip(self.details, identity[len(_PERSON_PARAMETERS) :], strict=True):
             targets[name] = float(np.clip(targets.get(name, 0.0) + _SHAPE_TARGET_SD * step, -1.0, 1.0))
-        return replace(self.prior, **macro, targets=targets, skin=self.prior.look)
+        return replace(self.prior, **person_parameters, targets=targets, skin=self.prior.look)
 
 
 def _landmark_derivative(
@@ -154,7 +157,7 @@ def _landmark_derivative(
     person_landmarks : function that returns the landmark positions (n, 3) of a person [mm]
     """
     for step in _IDENTITY_STEP, -_IDENTITY_STEP:
-        identity = np.zeros(len(_MACRO_PARAMETERS) + len(model.details))
+        identity = np.zeros(len(_PERSON_PARAMETERS) + len(model.details))
         identity[unknown_index] = step
         change = person_landmarks(model.person_with_identity(identity)) - model.positions
         if change.any():
@@ -170,11 +173,11 @@ def _prior_log_focal(photo_size: tuple[int, int]) -> float:
     return float(np.log(photo_size[1] * _PORTRAIT_DISTANCE_MM / _PORTRAIT_HEIGHT_MM))
 
 
-def _macro_prior_sd(parameter_name: str) -> float:
-    return _MACRO_PARAMETER_SD * (OLD_AGE - YOUNG_AGE if parameter_name == "age" else 1.0)
+def _person_parameter_sd(parameter_name: str) -> float:
+    return _PERSON_PARAMETER_SD * (OLD_AGE - YOUNG_AGE if parameter_name == "age" else 1.0)
 
 
-def _macro_limits(parameter_name: str) -> tuple[float, float]:
+def _person_parameter_limits(parameter_name: str) -> tuple[float, float]:
     return {"age": (YOUNG_AGE, OLD_AGE), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0)}.get(
         parameter_name, (0.01, 1.0)
     )

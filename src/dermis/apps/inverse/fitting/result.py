@@ -17,7 +17,7 @@ from dermis.apps.inverse.fitting.unknowns import (
     SKIN_UNKNOWNS,
     SUN_PRIOR_SD,
     WHITE_PRIOR_SD,
-    FitPoint,
+    FitUnknowns,
     sun_lights,
     with_skin,
 )
@@ -43,7 +43,8 @@ class FitResult:
     """Light and skin of a photograph, as found by `dermis.fit`.
 
     subject : head, person, camera and pose
-    point : fitted values of the skin parameters, of the directions towards the suns and of the light's colour
+    unknowns : fitted values of the skin parameters, of the directions towards the suns and of the light's
+        colour
     strengths : (9 + k,) strengths of the ambient lobes and of the suns
     white : (3,) colour of the light in linear Rec. 709, scaled to green 1
     exposure : ratio of the photograph's linear values to the radiance [-]
@@ -58,7 +59,7 @@ class FitResult:
     """
 
     subject: FitSubject
-    point: FitPoint
+    unknowns: FitUnknowns
     strengths: Floats
     white: Floats
     exposure: float
@@ -71,16 +72,18 @@ class FitResult:
     frames: int
     seconds: float
     certainty = renamed_attribute("certainty", "uncertainty")
+    point = renamed_attribute("point", "unknowns")
+    values = renamed_attribute("values", "skin_values")
 
     @property
-    def values(self) -> dict[str, float]:
+    def skin_values(self) -> dict[str, float]:
         """Return the fitted skin as a dictionary with melanin, blood, roughness and rho_s [-]."""
-        return self.point.values()
+        return self.unknowns.skin_values()
 
     @property
     def suns(self) -> list[tuple[Floats, float]]:
         """Return for each sun the unit vector towards it and its irradiance at normal incidence."""
-        return list(zip(self.point.suns, map(float, self.strengths[AMBIENT_LOBE_COUNT:]), strict=True))
+        return list(zip(self.unknowns.suns, map(float, self.strengths[AMBIENT_LOBE_COUNT:]), strict=True))
 
     def summary(self) -> dict[str, Any]:
         """Return the content of fit.json: the fitted unknowns with their uncertainties and priors.
@@ -92,7 +95,7 @@ class FitResult:
         skin = {}
         for one in SKIN_UNKNOWNS:
             prior = {"usual": one.prior_median, "believed_relative_sd": one.prior_sd}
-            skin[one.name] = {"value": self.values[one.name], "relative_sd": sd[one.name], **prior}
+            skin[one.name] = {"value": self.skin_values[one.name], "relative_sd": sd[one.name], **prior}
         suns = []
         for k, (direction, strength) in enumerate(self.suns):
             sd_degrees = np.degrees([sd[f"sun {k + 1} {name}"] for name in ("across", "along")])
@@ -157,7 +160,9 @@ def save_fit(folder: Path, fit_result: FitResult) -> list[Path]:
             file.write_bytes(encode_exr((radiance[..., None] * fit_result.white).astype(np.float32)))
     if person is not None:
         written.append(folder / "person.json")
-        look = replace(person.look, melanin=fit_result.values["melanin"], blood=fit_result.values["blood"])
+        look = replace(
+            person.look, melanin=fit_result.skin_values["melanin"], blood=fit_result.skin_values["blood"]
+        )
         write_person_json(written[-1], replace(person, skin=look))
         table = {"name": "person.json"}
     written.append(folder / "scene.toml")
@@ -174,11 +179,13 @@ def save_fit(folder: Path, fit_result: FitResult) -> list[Path]:
 
 def fitted_scene(fit_result: FitResult, folder: Path) -> Scene:
     """Return the scene with the fitted skin and lights, and with light.exr in `folder` as environment."""
-    suns = sun_lights(fit_result.point.suns, fit_result.strengths[AMBIENT_LOBE_COUNT:], fit_result.white)
+    suns = sun_lights(fit_result.unknowns.suns, fit_result.strengths[AMBIENT_LOBE_COUNT:], fit_result.white)
     has_sky = ambient_panorama(fit_result.strengths[:AMBIENT_LOBE_COUNT]).max() > 0.0
     ambient = Environment(name=str(folder / "light.exr")) if has_sky else None
     lights = [one for one in suns if max(one.irradiance) > 0.0]
-    return with_skin(replace(fit_result.subject.scene, lights=lights, environment=ambient), fit_result.point)
+    return with_skin(
+        replace(fit_result.subject.scene, lights=lights, environment=ambient), fit_result.unknowns
+    )
 
 
 def result_pictures(fit_result: FitResult) -> dict[str, Floats]:

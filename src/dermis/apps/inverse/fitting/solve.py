@@ -18,7 +18,7 @@ from dermis.apps.inverse.fitting.unknowns import (
     SUN_PRIOR_SD,
     SUN_STEP_RAD,
     WHITE_PRIOR_SD,
-    FitPoint,
+    FitUnknowns,
 )
 from dermis.base.renamed import renamed_attribute
 from dermis.optics.media import Floats
@@ -26,7 +26,7 @@ from dermis.optics.media import Floats
 _NOISE_FLOOR_FRACTION = 0.03
 """Radiance that is added to that of a pixel before its standard deviation is computed, relative to the
 photograph's median; it limits the weight of dark pixels [-]."""
-ROBUST_LIMIT = 3.0
+ROBUST_LIMIT_SD = 3.0
 """Number of standard deviations above which the weight of a residual decreases [Huber1964]."""
 NO_ADDITIONAL_SD: Mapping[str, float] = MappingProxyType({})
 _MAD_TO_SD = 1.4826
@@ -35,14 +35,14 @@ _STEP_TOLERANCE = 0.01
 _MIN_RELATIVE_COST_DECREASE = 1e-4
 _INITIAL_DAMPING = 1e-3
 _MAX_DAMPING_TRIALS = 3
-_MAX_UNKNOWN_STEP = 0.7  # largest step of a logarithm or of a direction [rad]
+_MAX_STEP_PER_UNKNOWN = 0.7  # largest step of a logarithm or of a direction [rad]
 
 
 @dataclass(frozen=True, eq=False)
 class FitState:
     """Unknowns of a fit at one step, with the light strengths that fit best and the residual.
 
-    point : skin, directions of the suns, and colour of the light
+    unknowns : skin, directions of the suns, and colour of the light
     strengths : (9 + k,) strengths of the ambient lobes and of the suns
     basis : (9 + k, p, 3) radiance of the p fitted pixels under each light alone
     residual : (p, 3) radiance of the photograph minus radiance of the model
@@ -51,7 +51,7 @@ class FitState:
         the means of their priors, in standard deviations of the priors
     """
 
-    point: FitPoint
+    unknowns: FitUnknowns
     strengths: Floats
     basis: Floats
     residual: Floats
@@ -75,7 +75,7 @@ class FitProblem:
     target: Floats
     noise: float
     free_white: bool
-    robust: float = ROBUST_LIMIT
+    robust: float = ROBUST_LIMIT_SD
 
     def pixel_weights(self, radiance: Floats) -> Floats:
         """Return the inverse standard deviations (p, 3) of pixels with a given radiance."""
@@ -90,10 +90,12 @@ class FitProblem:
         """
         return self.pixel_weights(self.target.mean(axis=1, keepdims=True) * np.ones(3))
 
-    def render_state(self, fit_point: FitPoint, pixel_weight: Floats) -> FitState:
-        """Render the face for the unknowns of `fit_point`; return the state with the best light strengths."""
+    def render_state(self, fit_unknowns: FitUnknowns, pixel_weight: Floats) -> FitState:
+        """Render the face for given unknowns; return the state with the best light strengths."""
         return self._best_light_state(
-            fit_point, self.frames.single_light_radiance(fit_point) * light_tint(fit_point), pixel_weight
+            fit_unknowns,
+            self.frames.single_light_radiance(fit_unknowns) * light_tint(fit_unknowns),
+            pixel_weight,
         )
 
     def reweighted_state(self, fit_state: FitState) -> FitState:
@@ -106,15 +108,15 @@ class FitProblem:
         scaled = np.abs(fit_state.residual * weights)
         limit = self.robust * max(_MAD_TO_SD * float(np.median(scaled)), 1.0)
         weights *= np.sqrt(limit / np.maximum(scaled, limit))
-        return self._best_light_state(fit_state.point, fit_state.basis, weights)
+        return self._best_light_state(fit_state.unknowns, fit_state.basis, weights)
 
-    def _best_light_state(self, fit_point: FitPoint, basis: Floats, pixel_weight: Floats) -> FitState:
+    def _best_light_state(self, fit_unknowns: FitUnknowns, basis: Floats, pixel_weight: Floats) -> FitState:
         A = (basis * pixel_weight).reshape(len(basis), -1).T
         x = solve_light_strengths(A, (self.target * pixel_weight).ravel())
         residual = self.target - np.einsum("a,apc->pc", x, basis)
-        prior = (self.prior_offsets(fit_point) / self.prior_sd(2 * len(fit_point.suns))) ** 2
+        prior = (self.prior_offsets(fit_unknowns) / self.prior_sd(2 * len(fit_unknowns.suns))) ** 2
         cost = float(((residual * pixel_weight) ** 2).sum()) + float(prior.sum())
-        return FitState(fit_point, x, basis, residual, pixel_weight, cost)
+        return FitState(fit_unknowns, x, basis, residual, pixel_weight, cost)
 
     def derivatives(self, fit_state: FitState, frame_name: str) -> Floats:
         """Return the derivatives (p, 3, u) of the radiance with respect to the u unknowns.
@@ -123,18 +125,20 @@ class FitProblem:
 
         frame_name : file name of the ambient light's panorama, without suffix
         """
-        point, count = fit_state.point, 2 * len(fit_state.point.suns)
-        centre = self.frames.combined_radiance(point, fit_state.strengths, frame_name)
+        unknowns, count = fit_state.unknowns, 2 * len(fit_state.unknowns.suns)
+        centre = self.frames.combined_radiance(unknowns, fit_state.strengths, frame_name)
         shifted = []
         for k, step in enumerate(self.difference_steps(count)):
             change = np.zeros(len(SKIN_UNKNOWNS) + count + 2)
-            limited = k < len(SKIN_UNKNOWNS) and point.logs[k] + step >= np.log(SKIN_UNKNOWNS[k].high)
+            limited = k < len(SKIN_UNKNOWNS) and unknowns.logs[k] + step >= np.log(SKIN_UNKNOWNS[k].high)
             change[k] = -step if limited else step
-            neighbour = self.frames.combined_radiance(point.stepped(change), fit_state.strengths, frame_name)
+            neighbour = self.frames.combined_radiance(
+                unknowns.stepped(change), fit_state.strengths, frame_name
+            )
             shifted.append((neighbour - centre) / change[k])
-        radiance, white = centre * light_tint(point), np.zeros((2, *centre.shape))
+        radiance, white = centre * light_tint(unknowns), np.zeros((2, *centre.shape))
         white[0, :, 0], white[1, :, 2] = radiance[:, 0], radiance[:, 2]
-        derivatives = np.concatenate([np.asarray(shifted) * light_tint(point), white])
+        derivatives = np.concatenate([np.asarray(shifted) * light_tint(unknowns), white])
         return np.moveaxis(derivatives, 0, -1)
 
     def difference_steps(self, sun_angle_count: int) -> list[float]:
@@ -154,24 +158,26 @@ class FitProblem:
             [one.prior_sd for one in SKIN_UNKNOWNS] + [SUN_PRIOR_SD] * sun_angle_count + [white] * 2
         )
 
-    def prior_offsets(self, fit_point: FitPoint) -> Floats:
+    def prior_offsets(self, fit_unknowns: FitUnknowns) -> Floats:
         """Return the difference (u,) of each unknown from the mean of its prior.
 
         It is 0 for the angles that describe the directions of suns, because no direction is preferred.
         """
-        skin = fit_point.logs - np.log([one.prior_median for one in SKIN_UNKNOWNS])
-        return np.concatenate([skin, np.zeros(2 * len(fit_point.suns)), fit_point.white])
+        skin = fit_unknowns.logs - np.log([one.prior_median for one in SKIN_UNKNOWNS])
+        return np.concatenate([skin, np.zeros(2 * len(fit_unknowns.suns)), fit_unknowns.white])
 
 
-def light_tint(fit_point: FitPoint) -> Floats:
+def light_tint(fit_unknowns: FitUnknowns) -> Floats:
     """Return the ratio (3,) of the fitted light colour to the light colour given by the user; green is 1."""
-    return np.array([np.exp(fit_point.white[0]), 1.0, np.exp(fit_point.white[1])])
+    return np.array([np.exp(fit_unknowns.white[0]), 1.0, np.exp(fit_unknowns.white[1])])
 
 
 def solve_fit(
-    problem: FitProblem, start_point: FitPoint, progress: Callable[[int, int], None] = lambda done, of: None
+    problem: FitProblem,
+    start_unknowns: FitUnknowns,
+    progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> tuple[FitState, Floats]:
-    """Minimise the cost from a start point; return the best state and derivatives of the radiance.
+    """Minimise the cost from given start values; return the best state and derivatives of the radiance.
 
     The derivatives (p, 3, u) are with respect to the u unknowns. They belong to the best state if the search
     ended because no step improved it; otherwise, to the state before the last step.
@@ -181,7 +187,7 @@ def solve_fit(
 
     progress : function called with the number of finished steps and the largest number of steps
     """
-    state = problem.reweighted_state(problem.render_state(start_point, problem.initial_weights()))
+    state = problem.reweighted_state(problem.render_state(start_unknowns, problem.initial_weights()))
     damping = _INITIAL_DAMPING
     for iteration in range(_MAX_ITERATIONS):
         progress(iteration, _MAX_ITERATIONS)
@@ -206,10 +212,10 @@ def _try_damped_steps(
     H, g = _normal_equations(problem, fit_state, derivatives)
     for _ in range(_MAX_DAMPING_TRIALS):
         step = np.asarray(np.linalg.solve(H + damping * np.diag(np.diag(H)), g), np.float64)
-        step *= min(1.0, _MAX_UNKNOWN_STEP / max(float(np.abs(step).max()), 1e-12))
+        step *= min(1.0, _MAX_STEP_PER_UNKNOWN / max(float(np.abs(step).max()), 1e-12))
         if np.abs(step).max() < 0.1 * _STEP_TOLERANCE:
             break
-        trial = problem.render_state(fit_state.point.stepped(step), fit_state.weight)
+        trial = problem.render_state(fit_state.unknowns.stepped(step), fit_state.weight)
         if trial.cost < fit_state.cost:
             return trial, step, max(0.2 * damping, 1e-6)
         damping = max(30.0 * damping, 0.03)
@@ -223,9 +229,9 @@ def _normal_equations(problem: FitProblem, fit_state: FitState, derivatives: Flo
     """
     J = (derivatives * fit_state.weight[..., None]).reshape(-1, derivatives.shape[-1])
     J, r = _eliminate_lights(fit_state, J)
-    prior_sd = problem.prior_sd(2 * len(fit_state.point.suns))
+    prior_sd = problem.prior_sd(2 * len(fit_state.unknowns.suns))
     H = J.T @ J + np.diag(prior_sd**-2.0)
-    return H, J.T @ r - problem.prior_offsets(fit_state.point) / prior_sd**2
+    return H, J.T @ r - problem.prior_offsets(fit_state.unknowns) / prior_sd**2
 
 
 def _eliminate_lights(fit_state: FitState, weighted_derivatives: Floats) -> tuple[Floats, Floats]:
@@ -288,7 +294,7 @@ def fit_uncertainty(
     sd_from_assumed_parameters : dictionary from pigment to the standard deviation of its logarithm that is
         due to assumed parameters of the skin
     """
-    sun_angles = 2 * len(fit_state.point.suns)
+    sun_angles = 2 * len(fit_state.unknowns.suns)
     suns = [f"sun {k + 1} {axis}" for k in range(sun_angles // 2) for axis in ("across", "along")]
     names = [*(one.name for one in SKIN_UNKNOWNS), *suns, "white red", "white blue"]
     count = len(names) if problem.free_white else len(names) - 2
@@ -305,7 +311,7 @@ def fit_uncertainty(
     covariance += np.diag(systematic[:count] ** 2)
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
-    values, e = fit_state.point.values(), _PARAMETER_LIMIT_TOLERANCE
+    values, e = fit_state.unknowns.skin_values(), _PARAMETER_LIMIT_TOLERANCE
     free = {one.name: one.low * (1 + e) < values[one.name] < one.high * (1 - e) for one in SKIN_UNKNOWNS}
     uncertain = zip(names, sd > _MIN_UNDETERMINED_SD_RATIO * prior_sd, strict=False)
     undetermined = tuple(name for name, large in uncertain if large or not free.get(name, True))
@@ -320,7 +326,7 @@ def fit_uncertainty(
     return Uncertainty(sd_by_name, undetermined, correlated, tuple(map(float, singular_values)))
 
 
-def block_residual(problem: FitProblem, fit_state: FitState) -> float:
+def median_block_residual(problem: FitProblem, fit_state: FitState) -> float:
     """Return the median relative residual over blocks of the picture, which hardly depends on noise [-]."""
     block = _pixel_blocks(problem.frames)
     residual, target = (

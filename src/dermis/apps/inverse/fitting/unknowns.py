@@ -70,7 +70,7 @@ WHITE_PRIOR_SD = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class FitPoint:
+class FitUnknowns:
     """Values of all unknowns of a fit except the strengths of lights.
 
     logs : (4,) logarithms of the skin parameters, in the order of `SKIN_UNKNOWNS`
@@ -83,12 +83,12 @@ class FitPoint:
     suns: Floats
     white: Floats
 
-    def values(self) -> dict[str, float]:
+    def skin_values(self) -> dict[str, float]:
         """Return a dictionary from name to value of each skin parameter."""
         return {one.name: float(np.exp(log)) for one, log in zip(SKIN_UNKNOWNS, self.logs, strict=True)}
 
-    def stepped(self, unknowns_step: Floats) -> FitPoint:
-        """Return the point after a step, with the skin parameters clipped to their limits.
+    def stepped(self, unknowns_step: Floats) -> FitUnknowns:
+        """Return the unknowns after a step, with the skin parameters clipped to their limits.
 
         unknowns_step : (4 + 2 k + 2,) steps: first of the logarithms of the 4 skin parameters; then of each
             of the k suns' directions, along its two `tangents`; last of the 2 logarithms `white`
@@ -97,16 +97,16 @@ class FitPoint:
         low, high = np.log([one.low for one in SKIN_UNKNOWNS]), np.log([one.high for one in SKIN_UNKNOWNS])
         sun_steps = unknowns_step[skin : skin + 2 * count].reshape(count, 2)
         stepped = self.suns + np.einsum("kt,ktc->kc", sun_steps, tangents(self.suns))
-        return FitPoint(
+        return FitUnknowns(
             np.clip(self.logs + unknowns_step[:skin], low, high),
             stepped / np.linalg.norm(stepped, axis=1, keepdims=True),
             self.white + unknowns_step[skin + 2 * count :],
         )
 
 
-def prior_point(sun_directions: Floats) -> FitPoint:
-    """Return the point with all skin unknowns at the medians of their priors, and with given suns (k, 3)."""
-    return FitPoint(np.log([one.prior_median for one in SKIN_UNKNOWNS]), sun_directions, np.zeros(2))
+def prior_unknowns(sun_directions: Floats) -> FitUnknowns:
+    """Return unknowns with all skin parameters at the medians of their priors, and with given suns (k, 3)."""
+    return FitUnknowns(np.log([one.prior_median for one in SKIN_UNKNOWNS]), sun_directions, np.zeros(2))
 
 
 def tangents(directions: Floats) -> Floats:
@@ -120,21 +120,21 @@ def tangents(directions: Floats) -> Floats:
     return np.stack([first, np.cross(directions, first)], axis=1)
 
 
-def with_skin(scene: Scene, fit_point: FitPoint) -> Scene:
+def with_skin(scene: Scene, fit_unknowns: FitUnknowns) -> Scene:
     """Return the scene with the skin that the unknowns of a fit describe.
 
-    If the head's maps are painted from pigments, they are painted with the pigments of `fit_point`, but the
-    diffusion profile, which is slow to compute, is that of the nearest pigments of a coarse grid. Other heads
-    get a uniform colour in place of their colour map; this colour and their diffusion profile are those of
-    the pigments of `fit_point`.
+    If the head's maps are painted from pigments, they are painted with the pigments of `fit_unknowns`, but
+    the diffusion profile, which is slow to compute, is that of the nearest pigments of a coarse grid. Other
+    heads get a uniform colour in place of their colour map; this colour and their diffusion profile are those
+    of the pigments of `fit_unknowns`.
     """
-    numbers = fit_point.values()
+    numbers = fit_unknowns.skin_values()
     skin_values: dict[str, object] = {name: numbers[name] for name in ("roughness", "rho_s")}
     skin_values |= {"oiliness": 0.0, "profile": "spectral"}
     if isinstance(maps := scene.head.maps, PaintedMaps):
         look = replace(maps.look, melanin=numbers["melanin"], blood=numbers["blood"])
         head = replace(scene.head, maps=replace(maps, look=look))
-        melanin, blood = np.exp(_PROFILE_LOG_STEP * np.rint(fit_point.logs[:2] / _PROFILE_LOG_STEP))
+        melanin, blood = np.exp(_PROFILE_LOG_STEP * np.rint(fit_unknowns.logs[:2] / _PROFILE_LOG_STEP))
     else:
         head, melanin, blood = scene.head, numbers["melanin"], numbers["blood"]
         skin_values["albedo"] = "profile"

@@ -64,7 +64,7 @@ class Unmixer:
     ) -> tuple[Pixels, Pixels, Pixels]:
         """Unmix a picture; return pigments (h, w, 3), standard deviations (h, w, 2) and residual (h, w, 3).
 
-        The pigments are melanin, blood and the third unknown of the model; the standard deviations are those
+        The pigments are melanin, blood and the extra unknown of the model; the standard deviations are those
         of melanin and blood. The residual is the colour divided by the model's colour.
 
         colours : (h, w, 3) diffuse reflectance, linear Rec. 709 [-]
@@ -79,9 +79,9 @@ class Unmixer:
             )
             textures = self.record(frame, strip)
             frame.submit()
-            fractions, residual_and_third = (download(self.device, texture) for texture in textures)
+            fractions, residual_and_extra = (download(self.device, texture) for texture in textures)
             estimate[rows, :, :2], sd[rows] = fractions[..., :2], fractions[..., 2:]
-            estimate[rows, :, 2], residual[rows] = residual_and_third[..., 3], residual_and_third[..., :3]
+            estimate[rows, :, 2], residual[rows] = residual_and_extra[..., 3], residual_and_extra[..., :3]
             progress(rows.stop, height)
         return estimate, sd, residual
 
@@ -89,7 +89,7 @@ class Unmixer:
         """Record the pass that unmixes a texture of colours into two textures; return the two textures.
 
         The first texture has melanin, blood and their standard deviations. The second texture has the
-        residual, and the third unknown of the model (see `SkinModel`). The next call for a texture of the
+        residual, and the extra unknown of the model (see `SkinModel`). The next call for a texture of the
         same size overwrites both.
         """
         size = colours.size[:2]
@@ -119,10 +119,10 @@ def recolour(
 ) -> Pixels:
     """Return the model's colours (h, w, 3) for changed pigments, multiplied by the residual.
 
-    unmixed_pigments : (h, w, 3) melanin, blood and the model's third unknown (see `SkinModel`) before the
+    unmixed_pigments : (h, w, 3) melanin, blood and the model's extra unknown (see `SkinModel`) before the
         change
     residual : (h, w, 3) original colour divided by the model's colour
-    pigment_factors : (3,) factors by which melanin, blood and the third unknown are multiplied
+    pigment_factors : (3,) factors by which melanin, blood and the extra unknown are multiplied
     added_fractions : (3,) constants that are added to these products
     """
     table, shader = _table_texture(device, model), _unmixing_program(device, "recolour", model)
@@ -163,11 +163,11 @@ def _table_texture(device: Device, model: SkinModel) -> Texture:
 
 
 def _unmixing_program(device: Device, shader_name: str, model: SkinModel) -> ComputeProgram:
-    thirds, nodes = model.log_colours.shape[:2]
+    extra_nodes, nodes = model.log_colours.shape[:2]
     numbers = {
         "NODES": nodes,
-        "THIRDS": thirds,
-        "SHADE": int(model.third == "shade"),
+        "EXTRA_NODES": extra_nodes,
+        "SHADE": int(model.extra_unknown == "shade"),
         "SIDE": _INITIAL_GUESS_GRID_SIDE,
     }
     path = _SHADER_FOLDER / f"{shader_name}.wgsl"
@@ -182,7 +182,7 @@ def _model_uniforms(
     priors = {"prior_mean": model.prior_mean, "prior_sd": model.prior_sd}
     priors |= {"blood_mean": skins.BLOOD_ROOT_MEAN, "blood_sd": skins.BLOOD_ROOT_SD}
     limits = {"floor": skins.COLOUR_FLOOR, "min_reflectance": skins.MIN_REFLECTANCE}
-    numbers = {"third_range": model.third_range, "noise": relative_noise, "steps": step_count}
+    numbers = {"extra_range": model.extra_range, "noise": relative_noise, "steps": step_count}
     return shader.make_record("Model", **numbers, **priors, **limits)
 
 

@@ -2,12 +2,12 @@
 //#include "skin_model.wgsl"
 
 struct Change {
-    factors: vec3f, // of melanin, blood and the third unknown
+    factors: vec3f, // of melanin, blood and the extra unknown
     added: vec3f,
 }
 
 @group(0) @binding(2) var<uniform> change: Change;
-@group(0) @binding(3) var estimate: texture_2d<f32>; // melanin, blood, third unknown
+@group(0) @binding(3) var estimate: texture_2d<f32>; // melanin, blood, extra unknown
 @group(0) @binding(4) var residual: texture_2d<f32>;
 @group(0) @binding(5) var recoloured: texture_storage_2d<rgba32float, write>;
 

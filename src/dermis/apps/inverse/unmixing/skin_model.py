@@ -1,6 +1,6 @@
-"""Model of skin colour as a function of melanin, blood and a third unknown, and its inversion in float64.
+"""Model of skin colour as a function of melanin, blood and an extra unknown, and its inversion in float64.
 
-The third unknown is the oxygenated fraction of haemoglobin or the shading; a model can also do without it.
+The extra unknown is the oxygenated fraction of haemoglobin or the shading; a model can also do without it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 from dermis.optics.pigments.priors import skin_prior
 from dermis.optics.skin_colours import colour_table
 
-ThirdUnknown = Literal["none", "oxygen", "shade"]
+ExtraUnknown = Literal["none", "oxygen", "shade"]
 MIN_REFLECTANCE = 1e-4
 """Smallest reflectance of which a logarithm is taken, below that of all skins [-]."""
 BLOOD_ROOT_MEAN, BLOOD_ROOT_SD = 0.1, 0.1
@@ -32,20 +32,20 @@ _LOG_SHADE_RANGE = -3.0, 1.5  # limits of the logarithm of the shading
 
 @dataclass(frozen=True, eq=False)
 class SkinModel:
-    """Table of skin colours over melanin, blood and a third unknown; colours are unmixed by inverting it.
+    """Table of skin colours over melanin, blood and an extra unknown; colours are unmixed by inverting it.
 
     log_colours : (k, n, n, 3) logarithms of diffuse reflectance in linear Rec. 709. The axes are k oxygenated
-        fractions, evenly spaced from 0 to 1 (k is 1 unless oxygen is the third unknown); and n melanin and
+        fractions, evenly spaced from 0 to 1 (k is 1 unless oxygen is the extra unknown); and n melanin and
         n blood fractions, whose square roots are evenly spaced from 0 to 1
-    third : third unknown: "oxygen" is the oxygenated fraction of haemoglobin; "shade" is the logarithm of a
+    extra_unknown : "oxygen" is the oxygenated fraction of haemoglobin; "shade" is the logarithm of a
         factor common to all channels, such as uneven light in a photograph; "none" if there is none
-    third_range : smallest and largest value of the third unknown
-    prior_mean, prior_sd : mean and standard deviation of the third unknown's prior
+    extra_range : smallest and largest value of the extra unknown
+    prior_mean, prior_sd : mean and standard deviation of the extra unknown's prior
     """
 
     log_colours: Floats
-    third: ThirdUnknown
-    third_range: tuple[float, float]
+    extra_unknown: ExtraUnknown
+    extra_range: tuple[float, float]
     prior_mean: float
     prior_sd: float
 
@@ -56,37 +56,39 @@ class SkinModel:
         interpolated linearly.
 
         unknowns : (t, 3) for each colour, the square root of the melanin fraction, the square root of the
-            blood fraction, and the quantity that the field `third` names (ignored if that is "none")
+            blood fraction, and the quantity that the field `extra_unknown` names (ignored if that is "none")
         """
-        third_count, nodes = len(self.log_colours), self.log_colours.shape[1]
-        low, high = self.third_range
+        extra_node_count, nodes = len(self.log_colours), self.log_colours.shape[1]
+        low, high = self.extra_range
         i, u = _grid_node_below(unknowns[:, 0], nodes)
         j, v = _grid_node_below(unknowns[:, 1], nodes)
         fraction = (unknowns[:, 2] - low) / (high - low)
-        k, w = _grid_node_below(fraction if third_count > 1 else np.zeros(len(unknowns)), third_count)
-        next_k = min(1, third_count - 1)
+        k, w = _grid_node_below(
+            fraction if extra_node_count > 1 else np.zeros(len(unknowns)), extra_node_count
+        )
+        next_k = min(1, extra_node_count - 1)
         corners = [(k + (d & next_k), i + (e >> 1), j + (e & 1)) for d in (0, 1) for e in range(4)]
         c = np.array([self.log_colours[corner] for corner in corners])
         u, v, w = u[:, None], v[:, None], w[:, None]
         along_q = c[1::2] - c[0::2]
-        rows = c[0::2] + v * along_q  # by third unknown and melanin
+        rows = c[0::2] + v * along_q  # by extra unknown and melanin
         layers = rows[0::2] + u * (rows[1::2] - rows[0::2])
         by_p = _lerp(rows[1::2] - rows[0::2], w) * (nodes - 1)
         by_q = _lerp(along_q[0::2] + u * (along_q[1::2] - along_q[0::2]), w) * (nodes - 1)
-        by_t = (layers[1] - layers[0]) * max(third_count - 1, 1) / (high - low)
+        by_t = (layers[1] - layers[0]) * max(extra_node_count - 1, 1) / (high - low)
         result = _lerp(layers, w)
-        if self.third == "shade":
+        if self.extra_unknown == "shade":
             result, by_t = result + unknowns[:, 2:], np.ones_like(result)
         return result, np.stack([by_p, by_q, by_t], axis=-1)
 
-    def colours(self, melanin: Floats, blood: Floats, third_unknown: Floats | float | None = None) -> Floats:
+    def colours(self, melanin: Floats, blood: Floats, extra_value: Floats | float | None = None) -> Floats:
         """Return the diffuse reflectance (t, 3) of t skins, linear Rec. 709 [-].
 
         melanin, blood : (t,) volume fractions [-]
-        third_unknown : value of the quantity that the field `third` names: an oxygenated fraction, or the
-            logarithm of a shading; by default the mean of its prior [-]
+        extra_value : value of the quantity that the field `extra_unknown` names: an oxygenated fraction, or
+            the logarithm of a shading; by default the mean of its prior [-]
         """
-        last = np.broadcast_to(self.prior_mean if third_unknown is None else third_unknown, np.shape(melanin))
+        last = np.broadcast_to(self.prior_mean if extra_value is None else extra_value, np.shape(melanin))
         x = np.stack([np.sqrt(melanin), np.sqrt(blood), last], axis=-1)
         return np.asarray(np.exp(self.evaluate(x)[0]))
 
@@ -105,34 +107,34 @@ def _lerp(node_values: Floats, fraction: Floats) -> Floats:
     return np.asarray(node_values[0] + fraction * (node_values[1] - node_values[0]))
 
 
-def skin_model(skin: SkinParameters = DEFAULT_SKIN, third_unknown: ThirdUnknown = "none") -> SkinModel:
+def skin_model(skin: SkinParameters = DEFAULT_SKIN, extra_unknown: ExtraUnknown = "none") -> SkinModel:
     """Return the skin model for all fractions of melanin and blood, computed by layered diffusion.
 
     skin : parameters that do not vary; its melanin and blood are ignored
-    third_unknown : unknown besides melanin and blood; "none" keeps the oxygenation of `skin`
+    extra_unknown : unknown besides melanin and blood; "none" keeps the oxygenation of `skin`
 
-    Raises DermisError for other names of the third unknown.
+    Raises DermisError for other names of the extra unknown.
     """
-    if third_unknown not in get_args(ThirdUnknown):
+    if extra_unknown not in get_args(ExtraUnknown):
         refuse(
-            "third",
-            ", ".join(get_args(ThirdUnknown)),
-            f"got {format_value(third_unknown)}",
+            "extra_unknown",
+            ", ".join(get_args(ExtraUnknown)),
+            f"got {format_value(extra_unknown)}",
             "Take one of them",
         )
-    return _cached_skin_model(replace(skin, melanin=0.0, blood=0.0, epidermal_blood=0.0), third_unknown)
+    return _cached_skin_model(replace(skin, melanin=0.0, blood=0.0, epidermal_blood=0.0), extra_unknown)
 
 
 @lru_cache(maxsize=8)
-def _cached_skin_model(skin: SkinParameters, third_unknown: ThirdUnknown) -> SkinModel:
-    if third_unknown == "oxygen":
+def _cached_skin_model(skin: SkinParameters, extra_unknown: ExtraUnknown) -> SkinModel:
+    if extra_unknown == "oxygen":
         oxygens = np.linspace(0.0, 1.0, _OXYGEN_NODE_COUNT)
         sd = skin_prior().moments("oxygen")[1]
-        return SkinModel(_log_colour_tables(skin, oxygens), third_unknown, (0.0, 1.0), skin.oxygen, sd)
+        return SkinModel(_log_colour_tables(skin, oxygens), extra_unknown, (0.0, 1.0), skin.oxygen, sd)
     logs = _log_colour_tables(skin, [skin.oxygen])
-    if third_unknown == "shade":
-        return SkinModel(logs, third_unknown, _LOG_SHADE_RANGE, 0.0, _LOG_SHADE_SD)
-    return SkinModel(logs, third_unknown, (-1.0, 1.0), 0.0, _FIXED_UNKNOWN_SD)
+    if extra_unknown == "shade":
+        return SkinModel(logs, extra_unknown, _LOG_SHADE_RANGE, 0.0, _LOG_SHADE_SD)
+    return SkinModel(logs, extra_unknown, (-1.0, 1.0), 0.0, _FIXED_UNKNOWN_SD)
 
 
 def _log_colour_tables(skin: SkinParameters, oxygen_fractions: Floats | list[float]) -> Floats:
@@ -155,16 +157,16 @@ class PigmentEstimate:
     """Pigments estimated from t colours.
 
     melanin, blood : (t,) volume fractions [-]
-    third : (t,) quantity that `SkinModel.third` names: the oxygenated fraction of haemoglobin, or the
-        logarithm of the shading; without meaning if that is "none" [-]
+    extra_value : (t,) quantity that `SkinModel.extra_unknown` names: the oxygenated fraction of haemoglobin,
+        or the logarithm of the shading; without meaning if that is "none" [-]
     melanin_sd, blood_sd : (t,) lower bounds of the standard deviations due to noise: the Cramér-Rao bound,
-        which includes the priors of blood and of the third unknown [-]
+        which includes the priors of blood and of the extra unknown [-]
     residual : (t, 3) colour divided by the model's colour [-]
     """
 
     melanin: Floats
     blood: Floats
-    third: Floats
+    extra_value: Floats
     melanin_sd: Floats
     blood_sd: Floats
     residual: Floats
@@ -184,10 +186,10 @@ def solve_pigments(
 ) -> PigmentEstimate:
     """Return the most probable melanin and blood of each colour, computed in float64.
 
-    If the model has a third unknown (oxygen or shading, see `SkinModel`), it is estimated too.
+    If the model has an extra unknown (oxygen or shading, see `SkinModel`), it is estimated too.
 
     The cost is a sum of squares, each divided by its variance: the difference between the logarithms of the
-    given and the model's colour in each channel, and the deviations of blood and of the third unknown from
+    given and the model's colour in each channel, and the deviations of blood and of the extra unknown from
     their prior means. It is minimised by Gauss-Newton steps with Levenberg's damping. An unknown at a limit
     stays fixed if the step would cross the limit.
 
@@ -228,12 +230,12 @@ def _initial_guess(model: SkinModel, log_colours: Floats) -> Floats:
 def _fit_cost(model: SkinModel, unknowns: Floats, log_colours: Floats, colour_weights: Floats) -> Floats:
     residual_cost = colour_weights * (log_colours - model.evaluate(unknowns)[0]) ** 2
     blood_cost = ((unknowns[:, 1] - BLOOD_ROOT_MEAN) / BLOOD_ROOT_SD) ** 2
-    third_cost = ((unknowns[:, 2] - model.prior_mean) / model.prior_sd) ** 2
-    return np.asarray(residual_cost.sum(axis=1) + (blood_cost + third_cost))
+    extra_cost = ((unknowns[:, 2] - model.prior_mean) / model.prior_sd) ** 2
+    return np.asarray(residual_cost.sum(axis=1) + (blood_cost + extra_cost))
 
 
 def _clip_unknowns(model: SkinModel, unknowns: Floats) -> Floats:
-    return np.clip(unknowns, (0.0, 0.0, model.third_range[0]), (1.0, 1.0, model.third_range[1]))
+    return np.clip(unknowns, (0.0, 0.0, model.extra_range[0]), (1.0, 1.0, model.extra_range[1]))
 
 
 def _damped_step(

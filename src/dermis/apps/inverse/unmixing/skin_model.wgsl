@@ -1,12 +1,12 @@
 // Skin model and its inversion by damped Gauss-Newton steps, as in skin_model.py, which computes in float64.
 
 override NODES: u32; // number of table nodes along the square roots of melanin and of blood
-override THIRDS: u32; // nodes of the third unknown, 1 if it is not in the table
-override SHADE: bool; // whether the third unknown is the logarithm of a factor
+override EXTRA_NODES: u32; // nodes of the extra unknown, 1 if it is not in the table
+override SHADE: bool; // whether the extra unknown is the logarithm of a factor
 
 struct Model {
-    third_range: vec2f, // limits of the third unknown
-    prior_mean: f32, // of the third unknown
+    extra_range: vec2f, // limits of the extra unknown
+    prior_mean: f32, // of the extra unknown
     prior_sd: f32,
     blood_mean: f32, // prior of the root of the blood fraction
     blood_sd: f32,
@@ -46,13 +46,13 @@ const TOLERANCE: f32 = 1e-4; // largest step at which the search ends
 const MIN_CURVATURE: f32 = 1e-6; // added to curvatures, for nodes where an unknown has no effect
 
 @group(0) @binding(0) var<uniform> model: Model;
-@group(0) @binding(1) var table: texture_2d_array<f32>; // logarithms by blood (x), melanin (y) and third unknown (layer)
+@group(0) @binding(1) var table: texture_2d_array<f32>; // logarithms by blood (x), melanin (y) and extra unknown (layer)
 
-fn evaluate_layer(third: u32, node: vec2u, fraction: vec2f) -> Evaluation {
-    let a = textureLoad(table, node.yx, third, 0).rgb;
-    let b = textureLoad(table, node.yx + vec2u(1u, 0u), third, 0).rgb;
-    let c = textureLoad(table, node.yx + vec2u(0u, 1u), third, 0).rgb;
-    let d = textureLoad(table, node.yx + vec2u(1u, 1u), third, 0).rgb;
+fn evaluate_layer(layer: u32, node: vec2u, fraction: vec2f) -> Evaluation {
+    let a = textureLoad(table, node.yx, layer, 0).rgb;
+    let b = textureLoad(table, node.yx + vec2u(1u, 0u), layer, 0).rgb;
+    let c = textureLoad(table, node.yx + vec2u(0u, 1u), layer, 0).rgb;
+    let d = textureLoad(table, node.yx + vec2u(1u, 1u), layer, 0).rgb;
     let near = mix(a, b, fraction.y);
     let far = mix(c, d, fraction.y);
     let scale = f32(NODES - 1u);
@@ -63,7 +63,7 @@ fn evaluate(x: vec3f) -> Evaluation {
     let position = clamp(x.xy, vec2f(0.0), vec2f(1.0)) * f32(NODES - 1u);
     let node = min(vec2u(position), vec2u(NODES - 2u));
     let fraction = position - vec2f(node);
-    if (THIRDS == 1u) {
+    if (EXTRA_NODES == 1u) {
         var result = evaluate_layer(0u, node, fraction);
         if (SHADE) {
             result.logs += x.z;
@@ -71,9 +71,9 @@ fn evaluate(x: vec3f) -> Evaluation {
         }
         return result;
     }
-    let scale = f32(THIRDS - 1u) / (model.third_range.y - model.third_range.x);
-    let height = clamp((x.z - model.third_range.x) * scale, 0.0, f32(THIRDS - 1u));
-    let lower = min(u32(height), THIRDS - 2u);
+    let scale = f32(EXTRA_NODES - 1u) / (model.extra_range.y - model.extra_range.x);
+    let height = clamp((x.z - model.extra_range.x) * scale, 0.0, f32(EXTRA_NODES - 1u));
+    let lower = min(u32(height), EXTRA_NODES - 2u);
     let w = height - f32(lower);
     let low = evaluate_layer(lower, node, fraction);
     let high = evaluate_layer(lower + 1u, node, fraction);
@@ -103,7 +103,7 @@ fn normal_equations(x: vec3f, logs: vec3f, weights: vec3f) -> NormalEquations {
         dot(w, difference * difference) + blood_offset * blood_offset,
         difference,
     );
-    if (SHADE || THIRDS > 1u) {
+    if (SHADE || EXTRA_NODES > 1u) {
         let prior_weight = 1.0 / (model.prior_sd * model.prior_sd);
         let offset = x.z - model.prior_mean;
         result.pt = dot(w, current.p * current.t);
@@ -115,22 +115,22 @@ fn normal_equations(x: vec3f, logs: vec3f, weights: vec3f) -> NormalEquations {
     return result;
 }
 
-// Eliminate the third unknown, which leaves a system of two.
-fn eliminate_third(s: NormalEquations) -> array<f32, 5> {
+// Eliminate the extra unknown, which leaves a system of two.
+fn eliminate_extra(s: NormalEquations) -> array<f32, 5> {
     let a = s.pt / s.tt;
     let b = s.qt / s.tt;
     return array<f32, 5>(s.pp - a * s.pt, s.pq - a * s.qt, s.qq - b * s.qt, s.descent.x - a * s.descent.z, s.descent.y - b * s.descent.z);
 }
 
-// Return a Gauss-Newton step with Levenberg damping. A third unknown at its limit is fixed.
+// Return a Gauss-Newton step with Levenberg damping. An extra unknown at its limit is fixed.
 fn damped_step(s: NormalEquations, x: vec3f, damping: f32) -> vec3f {
-    let step = pair_step(eliminate_third(s), x, damping);
-    let third = (s.descent.z - s.pt * step.x - s.qt * step.y) / s.tt;
-    let range = model.third_range;
-    if ((x.z <= range.x && third < 0.0) || (x.z >= range.y && third > 0.0)) {
+    let step = pair_step(eliminate_extra(s), x, damping);
+    let extra = (s.descent.z - s.pt * step.x - s.qt * step.y) / s.tt;
+    let range = model.extra_range;
+    if ((x.z <= range.x && extra < 0.0) || (x.z >= range.y && extra > 0.0)) {
         return vec3f(pair_step(array<f32, 5>(s.pp, s.pq, s.qq, s.descent.x, s.descent.y), x, damping), 0.0);
     }
-    return vec3f(step, third);
+    return vec3f(step, extra);
 }
 
 // Return the damped step of melanin and blood from a system of two.
@@ -146,8 +146,8 @@ fn pair_step(r: array<f32, 5>, x: vec3f, damping: f32) -> vec2f {
 
 // Solve for the unknowns of a colour from an initial guess.
 fn solve(start: vec3f, logs: vec3f, weights: vec3f) -> Solution {
-    let low = vec3f(0.0, 0.0, model.third_range.x);
-    let high = vec3f(1.0, 1.0, model.third_range.y);
+    let low = vec3f(0.0, 0.0, model.extra_range.x);
+    let high = vec3f(1.0, 1.0, model.extra_range.y);
     var best = start;
     var current = normal_equations(start, logs, weights);
     var damping = 1e-3;

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from dermis.apps.inverse.unmixing.spectral_inversion import (
-    FIVE_UNKNOWNS,
+    PIGMENT_AND_OXYGEN_UNKNOWNS,
+    PIGMENT_UNKNOWNS,
     SPECULAR_INCLUDED_REFLECTANCE,
-    THREE_UNKNOWNS,
-    TWO_UNKNOWNS,
+    TISSUE_UNKNOWNS,
     SpectralFit,
     fit_skin,
 )
@@ -30,8 +30,12 @@ from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 
-UNKNOWN_NAMES_BY_SET = {"none": TWO_UNKNOWNS, "oxygen": THREE_UNKNOWNS, "all": FIVE_UNKNOWNS}
-"""Names of all fitted parameters, by the value of `find` that selects those besides melanin and blood."""
+UNKNOWN_NAMES_BY_SET = {
+    "none": PIGMENT_UNKNOWNS,
+    "oxygen": PIGMENT_AND_OXYGEN_UNKNOWNS,
+    "all": TISSUE_UNKNOWNS,
+}
+"""Names of all fitted parameters, by the word that selects those besides melanin and blood."""
 _EXPECTED_TABLE = "a table of reflectance spectra (CSV), a spectrum in each row or in each column"
 _WAVELENGTH_PATTERN = re.compile(r"[^\d.]{0,20}?(\d{3,4}(?:\.\d+)?)\s*(?:nm)?", re.IGNORECASE)
 _MAX_FILE_BYTES = 32 << 20
@@ -178,7 +182,7 @@ class UnmixedSpectra:
         rows: list[dict[str, Any]] = [
             {"row": number, "labels": labels} for number, labels in enumerate(self.labels, 1)
         ]
-        rms, delta_e, residual = self.fit.rms, self.fit.delta_e(), self.fit.residual
+        rms, delta_e, residual = self.fit.rms_residual, self.fit.delta_e(), self.fit.residual
         for k, index in enumerate(self.complete):
             rows[index] |= {name: float(self.fit.values[name][k]) for name in self.names}
             rows[index] |= {"rms": float(rms[k]), "delta_e": float(delta_e[k])}
@@ -187,7 +191,7 @@ class UnmixedSpectra:
 
     def summary(self) -> dict[str, Any]:
         """Return the number of spectra, and percentiles of the parameters and errors of all spectra."""
-        values = self.fit.values | {"rms": self.fit.rms, "delta_e": self.fit.delta_e()}
+        values = self.fit.values | {"rms": self.fit.rms_residual, "delta_e": self.fit.delta_e()}
         percentiles = {}
         for name in (*self.names, "rms", "delta_e"):
             low, middle, high = (float(one) for one in np.percentile(values[name], (5.0, 50.0, 95.0)))
@@ -198,22 +202,23 @@ class UnmixedSpectra:
 
 def unmix_spectra(
     path: str | Path,
-    find: str = "none",
+    extra_unknowns: str = "none",
     skin: SkinParameters = DEFAULT_SKIN,
     surface: float = SPECULAR_INCLUDED_REFLECTANCE,
 ) -> UnmixedSpectra:
     """Estimate the pigments of each reflectance spectrum of a table.
 
     path : file with the table, see `read_spectra`
-    find : parameters to estimate besides melanin and blood: "none", "oxygen", or "all" for oxygen, scattering
-        and epidermal thickness
+    extra_unknowns : parameters to estimate besides melanin and blood: "none", "oxygen", or "all" for oxygen,
+        scattering and epidermal thickness
     skin : values of all other parameters
     surface : surface reflection that is subtracted from the spectra; 0 if they do not include it [-]
 
-    Raises DermisError when `read_spectra` does, and for an unknown `find` or a `surface` out of range.
+    Raises DermisError when `read_spectra` does, and for other `extra_unknowns` or a `surface` out of
+    range.
     """
-    if find not in UNKNOWN_NAMES_BY_SET:
-        refuse("--find", ", ".join(UNKNOWN_NAMES_BY_SET), f"got {find!r}", "Choose one of them")
+    if extra_unknowns not in UNKNOWN_NAMES_BY_SET:
+        refuse("--find", ", ".join(UNKNOWN_NAMES_BY_SET), f"got {extra_unknowns!r}", "Choose one of them")
     surface = checked_number("--surface", surface, 0.0, 0.2, "a reflectance")
     table = read_spectra(path)
     complete = np.flatnonzero(np.isfinite(table.reflectance).all(axis=1))
@@ -222,7 +227,7 @@ def unmix_spectra(
         notify(f"{path}: {incomplete} of {len(table.labels)} spectra have missing values and no result")
     if not len(complete):
         refuse(path, "a complete spectrum", "all have missing values", "Fill the missing cells")
-    names: Sequence[str] = UNKNOWN_NAMES_BY_SET[find]
+    names: Sequence[str] = UNKNOWN_NAMES_BY_SET[extra_unknowns]
     spectra = table.reflectance[complete] - surface
     parts = [fit_skin(part, names, "spectrum", skin) for part in _spectra_batches(spectra)]
     values = {name: np.concatenate([part.values[name] for part in parts]) for name in names}

@@ -37,8 +37,8 @@ class SpectralUnknown:
     name : name of the parameter
     low, high : smallest and largest value
     start : value from which a fit starts
-    scale : function of the parameter that the fit varies, here called the coordinate of the parameter: its
-        square root ("root"), its logarithm ("log"), or the value itself ("linear")
+    scale : function of the parameter that the fit varies, here called the scaled value: the square root
+        ("root"), the logarithm ("log"), or the value itself ("linear")
     """
 
     name: str
@@ -47,8 +47,8 @@ class SpectralUnknown:
     start: float
     scale: Literal["root", "log", "linear"] = "linear"
 
-    def coordinates(self, parameter_values: Floats | np.float64) -> Floats:
-        """Convert parameter values to coordinates: their square roots, logarithms, or the values themselves.
+    def scaled_values(self, parameter_values: Floats | np.float64) -> Floats:
+        """Convert parameter values to scaled values: square roots, logarithms, or the values themselves.
 
         The field `scale` decides which of the three.
         """
@@ -56,15 +56,15 @@ class SpectralUnknown:
             return np.asarray(np.log(parameter_values))
         return np.asarray(np.sqrt(parameter_values) if self.scale == "root" else parameter_values)
 
-    def coordinate(self, parameter_value: float) -> float:
-        """Convert one parameter value to its coordinate, which is what a fit varies, see `scale`."""
-        return float(self.coordinates(np.float64(parameter_value)))
+    def scaled_value(self, parameter_value: float) -> float:
+        """Convert one parameter value to its scaled value, which is what a fit varies, see `scale`."""
+        return float(self.scaled_values(np.float64(parameter_value)))
 
-    def parameter_values(self, coordinates: Floats) -> Floats:
-        """Convert coordinates (n,) on this parameter's `scale` back to parameter values (n,)."""
+    def parameter_values(self, scaled_values: Floats) -> Floats:
+        """Convert scaled values (n,), see `scale`, back to parameter values (n,)."""
         if self.scale == "log":
-            return np.exp(coordinates)
-        return np.asarray(coordinates**2 if self.scale == "root" else coordinates)
+            return np.exp(scaled_values)
+        return np.asarray(scaled_values**2 if self.scale == "root" else scaled_values)
 
 
 UNKNOWNS = {
@@ -79,9 +79,9 @@ UNKNOWNS = {
     )
 }
 """Parameters of the package's skin that a fit may vary; scattering is relative to [DonnerJensen2006]."""
-TWO_UNKNOWNS = ("melanin", "blood")
-THREE_UNKNOWNS = (*TWO_UNKNOWNS, "oxygen")
-FIVE_UNKNOWNS = (*THREE_UNKNOWNS, "scattering", "epidermis_mm")
+PIGMENT_UNKNOWNS = ("melanin", "blood")
+PIGMENT_AND_OXYGEN_UNKNOWNS = (*PIGMENT_UNKNOWNS, "oxygen")
+TISSUE_UNKNOWNS = (*PIGMENT_AND_OXYGEN_UNKNOWNS, "scattering", "epidermis_mm")
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class SpectralFit:
         return self.measured - self.model
 
     @property
-    def rms(self) -> Floats:
+    def rms_residual(self) -> Floats:
         """Return for each skin the root mean square (n,) of the residual over all wavelengths [-]."""
         return np.asarray(np.sqrt((self.residual**2).mean(axis=1)))
 
@@ -163,19 +163,21 @@ def invert_spectra(
     max_steps : largest number of steps
     """
     first = {} if start is None else start
-    columns = (one.coordinates(first.get(one.name, np.array(one.start))) for one in unknowns)
+    columns = (one.scaled_values(first.get(one.name, np.array(one.start))) for one in unknowns)
     x = np.stack([np.broadcast_to(column, len(spectra)) for column in columns], axis=-1)
-    low, high = (np.array([one.coordinate(getattr(one, end)) for one in unknowns]) for end in ("low", "high"))
+    low, high = (
+        np.array([one.scaled_value(getattr(one, end)) for one in unknowns]) for end in ("low", "high")
+    )
 
-    def parameter_values_at(coordinates: Floats) -> dict[str, Floats]:
-        return {one.name: one.parameter_values(coordinates[:, i]) for i, one in enumerate(unknowns)}
+    def parameter_values_at(scaled_values: Floats) -> dict[str, Floats]:
+        return {one.name: one.parameter_values(scaled_values[:, i]) for i, one in enumerate(unknowns)}
 
     weights = rgb_weights()
     target = lab(spectra @ weights.T)
     metric = colour_metric(target)
 
-    def residual(coordinates: Floats) -> Floats:
-        reflectance = model(parameter_values_at(coordinates))
+    def residual(scaled_values: Floats) -> Floats:
+        reflectance = model(parameter_values_at(scaled_values))
         if criterion == "spectrum":
             return np.asarray(reflectance - spectra)
         return np.asarray(np.einsum("nij,nj->ni", metric, lab(reflectance @ weights.T) - target))
@@ -186,7 +188,7 @@ def invert_spectra(
 
 def fit_skin(
     spectra: Floats,
-    unknown_names: Sequence[str] = TWO_UNKNOWNS,
+    unknown_names: Sequence[str] = PIGMENT_UNKNOWNS,
     criterion: Criterion = "spectrum",
     skin: SkinParameters = DEFAULT_SKIN,
 ) -> SpectralFit:

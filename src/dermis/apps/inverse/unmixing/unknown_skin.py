@@ -18,10 +18,10 @@ FIXED_PARAMETERS = ("oxygen", "epidermis_mm")
 """Parameters that an inversion of colours assumes, and that differ between people."""
 _SAMPLE_COUNT = 2000
 _LOG_PIGMENT_KERNEL_SD = 0.35  # standard deviation of weights over the logarithms of melanin and blood
-_MAX_COUNTED_LOG_ERROR = 2.5  # largest error of a logarithm that counts, for blood that melanin hides
+_LOG_ERROR_CLIP = 2.5  # largest error of a logarithm that counts, for blood that melanin hides
 
 
-def unknown_skin_sd(
+def sd_from_assumed_parameters(
     melanin: float,
     blood: float,
     skin: SkinParameters = DEFAULT_SKIN,
@@ -73,4 +73,4 @@ def _unmix_prior_sample(
     estimate = solve_pigments(model, np.maximum(spectra @ rgb_weights().T, 0.0))
     found = np.log(np.maximum(np.stack([estimate.melanin, estimate.blood], axis=-1), 1e-4))
     error = found - np.log(np.maximum(np.stack([values["melanin"], values["blood"]], axis=-1), 1e-4))
-    return found, np.clip(error, -_MAX_COUNTED_LOG_ERROR, _MAX_COUNTED_LOG_ERROR)
+    return found, np.clip(error, -_LOG_ERROR_CLIP, _LOG_ERROR_CLIP)

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.inverse.unmixing.device_unmixer import Unmixer, estimate_shading, recolour
-from dermis.apps.inverse.unmixing.skin_model import SkinModel, ThirdUnknown, skin_model
-from dermis.apps.inverse.unmixing.unknown_skin import unknown_skin_sd
+from dermis.apps.inverse.unmixing.skin_model import ExtraUnknown, SkinModel, skin_model
+from dermis.apps.inverse.unmixing.unknown_skin import sd_from_assumed_parameters
 from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import refuse
 from dermis.base.quantities import checked_number
-from dermis.base.renamed import successor
+from dermis.base.renamed import renamed_attribute, renamed_keywords, successor
 from dermis.formats.maps import colour_map
 from dermis.gpu import Device
 from dermis.gpu.failures import LazyDevice
@@ -87,8 +87,8 @@ class PigmentChange:
     def scales_and_offsets(self, melanin: float, blood: float) -> tuple[Floats, Floats]:
         """Return the factors (3,) and constants (3,) of this change: each new map is factor * map + constant.
 
-        The maps are those of melanin, of blood and of the third unknown of a `SkinModel`, such as oxygen. The
-        third map keeps its values, so its factor is 1 and its constant is 0.
+        The maps are those of melanin, of blood and of the extra unknown of a `SkinModel`, such as oxygen. The
+        last map keeps its values, so its factor is 1 and its constant is 0.
 
         melanin, blood : medians of the maps of melanin and blood before the change [-]
         """
@@ -127,7 +127,7 @@ class UnmixResult:
         noise (Cramér-Rao bound) [-]
     residual : (h, w, 3) colour divided by the model's colour; it differs from 1 where the picture shows
         something other than skin, such as paint or hair [-]
-    third : (h, w) oxygenated fraction of haemoglobin; None if it was not requested [-]
+    oxygen : (h, w) oxygenated fraction of haemoglobin; None if it was not requested [-]
     shading : (h, w) shading by which the colours were divided; None if it was not requested [-]
     skin : parameters of the model's skins other than melanin and blood
     model : model of skin colours
@@ -139,17 +139,18 @@ class UnmixResult:
     melanin_sd: Pixels
     blood_sd: Pixels
     residual: Pixels
-    third: Pixels | None
+    oxygen: Pixels | None
     shading: Pixels | None
     skin: SkinParameters
     model: SkinModel
     devices: dict[str, LazyDevice] = field(default_factory=dict)
+    third = renamed_attribute("third", "oxygen")
 
     def maps(self) -> dict[str, Pixels]:
         """Return all maps that were computed, as a dictionary from file name without suffix to map."""
         names = "melanin", "blood", "melanin_sd", "blood_sd", "residual"
         named = {name: getattr(self, name) for name in names}
-        optional = {"oxygen": self.third, "shading": self.shading}
+        optional = {"oxygen": self.oxygen, "shading": self.shading}
         return named | {name: one for name, one in optional.items() if one is not None}
 
     def summary(self) -> dict[str, Any]:
@@ -179,8 +180,8 @@ class UnmixResult:
                 sd = {"sd": float(np.median(maps[f"{name}_sd"].ravel()[skin]))} if name != "oxygen" else {}
                 result[name] = _percentile_summary(fraction[skin]) | sd
             median = {name: result[name]["median"] for name in ("melanin", "blood")}
-            found = self.third is not None
-            spread = unknown_skin_sd(**median, skin=self.skin, is_oxygen_fitted=found)
+            found = self.oxygen is not None
+            spread = sd_from_assumed_parameters(**median, skin=self.skin, is_oxygen_fitted=found)
             for pigment, relative in spread.items():
                 result[pigment]["skin_sd"] = relative * median[pigment]
         return result
@@ -199,11 +200,11 @@ class UnmixResult:
         return lazy_device.run(lambda device: self._recolour_on_device(device, change))
 
     def _recolour_on_device(self, device: Device, pigment_change: PigmentChange) -> Pixels:
-        fixed = self.third is None or pigment_change.oxygen is not None
+        fixed = self.oxygen is None or pigment_change.oxygen is not None
         target = skin_model(pigment_change.applied_to(self.skin), "none") if fixed else self.model
         prior_mean = np.broadcast_to(np.float32(target.prior_mean), self.melanin.shape)
-        third = prior_mean if fixed or self.third is None else self.third
-        estimate = np.stack([self.melanin, self.blood, third], axis=-1)
+        extra_value = prior_mean if fixed or self.oxygen is None else self.oxygen
+        estimate = np.stack([self.melanin, self.blood, extra_value], axis=-1)
         factors, added = pigment_change.scales_and_offsets(
             self._skin_median(self.melanin), self._skin_median(self.blood)
         )
@@ -225,11 +226,12 @@ def _percentile_summary(texel_values: Floats) -> dict[str, float]:
     return {"p5": float(low), "median": float(middle), "p95": float(high)}
 
 
+@renamed_keywords(third="extra_unknown")
 def unmix(
     picture: str | Path | EmbeddedPicture | ArrayLike,
     *,
     skin: SkinParameters = DEFAULT_SKIN,
-    third: ThirdUnknown = "none",
+    extra_unknown: ExtraUnknown = "none",
     noise: float = DEFAULT_NOISE,
     shading: bool = False,
     adapter: str = "auto",
@@ -243,7 +245,7 @@ def unmix(
         File (PNG, JPEG, HEIC, EXR and others), or (h, w, 3) diffuse reflectance in linear Rec. 709 [-].
     skin : SkinParameters
         Epidermal thickness, eumelanin and oxygen of the model's skins; melanin and blood are ignored.
-    third : {"none", "oxygen"}
+    extra_unknown : {"none", "oxygen"}
         "oxygen" also estimates the oxygenated fraction of haemoglobin; the mean of its prior is the fraction
         in `skin`, and the standard deviation is that among measured people. "none" keeps the fraction in
         `skin`.
@@ -279,9 +281,9 @@ def unmix(
     (1, 1)
     """
     noise = checked_number("noise", noise, *_RELATIVE_NOISE_RANGE, "relative to each channel")
-    model = skin_model(skin, third)
-    if third == "shade":
-        refuse("third", '"none" or "oxygen"', "got 'shade'", "Set shading=True instead")
+    model = skin_model(skin, extra_unknown)
+    if extra_unknown == "shade":
+        refuse("extra_unknown", '"none" or "oxygen"', "got 'shade'", "Set shading=True instead")
     if isinstance(picture, str | Path | EmbeddedPicture):
         colours = colour_map(picture, apply_exif_orientation=True)
     else:
@@ -291,7 +293,7 @@ def unmix(
         light = estimate_shading(device, colours, skin, noise) if shading else None
         unshaded = colours if light is None else colours / light[..., None]
         estimate, sd, residual = Unmixer(device, model, noise).unmix(unshaded, progress)
-        oxygen = estimate[..., 2] if third == "oxygen" else None
+        oxygen = estimate[..., 2] if extra_unknown == "oxygen" else None
         maps = (estimate[..., 0], estimate[..., 1], sd[..., 0], sd[..., 1])
         return UnmixResult(*maps, residual, oxygen, light, skin, model, {adapter: lazy_device})
 

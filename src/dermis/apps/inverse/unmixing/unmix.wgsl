@@ -5,7 +5,7 @@
 @group(0) @binding(2) var<storage, read> guesses: array<vec2f>;
 @group(0) @binding(3) var colours: texture_2d<f32>; // diffuse reflectance, linear
 @group(0) @binding(4) var fractions: texture_storage_2d<rgba32float, write>; // melanin, blood, and their standard deviations
-@group(0) @binding(5) var residual: texture_storage_2d<rgba32float, write>; // ratio of the colour to the model's; third unknown
+@group(0) @binding(5) var residual: texture_storage_2d<rgba32float, write>; // ratio of the colour to the model's; extra unknown
 
 fn initial_guess(logs: vec3f) -> vec2f {
     let position = guess_position(logs);
@@ -25,7 +25,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let logs = log(colour);
     let weights = inverse_variances(colour);
     let result = solve(vec3f(initial_guess(logs), model.prior_mean), logs, weights);
-    let r = eliminate_third(result.system);
+    let r = eliminate_extra(result.system);
     let sd = sqrt(vec2f(r[2], r[0]) / max(r[0] * r[2] - r[1] * r[1], 1e-9 * r[0] * r[2]));
     let x = result.x;
     // A fraction is the square of its root r: its deviation is 2 r sd + sd^2.

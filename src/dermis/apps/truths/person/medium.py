@@ -34,7 +34,7 @@ _HALF_SIDE_PER_FRAME_HEIGHT, _MIN_HALF_SIDE_MM = 0.75, 25.0
 _COLOURED_DEPTH_MM = 3.0  # depth to which the medium has the colour of the surface
 _SAMPLES_PER_VOXEL = 3.0  # samples per area of one voxel face
 _MAX_SKIN_REFLECTANCE = 0.97
-_MIN_ROOT_ABSORPTION = 0.02  # smallest tabulated square root of 1 - albedo
+_MIN_SQRT_CO_ALBEDO = 0.02  # smallest tabulated square root of 1 - albedo
 _DISTANCE_PHOTON_COUNT, _TABLE_PHOTON_COUNT = 40_000, 40_000
 _HALF_SPACE_TABLE_ALBEDO_COUNT = 48
 _STACK_TABLE_ALBEDO_COUNT = 20
@@ -108,7 +108,7 @@ def deepest_albedo(medium: Medium, colour: ArrayLike) -> Doubles:
         )
         for one in medium.layers
     )
-    roots = np.linspace(1.0, _MIN_ROOT_ABSORPTION, _STACK_TABLE_ALBEDO_COUNT)
+    roots = np.linspace(1.0, _MIN_SQRT_CO_ALBEDO, _STACK_TABLE_ALBEDO_COUNT)
     found = [
         np.interp(wanted[..., c], _reflectance_table(tuple(one[c] for one in layers), medium.eta), roots)
         for c in range(3)
@@ -127,7 +127,7 @@ def _reflectance_table(layers: tuple[tuple[float, float, float], ...], eta: floa
     above = [ScatteringLayer(a, s, thickness, eta=eta) for a, s, thickness in layers[:-1]]
     extinction = layers[-1][0] + layers[-1][1]
     totals = []
-    for root in np.linspace(1.0, _MIN_ROOT_ABSORPTION, _STACK_TABLE_ALBEDO_COUNT):
+    for root in np.linspace(1.0, _MIN_SQRT_CO_ALBEDO, _STACK_TABLE_ALBEDO_COUNT):
         last = ScatteringLayer(root**2 * extinction, (1.0 - root**2) * extinction, eta=eta)
         totals.append(trace_slab([*above, last], _TABLE_PHOTON_COUNT).relative_to_entering.total_reflectance)
     return np.maximum.accumulate(totals)
@@ -146,7 +146,7 @@ def _half_space_reflectance_table(eta: float) -> tuple[Doubles, Doubles]:
 
     The reflectances are exact for an index of refraction of 1, and from Monte Carlo for `SKIN_ETA`.
     """
-    roots = np.linspace(1.0, _MIN_ROOT_ABSORPTION, _HALF_SPACE_TABLE_ALBEDO_COUNT)
+    roots = np.linspace(1.0, _MIN_SQRT_CO_ALBEDO, _HALF_SPACE_TABLE_ALBEDO_COUNT)
     if eta == 1.0:
         return np.array([float(directional_albedo(1.0, float(1.0 - root**2))) for root in roots]), roots
     if eta != SKIN_ETA:

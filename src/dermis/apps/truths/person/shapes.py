@@ -311,7 +311,7 @@ def hair_shapes(mi: Mitsuba, hairs: HairFibres, shape_name: str = "hairs") -> Sc
     # Mitsuba's unit of length is the radius.
     optical_depth = hairs.absorption * hairs.radius_mm.max(axis=1, keepdims=True)
     with tempfile.TemporaryDirectory() as folder:
-        for k, group in enumerate(absorption_groups(optical_depth)):
+        for k, group in enumerate(group_by_optical_depth(optical_depth)):
             file = Path(folder) / f"{k}.txt"
             write_curves(file, hairs.knots_mm[group], hairs.radius_mm[group])
             fibre = {
@@ -327,7 +327,7 @@ def hair_shapes(mi: Mitsuba, hairs: HairFibres, shape_name: str = "hairs") -> Sc
     return shapes
 
 
-def absorption_groups(optical_depth: NDArray[np.floating]) -> list[NDArray[np.int64]]:
+def group_by_optical_depth(optical_depth: NDArray[np.floating]) -> list[NDArray[np.int64]]:
     """Return at most `MAX_HAIR_GROUPS` groups of fibres with similar absorption, each as fibre indices.
 
     optical_depth : (n, 3) absorption coefficient of each fibre times its radius; fibres are grouped by the

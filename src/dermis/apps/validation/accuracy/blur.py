@@ -50,13 +50,13 @@ STRIPE_SPACING_MM, STRIPE_WIDTH_MM = 12.0, 6.0  # of stripes of light across sea
 MIN_FACING_COSINE = 0.4  # least cosine between the normal at a seam and the light
 
 
-def blur(adapter: str = "auto") -> None:
+def print_blur_errors(adapter: str = "auto") -> None:
     """Print tables of the errors of blurred light: for a single lit texel, on spheres and across seams.
 
     The tables of spheres and of seams need the folder `tests` of a checkout.
     """
     print_tables({name: str(text) for name, text in blur_error_texts(open_device(adapter)).items()})
-    print_tables(surface_tables(adapter))
+    print_tables(curvature_and_seam_tables(adapter))
 
 
 def blur_error_texts(device: Device) -> dict[str, object]:
@@ -140,7 +140,7 @@ def constant_light_error(device: Device) -> float:
     return max(float(np.abs(level[atlas.coverage] - 1).max()) for level in levels)
 
 
-def surface_tables(adapter: str) -> dict[str, str]:
+def curvature_and_seam_tables(adapter: str) -> dict[str, str]:
     """Return Markdown rows on curvature and seams for docs/templates/techniques.md, keyed by placeholder."""
     add_tests_to_path()
     renderer = dermis.Renderer(adapter)

@@ -28,8 +28,8 @@ from dermis.scene.camera import CAMERA_PRESETS
 from dermis.scene.lights import PointLight
 from dermis.specular.two_lobe import NARROW_FACTOR, NARROW_WEIGHT, WIDE_FACTOR
 
-HIGHLIGHT_RESULTS, LOOK_RESULTS = RESULTS / "highlights.json", RESULTS / "look.json"
-LOOK_PICTURE = DOCS / "images" / "look.webp"
+HIGHLIGHT_RESULTS, SKIN_COMPARISON_RESULTS = RESULTS / "highlights.json", RESULTS / "look.json"
+SKIN_COMPARISON_PICTURE = DOCS / "images" / "look.webp"
 LOBE_MODELS = ("torrance-sparrow-smith", "kelemen", "two-lobe")
 HIGHLIGHT_VIEWS = ("cheek", "portrait")
 SKIN_ROUGHNESS, HIGHLIGHT_PATH_COUNT = 0.3, 64
@@ -43,9 +43,9 @@ LIT_QUANTILE = 0.6  # quantile of brightness above which lit pixels are compared
 GRAIN_BLUR_PX = 6.0  # standard deviation of the blur that removes the grain [pixel]
 
 HEAD_NAMES = {"scan": "lee_perry_smith", "human": "human"}
-LOOK_VIEWS = ("portrait", "three-quarter", "cheek", "profile")
-LOOK_COLUMNS = ("deck-2007", "default", "Cycles")
-LOOK_SIDE, SURFACE_PATH_COUNT, MAX_MAP_SIDE = 256, 16, 1024
+SKIN_COMPARISON_VIEWS = ("portrait", "three-quarter", "cheek", "profile")
+SKIN_COMPARISON_COLUMNS = ("deck-2007", "default", "Cycles")
+SKIN_COMPARISON_SIDE, SURFACE_PATH_COUNT, MAX_MAP_SIDE = 256, 16, 1024
 
 Picture = NDArray[np.float32]
 
@@ -76,7 +76,7 @@ class SkinRender(NamedTuple):
     reflected: float
 
 
-def highlights(adapter: str = "auto") -> None:
+def compare_highlights(adapter: str = "auto") -> None:
     """Compare highlights rendered by dermis and by Cycles; write benchmarks/results/highlights.json."""
     require_in_checkout(RESULTS)
     renderer, head = dermis.Renderer(adapter), scan_with_normal_map()
@@ -84,25 +84,28 @@ def highlights(adapter: str = "auto") -> None:
     write_results(HIGHLIGHT_RESULTS, {"paths": HIGHLIGHT_PATH_COUNT, "rows": rows})
 
 
-def looks(adapter: str = "auto") -> None:
+def compare_skins(adapter: str = "auto") -> None:
     """Render skin with dermis and Cycles; write benchmarks/results/look.json and docs/images/look.webp."""
-    require_in_checkout(LOOK_PICTURE.parent)
+    require_in_checkout(SKIN_COMPARISON_PICTURE.parent)
     renderer, rows, panels = dermis.Renderer(adapter), list[dict[str, object]](), dict[str, Picture]()
     renders = {head: skin_renders(renderer, head) for head in HEAD_NAMES}
-    for view in LOOK_VIEWS:
+    for view in SKIN_COMPARISON_VIEWS:
         for head in HEAD_NAMES:
             columns = renders[head][view]
             rows.append({"head": head, "view": view, "shares": [one.reflected for one in columns]})
-            for column, one in zip(LOOK_COLUMNS, columns, strict=True):
+            for column, one in zip(SKIN_COMPARISON_COLUMNS, columns, strict=True):
                 panels[f"{head} {view}, {column}: {100 * one.reflected:.1f} %"] = one.picture
-    write_results(LOOK_RESULTS, {"paths": HIGHLIGHT_PATH_COUNT, "rows": rows})
-    LOOK_PICTURE.write_bytes(sheet_bytes(panels, 2 * len(LOOK_COLUMNS)))
+    write_results(SKIN_COMPARISON_RESULTS, {"paths": HIGHLIGHT_PATH_COUNT, "rows": rows})
+    SKIN_COMPARISON_PICTURE.write_bytes(sheet_bytes(panels, 2 * len(SKIN_COMPARISON_COLUMNS)))
 
 
 def cycles_comparison_texts() -> dict[str, object]:
     """Return texts on the last measurement for docs/templates/accuracy.md, keyed by placeholder."""
-    highlight_rows, look_rows = read_results(HIGHLIGHT_RESULTS)["rows"], read_results(LOOK_RESULTS)["rows"]
-    cells = (" | ".join(f"{100 * share:.1f} %" for share in row["shares"]) for row in look_rows)
+    highlight_rows, skin_rows = (
+        read_results(HIGHLIGHT_RESULTS)["rows"],
+        read_results(SKIN_COMPARISON_RESULTS)["rows"],
+    )
+    cells = (" | ".join(f"{100 * share:.1f} %" for share in row["shares"]) for row in skin_rows)
     return {
         "highlights": "\n".join(
             f"| {row['view']} | {row['model']} | {row['energy']:.3f} | {row['grain']:.2f} "
@@ -112,7 +115,7 @@ def cycles_comparison_texts() -> dict[str, object]:
         "highlight_paths": HIGHLIGHT_PATH_COUNT,
         "looks": "\n".join(
             f"| {row['head']} | {row['view']} | {fractions} |"
-            for row, fractions in zip(look_rows, cells, strict=True)
+            for row, fractions in zip(skin_rows, cells, strict=True)
         ),
         "look_paths": HIGHLIGHT_PATH_COUNT,
     }
@@ -189,7 +192,7 @@ def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
 
     This fraction is found by a second rendering without scattered light.
     """
-    options = {"size": (LOOK_SIDE, LOOK_SIDE), "atlas": 1024, "strands": False}
+    options = {"size": (SKIN_COMPARISON_SIDE, SKIN_COMPARISON_SIDE), "atlas": 1024, "strands": False}
     settings = Settings.model_validate(options), Settings.model_validate(options | {"parts": "specular"})
     picture, surface_pass = (renderer.draw(scene, one).linear() for one in settings)
     return SkinRender(picture, float(surface_pass.sum() / picture.sum()))
@@ -200,7 +203,7 @@ def render_cycles_skin(scene: Scene, skin: PrincipledSkin) -> SkinRender:
 
     This fraction is found by a second rendering with black skin, which only reflects light at its surface.
     """
-    settings = Settings(size=(LOOK_SIDE, LOOK_SIDE))
+    settings = Settings(size=(SKIN_COMPARISON_SIDE, SKIN_COMPARISON_SIDE))
     black = replace(skin, colour=np.zeros_like(skin.colour))
     (image_pass,) = cycles_passes(scene, skin, [HIGHLIGHT_PATH_COUNT], settings)
     (surface_pass,) = cycles_passes(scene, black, [SURFACE_PATH_COUNT], settings)
@@ -252,7 +255,7 @@ def skin_renders(renderer: dermis.Renderer, head_title: str) -> dict[str, list[S
     painted, one_lobe = (dermis.load_head(name, subdivide=1, regions=regions) for regions in ("auto", "none"))
     mapped = with_normal_map(with_painted_maps(renderer.device, painted, MAX_MAP_SIDE))
     skin, renders = principled_skin(mapped), dict[str, list[SkinRender]]()
-    for view in LOOK_VIEWS:
+    for view in SKIN_COMPARISON_VIEWS:
         camera = CAMERA_PRESETS[view](painted)
         preset_2007 = render_skin(renderer, Scene(one_lobe, camera=camera, skin=Skin.preset("deck-2007")))
         ours = render_skin(renderer, Scene(painted, camera=camera))

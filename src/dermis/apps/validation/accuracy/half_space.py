@@ -33,7 +33,7 @@ _MIN_PHOTON_WEIGHT = 0.01
 _QUADRATURE_NODE_COUNT = 48
 
 
-def half_space(adapter: str = "auto") -> None:
+def print_half_space_table(adapter: str = "auto") -> None:
     """Print a table that shows how the reflection of skin depends on the directions of light and view."""
     print_lines(direction_table(load_head("lee_perry_smith", subdivide=0), adapter))
 

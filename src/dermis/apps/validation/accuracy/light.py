@@ -45,7 +45,7 @@ Array = NDArray[np.floating]
 UP_AXIS = np.array([0.0, 1.0, 0.0])
 
 
-def light(adapter: str = "auto") -> None:
+def print_light_errors(adapter: str = "auto") -> None:
     """Print tables with errors of environments, area lights, ambient occlusion and white furnace tests."""
     print_tables(light_error_tables(adapter))
 

@@ -66,7 +66,7 @@ _REFERENCE_DIRECTION_COUNT = 1024  # number of directions, and side of their dep
 _MIN_VISIBILITY_CHANGE = 0.02
 
 
-def motion(adapter: str = "auto") -> None:
+def write_motion_page(adapter: str = "auto") -> None:
     """Compare posed heads with heads whose meshes have the posed shape at rest, and write docs/motion.md.
 
     Takes some minutes. Needs the published heads of MakeHuman in DERMIS_DATA, and a checkout with its folder

@@ -39,7 +39,7 @@ COMPARED_MODELS: tuple[tuple[DiffusionModel, Clamp], ...] = (
 THICKNESSES_MM = (0.5, 1.0, 2.0, 4.0)
 
 
-def optics() -> None:
+def print_optics_errors() -> None:
     """Print tables with errors of diffusion models, of fitted profiles and of the transmittance of slabs."""
     print_tables(optics_error_tables())
 

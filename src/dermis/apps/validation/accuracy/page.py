@@ -9,7 +9,7 @@ from dermis.gpu import open_device
 PAGE = DOCS / "accuracy.md"
 
 
-def page(adapter: str = "auto") -> None:
+def write_accuracy_page(adapter: str = "auto") -> None:
     """Measure the errors of the approximations that frames use, and write docs/accuracy.md."""
     device = open_device(adapter)
     fill_page(

@@ -24,19 +24,19 @@ from dermis.apps.gallery.script import encode_webp
 from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse, signed_difference
 from dermis.apps.truths.path_traced import MitsubaVariant, path_trace
 from dermis.apps.validation.comparisons.person import (
-    ERROR_CAUSES,
-    TRUTHS,
-    Cause,
+    OMITTED_FEATURES,
+    SHARED_SKIN_KINDS,
+    OmittedFeature,
     PersonComparison,
     PersonSubject,
     SharedSkin,
-    TruthName,
+    SharedSkinKind,
     compare_person,
     iris_errors,
     render_frame,
     render_subject_frame,
     shared_skin,
-    without_cause,
+    without_feature,
 )
 from dermis.apps.validation.comparisons.person_regions import picture_regions
 from dermis.apps.validation.comparisons.person_textures import person_textures
@@ -69,7 +69,7 @@ NOT_MEASURED = "not measured"
 _PANEL_FOLDER, _PANEL_NAMES = "path-traced-panels", ("frame", "traced", "difference")
 _ABLATED_VIEWS = "portrait", "profile", "ear from behind", "three-quarter, lebombo"
 _FULL_COVERAGE = 0.999
-Figures = dict[str, Any]
+ComparisonResult = dict[str, Any]
 PersonName = Literal["human", "dark", "old"]
 _PEOPLE: dict[PersonName, Callable[[], Head]] = {
     "human": lambda: load_head("human"),
@@ -89,37 +89,39 @@ _HEAD_MEDIA = "dj3", "skin1"
 
 
 @dataclass(frozen=True)
-class Measurement:
+class ComparisonCase:
     """Comparison of one view of a person, rendered by dermis and by path tracing.
 
     person : key of `_PEOPLE`
     view : key of `ALL_VIEWS`
-    truth : model of the skin that both renderers use, one of `comparisons.person.TRUTHS`
-    cause : feature that both renderers omit, such as "hair", to find how much of the error it causes; None if
-        they omit nothing
+    skin_kind : model of the skin that both renderers use, one of `comparisons.person.SHARED_SKIN_KINDS`
+    omitted_feature : feature that both renderers omit, such as "hair", to find how much of the error it
+        causes; None if they omit nothing
     """
 
     person: PersonName
     view: str
-    truth: TruthName
-    cause: Cause | None = None
+    skin_kind: SharedSkinKind
+    omitted_feature: OmittedFeature | None = None
 
     @property
     def key(self) -> str:
         """Return the name of the comparison in the file of results."""
-        return f"{self.person} / {self.view} / {self.truth} / {self.cause or 'everything'}"
+        return f"{self.person} / {self.view} / {self.skin_kind} / {self.omitted_feature or 'everything'}"
 
 
-def list_measurements() -> list[Measurement]:
-    """Return all measurements of people rendered by dermis against path tracing, most important first."""
-    found = [Measurement("human", view, "matched") for view in ALL_VIEWS]
-    found += [Measurement("human", view, "layered") for view in VIEWS]
+def list_comparison_cases() -> list[ComparisonCase]:
+    """Return all comparisons of people rendered by dermis against path tracing, most important first."""
+    found = [ComparisonCase("human", view, "matched") for view in ALL_VIEWS]
+    found += [ComparisonCase("human", view, "layered") for view in VIEWS]
     people: tuple[PersonName, ...] = "dark", "old"
-    found += [Measurement(one, view, "matched") for one in people for view in _PEOPLE_VIEWS]
+    found += [ComparisonCase(one, view, "matched") for one in people for view in _PEOPLE_VIEWS]
     found += [
-        Measurement("human", view, "matched", cause) for view in _ABLATED_VIEWS for cause in ERROR_CAUSES
+        ComparisonCase("human", view, "matched", omitted_feature)
+        for view in _ABLATED_VIEWS
+        for omitted_feature in OMITTED_FEATURES
     ]
-    found += [Measurement("human", view, "refracting") for view in VIEWS]
+    found += [ComparisonCase("human", view, "refracting") for view in VIEWS]
     return found
 
 
@@ -141,34 +143,34 @@ class ComparisonRunner:
         self._people: dict[str, tuple[Head, Any]] = {}
         self._skins: dict[tuple[str, str], SharedSkin] = {}
 
-    def measure(self, measurement: Measurement) -> Figures:
+    def compare_case(self, comparison_case: ComparisonCase) -> ComparisonResult:
         """Render a person with dermis and by path tracing; return the errors in JSON-compatible form.
 
         Pictures that docs/path_traced.md shows are kept in the cache.
         """
-        head, textures = self._load_person(measurement.person)
-        skin = self._shared_skin(measurement.person, head, measurement.truth)
-        subject = PersonSubject(view_scene(head, ALL_VIEWS[measurement.view]), textures)
-        if measurement.cause is not None:
-            subject = without_cause(subject, measurement.cause)
-        samples = round(self.samples * ALL_VIEWS[measurement.view].sample_factor)
+        head, textures = self._load_person(comparison_case.person)
+        skin = self._shared_skin(comparison_case.person, head, comparison_case.skin_kind)
+        subject = PersonSubject(view_scene(head, ALL_VIEWS[comparison_case.view]), textures)
+        if comparison_case.omitted_feature is not None:
+            subject = without_feature(subject, comparison_case.omitted_feature)
+        samples = round(self.samples * ALL_VIEWS[comparison_case.view].sample_factor)
         options: dict[str, Any] = {"picture_side": self.side, "samples": samples, "variant": self.variant}
-        pair = compare_person(self.renderer, subject, skin, measurement.view, **options)
-        figures = comparison_figures(pair)
-        if measurement.truth == "matched":
+        pair = compare_person(self.renderer, subject, skin, comparison_case.view, **options)
+        result = comparison_result(pair)
+        if comparison_case.skin_kind == "matched":
             regions = picture_regions(self.renderer, subject.scene, self.side)
-            figures["regions"] = {name: list(ratio) for name, ratio in regions.light_ratios(pair).items()}
-        if measurement.truth == "matched" and measurement.cause is None:
+            result["regions"] = {name: list(ratio) for name, ratio in regions.light_ratios(pair).items()}
+        if comparison_case.skin_kind == "matched" and comparison_case.omitted_feature is None:
             settings = Settings(size=(self.side, self.side), samples=4)
             shipped = render_subject_frame(self.renderer, subject, None, settings)
             error = relative_rmse(shipped, pair.reference, pair.mask, pair.variance)
-            figures["default"] = [*error, *energy_ratio(shipped, pair.reference, pair.mask, pair.variance)]
-            if measurement.view == "eye":
+            result["default"] = [*error, *energy_ratio(shipped, pair.reference, pair.mask, pair.variance)]
+            if comparison_case.view == "eye":
                 iris = iris_errors(pair, EYE_FRAME_MM)._asdict()
-                figures["iris"] = {name: list(value) for name, value in iris.items()}
-            if measurement.person == "human":
-                save_panels(measurement.view, pair)
-        return figures
+                result["iris"] = {name: list(value) for name, value in iris.items()}
+            if comparison_case.person == "human":
+                save_panels(comparison_case.view, pair)
+        return result
 
     def _load_person(self, person_name: PersonName) -> tuple[Head, Any]:
         if person_name not in self._people:
@@ -177,15 +179,15 @@ class ComparisonRunner:
             self._people[person_name] = head, textures
         return self._people[person_name]
 
-    def _shared_skin(self, person_name: PersonName, head: Head, reference_kind: TruthName) -> SharedSkin:
-        key = person_name, reference_kind
+    def _shared_skin(self, person_name: PersonName, head: Head, skin_kind: SharedSkinKind) -> SharedSkin:
+        key = person_name, skin_kind
         if key not in self._skins:
             folder = self.folder / person_name
             folder.mkdir(exist_ok=True)
-            self._skins[key] = shared_skin(self.renderer, head, reference_kind, folder)
+            self._skins[key] = shared_skin(self.renderer, head, skin_kind, folder)
         return self._skins[key]
 
-    def measure_head(self, head_name: str, light_name: str, medium: Medium) -> Figures:
+    def compare_head(self, head_name: str, light_name: str, medium: Medium) -> ComparisonResult:
         """Compare renderings of a head without maps or surface reflection, and return the errors.
 
         The result also has the number of paths per pixel and the notes of the path tracer.
@@ -217,7 +219,7 @@ def _load_named_head(head_name: str) -> Head:
     return load_head(str(data_file(file)) if "/" in file else file)
 
 
-def comparison_figures(comparison: PersonComparison) -> Figures:
+def comparison_result(comparison: PersonComparison) -> ComparisonResult:
     """Return the errors of a comparison, its paths per pixel and its duration in JSON-compatible form."""
     return {
         "error": list(comparison.relrmse),
@@ -303,7 +305,7 @@ assert np.isfinite(np.array(mi.render(mi.load_dict(scene), spp=4))).all()
 """
 
 
-def person(
+def compare_people_with_path_tracer(
     adapter: str = "auto",
     side: int = PICTURE_SIDE,
     samples: int = PATHS_PER_PIXEL,
@@ -330,40 +332,40 @@ def person(
     started, renderer = time.perf_counter(), Renderer(adapter)
     chosen: Any = fastest_variant() if variant == "auto" else variant
     device = f"{renderer.device.adapter.name}, {renderer.device.adapter.backend}"
-    figures = read_results(RESULTS_FILE) if RESULTS_FILE.exists() else {}
+    results = read_results(RESULTS_FILE) if RESULTS_FILE.exists() else {}
     settings = {"side": side, "samples": samples}
-    if figures.get("settings") != settings:
-        figures = {"settings": settings, "people": {}, "heads": {}}
-    figures |= {"adapter": device, "variant": chosen}
+    if results.get("settings") != settings:
+        results = {"settings": settings, "people": {}, "heads": {}}
+    results |= {"adapter": device, "variant": chosen}
     with tempfile.TemporaryDirectory() as folder:
         runner = ComparisonRunner(renderer, side, samples, chosen, Path(folder))
-        for group, key, measure in _measurement_jobs(runner):
-            if key in figures[group] or (seconds and time.perf_counter() - started > seconds):
+        for group, key, compare in _comparison_jobs(runner):
+            if key in results[group] or (seconds and time.perf_counter() - started > seconds):
                 continue
-            figures[group][key] = measure()
-            write_results(RESULTS_FILE, figures, digits=5)
-            print_lines(f"{key}: {figures[group][key]['error']} {figures[group][key]['energy']}")
+            results[group][key] = compare()
+            write_results(RESULTS_FILE, results, digits=5)
+            print_lines(f"{key}: {results[group][key]['error']} {results[group][key]['energy']}")
     PICTURE_FILE.write_bytes(picture_sheet(list(ALL_VIEWS)))
-    person_page()
+    write_path_traced_page()
 
 
-_MeasurementJob = tuple[str, str, Callable[[], Figures]]
+_ComparisonJob = tuple[str, str, Callable[[], ComparisonResult]]
 
 
-def _measurement_jobs(runner: ComparisonRunner) -> list[_MeasurementJob]:
+def _comparison_jobs(runner: ComparisonRunner) -> list[_ComparisonJob]:
     """Return the comparisons in the order in which they are run, each as a tuple (group, key, function).
 
     The function runs the comparison and returns its errors. The group and the key, such as "people" and the
     name of the comparison, say where in the file of results these errors are stored.
     """
-    people: list[_MeasurementJob] = [
-        ("people", one.key, partial(runner.measure, one)) for one in list_measurements()
+    people: list[_ComparisonJob] = [
+        ("people", one.key, partial(runner.compare_case, one)) for one in list_comparison_cases()
     ]
-    heads: list[_MeasurementJob] = [
+    heads: list[_ComparisonJob] = [
         (
             "heads",
             f"{name} / {light} / {medium}",
-            partial(runner.measure_head, name, light, published_media()[medium].with_eta(1.0)),
+            partial(runner.compare_head, name, light, published_media()[medium].with_eta(1.0)),
         )
         for medium in _HEAD_MEDIA
         for name in _HEAD_FILES
@@ -373,20 +375,20 @@ def _measurement_jobs(runner: ComparisonRunner) -> list[_MeasurementJob]:
     return [*people[:first], *heads, *people[first:]]
 
 
-def person_page() -> None:
+def write_path_traced_page() -> None:
     """Write docs/path_traced.md from the last measurement."""
-    figures = read_results(RESULTS_FILE)
+    results = read_results(RESULTS_FILE)
     fill_page(
         PAGE,
-        adapter=figures["adapter"],
-        variant=figures["variant"],
-        **figures["settings"],
-        views=view_rows(figures["people"]),
-        people=people_rows(figures["people"]),
-        heads=head_rows(figures["heads"]),
-        regions=region_table(figures["people"]),
-        causes=cause_table(figures["people"]),
-        **iris_cells(figures["people"]),
+        adapter=results["adapter"],
+        variant=results["variant"],
+        **results["settings"],
+        views=view_rows(results["people"]),
+        people=people_rows(results["people"]),
+        heads=head_rows(results["heads"]),
+        regions=region_table(results["people"]),
+        causes=omitted_feature_table(results["people"]),
+        **iris_cells(results["people"]),
     )
 
 
@@ -398,7 +400,7 @@ def estimate_text(estimate: Sequence[float] | Estimate | None, digits: int = 3) 
     return f"{value:.{digits}f} ± {error:.{digits}f}"
 
 
-def _error_cells(comparison_errors: Figures | None) -> str:
+def _error_cells(comparison_errors: ComparisonResult | None) -> str:
     """Return table cells with the relative RMSE and the energy ratio of a comparison."""
     return (
         f"{estimate_text(comparison_errors['error'])} | {comparison_errors['energy'][0]:.3f}"
@@ -407,42 +409,45 @@ def _error_cells(comparison_errors: Figures | None) -> str:
     )
 
 
-def view_rows(people_figures: Figures) -> str:
+def view_rows(people_results: ComparisonResult) -> str:
     """Return Markdown rows, one per view of the human, with the errors against each path-traced reference."""
     lines = []
     for view, where in ALL_VIEWS.items():
-        rows = {truth: people_figures.get(Measurement("human", view, truth).key) for truth in TRUTHS}
+        rows = {
+            skin_kind: people_results.get(ComparisonCase("human", view, skin_kind).key)
+            for skin_kind in SHARED_SKIN_KINDS
+        }
         matched = rows["matched"]
         shipped = matched["default"] if matched else None
         default = f"{estimate_text(shipped[:2])} | {shipped[2]:.3f}" if shipped else f"{NOT_MEASURED} | "
-        cells = " | ".join(_error_cells(rows[truth]) for truth in TRUTHS)
+        cells = " | ".join(_error_cells(rows[skin_kind]) for skin_kind in SHARED_SKIN_KINDS)
         paths = matched["paths"] if matched else ""
         lines.append(f"| {view} | {where.light} | {paths} | {cells} | {default} |")
     return "\n".join(lines)
 
 
-def people_rows(people_figures: Figures) -> str:
+def people_rows(people_results: ComparisonResult) -> str:
     """Return Markdown rows with the errors of all people but "human", which is the package's default head."""
     keys = [(one, view) for one in get_args(PersonName)[1:] for view in _PEOPLE_VIEWS]
-    rows = ((one, view, people_figures.get(Measurement(one, view, "matched").key)) for one, view in keys)
+    rows = ((one, view, people_results.get(ComparisonCase(one, view, "matched").key)) for one, view in keys)
     return "\n".join(f"| {one} | {view} | {_error_cells(row)} |" for one, view, row in rows)
 
 
-def head_rows(head_figures: Figures) -> str:
+def head_rows(head_results: ComparisonResult) -> str:
     """Return Markdown rows with the errors of heads without maps, by head and medium."""
     lines = []
     for medium in _HEAD_MEDIA:
         for name in _HEAD_FILES:
             cells = " | ".join(
-                _error_cells(head_figures.get(f"{name} / {light} / {medium}")) for light in _HEAD_LIGHTS
+                _error_cells(head_results.get(f"{name} / {light} / {medium}")) for light in _HEAD_LIGHTS
             )
             lines.append(f"| {name} | {medium} | {cells} |")
     return "\n".join(lines)
 
 
-def region_table(people_figures: Figures) -> str:
+def region_table(people_results: ComparisonResult) -> str:
     """Return a Markdown table with the ratio of light in frames to that in references, by region and view."""
-    rows = {view: people_figures.get(Measurement("human", view, "matched").key) for view in ALL_VIEWS}
+    rows = {view: people_results.get(ComparisonCase("human", view, "matched").key) for view in ALL_VIEWS}
     found = {view: row["regions"] for view, row in rows.items() if row}
     names = list(dict.fromkeys(name for regions in found.values() for name in regions))
     lines = [f"| region | {' | '.join(found)} |", "|---" * (len(found) + 1) + "|"]
@@ -452,7 +457,7 @@ def region_table(people_figures: Figures) -> str:
     return "\n".join(lines)
 
 
-def cause_table(people_figures: Figures) -> str:
+def omitted_feature_table(people_results: ComparisonResult) -> str:
     """Return a Markdown table with the errors of the person "human" without features that cause errors.
 
     The errors are the relative RMSE and the energy ratio. In the first row, both renderers omit nothing. In
@@ -462,20 +467,21 @@ def cause_table(people_figures: Figures) -> str:
         f"| left out on both sides | {' | '.join(f'{view} | energy' for view in _ABLATED_VIEWS)} |",
         "|---" * (2 * len(_ABLATED_VIEWS) + 1) + "|",
     ]
-    for cause in (None, *ERROR_CAUSES):
+    for omitted_feature in (None, *OMITTED_FEATURES):
         rows = (
-            people_figures.get(Measurement("human", view, "matched", cause).key) for view in _ABLATED_VIEWS
+            people_results.get(ComparisonCase("human", view, "matched", omitted_feature).key)
+            for view in _ABLATED_VIEWS
         )
-        lines.append(f"| {cause or 'nothing'} | {' | '.join(_error_cells(row) for row in rows)} |")
+        lines.append(f"| {omitted_feature or 'nothing'} | {' | '.join(_error_cells(row) for row in rows)} |")
     return "\n".join(lines)
 
 
-def iris_cells(people_figures: Figures) -> dict[str, str]:
+def iris_cells(people_results: ComparisonResult) -> dict[str, str]:
     """Return texts on how the iris rendered by dermis differs from the path-traced one in the view "eye".
 
     The keys are the placeholders of docs/templates/path_traced.md that the texts replace.
     """
-    row = people_figures.get(Measurement("human", "eye", "matched").key) or {}
+    row = people_results.get(ComparisonCase("human", "eye", "matched").key) or {}
     iris = row.get("iris", {})
     names = "right", "down", "brightness", "left_half", "right_half"
     return {name: estimate_text(iris.get(name), 2) for name in names}

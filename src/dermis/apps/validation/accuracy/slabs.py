@@ -38,7 +38,7 @@ FORWARD_G = 0.8  # mean cosine of scattering in real skin
 SLAB_MEDIA = (("skin1", 1.0), ("skin2", 1.0), ("skin1", 1.4), ("skin2", 1.4))
 
 
-def slabs(adapter: str = "auto") -> None:
+def print_slab_errors(adapter: str = "auto") -> None:
     """Print tables with errors of the reflectance and transmittance of rendered slabs."""
     print_tables(slab_error_tables(adapter))
 

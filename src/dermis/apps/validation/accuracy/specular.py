@@ -34,7 +34,7 @@ ROUGHNESS_AND_STRENGTH = ((0.1, 0.18), (0.3, 0.18), (0.5, 0.18), (0.3, 1.0))
 REFERENCE_QUADRATURE_NODE_COUNTS = (96, 96)
 
 
-def specular() -> None:
+def print_specular_errors() -> None:
     """Print tables with errors of directional albedos, and with results of white furnace tests."""
     print_tables(specular_error_tables())
 

@@ -32,7 +32,7 @@ SAMPLES_BY_LIGHT = {"front": 64, "back": 256, "laser": 256}  # paths per pixel
 SETTINGS = Settings(size=(256, 256), atlas=1024)
 TABLE_HEADER = "|  | technique | relative RMSE | FLIP | energy ratio | ms |\n|---|---|---|---|---|---|"
 
-DIRECTION_HEADER = (
+DIRECTION_TABLE_HEADER = (
     "|  |  |  | relative RMSE | in red, green, blue | FLIP | energy ratio | in red, green, blue |\n"
     "|---|---|---|---|---|---|---|---|"
 )
@@ -40,7 +40,7 @@ BALL = Head("ball", uv_sphere(100.0, 512, 256), Maps())
 BALL_SAMPLES_BY_LIGHT = {"front": 64, "back": 64}  # paths per pixel
 
 
-def techniques(adapter: str = "auto") -> None:
+def write_techniques_page(adapter: str = "auto") -> None:
     """Compare scattering techniques with reference solutions, and write docs/techniques.md.
 
     Needs the sample data, Mitsuba, and a checkout of the project with its folder `tests`. The path-traced
@@ -61,7 +61,9 @@ def techniques(adapter: str = "auto") -> None:
     parts["integral"], _ = technique_rows(head, "surface-integral", "skin1", adapter, "layered")
     parts["heat"], _ = technique_rows(head, "heat", "skin1", adapter, "layered")
     parts["heat"] += "\n" + fine_atlas_row(head, adapter)
-    parts |= texture_space.texture_space_error_tables(head, SETTINGS, adapter) | blur.surface_tables(adapter)
+    parts |= texture_space.texture_space_error_tables(
+        head, SETTINGS, adapter
+    ) | blur.curvature_and_seam_tables(adapter)
     fill_page(PAGE, adapter=comparison["front"].adapter, **parts)
 
 
@@ -197,7 +199,7 @@ def direction_rows(head: Head, samples_by_light: dict[str, int], settings: Setti
 
     samples_by_light : dictionary from the name of a light to the number of paths per pixel
     """
-    lines = [DIRECTION_HEADER]
+    lines = [DIRECTION_TABLE_HEADER]
     for light, samples in samples_by_light.items():
         lines += _direction_rows_under_light(head, light, default_region(light), samples, settings, adapter)
     for light, samples in BALL_SAMPLES_BY_LIGHT.items():

@@ -18,9 +18,9 @@ from dermis.apps.validation.comparisons.compare import comparison_subject
 from dermis.apps.validation.comparisons.references import (
     ComparisonSubject,
     ReferenceImage,
+    heat_equation_patch_reference,
     hit_positions,
     irradiance_samples,
-    surface_heat_around,
     surface_integral,
 )
 from dermis.apps.validation.comparisons.scenes import default_region
@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 COMPARED_LIGHTS = ("front", "back", "laser")
 ATLAS_SIDES = (512, 1024, 2048)
 REGION_RADIUS_MM = 14.0
-MIN_UNIFORM_INTEGRAL = 1e-3
+MIN_UNIFORM_LIGHT_INTEGRAL = 1e-3
 MIN_VARIANCE_MM2 = 1.0  # of Gaussians for which Euclidean and surface distance differ
 LANDMARKS_BY_REGION: dict[str, dict[str, tuple[str, ...]]] = {
     "front": {
@@ -59,7 +59,9 @@ def texture_space_error_tables(head: Head, settings: Settings, adapter: str) -> 
         region = default_region(light)
         with comparison_subject(head, light, region, "skin1", settings, adapter, "layered") as subject:
             integral, uniform = surface_integral(subject, 0), uniform_light_integral(subject)
-            normalised = replace(integral, image=integral.image / np.maximum(uniform, MIN_UNIFORM_INTEGRAL))
+            normalised = replace(
+                integral, image=integral.image / np.maximum(uniform, MIN_UNIFORM_LIGHT_INTEGRAL)
+            )
             rows["by_atlas"] += atlas_rows(subject, integral, normalised, light)
             rows["zero_width"].append(narrow_profile_row(subject, light))
             rows["places"] += region_rows(subject, integral, light) if light in LANDMARKS_BY_REGION else []
@@ -158,7 +160,7 @@ def region_rows(subject: ComparisonSubject, integral_image: ReferenceImage, ligh
     rows = []
     for region, names in LANDMARKS_BY_REGION[light_name].items():
         centre = tuple(np.mean([landmarks[name] for name in names], axis=0))
-        heat = surface_heat_around(subject, centre, REGION_RADIUS_MM, samples, MIN_VARIANCE_MM2)
+        heat = heat_equation_patch_reference(subject, centre, REGION_RADIUS_MM, samples, MIN_VARIANCE_MM2)
         fraction = ((ours - integral_image.image)[heat.mask] ** 2).sum() / total
         pixels = heat.mask.sum() / integral_image.mask.sum()
         errors = [

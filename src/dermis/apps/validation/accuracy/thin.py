@@ -35,10 +35,10 @@ BLURRED_PROFILE = GaussianSum(
 THICKNESSES_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0)
 WEDGE_DEGREES = (5.0, 10.0, 20.0, 30.0, 45.0)
 ATLAS_SIDE = 1024
-EAR_DISTANCE_MM = 66.0  # distance from the scan's middle beyond which a point is on an ear
+EAR_DISTANCE_FROM_MIDPLANE_MM = 66.0  # distance from the scan's middle beyond which a point is on an ear
 
 
-def thin(adapter: str = "auto") -> None:
+def print_thin_body_errors(adapter: str = "auto") -> None:
     """Print tables with errors of light transmitted through slabs, wedges and ears."""
     print_tables(thin_body_error_tables(adapter))
 
@@ -155,7 +155,7 @@ def comparison_cells(
     atlas_side: int,
     spacing_mm: float,
     *,
-    compares_without_air: bool,
+    adds_air_corrected_cell: bool,
 ) -> str:
     """Return table cells with the energy ratio and the relative RMSE of rendered light, for two settings.
 
@@ -164,8 +164,8 @@ def comparison_cells(
 
     point_filter : function that returns the mask of the points to compare, given positions and normals
     spacing_mm : largest distance between neighbouring samples of the irradiance
-    compares_without_air : whether to add a fifth cell: the energy ratio for "thin" if `light_across_air` is
-        subtracted from the reference
+    adds_air_corrected_cell : whether to add a fifth cell: the energy ratio for "thin" if `light_across_air`
+        is subtracted from the reference
     """
     cells = []
     for transmission in ("none", "thin"):
@@ -179,7 +179,7 @@ def comparison_cells(
         red = light[selected, 0]
         error = red - exact
         cells += [f"{red.sum() / exact.sum():.3f}", f"{np.sqrt((error**2).mean() / (exact**2).mean()):.1%}"]
-    if compares_without_air:
+    if adds_air_corrected_cell:
         inside = exact - light_across_air(mesh, light_direction, points[selected], normals[selected])
         cells.append(f"{red.sum() / inside.sum():.3f}")
     return " | ".join(cells)
@@ -196,7 +196,7 @@ def wedge_rows(renderer: dermis.Renderer) -> str:
             return np.asarray(facing & (points[:, 0] < -15.0) & (np.abs(points[:, 1]) < 15.0))
 
         cells = comparison_cells(
-            renderer, mesh, np.array([0.0, 0.0, 1.0]), unlit_points, 512, 0.7, compares_without_air=False
+            renderer, mesh, np.array([0.0, 0.0, 1.0]), unlit_points, 512, 0.7, adds_air_corrected_cell=False
         )
         rows.append(f"| {angle:g}° | {cells} |")
     return "\n".join(rows)
@@ -216,11 +216,11 @@ def ear_rows(renderer: dermis.Renderer) -> str:
 
             def unlit_points(points: Array, normals: Array, z: float = z, centre: Array = centre) -> Mask:
                 local = points - centre
-                ear = (np.abs(local[:, 0]) > EAR_DISTANCE_MM) & (np.abs(local[:, 1]) < 45.0)
+                ear = (np.abs(local[:, 0]) > EAR_DISTANCE_FROM_MIDPLANE_MM) & (np.abs(local[:, 1]) < 45.0)
                 return np.asarray(ear & (z * normals[:, 2] > 0.3))
 
             cells = comparison_cells(
-                renderer, mesh, beam, unlit_points, ATLAS_SIDE, 1.5, compares_without_air=True
+                renderer, mesh, beam, unlit_points, ATLAS_SIDE, 1.5, adds_air_corrected_cell=True
             )
             rows.append(f"| {name} | {side} | {cells} |")
     return "\n".join(rows)

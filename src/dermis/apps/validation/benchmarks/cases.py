@@ -185,8 +185,8 @@ def with_gaussian_count(profile: GaussianSum, gaussian_count: int) -> GaussianSu
 
 
 BONE_COUNT = 4
-_TARGET_POINT_FRACTION = 1 / 6  # of the points that a target moves, as in targets of faces
-_TARGET_LIFT_MM = 2.0
+_MORPH_POINT_FRACTION = 1 / 6  # of the points that a target moves, as in targets of faces
+_MORPH_DISPLACEMENT_MM = 2.0
 _BONE_ROTATION_DEGREES = 4.0
 
 Doubles = NDArray[np.float64]
@@ -221,14 +221,14 @@ def _synthetic_targets(point_positions: Doubles, target_count: int) -> MorphTarg
     point_positions : (p, 3) positions of the points in the rest pose [mm]
     """
     centres = point_positions[np.linspace(0, len(point_positions) - 1, target_count).astype(int)]
-    nearest = max(1, int(_TARGET_POINT_FRACTION * len(point_positions)))
+    nearest = max(1, int(_MORPH_POINT_FRACTION * len(point_positions)))
     moved, deltas = [], []
     for centre in centres:
         distance = np.linalg.norm(point_positions - centre, axis=1)
         indices = np.sort(np.argpartition(distance, nearest - 1)[:nearest])
         falloff = 1.0 - (distance[indices] / max(float(distance[indices].max()), 1e-9)) ** 2
         moved.append(indices)
-        deltas.append(falloff[:, None] * np.array([0.0, 0.0, _TARGET_LIFT_MM / target_count]))
+        deltas.append(falloff[:, None] * np.array([0.0, 0.0, _MORPH_DISPLACEMENT_MM / target_count]))
     first = nearest * np.arange(target_count + 1)
     names = tuple(f"target {k}" for k in range(target_count))
     point = np.concatenate(moved).astype(np.int32)

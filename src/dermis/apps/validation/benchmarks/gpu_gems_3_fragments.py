@@ -65,7 +65,7 @@ class FragmentPasses(GpuGems3):
             (stack,), (0,), scratch, atlas_side, HALF_TEXEL_FORMAT, stretch=(first, second)
         )
 
-    def make_sum(self, device: Device, atlas_side: int) -> Texture:
+    def make_exitance_texture(self, device: Device, atlas_side: int) -> Texture:
         """Return the texture for the weighted sum of the pyramid levels."""
         return make_texture(device, (atlas_side, atlas_side), FLOAT_TEXEL_FORMAT, content_source="raster")
 

@@ -42,7 +42,7 @@ class FrameCounts:
     timed: int = 9
     sequence: int = 100
 
-    def limited_to(self, max_seconds: float, frame_ms: float) -> FrameCounts:
+    def with_max_duration(self, max_seconds: float, frame_ms: float) -> FrameCounts:
         """Return frame counts reduced so that a case takes at most `max_seconds`, at `frame_ms` per frame."""
         frames = self.warmup + 2 * self.sequence + 2 * self.timed * (1 + self.between)
         fraction = min(1.0, 1e3 * max_seconds / (frame_ms * frames))
@@ -118,7 +118,7 @@ def _measure_case(
     first, *other_scenes = case_scenes(case, head, folder, max(frame_counts.sequence, frame_counts.timed, 2))
     scenes = cycle([*other_scenes, first])
     renderer.draw(first, settings)
-    frame_counts = frame_counts.limited_to(_MAX_CASE_S, sequence_ms(renderer, scenes, 1, settings))
+    frame_counts = frame_counts.with_max_duration(_MAX_CASE_S, sequence_ms(renderer, scenes, 1, settings))
     sequence_ms(renderer, scenes, frame_counts.warmup, settings)
     frame_ms = sequence_ms(renderer, scenes, frame_counts.sequence, settings) / frame_counts.sequence
     gpu_ms = stage_ms(renderer, scenes, settings, frame_counts)
@@ -130,7 +130,7 @@ def _measure_case(
         len(head.mesh.triangles),
         frame_ms,
         gpu_ms,
-        _floor_ms(stage_bytes(traffic), gpu_ms, bytes_per_s),
+        _lower_bound_ms(stage_bytes(traffic), gpu_ms, bytes_per_s),
         python_ms,
         image_ms,
         allocated_bytes() / 1e6,
@@ -192,7 +192,7 @@ def _elapsed_ms(timed_function: Callable[[], object]) -> float:
     return 1e3 * (time.perf_counter() - started)
 
 
-def _floor_ms(
+def _lower_bound_ms(
     stage_bytes: dict[str, float], gpu_ms: dict[str, float], bytes_per_s: float
 ) -> dict[str, float]:
     """Return the lower bound of the time of each measured stage, and the sum of the bounds as "total" [ms].

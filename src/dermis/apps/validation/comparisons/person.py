@@ -77,22 +77,22 @@ class PersonComparison:
         return np.asarray(np.rint(255 * encoded), np.uint8)
 
 
-TruthName = Literal["matched", "refracting", "layered"]
+SharedSkinKind = Literal["matched", "refracting", "layered"]
 """Model of the skin that frame and path tracer share.
 
 "matched": homogeneous skin without refraction, whose surface adds its reflection. "refracting": homogeneous
 skin below a refracting surface of index 1.4 with a strength of 1. "layered": epidermis over dermis with the
 pigments of the person, with the surface of "matched".
 """
-TRUTHS: tuple[TruthName, ...] = get_args(TruthName)
-Cause = Literal["pigments", "relief", "reflection", "hair", "scattering", "bounces"]
+SHARED_SKIN_KINDS: tuple[SharedSkinKind, ...] = get_args(SharedSkinKind)
+OmittedFeature = Literal["pigments", "relief", "reflection", "hair", "scattering", "bounces"]
 """Feature that frame and path tracer can both omit, to find how much of the error it causes.
 
 "pigments": variation of the colour. "relief": folds, pores, and variation of gloss. "reflection": specular
 lobe of the skin. "hair": hair, brows and lashes. "scattering": subsurface scattering, so that skin is
 Lambertian. "bounces": all light but direct light on Lambertian skin, so that eyes are black; and hair.
 """
-ERROR_CAUSES: tuple[Cause, ...] = get_args(Cause)
+OMITTED_FEATURES: tuple[OmittedFeature, ...] = get_args(OmittedFeature)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,25 +107,25 @@ class SharedSkin:
     profile: Path
 
 
-def shared_skin(renderer: Renderer, head: Head, reference_kind: TruthName, folder: Path) -> SharedSkin:
+def shared_skin(renderer: Renderer, head: Head, skin_kind: SharedSkinKind, folder: Path) -> SharedSkin:
     """Return the skin of a person that dermis and the path tracer share, and write its diffusion profile.
 
-    For `reference_kind` "layered", the skin has two layers with the pigments of the person. Otherwise, it
+    For `skin_kind` "layered", the skin has two layers with the pigments of the person. Otherwise, it
     is homogeneous, with the mean scattering distance of the default skin.
 
-    reference_kind : model of the skin that both renderers use, one of `TRUTHS`
+    skin_kind : model of the skin that both renderers use, one of `SHARED_SKIN_KINDS`
     folder : existing folder in which the file of the profile is written
     """
-    maps, eta = head.maps, SKIN_ETA if reference_kind == "refracting" else 1.0
+    maps, eta = head.maps, SKIN_ETA if skin_kind == "refracting" else 1.0
     assert isinstance(maps, PaintedMaps)
     colour = mean_colour(maps.look)
-    if reference_kind == "layered":
+    if skin_kind == "layered":
         look = maps.look
         parameters = SkinParameters(look.melanin, look.eumelanin, look.blood, look.oxygen, look.epidermis_mm)
         medium = pigmented_skin(parameters, colour, eta)
     else:
         medium = uniform_skin(colour, mean_distance_mm(renderer.skin_profile(Skin())), eta)
-    file = folder / f"{reference_kind}.toml"
+    file = folder / f"{skin_kind}.toml"
     write_profile(file, medium_gaussians(medium, "montecarlo"), {"model": "montecarlo"})
     return SharedSkin(medium, file)
 
@@ -134,33 +134,33 @@ def shared_skin(renderer: Renderer, head: Head, reference_kind: TruthName, folde
 class PersonSubject:
     """Scene of a person, and the textures of the skin for the path tracer.
 
-    cause : feature that both renderers omit, such as "hair", to find how much of the error it causes; None if
-        they omit nothing
+    omitted_feature : feature that both renderers omit, such as "hair", to find how much of the error it
+        causes; None if they omit nothing
     """
 
     scene: Scene
     textures: SkinTextures
-    cause: Cause | None = None
+    omitted_feature: OmittedFeature | None = None
 
 
-def without_cause(subject: PersonSubject, cause: Cause) -> PersonSubject:
+def without_feature(subject: PersonSubject, omitted_feature: OmittedFeature) -> PersonSubject:
     """Return a subject for which dermis and the path tracer both omit one feature that causes errors."""
     scene, textures, head = subject.scene, subject.textures, subject.scene.head
     maps, flat = head.maps, np.ones((1, 1), np.float32)
     assert isinstance(maps, PaintedMaps)
-    if cause == "pigments":
+    if omitted_feature == "pigments":
         colour = np.broadcast_to(mean_colour(maps.look), textures.colour.shape).astype(np.float32)
         maps, textures = replace(maps, colour=colour), replace(textures, colour=colour)
-    elif cause == "relief":
+    elif omitted_feature == "relief":
         rough = flat * np.float32(DEFAULT_ROUGHNESS)
         maps = replace(maps, height=0.0 * flat, specular=flat, roughness=rough)
         strength = flat * np.float32(scene.skin.strength)
         textures = replace(textures, height_mm=0.0 * flat, strength=strength, roughness=rough)
-    elif cause == "reflection":
+    elif omitted_feature == "reflection":
         textures = replace(textures, strength=0.0 * flat)
-    elif cause in ("hair", "bounces"):
+    elif omitted_feature in ("hair", "bounces"):
         head = replace(head, strands=None, hair=None)
-    return PersonSubject(scene.replace(head=replace(head, maps=maps)), textures, cause)
+    return PersonSubject(scene.replace(head=replace(head, maps=maps)), textures, omitted_feature)
 
 
 def render_subject_frame(
@@ -173,18 +173,18 @@ def render_subject_frame(
 
     skin : skin of the path-traced reference; None for the skin of the scene
     """
-    scene, cause = subject.scene, subject.cause
-    if cause in ("scattering", "bounces"):
+    scene, omitted_feature = subject.scene, subject.omitted_feature
+    if omitted_feature in ("scattering", "bounces"):
         settings = settings.model_copy(update={"technique": "none", "transmission": "none"})
-    if cause == "bounces":
+    if omitted_feature == "bounces":
         settings = settings.model_copy(update={"interreflection": False, "occlusion": "none"})
     own = scene.skin if skin is None else scene.skin.replace(profile=str(skin.profile))
-    if cause in ("scattering", "bounces"):
+    if omitted_feature in ("scattering", "bounces"):
         own = own.replace(direction="lambertian")
     if skin is not None and skin.medium.eta != 1.0:
         own = own.replace(rho_s=1.0)
     matte = own.replace(specular="none")
-    if cause == "reflection":
+    if omitted_feature == "reflection":
         return render_frame(renderer, scene.replace(skin=matte), settings)
     if skin is None or skin.medium.eta != 1.0:
         return render_frame(renderer, scene.replace(skin=own), settings)
@@ -261,7 +261,7 @@ def path_trace_subject(
     samples : paths per pixel
     variant : variant of Mitsuba, as in `path_trace`
     """
-    medium = None if subject.cause in ("scattering", "bounces") else skin.medium
+    medium = None if subject.omitted_feature in ("scattering", "bounces") else skin.medium
     textures, scene = subject.textures, subject.scene
     if skin.medium.eta != 1.0 and scene.skin.strength > 0.0:
         textures = replace(textures, strength=textures.strength / np.float32(scene.skin.strength))
@@ -271,7 +271,7 @@ def path_trace_subject(
         medium,
         picture_size,
         samples,
-        max_depth=_DIRECT_LIGHT_DEPTH if subject.cause == "bounces" else None,
+        max_depth=_DIRECT_LIGHT_DEPTH if subject.omitted_feature == "bounces" else None,
         variant=variant,
         use_cache=use_cache,
         progress=progress,

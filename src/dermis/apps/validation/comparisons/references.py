@@ -91,7 +91,7 @@ def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage
     return _image_of_points(visible, exitance, started, f"{len(light.positions):,} irradiance samples")
 
 
-def surface_heat(subject: ComparisonSubject, samples: int) -> ReferenceImage:
+def heat_equation_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage:
     """Return the reference image in which the irradiance diffuses according to the heat equation.
 
     Light diffuses along the surface. Only the skin around the camera's target is computed.
@@ -99,10 +99,10 @@ def surface_heat(subject: ComparisonSubject, samples: int) -> ReferenceImage:
     samples : ignored, because the solution has no noise
     """
     target = subject.scene.camera.target
-    return surface_heat_around(subject, target, _HEAT_PATCH_RADIUS_MM, irradiance_samples(subject))
+    return heat_equation_patch_reference(subject, target, _HEAT_PATCH_RADIUS_MM, irradiance_samples(subject))
 
 
-def surface_heat_around(
+def heat_equation_patch_reference(
     subject: ComparisonSubject,
     target_mm: tuple[float, float, float],
     radius_mm: float,
@@ -181,7 +181,7 @@ def cycles_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage
 
 REFERENCES: dict[str, Callable[[ComparisonSubject, int], ReferenceImage]] = {
     "surface-integral": surface_integral,
-    "heat": surface_heat,
+    "heat": heat_equation_reference,
     "path-traced": path_traced_reference,
     "cycles": cycles_reference,
 }

@@ -212,7 +212,7 @@ def measure_exported_skin(page: Page, skin_name: str) -> JsonObject:
 DIFFUSION_COLOURS = {"white": (1, 1, 1), "grey": (0.5, 0.5, 0.5), "coloured": (1, 0.5, 0.25)}
 
 
-def babylon() -> None:
+def measure_babylon() -> None:
     """Measure light across the edge of a half-lit plane; write benchmarks/results/engines_babylon.json.
 
     The environment variable DERMIS_BABYLON names the folder into which npm has installed the package

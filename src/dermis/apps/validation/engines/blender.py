@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
+from cyclopts import Parameter
 from PIL import Image
 
 from dermis.apps.export.fitting import fit_burley_width, profile_error
@@ -50,19 +51,23 @@ HALF_LIT_PLANE_TASK = BlenderTask(
 )
 
 
-def blender(python_45: Path, python_52: Path, *parts: Measurement) -> None:
+def measure_blender(
+    blender_45_python: Annotated[Path, Parameter(name="--python-45")],
+    blender_52_python: Annotated[Path, Parameter(name="--python-52")],
+    *parts: Measurement,
+) -> None:
     """Measure exported skin in Cycles and write benchmarks/results/engines_blender.json; takes half an hour.
 
     Parameters
     ----------
-    python_45:
+    blender_45_python:
         Python program that has the module bpy of Blender 4.5.
-    python_52:
+    blender_52_python:
         Python program that has the module bpy of Blender 5.2.
     parts:
         Measurements to make [all]; other measurements keep their last results.
     """
-    python_by_version = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
+    python_by_version = {"4.5": blender_python(blender_45_python), "5.2": blender_python(blender_52_python)}
     parts = parts or get_args(Measurement)
     results: JsonObject = read_results(RESULTS_FILE) if RESULTS_FILE.exists() else {}
     results["columns_in_d"] = (

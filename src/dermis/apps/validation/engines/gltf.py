@@ -43,7 +43,7 @@ def gltf_results(skin_name: str) -> JsonObject:
     return results
 
 
-def gltf() -> None:
+def predict_gltf_errors() -> None:
     """Predict scattering errors of skins exported to glTF; write benchmarks/results/engines_gltf.json."""
     figures = {
         "version": GLTF_TARGET_VERSION,

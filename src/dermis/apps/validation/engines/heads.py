@@ -52,7 +52,7 @@ HIGHLIGHT_WIDTH_PX = 9  # width of the square around a highlight that is exclude
 Floats = NDArray[np.float64]
 
 
-def heads() -> None:
+def compare_heads() -> None:
     """Render one head in all installed programs and compare each picture with that of dermis.
 
     Writes benchmarks/results/engines_heads.json and docs/images/engines_heads.webp. Needs Mitsuba. Other

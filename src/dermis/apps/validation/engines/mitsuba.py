@@ -38,9 +38,9 @@ COMPARED_SKINS: dict[str, tuple[Boundary, ...]] = {
 }
 """Surface models for which each skin is measured, by name of the skin."""
 # half the width of the view [Burley widths]; numbers of pixels, of rendering passes, and of samples per pixel
-_VIEW_HALF_WIDTH_D, _PIXEL_COUNT, _PASS_COUNT, _SAMPLES_PER_PIXEL_AVERAGE = 3.0, 8, 8, 16
-_LAMP_HEIGHT_D = 0.01
-_PLANE_HALF_SIDE_D = 500.0
+_VIEW_HALF_WIDTH_PER_BURLEY_WIDTH, _PIXEL_COUNT, _PASS_COUNT, _SAMPLES_PER_PIXEL_AVERAGE = 3.0, 8, 8, 16
+_LAMP_HEIGHT_PER_BURLEY_WIDTH = 0.01
+_PLANE_HALF_SIDE_PER_BURLEY_WIDTH = 500.0
 _BLACK_ALBEDO = 1e-9
 
 
@@ -64,13 +64,20 @@ def half_lit_plane(
     is_black : whether the medium absorbs all light, so that only the surface reflects
     """
     transform = mi.ScalarTransform4f
-    size, height = _PLANE_HALF_SIDE_D * burley_width_mm, _LAMP_HEIGHT_D * burley_width_mm
+    size, height = (
+        _PLANE_HALF_SIDE_PER_BURLEY_WIDTH * burley_width_mm,
+        _LAMP_HEIGHT_PER_BURLEY_WIDTH * burley_width_mm,
+    )
     albedo = (_BLACK_ALBEDO,) * 3 if is_black else medium.albedo
     inside = mi.load_dict(medium_description(IsotropicMedium(medium.sigma_t, albedo)))
     camera_below = boundary != "rough"
     eye = -1e-3 * height if camera_below else 0.5 * height
     lamp_to_world = transform().translate([size, 0.0, height]).rotate([1, 0, 0], 180).scale([size, size, 1.0])
-    scale = [_VIEW_HALF_WIDTH_D * burley_width_mm, _VIEW_HALF_WIDTH_D * burley_width_mm, 1.0]
+    scale = [
+        _VIEW_HALF_WIDTH_PER_BURLEY_WIDTH * burley_width_mm,
+        _VIEW_HALF_WIDTH_PER_BURLEY_WIDTH * burley_width_mm,
+        1.0,
+    ]
     camera_to_world = transform().look_at([0, 0, eye], [0, 0, -1], [0, 1, 0]).scale(scale)
     film = {"type": "hdrfilm", "width": _PIXEL_COUNT, "height": 1, "pixel_format": "rgb"}
     sensor = {
@@ -132,7 +139,10 @@ def pixel_edge_response(
     channel : index of the channel
     burley_width_mm : Burley width of the profile, which sets the size of the view [mm]
     """
-    edges = np.linspace(-_VIEW_HALF_WIDTH_D, _VIEW_HALF_WIDTH_D, _PIXEL_COUNT + 1) * burley_width_mm
+    edges = (
+        np.linspace(-_VIEW_HALF_WIDTH_PER_BURLEY_WIDTH, _VIEW_HALF_WIDTH_PER_BURLEY_WIDTH, _PIXEL_COUNT + 1)
+        * burley_width_mm
+    )
     centres = (
         edges[:-1, None]
         + np.diff(edges)[:, None] * (np.arange(_SAMPLES_PER_PIXEL_AVERAGE) + 0.5) / _SAMPLES_PER_PIXEL_AVERAGE
@@ -172,7 +182,9 @@ def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int
     return {"skin": subject.name, "boundary": boundary, "d_mm": [float(x) for x in d], **results}
 
 
-def mitsuba(*, samples: int = 32000, output: Path = RESULTS_FILE, variant: str = "scalar_rgb") -> None:
+def measure_mitsuba(
+    *, samples: int = 32000, output: Path = RESULTS_FILE, variant: str = "scalar_rgb"
+) -> None:
     """Measure light across the edge of a half-lit plane, for all skins and surface models.
 
     Parameters
@@ -191,6 +203,6 @@ def mitsuba(*, samples: int = 32000, output: Path = RESULTS_FILE, variant: str =
             subject = load_subject(name)
             edge += [measure_skin(mi, subject, boundary, samples) for boundary in boundaries]
     half = _PIXEL_COUNT // 2
-    centres = [(k + 0.5) * _VIEW_HALF_WIDTH_D / half for k in range(half)]
+    centres = [(k + 0.5) * _VIEW_HALF_WIDTH_PER_BURLEY_WIDTH / half for k in range(half)]
     settings = {"mitsuba": mi.__version__, "samples": samples, "pixels": _PIXEL_COUNT, "at_d": centres}
     write_results(output, {**settings, "edges": edge}, 4)

@@ -104,7 +104,7 @@ def error_table(results: JsonObject) -> list[str]:
     return lines
 
 
-def openpbr() -> None:
+def predict_openpbr_errors() -> None:
     """Predict the scattering errors of exported skins, and write benchmarks/results/engines_openpbr.json.
 
     The errors are also printed. Needs the packages usd-core and MaterialX; no renderer of these formats is

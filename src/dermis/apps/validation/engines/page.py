@@ -39,7 +39,7 @@ _BLENDER_HEAD_HEADER = """\
 |---|---|---|---|---|---|"""
 
 
-def page() -> None:
+def write_engines_page() -> None:
     """Rewrite the tables of docs/engines.md, except the two tables with measurements in Blender.
 
     These two are printed, to be copied into the page by hand.

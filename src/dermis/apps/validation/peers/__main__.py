@@ -7,8 +7,8 @@ DERMIS_BLENDER_PYTHON names this program. Times differ from run to run, images d
 
 from __future__ import annotations
 
-from dermis.apps.validation.peers.report import peers
+from dermis.apps.validation.peers.report import write_peer_report
 from dermis.base.command_line import run_script
 
 if __name__ == "__main__":
-    run_script(peers, "python -m dermis.apps.validation.peers")
+    run_script(write_peer_report, "python -m dermis.apps.validation.peers")

@@ -13,7 +13,7 @@ from dermis.apps.truths.cycles import CyclesPass
 from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 from dermis.apps.truths.path_traced import PathTraced
 from dermis.apps.validation.pages import JsonObject
-from dermis.apps.validation.peers.rendering import DERMIS_VARIANTS, GPU_GEMS_3_VARIANTS, PeerRenders
+from dermis.apps.validation.peers.rendering import DERMIS_VARIANTS, GPU_GEMS_3_VARIANTS, SceneRenders
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -55,29 +55,29 @@ class MeanImage:
     variance: Floats
 
 
-def scene_results(peer_renders: PeerRenders) -> JsonObject:
+def scene_results(scene_renders: SceneRenders) -> JsonObject:
     """Return the times and errors of all renderers in one scene as a JSON object."""
-    mask = skin_only_mask(peer_renders)
-    means = {method: mean_of_passes(turns) for method, turns in peer_renders.cycles.items()}
-    ours = [_dermis_row(peer_renders, name, mask) for name in DERMIS_VARIANTS]
-    gpu_gems_3 = [_dermis_row(peer_renders, name, mask) for name in GPU_GEMS_3_VARIANTS]
-    rows = [*ours, *gpu_gems_3, _mitsuba_row(peer_renders, mask)]
+    mask = skin_only_mask(scene_renders)
+    means = {method: mean_of_passes(turns) for method, turns in scene_renders.cycles.items()}
+    ours = [_dermis_row(scene_renders, name, mask) for name in DERMIS_VARIANTS]
+    gpu_gems_3 = [_dermis_row(scene_renders, name, mask) for name in GPU_GEMS_3_VARIANTS]
+    rows = [*ours, *gpu_gems_3, _mitsuba_row(scene_renders, mask)]
     for method, mean in means.items():
-        rows += _cycles_rows(peer_renders, method, mean, mask)
+        rows += _cycles_rows(scene_renders, method, mean, mask)
     scene: JsonObject = {
-        "light": peer_renders.light,
-        "region": peer_renders.region,
+        "light": scene_renders.light,
+        "region": scene_renders.region,
         "pixels": int(mask.sum()),
         "rows": [asdict(row) for row in rows],
-        "left_out": peer_renders.left_out,
+        "left_out": scene_renders.left_out,
         "ours_energy_put_right": {
-            name: _energy_corrected_error(peer_renders, name, mask) for name in DERMIS_VARIANTS
+            name: _energy_corrected_error(scene_renders, name, mask) for name in DERMIS_VARIANTS
         },
         "published": {row.setting: _time_ratios(row, ours[0]) for row in gpu_gems_3},
     }
     if "random-walk" in means:
         mean = means["random-walk"]
-        scene["as_near"] = {row.setting: _equal_error_costs(peer_renders, mean, row, mask) for row in ours}
+        scene["as_near"] = {row.setting: _equal_error_costs(scene_renders, mean, row, mask) for row in ours}
     if len(means) == len(CYCLES_NAMES):
         random_walk, burley = means["random-walk"], means["burley"]
         scene["burley_against_random_walk"] = relative_rmse(
@@ -86,10 +86,10 @@ def scene_results(peer_renders: PeerRenders) -> JsonObject:
     return scene
 
 
-def skin_only_mask(peer_renders: PeerRenders) -> Mask:
+def skin_only_mask(scene_renders: SceneRenders) -> Mask:
     """Return the mask (h, w) of pixels that show only skin in the pictures of all renderers."""
-    mask = peer_renders.reference.mask > 0.999
-    for turns in peer_renders.cycles.values():
+    mask = scene_renders.reference.mask > 0.999
+    for turns in scene_renders.cycles.values():
         for one in turns[0]:
             mask = mask & (one.coverage > 0.999)
     return mask
@@ -150,8 +150,8 @@ def _reference_mean_image(reference: PathTraced) -> MeanImage:
     return MeanImage(reference.image.astype(np.float64), reference.variance.astype(np.float64))
 
 
-def _dermis_row(peer_renders: PeerRenders, variant_name: str, mask: Mask) -> RendererRow:
-    frames, reference = peer_renders.ours[variant_name], peer_renders.reference
+def _dermis_row(scene_renders: SceneRenders, variant_name: str, mask: Mask) -> RendererRow:
+    frames, reference = scene_renders.ours[variant_name], scene_renders.reference
     error = relative_rmse(frames.image, reference.image, mask, reference.variance)
     energy = energy_ratio(frames.image, reference.image, mask, reference.variance)
     times = statistics.median(frames.seconds), statistics.median(frames.core_seconds)
@@ -169,26 +169,26 @@ def _time_ratios(renderer_row: RendererRow, dermis_row: RendererRow) -> dict[str
     }
 
 
-def _mitsuba_row(peer_renders: PeerRenders, mask: Mask) -> RendererRow:
-    reference = peer_renders.reference
+def _mitsuba_row(scene_renders: SceneRenders, mask: Mask) -> RendererRow:
+    reference = scene_renders.reference
     energy = _signal_energy(_reference_mean_image(reference), mask)
     noise = float(np.sqrt(reference.variance[mask].sum(dtype=np.float64) / energy))
     setting = _samples_text(reference.samples)
-    times = reference.seconds, peer_renders.reference_core_seconds
+    times = reference.seconds, scene_renders.reference_core_seconds
     return RendererRow("Mitsuba, volpathmis", setting, *times, noise, None, None, None, None)
 
 
 def _cycles_rows(
-    peer_renders: PeerRenders, subsurface_method: str, mean_image: MeanImage, mask: Mask
+    scene_renders: SceneRenders, subsurface_method: str, mean_image: MeanImage, mask: Mask
 ) -> list[RendererRow]:
     """Return the rows for a Cycles method: one for each number of paths, and one for the mean image.
 
     The errors of the mean image are corrected for its noise.
 
-    subsurface_method : method of Cycles, a key of `PeerRenders.cycles`
+    subsurface_method : method of Cycles, a key of `SceneRenders.cycles`
     """
-    reference, rows = peer_renders.reference, []
-    for level in zip(*peer_renders.cycles[subsurface_method], strict=True):
+    reference, rows = scene_renders.reference, []
+    for level in zip(*scene_renders.cycles[subsurface_method], strict=True):
         pairs = [(one.image, reference.image, mask, reference.variance) for one in level]
         error = np.mean([relative_rmse(*one) for one in pairs], axis=0).tolist()
         energy = np.mean([energy_ratio(*one) for one in pairs], axis=0).tolist()
@@ -210,7 +210,7 @@ def _cycles_rows(
 
 
 def _equal_error_costs(
-    peer_renders: PeerRenders, mean_image: MeanImage, dermis_row: RendererRow, mask: Mask
+    scene_renders: SceneRenders, mean_image: MeanImage, dermis_row: RendererRow, mask: Mask
 ) -> JsonObject:
     """Return the times that random walks in Cycles need to match the error of dermis, and to reach low noise.
 
@@ -221,7 +221,7 @@ def _equal_error_costs(
 
     dermis_row : row of dermis; its error against the reference is the target for Cycles
     """
-    reference, levels = peer_renders.reference, list(zip(*peer_renders.cycles["random-walk"], strict=True))
+    reference, levels = scene_renders.reference, list(zip(*scene_renders.cycles["random-walk"], strict=True))
     bias = relative_rmse(
         mean_image.image, reference.image, mask, reference.variance, mean_image.variance
     ).value
@@ -257,14 +257,14 @@ def _cycles_cost(
     return {"samples": paths_per_pixel, "seconds": seconds, **ratios}
 
 
-def _energy_corrected_error(peer_renders: PeerRenders, variant_name: str, mask: Mask) -> float:
+def _energy_corrected_error(scene_renders: SceneRenders, variant_name: str, mask: Mask) -> float:
     """Return the relative RMSE of an image by dermis, after it is given the brightness of the reference [-].
 
     Each channel is scaled so that its sum within the mask is that of the reference.
 
     variant_name : name of the settings of dermis, a key of `DERMIS_VARIANTS`
     """
-    reference, image = peer_renders.reference, peer_renders.ours[variant_name].image.astype(np.float64)
+    reference, image = scene_renders.reference, scene_renders.ours[variant_name].image.astype(np.float64)
     scale = reference.image[mask].sum(axis=0, dtype=np.float64) / image[mask].sum(axis=0)
     return relative_rmse(image * scale, reference.image, mask, reference.variance).value
 

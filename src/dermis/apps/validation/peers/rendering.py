@@ -62,7 +62,7 @@ _PROGRESS_STEPS_BY_RENDERER = {"ours": 35, "random-walk": 5, "burley": 2, "path-
 
 
 @dataclass(frozen=True)
-class PeerPlan:
+class ComparisonSettings:
     """Size of the images, and numbers of paths and frames, for a comparison of renderers.
 
     side : side of the square image [pixel]
@@ -103,14 +103,14 @@ class FrameTimes:
 
 
 @dataclass
-class PeerRenders:
+class SceneRenders:
     """Pictures and times of all renderers for one scene.
 
     light : name of the scene's light
     region : name of the visible region
     ours : dictionary from a name in `DERMIS_VARIANTS` or `GPU_GEMS_3_VARIANTS` to frames of dermis
     cycles : dictionary from a method of Cycles to two lists of images, rendered with different random seeds;
-        each list has one image for each number of paths in `PeerPlan.samples`
+        each list has one image for each number of paths in `ComparisonSettings.samples`
     left_out : dictionary from a missing method of Cycles to the reason why it is missing
     reference : path-traced image by Mitsuba
     reference_core_seconds : CPU time of Mitsuba, including loading of the scene [s]
@@ -125,13 +125,13 @@ class PeerRenders:
     reference_core_seconds: float
 
 
-def render_peers(
+def render_with_all_renderers(
     head: Head,
     light: str,
-    comparison_plan: PeerPlan,
+    comparison_settings: ComparisonSettings,
     renderer: Renderer,
     on_progress: Callable[[int], None] = lambda step_count: None,
-) -> PeerRenders:
+) -> SceneRenders:
     """Render a head under one light with all renderers.
 
     Frames of dermis are timed before, between and after the other renderers.
@@ -139,7 +139,7 @@ def render_peers(
     on_progress : function called with the number of steps since its last call
     """
     medium = published_media()["skin1"].with_eta(1.0)
-    settings = Settings(size=(comparison_plan.side, comparison_plan.side))
+    settings = Settings(size=(comparison_settings.side, comparison_settings.side))
     cycles: dict[str, list[list[CyclesPass]]] = {method: [] for method in CYCLES_METHODS}
     ours: dict[str, FrameTimes] = {}
     left_out: dict[str, str] = {}
@@ -151,49 +151,52 @@ def render_peers(
     with TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES), scene_context as (scene, _):
         for seed in FIRST_SEED_BY_TURN:
             for method in CYCLES_METHODS:
-                _time_frames(ours, renderer, scene, comparison_plan)
+                _time_frames(ours, renderer, scene, comparison_settings)
                 on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
                 try:
                     cycles[method].append(
-                        _cycles_passes(scene, medium, comparison_plan, settings, method, seed)
+                        _cycles_passes(scene, medium, comparison_settings, settings, method, seed)
                     )
                 except DermisError as fault:
                     left_out[method] = str(fault)
-                on_progress(_PROGRESS_STEPS_BY_RENDERER[method] * sum(comparison_plan.samples))
-        _time_frames(ours, renderer, scene, comparison_plan)
+                on_progress(_PROGRESS_STEPS_BY_RENDERER[method] * sum(comparison_settings.samples))
+        _time_frames(ours, renderer, scene, comparison_settings)
         on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
         cpu_started = time.process_time()
         reference = path_trace(
-            scene, medium, comparison_plan.paths, settings, use_cache=False, progress=report_pass
+            scene, medium, comparison_settings.paths, settings, use_cache=False, progress=report_pass
         )
         core_seconds = time.process_time() - cpu_started
-        _time_frames(ours, renderer, scene, comparison_plan)
+        _time_frames(ours, renderer, scene, comparison_settings)
         on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
     complete = {method: turns for method, turns in cycles.items() if method not in left_out}
-    return PeerRenders(light, default_region(light), ours, complete, left_out, reference, core_seconds)
+    return SceneRenders(light, default_region(light), ours, complete, left_out, reference, core_seconds)
 
 
 def _cycles_passes(
     scene: Scene,
     medium: Medium,
-    comparison_plan: PeerPlan,
+    comparison_settings: ComparisonSettings,
     settings: Settings,
     subsurface_method: SubsurfaceMethod,
     first_seed: int,
 ) -> list[CyclesPass]:
-    """Render the scene with Cycles, once for each number of paths in `comparison_plan.samples`.
+    """Render the scene with Cycles, once for each number of paths in `comparison_settings.samples`.
 
     An earlier pass, in which Cycles builds the scene, is not returned.
 
     first_seed : random seed of the first pass
     """
     return cycles_passes(
-        scene, medium, (1, *comparison_plan.samples), settings, method=subsurface_method, seed=first_seed
+        scene, medium, (1, *comparison_settings.samples), settings, method=subsurface_method, seed=first_seed
     )[1:]
 
 
 def _time_frames(
-    dermis_frames: dict[str, FrameTimes], renderer: Renderer, scene: Scene, comparison_plan: PeerPlan
+    dermis_frames: dict[str, FrameTimes],
+    renderer: Renderer,
+    scene: Scene,
+    comparison_settings: ComparisonSettings,
 ) -> None:
     """Draw and time frames with each of the compared settings of dermis; each frame recomputes all stages.
 
@@ -201,12 +204,14 @@ def _time_frames(
     """
     for name, variant in (DERMIS_VARIANTS | GPU_GEMS_3_VARIANTS).items():
         values = {"technique": variant.technique, "atlas": variant.atlas}
-        settings = Settings.model_validate(values | {"size": (comparison_plan.side, comparison_plan.side)})
+        settings = Settings.model_validate(
+            values | {"size": (comparison_settings.side, comparison_settings.side)}
+        )
         skin = Skin(**(scene.skin.model_dump() | {"direction": variant.direction}))
         variant_scene = replace(scene, skin=skin)
         drawn = renderer.draw(variant_scene, settings, run_all_passes=True)
         frames = dermis_frames.setdefault(name, FrameTimes(drawn.linear()))
-        for _ in range(comparison_plan.frames):
+        for _ in range(comparison_settings.frames):
             started, cpu_started = time.perf_counter(), time.process_time()
             renderer.draw(variant_scene, settings, run_all_passes=True)
             frames.seconds.append(time.perf_counter() - started)

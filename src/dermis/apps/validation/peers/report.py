@@ -18,20 +18,20 @@ from dermis.apps.truths.mitsuba_scene import load_mitsuba
 from dermis.apps.validation.comparisons.scenes import LIGHTS as SCENES
 from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, fill_page, write_results
 from dermis.apps.validation.peers.figures import scene_results
-from dermis.apps.validation.peers.rendering import PeerPlan, PeerRenders, render_peers
+from dermis.apps.validation.peers.rendering import ComparisonSettings, SceneRenders, render_with_all_renderers
 from dermis.base.atomic_write import check_output
 from dermis.base.console import note, print_lines, progress_bar
 from dermis.base.errors import DermisError, refuse
 
 RESULTS_FILE, PAGE = RESULTS / "peers.json", DOCS / "peers.md"
 DEFAULT_LIGHTS = ("front", "back")
-QUICK_PLAN = PeerPlan(side=160, samples=(4, 16), paths=16, frames=3)
+QUICK_SETTINGS = ComparisonSettings(side=160, samples=(4, 16), paths=16, frames=3)
 TARGET_TIME_RATIO = 50.0
 """Goal for the time of Cycles, relative to a frame of dermis with the same error [-]."""
 _COLUMN_TITLES = ("renderer", "", "seconds", "noise", "relative RMSE", "energy ratio")
 
 
-def peers(
+def write_peer_report(
     *,
     head: str = "lee_perry_smith",
     lights: str = ",".join(DEFAULT_LIGHTS),
@@ -62,9 +62,9 @@ def peers(
     if target is not None:
         target.parent.mkdir(parents=True, exist_ok=True)
         check_output(target, (".json",), "Choose such a name")
-    plan = QUICK_PLAN if quick else PeerPlan()
-    plan = plan if side is None else replace(plan, side=side)
-    report = compare_peers(head, lights.split(","), plan, adapter)
+    comparison_settings = QUICK_SETTINGS if quick else ComparisonSettings()
+    comparison_settings = comparison_settings if side is None else replace(comparison_settings, side=side)
+    report = compare_renderers(head, lights.split(","), comparison_settings, adapter)
     machine, scenes = machine_text(report), scenes_text(report)
     if target is not None:
         write_results(target, report)
@@ -73,7 +73,9 @@ def peers(
     print_lines(machine, "", scenes)
 
 
-def compare_peers(head: str, lights: list[str], comparison_plan: PeerPlan, adapter: str) -> JsonObject:
+def compare_renderers(
+    head: str, lights: list[str], comparison_settings: ComparisonSettings, adapter: str
+) -> JsonObject:
     """Render and compare all scenes, and return the report as a JSON object.
 
     If Cycles cannot run, its rows are missing.
@@ -89,16 +91,19 @@ def compare_peers(head: str, lights: list[str], comparison_plan: PeerPlan, adapt
     except DermisError as fault:
         note(f"Cycles is skipped. {fault}")
     loaded, renderer = dermis.load_head(head, subdivide=0), dermis.Renderer(adapter)
-    scenes: list[PeerRenders] = []
+    scenes: list[SceneRenders] = []
     with progress_bar("measuring") as bar:
         done = 0
 
-        def report_steps(step_count: int) -> None:
+        def advance_progress(step_count: int) -> None:
             nonlocal done
             done += step_count
-            bar(done, len(lights) * comparison_plan.progress_steps)
+            bar(done, len(lights) * comparison_settings.progress_steps)
 
-        scenes = [render_peers(loaded, light, comparison_plan, renderer, report_steps) for light in lights]
+        scenes = [
+            render_with_all_renderers(loaded, light, comparison_settings, renderer, advance_progress)
+            for light in lights
+        ]
     return {
         "date": date.today().isoformat(),
         "head": head,
@@ -107,12 +112,12 @@ def compare_peers(head: str, lights: list[str], comparison_plan: PeerPlan, adapt
         "adapter": renderer.device.adapter.name,
         "versions": software_versions(scenes),
         "denoising": False,
-        "plan": asdict(comparison_plan),
+        "plan": asdict(comparison_settings),
         "scenes": [scene_results(one) for one in scenes],
     }
 
 
-def software_versions(scene_renders: list[PeerRenders]) -> dict[str, str]:
+def software_versions(scene_renders: list[SceneRenders]) -> dict[str, str]:
     """Return the versions of Python, NumPy and all renderers, by name."""
     versions = {name: version(name) for name in ("dermis", "wgpu", "mitsuba", "numpy")}
     passes = [turns[0][0] for one in scene_renders for turns in one.cycles.values() if turns]
@@ -156,11 +161,11 @@ def _table_line(renderer_row: JsonObject) -> str:
     seconds = "-" if renderer_row["seconds"] is None else f"{renderer_row['seconds']:.3g}"
     noise = f"{renderer_row['noise']:.1%}" if renderer_row["noise"] > 0 else "-"
     cells = renderer_row["renderer"], renderer_row["setting"], seconds, noise
-    errors = [_estimate_cell(renderer_row, name) for name in ("relrmse", "energy_ratio")]
+    errors = [_error_cell(renderer_row, name) for name in ("relrmse", "energy_ratio")]
     return f"| {' | '.join((*cells, *errors))} |"
 
 
-def _estimate_cell(renderer_row: JsonObject, error_name: str) -> str:
+def _error_cell(renderer_row: JsonObject, error_name: str) -> str:
     return (
         "-"
         if renderer_row[error_name] is None

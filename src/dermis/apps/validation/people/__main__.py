@@ -9,11 +9,20 @@ from dermis.base.command_line import run_script
 
 PACKAGE = "dermis.apps.validation.people"
 COMMANDS = {
-    f"{PACKAGE}.table:table": "Write the table of measured people in the package.",
-    f"{PACKAGE}.drawn:people": "Print a comparison of drawn people with the archive.",
-    f"{PACKAGE}.drawn:page": "Measure the variation of people and write docs/measured.md.",
+    "table": (
+        f"{PACKAGE}.table:write_measured_table",
+        "Write the table of measured people in the package.",
+    ),
+    "people": (
+        f"{PACKAGE}.drawn:print_random_people_tables",
+        "Print a comparison of drawn people with the archive.",
+    ),
+    "page": (
+        f"{PACKAGE}.drawn:write_random_people_tables",
+        "Measure the variation of people and write docs/measured.md.",
+    ),
 }
-"""Functions that run as commands, with their descriptions."""
+"""Function and description of each command, by its name."""
 
 if __name__ == "__main__":
     run_script(COMMANDS, f"python -m {PACKAGE}")

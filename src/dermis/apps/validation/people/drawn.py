@@ -34,7 +34,7 @@ _COLOUR_QUANTITIES = "L*", "a*", "b*", "ITA"
 _MIN_OLD_AGE_YEARS = 55.0  # least age of the older people [years]
 
 
-class DrawnPeople(NamedTuple):
+class RandomPeople(NamedTuple):
     """Skin colours of n people of one group who are sampled at random, at each of `HEAD_SITES`.
 
     cielab : (n, 7, 3) colours under D65
@@ -63,20 +63,20 @@ def site_skin_variables(look: SkinLook) -> Doubles:
 
 
 @logged_step("drawing people")
-def draw_random_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
+def sample_people(group: str, seeds: Sequence[int]) -> RandomPeople:
     """Sample random people of an ancestry group, and compute their skin colours with the spectral model."""
     drawn = [Human.drawn(seed, skin_ancestry=group) for seed in seeds]
     variables = np.concatenate([site_skin_variables(one.look) for one in drawn])
     colours = model_lab(variables).reshape(len(drawn), len(HEAD_SITES), 3)
-    return DrawnPeople(colours, np.array([one.age for one in drawn]), np.array([one.sex for one in drawn]))
+    return RandomPeople(colours, np.array([one.age for one in drawn]), np.array([one.sex for one in drawn]))
 
 
-def draw_random_people_by_group(seed_count: int = _SEED_COUNT) -> dict[str, DrawnPeople]:
+def sample_people_by_group(seed_count: int = _SEED_COUNT) -> dict[str, RandomPeople]:
     """Return random people by ancestry group, sampled with the same seeds for all groups."""
-    return {group: draw_random_people(group, range(seed_count)) for group in GROUP_OF_CODE.values()}
+    return {group: sample_people(group, range(seed_count)) for group in GROUP_OF_CODE.values()}
 
 
-def people(seeds: int = _SEED_COUNT) -> None:
+def print_random_people_tables(seeds: int = _SEED_COUNT) -> None:
     """Print a comparison of people sampled at random with the people in the archive.
 
     Parameters
@@ -87,7 +87,7 @@ def people(seeds: int = _SEED_COUNT) -> None:
     print_tables(_people_tables(seeds))
 
 
-def page(seeds: int = _SEED_COUNT) -> None:
+def write_random_people_tables(seeds: int = _SEED_COUNT) -> None:
     """Compare people sampled at random with the people in the archive, and write docs/measured.md.
 
     Parameters
@@ -100,7 +100,7 @@ def page(seeds: int = _SEED_COUNT) -> None:
 
 
 def _people_tables(seed_count: int) -> dict[str, str]:
-    archive, drawn = read_archive(), draw_random_people_by_group(seed_count)
+    archive, drawn = read_archive(), sample_people_by_group(seed_count)
     return {
         "people_cheek": cheek_table(archive, drawn),
         "people_sites": sites_table(archive, drawn),
@@ -110,7 +110,7 @@ def _people_tables(seed_count: int) -> dict[str, str]:
     }
 
 
-def cheek_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> str:
+def cheek_table(archive: Archive, random_people: Mapping[str, RandomPeople]) -> str:
     """Return a Markdown table that compares the cheek colours of measured and of randomly sampled people.
 
     For each group, the table has medians, ranges, and energy distances between the two distributions.
@@ -122,7 +122,7 @@ def cheek_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> st
     ]
     for code, group in GROUP_OF_CODE.items():
         measured = _measured_colours(archive, code, "cheek")
-        both = [_with_ita(one) for one in (measured.cielab, drawn_people[group].cielab[:, 0])]
+        both = [_with_ita(one) for one in (measured.cielab, random_people[group].cielab[:, 0])]
         for k, name in enumerate(_COLOUR_QUANTITIES):
             a, b = both[0][:, k], both[1][:, k]
             distance, expected, limit = two_sample_distance(a, b)
@@ -153,7 +153,7 @@ def two_sample_distance(first_sample: Doubles, second_sample: Doubles) -> tuple[
 
 
 def site_differences(
-    archive: Archive, drawn_people: Mapping[str, DrawnPeople]
+    archive: Archive, random_people: Mapping[str, RandomPeople]
 ) -> Iterator[tuple[str, str, int, Doubles, Doubles]]:
     """Yield median colours of measured people, and how those of sampled people differ, by group and site.
 
@@ -165,11 +165,11 @@ def site_differences(
             measured = _measured_colours(archive, code, site)
             if len(measured.person):
                 median = np.median(measured.cielab, axis=0)
-                difference = np.median(drawn_people[group].cielab[:, k], axis=0) - median
+                difference = np.median(random_people[group].cielab[:, k], axis=0) - median
                 yield group, site, len(np.unique(measured.person)), median, difference
 
 
-def sites_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> str:
+def sites_table(archive: Archive, random_people: Mapping[str, RandomPeople]) -> str:
     """Return a Markdown table of median colours of measured people, by group and site.
 
     It also has the median colours of randomly sampled people minus these.
@@ -178,7 +178,7 @@ def sites_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> st
         "| group | site | people | archive: L*, a*, b* | drawn minus archive | |",
         "|---|---|---|---|---|---|",
     ]
-    for group, site, count, median, difference in site_differences(archive, drawn_people):
+    for group, site, count, median, difference in site_differences(archive, random_people):
         outside = count >= _MIN_COMPARED_PEOPLE and np.abs(difference).max() > _MEDIAN_TOLERANCE_LAB
         texts = (
             ", ".join(f"{one:{form}}" for one in values)
@@ -190,7 +190,7 @@ def sites_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> st
     return "\n".join(lines)
 
 
-def sex_age_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> str:
+def sex_age_table(archive: Archive, random_people: Mapping[str, RandomPeople]) -> str:
     """Return a Markdown table of how the colour of the cheek differs between sexes and between ages.
 
     The differences are those of measured people and of randomly sampled people, averaged over the groups.
@@ -201,9 +201,9 @@ def sex_age_table(archive: Archive, drawn_people: Mapping[str, DrawnPeople]) -> 
         for is_drawn in (False, True):
             differences, counts = [], []
             for code, group in GROUP_OF_CODE.items():
-                measured, drawn_group = _measured_colours(archive, code, "cheek"), drawn_people[group]
-                colours = drawn_group.cielab[:, 0] if is_drawn else measured.cielab
-                sex, age = (drawn_group.sex, drawn_group.age) if is_drawn else (measured.sex, measured.age)
+                measured, random_group = _measured_colours(archive, code, "cheek"), random_people[group]
+                colours = random_group.cielab[:, 0] if is_drawn else measured.cielab
+                sex, age = (random_group.sex, random_group.age) if is_drawn else (measured.sex, measured.age)
                 first, second = (
                     (sex > 0.5, sex < 0.5) if "men" in name else (age >= _MIN_OLD_AGE_YEARS, age < 45.0)
                 )

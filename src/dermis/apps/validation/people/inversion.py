@@ -12,8 +12,8 @@ from dermis.images.colour import lab
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
-_MIN_VARIABLES: Final = np.array([-13.3, -13.3, 0.0, np.log2(0.02)])
-_MAX_VARIABLES: Final = np.array([-0.3, -1.5, 1.0, np.log2(0.2)])
+_VARIABLE_LOWER_BOUNDS: Final = np.array([-13.3, -13.3, 0.0, np.log2(0.02)])
+_VARIABLE_UPPER_BOUNDS: Final = np.array([-0.3, -1.5, 1.0, np.log2(0.2)])
 _START_MELANIN, _START_BLOOD = 0.04, 0.01
 _PRIOR_MEAN: Final = np.array([0.7, np.log2(DEFAULT_SKIN.epidermis_mm)])
 _PRIOR_SD: Final = np.array([0.3, 0.2])
@@ -33,7 +33,7 @@ def model_spectra(skin_variables: Doubles) -> Doubles:
     skin_variables : (n, 4) log2 of the melanin fraction, log2 of the blood fraction, oxygenation, and log2 of
         the thickness of the epidermis in mm; values are clipped to the range that `invert_spectra` returns
     """
-    melanin, blood, oxygen, mm = np.clip(skin_variables, _MIN_VARIABLES, _MAX_VARIABLES).T
+    melanin, blood, oxygen, mm = np.clip(skin_variables, _VARIABLE_LOWER_BOUNDS, _VARIABLE_UPPER_BOUNDS).T
     values = {"melanin": np.exp2(melanin), "blood": np.exp2(blood), "oxygen": oxygen}
     return skin_model_spectra()(values | {"epidermis_mm": np.exp2(mm)})
 
@@ -63,4 +63,6 @@ def invert_spectra(reflectance: Doubles) -> Doubles:
         return np.hstack([(spectra - reflectance) / spectrum_sd, colours / _CIELAB_SD, prior])
 
     start = np.array([np.log2(_START_MELANIN), np.log2(_START_BLOOD), *_PRIOR_MEAN])
-    return least_squares(residual, np.tile(start, (len(reflectance), 1)), _MIN_VARIABLES, _MAX_VARIABLES)
+    return least_squares(
+        residual, np.tile(start, (len(reflectance), 1)), _VARIABLE_LOWER_BOUNDS, _VARIABLE_UPPER_BOUNDS
+    )

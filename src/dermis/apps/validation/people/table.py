@@ -42,7 +42,7 @@ _POOLED_DIFFERENCE_WEIGHT = (
     10.0  # number of people of a small cell that weigh as much as the pooled difference
 )
 _POPULATION_SIZE = 2000
-_VARIABLE_SHIFT_SD: Final = np.array([0.5, 0.5, 0.15, 0.15])
+_CORRECTION_SD: Final = np.array([0.5, 0.5, 0.15, 0.15])
 """Typical size of the corrections of the four variables by which median colours are made to agree."""
 _MEDIAN_COLOUR_SD = 0.05
 _ARCHIVE_SOURCE = (
@@ -50,10 +50,10 @@ _ARCHIVE_SOURCE = (
 )
 _LOG2_THICKNESS_CHANGES = (-0.6, -0.4, -0.2, 0.0, 0.2)
 """Changes of the thickness of the epidermis that are tried [doublings]."""
-_MAX_CORRECTION_STEP = 1.0  # of a correction, in `_VARIABLE_SHIFT_SD`
+_MAX_CORRECTION_STEP = 1.0  # of a correction, in `_CORRECTION_SD`
 _CALIBRATION_STEP_COUNT = 6
 _WINSOR_PERCENT = 5.0
-_TRUE_SPREAD_FRACTION = 0.5
+_PERSON_SPREAD_FRACTION = 0.5
 """Fraction of the measured spread of differences between sites that is due to people; pressure and placing of
 the probe cause the rest. With the whole spread, foreheads, necks and hands of random people would vary too
 much."""
@@ -69,7 +69,7 @@ _CELLS_CSV_HEADER = """\
 """
 
 
-def table() -> None:
+def write_measured_table() -> None:
     """Compute statistics of measured skin from the spectral archive, and write them to data files."""
     archive = read_archive()
     skin_variables = invert_spectra(archive.spectra)
@@ -223,7 +223,7 @@ def _site_differences(archive: Archive, skin_variables: Doubles) -> tuple[Double
         used = counts[group, site] >= _MIN_CELL_PEOPLE
         x, d = (_winsorise(one[used, :2]) for one in (deviation, difference))
         slope[site] = (x * d).sum(axis=0) / (x * x).sum(axis=0)
-        spread[site] = _TRUE_SPREAD_FRACTION * np.std(d - slope[site] * x, axis=0)
+        spread[site] = _PERSON_SPREAD_FRACTION * np.std(d - slope[site] * x, axis=0)
         filled = counts[:, site] >= _MIN_CELL_PEOPLE
         pooled = np.average(shifts[filled, site], axis=0, weights=counts[filled, site])
         weight = (counts[:, site] / (counts[:, site] + _POOLED_DIFFERENCE_WEIGHT))[~filled, None]
@@ -346,18 +346,18 @@ def _colour_matching_shift(
 
     for _ in range(_CALIBRATION_STEP_COUNT):
         error = target_colour - median_colour(shift)
-        steps = 0.1 * np.diag(_VARIABLE_SHIFT_SD)
+        steps = 0.1 * np.diag(_CORRECTION_SD)
         J = np.column_stack(
             [
                 (median_colour(shift + one) - median_colour(shift - one)) / (0.2 * sd)
-                for one, sd in zip(steps, _VARIABLE_SHIFT_SD, strict=True)
+                for one, sd in zip(steps, _CORRECTION_SD, strict=True)
             ]
         )
         J[:, ~used] = 0.0
-        scaled = J * _VARIABLE_SHIFT_SD / _MEDIAN_COLOUR_SD
+        scaled = J * _CORRECTION_SD / _MEDIAN_COLOUR_SD
         normal = scaled.T @ scaled + np.eye(4)  # the prior of the shift is 0
-        step = np.linalg.solve(normal, scaled.T @ error / _MEDIAN_COLOUR_SD - shift / _VARIABLE_SHIFT_SD)
-        shift += _VARIABLE_SHIFT_SD * np.clip(step, -_MAX_CORRECTION_STEP, _MAX_CORRECTION_STEP)
+        step = np.linalg.solve(normal, scaled.T @ error / _MEDIAN_COLOUR_SD - shift / _CORRECTION_SD)
+        shift += _CORRECTION_SD * np.clip(step, -_MAX_CORRECTION_STEP, _MAX_CORRECTION_STEP)
     return shift, target_colour - median_colour(shift)
 
 

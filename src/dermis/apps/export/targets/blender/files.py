@@ -21,7 +21,7 @@ from dermis.apps.export.subject import BALL_DIAMETER_MM, Subject
 from dermis.apps.export.target import Parameters, flat_tuple
 from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
 from dermis.apps.truths.cycles import cycles_camera
-from dermis.apps.truths.lights import CYCLES, cycles_lamp
+from dermis.apps.truths.lights import CYCLES_LIGHTS, cycles_lamp
 from dermis.apps.truths.scene_description import CYCLES_UNIT_MM, SceneDict, cycles_world
 from dermis.formats.gltf.write import encode_head
 from dermis.human.person_file import relief_slopes
@@ -182,7 +182,7 @@ def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArr
     Raises DermisError for lights and cameras that Blender does not support.
     """
     centre = np.array(centre_mm) * METRES_PER_MM
-    supported = supported_lights(scene.lights, CYCLES, "Blender")
+    supported = supported_lights(scene.lights, CYCLES_LIGHTS, "Blender")
     lights = [_convert_lamp(cycles_lamp(light, k), centre) for k, light in enumerate(supported, start=1)]
     camera = cycles_camera(scene)
     world, panorama = cycles_world(scene.environment)

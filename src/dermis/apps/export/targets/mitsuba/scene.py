@@ -15,7 +15,7 @@ from dermis.apps.export.targets.maps import encode_map_exr
 from dermis.apps.export.targets.mitsuba import xml
 from dermis.apps.export.targets.mitsuba.meshes import skin_meshes
 from dermis.apps.export.targets.mitsuba.xml import XmlBackend
-from dermis.apps.truths.lights import MITSUBA, mitsuba_emitter
+from dermis.apps.truths.lights import MITSUBA_LIGHTS, mitsuba_emitter
 from dermis.apps.truths.mitsuba_scene import RUSSIAN_ROULETTE_DEPTH, mitsuba_sensor
 from dermis.apps.truths.scene_description import SceneDict, mitsuba_environment, mitsuba_rgb
 from dermis.formats.part_pictures import PartRole
@@ -195,7 +195,7 @@ def _scene_elements(
     # Spectral multiple importance sampling, as extinction differs between channels.
     integrator = {"type": "volpathmis", "rr_depth": RUSSIAN_ROULETTE_DEPTH, "hide_emitters": True}
     parts: list[SceneDict] = [integrator, sensor]
-    lights = supported_lights(scene.lights, MITSUBA, "Mitsuba")
+    lights = supported_lights(scene.lights, MITSUBA_LIGHTS, "Mitsuba")
     parts += [mitsuba_emitter(xml_backend, light, k) for k, light in enumerate(lights, start=1)]
     if scene.environment is not None:
         parts.append(mitsuba_environment(xml_backend, scene.environment))

@@ -24,7 +24,7 @@ from dermis.optics.pigments.spectra import (
 )
 from dermis.optics.skin_spectra import two_layer_reflectance
 
-CONSTANTS = UNKNOWNS | {
+FITTABLE_CONSTANTS = UNKNOWNS | {
     one.name: one
     for one in (
         SpectralUnknown("oxygen", -1.0, 2.0, 0.8),
@@ -53,15 +53,15 @@ _ABSORPTION_BANDS_NM = {
     "carotene": (480.0, 20.0),
     "methaemoglobin": (630.0, 18.0),
 }
-_CONSTANT_ITERATIONS = 6  # of the constants
-_UNKNOWN_ITERATIONS = 4  # of the unknowns of spectra, in each outer step
+_OUTER_ITERATION_COUNT = 6  # of the constants
+_INNER_ITERATION_COUNT = 4  # of the unknowns of spectra, in each outer step
 _DERIVATIVE_STEP = 0.02
 _MIN_ERROR_REDUCTION = 1e-4
 _NOTABLE_CORRELATION = 0.85
 
 
 def extended_model(constants: Mapping[str, float]) -> ExtendedModel:
-    """Return an extended model of skin with given values of some of `CONSTANTS`, keyed by name."""
+    """Return an extended model of skin with given values of some of `FITTABLE_CONSTANTS`, keyed by name."""
     return ExtendedModel(dict(constants))
 
 
@@ -69,7 +69,7 @@ def extended_model(constants: Mapping[str, float]) -> ExtendedModel:
 class ExtendedModel:
     """Spectral model of skin with more pigments and constants than the package's model.
 
-    constants : values of some of `CONSTANTS`; the others have default values
+    constants : values of some of `FITTABLE_CONSTANTS`; the others have default values
     """
 
     constants: dict[str, float]
@@ -82,7 +82,7 @@ class ExtendedModel:
         defaults = {"vessel_mm": 0.0, "bandwidth_nm": 0.0, "scattering": 1.0}
 
         def parameter_column(name: str) -> Floats:
-            fallback = self.constants.get(name, defaults.get(name, CONSTANTS[name].start))
+            fallback = self.constants.get(name, defaults.get(name, FITTABLE_CONSTANTS[name].start))
             return np.asarray(parameter_values.get(name, np.float64(fallback)))[..., None]
 
         wavelength = WAVELENGTHS_NM
@@ -131,7 +131,7 @@ def _blood_absorption_by_band(oxygen: float, half_width_nm: float) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class SharedFit:
+class SharedConstantsFit:
     """Result of a fit of a skin model to spectra: shared constants, and values for each spectrum.
 
     constants : values of the constants that all spectra share, by name
@@ -150,51 +150,51 @@ def fit_constants(
     free_constants: Sequence[str],
     criterion: Criterion = "spectrum",
     fixed_constants: Mapping[str, float] | None = None,
-) -> SharedFit:
+) -> SharedConstantsFit:
     """Fit constants shared by all spectra, and unknowns of each spectrum, by least squares.
 
     spectra : (n, 31) measured reflectance [-]
     unknowns : names of the parameters that are fitted to each spectrum separately
-    free_constants : names of the `CONSTANTS` that are fitted to all spectra together
+    free_constants : names of the `FITTABLE_CONSTANTS` that are fitted to all spectra together
     criterion : what the fit minimises: differences of the spectra ("spectrum") or of their colours ("colour")
     fixed_constants : values of constants that are not fitted, by name
     """
     separate = [UNKNOWNS[name] for name in unknowns]
-    shared = [CONSTANTS[name] for name in free_constants]
-    z = np.array([one.coordinate(dict(fixed_constants or {}).get(one.name, one.start)) for one in shared])
+    shared = [FITTABLE_CONSTANTS[name] for name in free_constants]
+    z = np.array([one.scaled_value(dict(fixed_constants or {}).get(one.name, one.start)) for one in shared])
 
-    def constants_at(coordinates: Floats) -> dict[str, float]:
+    def constants_from(scaled_values: Floats) -> dict[str, float]:
         values = {
-            one.name: float(one.parameter_values(coordinates[i : i + 1])[0]) for i, one in enumerate(shared)
+            one.name: float(one.parameter_values(scaled_values[i : i + 1])[0]) for i, one in enumerate(shared)
         }
         return dict(fixed_constants or {}) | values
 
     def fit_unknowns(
-        coordinates: Floats, start_fit: SpectralFit | None, iteration_count: int
+        scaled_values: Floats, start_fit: SpectralFit | None, iteration_count: int
     ) -> tuple[SpectralFit, Floats]:
-        model = extended_model(constants_at(coordinates))
+        model = extended_model(constants_from(scaled_values))
         first = None if start_fit is None else start_fit.values
         found = invert_spectra(spectra, model, separate, criterion, first, iteration_count)
         return found, found.weighted_residual(criterion).ravel()
 
     fit, r = fit_unknowns(z, None, 25)
     damping = 1e-2
-    for _ in range(_CONSTANT_ITERATIONS):
+    for _ in range(_OUTER_ITERATION_COUNT):
         columns = []
         for i in range(len(z)):
             moved = z.copy()
             moved[i] += _DERIVATIVE_STEP
-            columns.append((fit_unknowns(moved, fit, _UNKNOWN_ITERATIONS)[1] - r) / _DERIVATIVE_STEP)
+            columns.append((fit_unknowns(moved, fit, _INNER_ITERATION_COUNT)[1] - r) / _DERIVATIVE_STEP)
         J = np.stack(columns, axis=-1)
         H, g = J.T @ J, -J.T @ r
         for _ in range(5):
             step = np.clip(np.linalg.solve(H + damping * np.diag(np.diag(H) + 1e-12), g), -0.7, 0.7)
             trial = np.clip(
                 z + step,
-                [one.coordinate(one.low) for one in shared],
-                [one.coordinate(one.high) for one in shared],
+                [one.scaled_value(one.low) for one in shared],
+                [one.scaled_value(one.high) for one in shared],
             )
-            trial_fit, trial_r = fit_unknowns(trial, fit, 2 * _UNKNOWN_ITERATIONS)
+            trial_fit, trial_r = fit_unknowns(trial, fit, 2 * _INNER_ITERATION_COUNT)
             if trial_r @ trial_r < r @ r:
                 break
             damping *= 8.0
@@ -204,7 +204,7 @@ def fit_constants(
         z, fit, r, damping = trial, trial_fit, trial_r, 0.3 * damping
         if gain < _MIN_ERROR_REDUCTION:
             break
-    return SharedFit(constants_at(z), fit, _confounded_pairs(free_constants, H))
+    return SharedConstantsFit(constants_from(z), fit, _confounded_pairs(free_constants, H))
 
 
 def _confounded_pairs(

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from cyclopts import Parameter
 
 from dermis.apps.inverse.unmixing.spectral_inversion import (
-    FIVE_UNKNOWNS,
-    THREE_UNKNOWNS,
-    TWO_UNKNOWNS,
+    PIGMENT_AND_OXYGEN_UNKNOWNS,
+    PIGMENT_UNKNOWNS,
+    TISSUE_UNKNOWNS,
     UNKNOWNS,
     ParameterValues,
     SpectralFit,
@@ -48,7 +50,7 @@ from dermis.optics.skin_spectra import two_layer_reflectance
 
 CHEEK_AND_FOREHEAD = SITES.index("cheek"), SITES.index("forehead")
 """Indices of the two facial sites that most people have."""
-FORMER_SKIN = replace(DEFAULT_SKIN, baseline=1.0, epidermis_mm=0.05, oxygen=0.75)
+PREVIOUS_DEFAULT_SKIN = replace(DEFAULT_SKIN, baseline=1.0, epidermis_mm=0.05, oxygen=0.75)
 """Default skin before it was compared with the archive."""
 _SPECTRA_SAMPLE_COUNT, _CONSTANTS_SAMPLE_COUNT = (
     1500,
@@ -64,7 +66,7 @@ _ERROR_PERCENTILES = 50.0, 95.0
 _DONNER_JENSEN_SKIN = SkinParameters(baseline=1.0, epidermis_mm=0.25, oxygen=0.75)
 _EDGE_LOSS_MELANIN = 0.01, 0.03, 0.1, 0.3
 _EDGE_LOSS_WAVELENGTHS_NM = np.arange(400.0, 701.0, 50.0)
-_CONSTANTS_BY_ADDITION: dict[str, tuple[str, ...]] = {
+_ADDED_CONSTANTS_BY_NAME: dict[str, tuple[str, ...]] = {
     "none": (),
     "scattering, both layers": ("scattering",),
     "scattering of the dermis": ("dermis",),
@@ -78,17 +80,20 @@ _CONSTANTS_BY_ADDITION: dict[str, tuple[str, ...]] = {
 }
 
 
-def measured(bioskin: Path | None = None, only: str | None = None) -> None:
+def fit_measured_spectra(
+    bioskin_weights: Annotated[Path | None, Parameter(name="--bioskin")] = None,
+    only_part: Annotated[str | None, Parameter(name="--only")] = None,
+) -> None:
     """Fit the spectral model of skin to all measured spectra, and write docs/measured.md.
 
     Takes ten minutes.
 
     Parameters
     ----------
-    only:
+    only_part:
         Part to measure again (models, surface, limits, folds, alternatives, additions, sites, site_folds or
         edge); the other parts keep their last results.
-    bioskin:
+    bioskin_weights:
         File pretrained_models/BioSkin.pt of facebookresearch/BioSkin; with it, BioSkin's decoder is also
         compared.
     """
@@ -98,24 +103,24 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
         "models": lambda: _default_skin_errors(archive),
         "surface": lambda: _smooth_surface_errors(archive),
         "limits": lambda: _implausible_fit_fractions(archive),
-        "folds": lambda: _fold_errors(archive),
+        "folds": lambda: _cross_validation_errors(archive),
         "alternatives": lambda: _published_model_errors(
-            archive.sample_rows(_SPECTRA_SAMPLE_COUNT, 2), bioskin
+            archive.sample_rows(_SPECTRA_SAMPLE_COUNT, 2), bioskin_weights
         ),
         "additions": lambda: _additional_constant_errors(archive.sample_rows(_CONSTANTS_SAMPLE_COUNT, 3)),
         "sites": lambda: _site_fits(archive),
-        "site_folds": lambda: _site_fold_errors(archive),
+        "site_folds": lambda: _site_cross_validation_errors(archive),
         "edge": lambda: _edge_loss_errors(archive.sample_rows(_CONSTANTS_SAMPLE_COUNT, 3)),
     }
-    results: JsonObject = {} if only is None else read_results(RESULT_FILE)
-    for name in parts if only is None else [only]:
+    results: JsonObject = {} if only_part is None else read_results(RESULT_FILE)
+    for name in parts if only_part is None else [only_part]:
         results[name] = parts[name]()
         print_lines(f"{name} measured")
     write_results(RESULT_FILE, results, digits=4)
     write_measured_page()
 
 
-def measured_page() -> None:
+def rewrite_measured_page() -> None:
     """Write docs/measured.md from the last measurement."""
     write_measured_page()
 
@@ -124,32 +129,37 @@ def _default_skin_errors(archive: Archive) -> JsonObject:
     """Return the errors of fits with two, three and five unknowns, for four choices of the fixed parameters.
 
     Fixed parameters are those that are not fitted. The keys name their values: "present" for those of the
-    default skin, "former" for those of `FORMER_SKIN`, the default skin of earlier versions; "half" and
-    "quarter" for those of `FORMER_SKIN` with a half and a quarter of the absorption by bloodless tissue.
+    default skin, "former" for those of `PREVIOUS_DEFAULT_SKIN`, the default skin of earlier versions; "half"
+    and "quarter" for those of `PREVIOUS_DEFAULT_SKIN` with a half and a quarter of the absorption by
+    bloodless tissue.
     """
     skins = {
-        "former": FORMER_SKIN,
-        "half": replace(FORMER_SKIN, baseline=0.5),
-        "quarter": replace(FORMER_SKIN, baseline=0.25),
+        "former": PREVIOUS_DEFAULT_SKIN,
+        "half": replace(PREVIOUS_DEFAULT_SKIN, baseline=0.5),
+        "quarter": replace(PREVIOUS_DEFAULT_SKIN, baseline=0.25),
         "present": DEFAULT_SKIN,
     }
     face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
     subsets = {"all": np.ones(len(archive.spectra), bool), "cheek and forehead": face}
     results: JsonObject = {}
     for name, skin in skins.items():
-        two, three = (fit_skin(archive.spectra, n, "colour", skin) for n in (TWO_UNKNOWNS, THREE_UNKNOWNS))
-        five = fit_skin(archive.spectra, FIVE_UNKNOWNS, "spectrum", skin)
+        two, three = (
+            fit_skin(archive.spectra, n, "colour", skin)
+            for n in (PIGMENT_UNKNOWNS, PIGMENT_AND_OXYGEN_UNKNOWNS)
+        )
+        five = fit_skin(archive.spectra, TISSUE_UNKNOWNS, "spectrum", skin)
         two_spectra, three_spectra = (
-            fit_skin(archive.spectra, n, "spectrum", skin) for n in (TWO_UNKNOWNS, THREE_UNKNOWNS)
+            fit_skin(archive.spectra, n, "spectrum", skin)
+            for n in (PIGMENT_UNKNOWNS, PIGMENT_AND_OXYGEN_UNKNOWNS)
         )
         results[name] = {
             label: {
                 "two": _percentiles(two.delta_e()[chosen]),
                 "above_2": float((two.delta_e()[chosen] > 2.0).mean()),
                 "three": _percentiles(three.delta_e()[chosen]),
-                "rms_two": _percentiles(two_spectra.rms[chosen]),
-                "rms_three": _percentiles(three_spectra.rms[chosen]),
-                "rms_five": _percentiles(five.rms[chosen]),
+                "rms_two": _percentiles(two_spectra.rms_residual[chosen]),
+                "rms_three": _percentiles(three_spectra.rms_residual[chosen]),
+                "rms_five": _percentiles(five.rms_residual[chosen]),
             }
             for label, chosen in subsets.items()
         }
@@ -219,7 +229,7 @@ def _implausible_fit_fractions(archive: Archive) -> JsonObject:
     The keys are "none" for a fitted oxygenation of 0, "all" for an oxygenation of 1, and "unmatched" for fits
     that do not reproduce the measured colour.
     """
-    fit = fit_skin(archive.spectra, THREE_UNKNOWNS, "colour")
+    fit = fit_skin(archive.spectra, PIGMENT_AND_OXYGEN_UNKNOWNS, "colour")
     oxygen = fit.values["oxygen"]
     return {
         "none": float((oxygen <= _OXYGEN_LIMIT_TOLERANCE).mean()),
@@ -248,7 +258,7 @@ def _category_errors(
     for category in categories:
         chosen = category_by_spectrum == category
         medians = [float(np.median(one.delta_e()[chosen])) for one in (two_unknown_fit, three_unknown_fit)]
-        rows.append([int(chosen.sum()), *medians, float(np.median(five_unknown_fit.rms[chosen]))])
+        rows.append([int(chosen.sum()), *medians, float(np.median(five_unknown_fit.rms_residual[chosen]))])
     return rows
 
 
@@ -260,7 +270,7 @@ def _illuminant_errors(fits_by_unknown_count: dict[str, SpectralFit]) -> JsonObj
     }
 
 
-def _fold_errors(archive: Archive) -> list[JsonObject]:
+def _cross_validation_errors(archive: Archive) -> list[JsonObject]:
     """Return one object for each fold of the cross-validation, with fitted constants and median errors.
 
     The measured people are divided into folds. For each fold, the constants are fitted to the spectra of the
@@ -271,30 +281,33 @@ def _fold_errors(archive: Archive) -> list[JsonObject]:
     for fold in range(FOLD_COUNT):
         known = archive.select_rows(archive.fold != fold).sample_rows(_CONSTANTS_SAMPLE_COUNT, fold)
         held = archive.select_rows(archive.fold == fold)
-        spectral = fit_constants(known.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
-        colour = fit_constants(known.spectra, TWO_UNKNOWNS, ("oxygen",), "colour", spectral.constants)
+        spectral = fit_constants(known.spectra, PIGMENT_AND_OXYGEN_UNKNOWNS, ("baseline", "epidermis_mm"))
+        colour = fit_constants(known.spectra, PIGMENT_UNKNOWNS, ("oxygen",), "colour", spectral.constants)
         skin = replace(DEFAULT_SKIN, **colour.constants | {"oxygen": min(1.0, colour.constants["oxygen"])})
         row: JsonObject = {"constants": colour.constants, "people": len(held.spectra)}
         for label, one in (("fitted", skin), ("default", DEFAULT_SKIN)):
-            two, three = (fit_skin(held.spectra, n, "colour", one) for n in (TWO_UNKNOWNS, THREE_UNKNOWNS))
-            five = fit_skin(held.spectra, FIVE_UNKNOWNS, "spectrum", one)
+            two, three = (
+                fit_skin(held.spectra, n, "colour", one)
+                for n in (PIGMENT_UNKNOWNS, PIGMENT_AND_OXYGEN_UNKNOWNS)
+            )
+            five = fit_skin(held.spectra, TISSUE_UNKNOWNS, "spectrum", one)
             face = np.isin(held.site, CHEEK_AND_FOREHEAD)
             row[label] = {
                 "two": float(np.median(two.delta_e())),
                 "two_face": float(np.median(two.delta_e()[face])),
                 "three": float(np.median(three.delta_e())),
-                "five": float(np.median(five.rms)),
+                "five": float(np.median(five.rms_residual)),
             }
         rows.append(row)
     return rows
 
 
-def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObject:
+def _published_model_errors(archive: Archive, bioskin_weights: Path | None) -> JsonObject:
     """Return fit errors of published models of skin, with two, three and five unknowns per spectrum.
 
-    bioskin : file of BioSkin's weights, see `bioskin_model`; None to leave out this model
+    bioskin_weights : file of BioSkin's weights, see `bioskin_model`; None to leave out this model
     """
-    sets = (TWO_UNKNOWNS, THREE_UNKNOWNS, FIVE_UNKNOWNS)
+    sets = (PIGMENT_UNKNOWNS, PIGMENT_AND_OXYGEN_UNKNOWNS, TISSUE_UNKNOWNS)
 
     def model_errors(
         model: SpectralModel | None, skin: SkinParameters, unknown_sets: Sequence[Sequence[str]]
@@ -310,18 +323,18 @@ def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObjec
                     if model is None
                     else invert_spectra(archive.spectra, model, [known[n] for n in one], criterion)
                 )
-                error = fit.rms if criterion == "spectrum" else fit.delta_e()
+                error = fit.rms_residual if criterion == "spectrum" else fit.delta_e()
                 result[f"{criterion}_{len(one)}"] = _percentiles(error)
         return result
 
     results = {
         "present": model_errors(None, DEFAULT_SKIN, sets),
-        "former": model_errors(None, FORMER_SKIN, sets),
+        "former": model_errors(None, PREVIOUS_DEFAULT_SKIN, sets),
         "donner": model_errors(None, _DONNER_JENSEN_SKIN, sets),
-        "jacques": model_errors(_jacques_model, FORMER_SKIN, sets),
+        "jacques": model_errors(_jacques_model, PREVIOUS_DEFAULT_SKIN, sets),
     }
-    if bioskin is not None:
-        results["bioskin"] = model_errors(bioskin_model(bioskin), DEFAULT_SKIN, BIOSKIN_UNKNOWN_SETS)
+    if bioskin_weights is not None:
+        results["bioskin"] = model_errors(bioskin_model(bioskin_weights), DEFAULT_SKIN, BIOSKIN_UNKNOWN_SETS)
     return results
 
 
@@ -358,14 +371,14 @@ def _jacques_model(parameter_values: ParameterValues) -> Floats:
 def _additional_constant_errors(archive_sample: Archive) -> list[JsonObject]:
     """Return errors of fits in which one more constant of the skin model is fitted, such as carotene.
 
-    Each of the fits has a constant of `_CONSTANTS_BY_ADDITION`, which all spectra share. The fit named "none"
-    has none of these constants. The key "three" has the errors for three unknowns per spectrum, "five" those
-    for five.
+    Each of the fits has a constant of `_ADDED_CONSTANTS_BY_NAME`, which all spectra share. The fit named
+    "none" has none of these constants. The key "three" has the errors for three unknowns per spectrum, "five"
+    those for five.
     """
     rows = []
-    for name, free in _CONSTANTS_BY_ADDITION.items():
+    for name, free in _ADDED_CONSTANTS_BY_NAME.items():
         row: JsonObject = {"name": name}
-        for label, unknowns in (("three", THREE_UNKNOWNS), ("five", FIVE_UNKNOWNS)):
+        for label, unknowns in (("three", PIGMENT_AND_OXYGEN_UNKNOWNS), ("five", TISSUE_UNKNOWNS)):
             shared = ("baseline", "epidermis_mm") if label == "three" else ("baseline",)
             if label == "five" and free == ("scattering",):
                 continue
@@ -388,8 +401,10 @@ def _site_fits(archive: Archive) -> list[JsonObject]:
     for site in range(len(SITES)):
         sample = archive.select_rows(archive.site == site).sample_rows(_SITE_SAMPLE_COUNT, site)
         fixed = {"baseline": DEFAULT_SKIN.baseline}
-        spectral = fit_constants(sample.spectra, THREE_UNKNOWNS, ("epidermis_mm",), fixed_constants=fixed)
-        colour = fit_constants(sample.spectra, TWO_UNKNOWNS, ("epidermis_mm", "oxygen"), "colour", fixed)
+        spectral = fit_constants(
+            sample.spectra, PIGMENT_AND_OXYGEN_UNKNOWNS, ("epidermis_mm",), fixed_constants=fixed
+        )
+        colour = fit_constants(sample.spectra, PIGMENT_UNKNOWNS, ("epidermis_mm", "oxygen"), "colour", fixed)
         oxygen = spectral.fit.values["oxygen"]
         rows.append(
             {
@@ -403,7 +418,7 @@ def _site_fits(archive: Archive) -> list[JsonObject]:
     return rows
 
 
-def _site_fold_errors(archive: Archive) -> JsonObject:
+def _site_cross_validation_errors(archive: Archive) -> JsonObject:
     """Return colour errors of fits with two unknowns per spectrum and two constants per site of the body.
 
     The constants are the epidermis thickness and the oxygenation. The errors are cross-validated: the
@@ -417,8 +432,8 @@ def _site_fold_errors(archive: Archive) -> JsonObject:
             held = here & (archive.fold == fold)
             sample = archive.select_rows(here & (archive.fold != fold)).sample_rows(_SITE_SAMPLE_COUNT, site)
             free = ("epidermis_mm", "oxygen")
-            constants = fit_constants(sample.spectra, TWO_UNKNOWNS, free, "colour", fixed).constants
-            unknowns = [UNKNOWNS[name] for name in TWO_UNKNOWNS]
+            constants = fit_constants(sample.spectra, PIGMENT_UNKNOWNS, free, "colour", fixed).constants
+            unknowns = [UNKNOWNS[name] for name in PIGMENT_UNKNOWNS]
             found = invert_spectra(archive.spectra[held], ExtendedModel(constants), unknowns, "colour")
             error[held] = found.delta_e()
     face = error[np.isin(archive.site, CHEEK_AND_FOREHEAD)]
@@ -451,13 +466,17 @@ def _edge_loss_errors(archive_sample: Archive) -> JsonObject:
             [1.0 - np.interp(archive_sample.spectra[:, k], seen[::-1, k], loss[::-1, k]) for k in range(31)],
             axis=-1,
         )
-        found = fit_constants(archive_sample.spectra / factor, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
+        found = fit_constants(
+            archive_sample.spectra / factor, PIGMENT_AND_OXYGEN_UNKNOWNS, ("baseline", "epidermis_mm")
+        )
         results[name] = {
             "loss": [one[name] for one in losses],
             "constants": found.constants,
             "rms": float(np.sqrt((found.fit.residual**2).mean())),
         }
-    uncorrected = fit_constants(archive_sample.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
+    uncorrected = fit_constants(
+        archive_sample.spectra, PIGMENT_AND_OXYGEN_UNKNOWNS, ("baseline", "epidermis_mm")
+    )
     results["uncorrected"] = {
         "constants": uncorrected.constants,
         "rms": float(np.sqrt((uncorrected.fit.residual**2).mean())),

@@ -25,7 +25,7 @@ GROUP_LABELS = {
     "AF": "African",
 }
 """Names of the archive's groups on the page, by their codes."""
-_SKIN_NAMES = {
+_ABSORPTION_LABELS = {
     "former": "absorption of [Jacques1998]",
     "half": "half of it",
     "quarter": "a quarter of it",
@@ -99,7 +99,7 @@ def _models_table(errors_by_model: JsonObject) -> str:
     heads = ["skin", "spectra", "two, by colour", "above 2", "three, by colour"]
     heads += ["two, RMS", "three, RMS", "five, RMS"]
     rows = []
-    for name, label in _SKIN_NAMES.items():
+    for name, label in _ABSORPTION_LABELS.items():
         for subset in ("all", "cheek and forehead"):
             one = errors_by_model[name][subset]
             rows.append(
@@ -187,7 +187,7 @@ def _residual_table(errors_by_model: JsonObject) -> str:
     heads = ("mean residual, 1e-4", *(f"{400 + 10 * k}" for k in shown))
     rows = [
         [
-            f"{_SKIN_NAMES[name]}, {count}",
+            f"{_ABSORPTION_LABELS[name]}, {count}",
             *(f"{1e4 * errors_by_model[name]['residual'][count][k]:.0f}" for k in shown),
         ]
         for name in ("former", "present")

@@ -27,7 +27,7 @@ _CSV_HEADER = """# quantity: mixture of normal distributions of log melanin, log
 """
 
 
-def priors() -> None:
+def fit_priors() -> None:
     """Fit the distribution of people's skin parameters to measured spectra, and write skin_priors.csv."""
     archive = read_archive()
     living = archive.select_rows(~np.isin(archive.site, [SITES.index(name) for name in _CALLOUS_SITES]))
