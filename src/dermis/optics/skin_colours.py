@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 _COLOUR_TABLE_NODES = 65
 _TABLE_ROWS_PER_BATCH = 13  # rows of the table that are computed together and fit into the processor's cache
-_COEFFICIENT_FIELDS = ("sigma_a", "sigma_s_prime")
 
 
 @dataclass(frozen=True)
@@ -94,8 +93,8 @@ def _with_axis(layer: Layer, axis: int, rows: NDArray[np.int64] | None = None) -
     axis : position of the new axis
     rows : indices of the rows; None for all rows
     """
-    fields = {name: getattr(layer, name) for name in _COEFFICIENT_FIELDS}
-    return replace(
-        layer,
-        **{name: np.expand_dims(one if rows is None else one[rows], axis) for name, one in fields.items()},
+    chosen = slice(None) if rows is None else rows
+    absorption, scattering = (
+        np.expand_dims(one[chosen], axis) for one in (layer.sigma_a, layer.sigma_s_prime)
     )
+    return Layer(absorption, scattering, layer.thickness_mm, layer.name)
