@@ -71,8 +71,8 @@ def test_texel_points_have_the_uv_of_their_texel(name: str, size: int) -> None:
     assert own.any()
     off = np.abs(atlas.interpolate(mesh, mesh.uv) - centres(size))[own]
     assert off.max() < 2 / 65535  # weights are whole 65535ths of a triangle that may span the map
-    assert np.abs(atlas.weights()[atlas.coverage].sum(axis=-1) - 1).max() < 1e-12
-    assert atlas.weights()[atlas.coverage].min() >= -1e-12
+    assert np.abs(atlas.barycentric_weights()[atlas.coverage].sum(axis=-1) - 1).max() < 1e-12
+    assert atlas.barycentric_weights()[atlas.coverage].min() >= -1e-12
 
 
 def test_every_centre_on_the_surface_is_covered() -> None:

@@ -52,7 +52,7 @@ def spread(device: Device, head: Head, atlas: Atlas, motion: MotionBytes, light:
     most = len(textures.mips_for_blurs("repeated")) - 1
     halvings = choose_halvings(BLURRED, textures.median_texels_per_mm, most)
     space = make_levels(device, SIDE, (halvings,), FLOAT_TEXEL_FORMAT)
-    upload(device, space.stacks[0], np.dstack([light, light, light, atlas.lit[..., None]]))
+    upload(device, space.stacks[0], np.dstack([light, light, light, atlas.lit_mask[..., None]]))
     frame = CommandList(device)
     shape.draw(frame, made, motion)
     draw_stretch(frame, upload_geometry(device, head.mesh, atlas, made), textures)
@@ -72,7 +72,7 @@ def test_uniform_light_stays_uniform_in_every_pose(
     moving = with_test_rig(head, 12)
     motion = pose_at_moment(moving, moment).motion(moving.control)
     held = MotionBytes(words(motion.positions_mm), words(40 * motion.weights), words(motion.matrices))
-    light = np.ones((SIDE, SIDE, 1)) * atlas.lit[..., None]
+    light = np.ones((SIDE, SIDE, 1)) * atlas.lit_mask[..., None]
     for level in spread(device, moving, atlas, held, light):
         covered = level[..., 0] > 0
         assert covered.any() and np.abs(level[covered] - 1).max() < FLAT
@@ -85,7 +85,9 @@ def test_scaled_ball_spreads_light_as_a_ball_of_that_size(
     """A Gaussian of variance v reduces light that is linear in x by exp(-v / r^2)."""
     light = np.nan_to_num(shown(atlas, head.mesh, own=True))[..., :1] / RADIUS
     levels = spread(device, head, atlas, MotionBytes(words(scale * head.positions_mm)), light)
-    area = atlas.lit[..., None] / np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
+    area = atlas.lit_mask[..., None] / np.maximum(
+        atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6
+    )
     for variance, level in zip(BLURRED, levels, strict=True):
         if len(level) == SIDE:  # the others are read between their texels
             left = (area * level * light).sum() / (area * light**2).sum()

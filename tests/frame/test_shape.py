@@ -184,7 +184,7 @@ def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Fl
 def test_gutter_sources_at_rest_equal_the_atlas(device: Device, head: Head) -> None:
     """Scale and rotation of the whole head do not change the gutters."""
     atlas = build_atlas(head.mesh, 256, "stitched")
-    sheet = AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source)
+    sheet = AtlasMip(atlas.coverage, atlas.lit_mask, atlas.edge_distance, atlas.gutter, atlas.source)
     turn = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], float)
     for points in (head.positions_mm, head.positions_mm @ turn.T):
         fine, coarse, *_ = sources(device, head, atlas, points)

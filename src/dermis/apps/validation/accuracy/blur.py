@@ -164,7 +164,7 @@ def sphere_blur_row(renderer: Renderer, radius_mm: float) -> str:
     light = np.nan_to_num(shown(atlas, mesh, own=True))[..., :1] / radius_mm
     remaining = widest_gaussian_level(renderer, *blur_light(renderer.device, mesh, atlas, light))
     density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
-    area = atlas.lit[..., None] / density
+    area = atlas.lit_mask[..., None] / density
     map_fraction = (area * remaining * light).sum() / (area * light**2).sum()
     v = BLUR_PROFILE.variance_mm2[-1] / radius_mm**2
     decay = np.exp(-2 / v)
