@@ -29,7 +29,7 @@ def draw(studio):
         cell = cells[name]
         sites = dermis.Human(skin_ancestry=cell.group).look.sites
         person = replace(PERSON, skin=replace(PERSON.look, **cell.pigments._asdict(), sites=sites))
-        scene = dermis.Scene(person.on(head), camera=dermis.portrait(head))
+        scene = dermis.Scene(person.transfer_skin_to(head), camera=dermis.portrait(head))
         face = studio.render(scene, 0.6, exposure="auto")
         patch = encode_srgb8(METERED_IRRADIANCE * np.maximum(linear_of_lab(cell.cielab), 0.0))
         panels[name] = np.hstack([face, np.broadcast_to(patch, (len(face), len(face) // 4, 3))])

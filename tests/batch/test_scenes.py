@@ -143,9 +143,9 @@ def test_people_follow_their_seed_except_for_sampled_fields() -> None:
         "[person]\nage = 70\ncaucasian = 1\n[person.skin]\nmelanin = 0.01\n[person.hair]\nstyle = 'none'"
     )
     parameters = drawn.parameters(3)
-    person, plain = sampled_person(parameters), Human.drawn(int(parameters["person.seed"]))
+    person, plain = sampled_person(parameters), Human.sampled(int(parameters["person.seed"]))
     assert (person.age, person.caucasian, person.african) == (70, 1, 0)
-    assert person.look.melanin == 0.01 and person.hairdo.style == "none"
+    assert person.look.melanin == 0.01 and person.hair_look.style == "none"
     assert person.look.age > 0.5 and person.sex == plain.sex
     assert person.look.seed == plain.look.seed and dict(person.targets) == dict(plain.targets)
 
@@ -153,7 +153,7 @@ def test_people_follow_their_seed_except_for_sampled_fields() -> None:
 @pytest.mark.parametrize("given", [{"age": 200}, {"african": 0}, {"skin": {"melanin": 3}}, {"sex": "male"}])
 def test_impossible_people_are_refused(given: dict[str, Any]) -> None:
     with pytest.raises(DermisError):
-        Human.drawn(3, **given)
+        Human.sampled(3, **given)
 
 
 def test_heads_are_loaded_from_files_of_people_and_scenes(tmp_path: Path) -> None:

@@ -33,7 +33,7 @@ def test_writes_a_person_that_renders(run: Run, render: Run, folder: Path) -> No
     ended = run("head", *words, "-o", "own.glb", "--json")
     assert (ended.code, ended.stderr) == (0, "")
     report = json.loads(ended.stdout)
-    drawn = Human.drawn(3)
+    drawn = Human.sampled(3)
     assert report["head"] == "own.glb" and report["bytes"] == (folder / "own.glb").stat().st_size
     assert report["person"]["age"] == 70 and report["person"]["sex"] == drawn.sex
     assert report["person"]["targets"] == {**drawn.targets, "nose/nose-hump-incr": 0.5}

@@ -171,7 +171,7 @@ def eye_pixels(renderer: Renderer, person: Human, weight: float) -> int:
 
 @pytest.mark.parametrize("seed", [None, 0, 5, 9])
 def test_closed_lids_leave_no_gap(renderer: Renderer, seed: int | None) -> None:
-    person = Human() if seed is None else Human.drawn(seed)
+    person = Human() if seed is None else Human.sampled(seed)
     assert eye_pixels(renderer, person, 0.0) > 150
     assert eye_pixels(renderer, person, 1.0) == 0
 

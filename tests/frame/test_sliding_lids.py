@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 
 
 def bare(levels: int = 0) -> Head:
-    return subdivide_head(build_head(Human().weights(), Maps(), "own", EyeLook(redness=0.0)), levels)
+    return subdivide_head(build_head(Human().target_weights(), Maps(), "own", EyeLook(redness=0.0)), levels)
 
 
 def test_lid_sliding_matches_numpy(device: Device) -> None:

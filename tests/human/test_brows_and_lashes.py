@@ -18,7 +18,7 @@ PEOPLE = [
     Human(),
     Human(sex=1.0, age=75, african=1, asian=0, caucasian=0, weight=0.5),
     Human(asian=1, african=0, caucasian=0, age=25),
-    Human.drawn(4),
+    Human.sampled(4),
 ]
 
 
@@ -109,9 +109,9 @@ def test_brows_rise_with_the_skin() -> None:
 
 
 def test_people_at_random_have_hair_of_their_ancestry() -> None:
-    fair = [Human.drawn(seed, caucasian=1.0).hair_eumelanin for seed in range(100)]
-    dark = [one.hair_eumelanin for one in map(Human.drawn, range(300)) if one.caucasian < 0.2]
-    dark += [Human.drawn(seed, skin_ancestry="south asian").hair_eumelanin for seed in range(50)]
+    fair = [Human.sampled(seed, caucasian=1.0).hair_eumelanin for seed in range(100)]
+    dark = [one.hair_eumelanin for one in map(Human.sampled, range(300)) if one.caucasian < 0.2]
+    dark += [Human.sampled(seed, skin_ancestry="south asian").hair_eumelanin for seed in range(50)]
     assert min(dark) > 3.0 and min(fair) < 0.6 and np.median(fair) < 2.5 < 6.0 < np.median(dark)
 
 

@@ -15,7 +15,7 @@ from dermis.human.person_file import write_person_glb
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 
-PERSON = Human.drawn(7)
+PERSON = Human.sampled(7)
 SAME_MM = 0.02  # no eye sees it; displacements below a thousandth are left out
 EXPRESSIONS = (Pose({"jawOpen": 1.0}), Pose({"mouthSmileLeft": 1.0, "eyeBlinkRight": 0.5}))
 TURNS = (Pose(bones={"head": (0, 25, 0)}), Pose({"jawOpen": 0.5}, {"head": (15, 0, 10), "eye.L": (0, 20, 0)}))

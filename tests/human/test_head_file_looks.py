@@ -23,7 +23,7 @@ from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import LIMBUS_MM, EyeTextures, eye_uv, surface_distance_mm
 
 LOOK = EyeLook(eumelanin=0.1, pupil_mm=2.5, redness=0.0, seed=3)
-PERSON = replace(Human.drawn(7), eyes=LOOK)
+PERSON = replace(Human.sampled(7), eyes=LOOK)
 SIDE = 256
 
 

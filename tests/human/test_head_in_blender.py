@@ -20,7 +20,7 @@ from dermis.images.io import read_image
 from dermis.mesh.head import Head
 
 SCRIPT = Path(__file__).with_name("opened_in_blender.py")
-PERSON = Human.drawn(7)
+PERSON = Human.sampled(7)
 MOVES = {
     "rest": Pose(),
     "moved": Pose({"mouthSmileLeft": 1.0}),

@@ -41,13 +41,13 @@ POSES: list[Mapping[str, float]] = [
 
 
 def person_of(seed: int | None) -> Human:
-    return Human() if seed is None else Human.drawn(seed)
+    return Human() if seed is None else Human.sampled(seed)
 
 
 @cache
 def head_of(seed: int | None) -> Head:
     person = person_of(seed)
-    return subdivide_head(build_head(person.weights(), Maps(), "own", person.iris), 1)
+    return subdivide_head(build_head(person.target_weights(), Maps(), "own", person.iris), 1)
 
 
 def rings(seed: int | None, weights: Mapping[str, float]) -> tuple[Floats, Floats]:
@@ -106,7 +106,7 @@ def test_closed_lids_touch(seed: int | None) -> None:
 @pytest.mark.parametrize("seed", PEOPLE)
 def test_seen_from_the_front_the_opening_stays_as_published(seed: int | None) -> None:
     person = person_of(seed)
-    places = morphed_points_mm(person.weights())
+    places = morphed_points_mm(person.target_weights())
     head = head_of(seed)
     crest = lid_rings()[..., CREST]
     off = head.positions_mm[crest] - places[crest]
@@ -128,7 +128,7 @@ def test_skin_far_from_the_eyes_stays_where_it_is() -> None:
 
 def test_lids_fit_other_people() -> None:
     """Check that contact uses the positions of that person's eyes."""
-    head, other = head_of(None), Human.drawn(7)
+    head, other = head_of(None), Human.sampled(7)
     motion = Pose({"eyeBlinkLeft": 0.5}, positions_mm=other.positions_mm).motion(head.control)
     assert head.eyes is not None
     points = head.control.points_mm(motion)[lid_rings()[0]]
@@ -139,7 +139,7 @@ def test_lids_fit_other_people() -> None:
 
 def test_targets_are_corrected_wherever_they_move_a_lid() -> None:
     """Compare with a correction of both eyes for each target; blinks move the other eye's inner corner."""
-    places = morphed_points_mm(Human.drawn(3).weights())
+    places = morphed_points_mm(Human.sampled(3).target_weights())
     sockets = _eye_sockets(places)
     found, resting = fit_lid_targets(places, sockets), fit_lids(places, sockets)
     targets = expression_targets()

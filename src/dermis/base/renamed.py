@@ -92,6 +92,17 @@ def renamed_attribute(old_name: str, new_name: str) -> property:
     return property(get)
 
 
+def renamed_classmethod(old_name: str, new_name: str) -> classmethod[Any, ..., Any]:
+    """Return a class method for the old name of a class method; it warns and calls the renamed method."""
+
+    def call(cls: type[Any], *args: Any, **kwargs: Any) -> Any:
+        text = f"{cls.__name__}.{old_name} is now {new_name}"
+        warnings.warn(f"{text}; {_REMOVAL_NOTICE}", DeprecationWarning, stacklevel=2)
+        return getattr(cls, new_name)(*args, **kwargs)
+
+    return classmethod(call)
+
+
 def install_renamed_module_finder() -> None:
     """Install an import hook, so that renamed modules can be imported by their old paths."""
     sys.meta_path.insert(0, _RenamedModuleFinder())

@@ -168,7 +168,7 @@ def head(
         person,
         skin=_look_with_values(person.look, skin, "--skin"),
         eyes=_look_with_values(person.iris, eye, "--eye"),
-        hair=_hair_look_with_values(person.hairdo, hair),
+        hair=_hair_look_with_values(person.hair_look, hair),
     )
     report: Options = {"head": str(output), "person": person_parameters(person)}
     if output.suffix.lower() == ".json":
@@ -201,7 +201,7 @@ def _build_person(
     """
     from dermis.human.person import Human
 
-    base = Human(**skin_tone) if seed is None else Human.drawn(seed, **skin_tone)
+    base = Human(**skin_tone) if seed is None else Human.sampled(seed, **skin_tone)
     return replace(base, **field_values, targets={**base.targets, **target_weights})
 
 

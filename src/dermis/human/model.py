@@ -183,7 +183,7 @@ class Template:
 
 
 @cache
-def template(layout: Layout, levels: int) -> Template:
+def head_template(layout: Layout, levels: int) -> Template:
     """Return the template for a uv layout and a number of subdivision levels; templates are cached."""
     head = control_head = build_head(MEAN_PERSON_WEIGHTS, Maps(), layout, EyeLook())
     refined = refinement(control_head.mesh, levels) if levels else None

@@ -36,7 +36,7 @@ def person_parameters(person: Human) -> dict[str, Any]:
     """
     numbers = {one.name: getattr(person, one.name) for one in fields(person)}
     numbers |= {"targets": dict(person.targets), "skin": asdict(person.look)}
-    return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hairdo)}
+    return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hair_look)}
 
 
 def write_person_json(path: Path, person: Human) -> int:

@@ -17,7 +17,7 @@ UInt32s = NDArray[np.uint32]
 MAX_EXPORTED_STRANDS = 40_000
 """Number of strands with which exports and path tracing show hair."""
 _SMOOTHING_KNOTS, _SMOOTH_HEIGHTS_MM = 8, (2.0, 18.0)
-_MIN_HEIGHT_MM, _RISE_LENGTH_MM = 0.35, 4.0
+_MIN_HEIGHT_ABOVE_SKIN_MM, _RISE_LENGTH_MM = 0.35, 4.0
 _HAIRLINE_FADE_MM, _SHORT_HAIR_HEIGHTS_MM = (-3.0, 11.0), (-2.0, 14.0)
 _HAIRLINE_STEP_DEGREES = 2.0
 _TIP_FRACTION, _TIP_WIDTH_RATIO = 0.12, 0.35
@@ -178,7 +178,7 @@ def _grow_chunk(
     across = across + _frizz_offsets(strand_number, part, s)
     varied = across[0][..., None] * side + across[1][..., None] * other
     height = (1.0 - pull) * own.height + pull * at.height + (varied * own.normal).sum(axis=-1)
-    least = _MIN_HEIGHT_MM * np.minimum(s / _RISE_LENGTH_MM, 1.0)
+    least = _MIN_HEIGHT_ABOVE_SKIN_MM * np.minimum(s / _RISE_LENGTH_MM, 1.0)
     positions = own.position + to_middle + varied + np.maximum(least - height, 0.0)[..., None] * own.normal
     taper = 1.0 - (1.0 - _TIP_WIDTH_RATIO) * _smoothstep(1.0 - _TIP_FRACTION, 1.0, t)
     edge = 1.0 - part["hairline"] * (0.45 - 0.45 * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_hairline_mm))

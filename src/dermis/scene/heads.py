@@ -274,7 +274,7 @@ def load_person(head_name: str) -> Human:
     if not words.isdecimal() or len(words) > _MAX_SEED_DIGITS:
         actual = f"got {format_value(words)}"
         refuse(head_name, f"{HUMAN}, or {HUMAN}:SEED with a whole number", actual, f"Try {HUMAN}:7")
-    return Human.drawn(int(words))
+    return Human.sampled(int(words))
 
 
 def _head_names() -> list[str]:

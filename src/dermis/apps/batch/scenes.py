@@ -157,7 +157,7 @@ def sampled_person(parameters: Parameters) -> Human:
             appearance.setdefault(part, {})[field] = value
         elif name not in _PARAMETERS_NOT_OF_HUMAN:
             fields[name] = value
-    return Human.drawn(int(parameters[_SEED_PARAMETER]), **fields, **appearance)
+    return Human.sampled(int(parameters[_SEED_PARAMETER]), **fields, **appearance)
 
 
 @cache

@@ -54,8 +54,8 @@ class FlatSurface:
     uv_neighbour : (f, 3) index of the triangle across each side in uv; the triangle itself at a seam
     uv_tangents : (f, 3, 2, 2) surface vectors per unit of u and of v at each corner, in the triangle's plane
         [mm]
-    uv_metric : (f, 3, 3) lengths of the two vectors in `uv_tangents` [mm], and the cosine of the angle between
-        these vectors [-]
+    uv_metric : (f, 3, 3) lengths of the two vectors in `uv_tangents` [mm], and the cosine of the angle
+        between these vectors [-]
     """
 
     corners: Doubles

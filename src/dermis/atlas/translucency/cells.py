@@ -44,8 +44,8 @@ class Cells:
     max_sigma_mm : standard deviation of the widest Gaussian of the diffusion profiles [mm]
     cell_mm : median side of a cell on the surface [mm]
     stride : a source cell averages the light of every `stride`-th texel along each axis [texel]
-    receiver_mask : (side, side) mask of the cells that receive light: cells with texels of `Atlas.lit_mask`, and
-        their neighbours
+    receiver_mask : (side, side) mask of the cells that receive light: cells with texels of `Atlas.lit_mask`,
+        and their neighbours
     receivers, receiver_first : (m,) uint32 packed x and y of the receiving cells, sorted by tile
     receiver_points : (m, 2) uint32 surface point at the centre of each receiving cell: triangle index, and
         packed barycentric weights
@@ -118,7 +118,7 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: flo
 
 
 def _median_texel_mm(atlas: Atlas) -> float:
-    """Return the median side length on the surface of texels whose light is computed (`Atlas.lit_mask`) [mm]."""
+    """Return the median side length on the surface of texels in `Atlas.lit_mask` [mm]."""
     step = max(1, atlas.size // _MAX_AVERAGED_TEXELS_PER_SIDE)
     lit, stretch = atlas.lit_mask[::step, ::step], atlas.stretch[::step, ::step].astype(np.float32)
     density = stretch[..., 0][lit] * stretch[..., 1][lit]

@@ -19,7 +19,7 @@ from dermis.mesh.strands import quad_corners
 CORNROW_SPACING_MM = 14.0
 """Distance between the middles of cornrows [mm]."""
 _MAX_STEP_MM = 5.0  # largest step of the growth of guides
-_MIN_HEIGHT_MM = 0.5  # least height of guides above the skin, away from their roots
+_MIN_HEIGHT_ABOVE_SKIN_MM = 0.5  # least height of guides above the skin, away from their roots
 _LAYER_LENGTH_MM = 35.0  # length along which hair rises to the outermost layer
 _WHORL_MM = np.array([9.0, 86.0, -131.0])
 _SKULL_CENTRE_MM = np.array([0.0, 12.0, -66.0])
@@ -252,7 +252,7 @@ def _grow_one_step(surface: SkinSurface, growth: Growth, step_mm: float, style: 
     height = ((moved - base) * normal).sum(axis=1)
     height_of_ears = _EAR_HEIGHT_MM * ear_weight(base) if style.comb in _COMBS_OVER_EARS else 0.0
     layer = style.volume_mm * (1.0 - np.exp(-length / _LAYER_LENGTH_MM)) * np.minimum(length / 20.0, 1.0)
-    least = np.minimum(length / 6.0, 1.0) * (_MIN_HEIGHT_MM + layer + height_of_ears)
+    least = np.minimum(length / 6.0, 1.0) * (_MIN_HEIGHT_ABOVE_SKIN_MM + layer + height_of_ears)
     pushed = np.clip(least - height, 0.0, 0.8 * step_mm)[:, None]
     moved += pushed * normal
     if style.comb == "fall":

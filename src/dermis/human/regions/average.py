@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.tables import read_rows
-from dermis.human.model import MATERIAL_OF_GROUP, build_head, template
+from dermis.human.model import MATERIAL_OF_GROUP, build_head, head_template
 from dermis.human.person import Human
 from dermis.human.regions.region_table import Doubles, classify_regions
 from dermis.mesh.eye_look import EyeLook
@@ -59,7 +59,9 @@ def average_skin() -> DenseSkin:
 
 def _bare_head(levels: int) -> Head:
     """Return the head of the average human, subdivided `levels` times and without its hair."""
-    return template("own", levels).refine_head(build_head(AVERAGE_HUMAN.weights(), Maps(), "own", EyeLook()))
+    return head_template("own", levels).refine_head(
+        build_head(AVERAGE_HUMAN.target_weights(), Maps(), "own", EyeLook())
+    )
 
 
 def landmark_indices() -> dict[str, int]:
