@@ -26,7 +26,7 @@ SIDES = 1024, 2048  # of the atlas [texel]
 
 def main() -> None:
     """Compute the tables and write them."""
-    mesh = head_template("own", LEVELS).head.topology.mesh
+    mesh = head_template("own", LEVELS).head.topology_head.mesh
     path = OUT / shipped.table_file_name(mesh)
     path.parent.mkdir(exist_ok=True)
     path.unlink(missing_ok=True)  # `build_atlas` would use the old tables

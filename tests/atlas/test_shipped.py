@@ -21,7 +21,7 @@ FACTOR_NAMES = [field.name for field in fields(FormFactors)]
 
 @pytest.fixture(scope="module")
 def mesh() -> Mesh:
-    return head_template("own", 1).head.topology.mesh
+    return head_template("own", 1).head.topology_head.mesh
 
 
 def test_layout_is_that_of_the_package(mesh: Mesh) -> None:

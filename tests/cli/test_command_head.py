@@ -71,7 +71,7 @@ def test_fields_targets_and_expressions_add_up(run: Run, folder: Path) -> None:
     assert (person["asian"], person["sex"], person["weight"], person["age"]) == (1, 1, 0.5, 30)
     assert len(person["targets"]) == 3
     head = load_head(folder / "head.glb")
-    rest = dict(zip(head.targets, head.control.targets.rest, strict=True))  # type: ignore[arg-type]
+    rest = dict(zip(head.targets, head.control_rig.targets.rest, strict=True))  # type: ignore[arg-type]
     assert rest["jawOpen"] == pytest.approx(0.3) and rest["mouthSmileLeft"] == 1
     assert sum(map(bool, rest.values())) == 2
 

@@ -85,6 +85,6 @@ def test_only_data_of_a_new_person_is_uploaded(
 
 def test_all_heads_share_the_template() -> None:
     heads = [person.head() for person in PEOPLE[:2]]
-    assert all(head.topology is head_template("own", 1).head for head in heads)
+    assert all(head.topology_head is head_template("own", 1).head for head in heads)
     assert np.array_equal(heads[0].mesh.positions, PEOPLE[0].head().mesh.positions)
     assert not np.array_equal(heads[0].mesh.positions, heads[1].mesh.positions)

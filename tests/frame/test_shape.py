@@ -19,7 +19,7 @@ from dermis.frame.features.atlas.passes import draw_stretch
 from dermis.frame.features.atlas.textures import AtlasMip, halve_mip, upload_atlas
 from dermis.frame.features.shape import shape
 from dermis.frame.features.shape.mesh import upload_geometry
-from dermis.frame.features.shape.shape import MotionBytes, Shape, make_shape, shape_tables
+from dermis.frame.features.shape.shape import PoseBytes, Shape, make_shape, shape_tables
 from dermis.gpu import CommandList, Device, download
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh, build_mesh
@@ -43,10 +43,10 @@ def rebuilt(mesh: Mesh, points: Floats) -> Mesh:
     return build_mesh(places, mesh.uv, mesh.triangles, mesh.material, mesh.materials, point=mesh.point)
 
 
-def evaluated(device: Device, head: Head, motion: MotionBytes) -> tuple[Shape, NDArray[np.float32]]:
+def evaluated(device: Device, head: Head, pose_bytes: PoseBytes) -> tuple[Shape, NDArray[np.float32]]:
     """Return the shape in motion, and its (v, 16) vertices."""
     made, frame = make_shape(device, shape_tables(device, head)), CommandList(device)
-    shape.draw(frame, made, motion)
+    shape.draw(frame, made, pose_bytes)
     frame.submit()
     table = download(device, made.surface["vertex_table"]).reshape(-1, 16)
     return made, table[: len(head.mesh.positions)]
@@ -68,7 +68,7 @@ def head() -> Head:
 def test_vertices_equal_those_of_a_rebuilt_mesh(device: Device, head: Head) -> None:
     """Normals and tangents follow the surface."""
     moved = bent(head.positions_mm.astype(float))
-    _, table = evaluated(device, head, MotionBytes(words(moved)))
+    _, table = evaluated(device, head, PoseBytes(words(moved)))
     mesh = rebuilt(head.mesh, moved.astype(np.float32).astype(float))
     assert np.array_equal(table[:, :3], mesh.positions) and np.array_equal(table[:, 3], mesh.uv[:, 0])
     assert np.abs(table[:, 4:7] - mesh.normals).max() < SHAPE_NORMAL
@@ -80,10 +80,10 @@ def test_normals_of_a_file_are_kept_and_rotate_with_the_surface(device: Device, 
     tilted = head.mesh.normals + RNG.uniform(-0.4, 0.4, head.mesh.normals.shape)
     tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
     own = replace(head, mesh=replace(head.mesh, normals=tilted.astype(np.float32)))
-    _, table = evaluated(device, own, MotionBytes(words(own.positions_mm)))
+    _, table = evaluated(device, own, PoseBytes(words(own.positions_mm)))
     assert np.abs(table[:, 4:7] - tilted).max() < SHAPE_NORMAL
     turn = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], float)
-    _, table = evaluated(device, own, MotionBytes(words(own.positions_mm @ turn.T)))
+    _, table = evaluated(device, own, PoseBytes(words(own.positions_mm @ turn.T)))
     assert np.abs(table[:, 4:7] - tilted @ turn.T).max() < SHAPE_NORMAL
 
 
@@ -112,13 +112,13 @@ def rigged(head: Head) -> Head:
 
 def test_targets_bones_and_stencils_match_the_rig(device: Device, head: Head) -> None:
     moving, weights = rigged(head), np.array([0.6, -0.3])
-    rig = moving.control
+    rig = moving.control_rig
     assert rig.skeleton is not None and rig.stencils is not None
     local = rig.skeleton.local.copy()
     local[1, :3, :3] = [[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]]
     matrices = rig.skeleton.matrices(local)
     made, table = evaluated(
-        device, moving, MotionBytes(words(rig.positions_mm), words(weights), words(matrices))
+        device, moving, PoseBytes(words(rig.positions_mm), words(weights), words(matrices))
     )
     posed = rig.pose(weights, matrices)
     assert np.abs(points_of(device, made.stencils["control"]) - posed).max() < SHAPE * 30
@@ -130,7 +130,7 @@ def test_targets_bones_and_stencils_match_the_rig(device: Device, head: Head) ->
 def stretched(device: Device, head: Head, atlas: Atlas, points: Floats) -> NDArray[np.float16]:
     textures, frame = upload_atlas(device, atlas), CommandList(device)
     made = make_shape(device, shape_tables(device, head))
-    shape.draw(frame, made, MotionBytes(words(points)))
+    shape.draw(frame, made, PoseBytes(words(points)))
     draw_stretch(frame, upload_geometry(device, head.mesh, atlas, made), textures)
     frame.submit()
     return download(device, textures.resources["stretch_map"])
@@ -171,7 +171,7 @@ def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Fl
         make_gutter_tracing(device, head.mesh, atlas, textures),
         with_separate_gutters(device, textures),
     )
-    shape.draw(frame, made, MotionBytes(words(points)))
+    shape.draw(frame, made, PoseBytes(words(points)))
     gutters.draw(frame, walked, walks, upload_geometry(device, head.mesh, atlas, made))
     frame.submit()
     lists = [one for one in (walked, *walked.coarser) if one.gutter]

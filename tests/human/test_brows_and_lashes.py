@@ -31,7 +31,9 @@ def knots(head: Head, **pose: float) -> Floats:
     """Return the knots (n, k, 3) in space [mm]."""
     assert head.strands is not None
     points = (
-        head.mesh.points_mm if not pose else head.control.points_mm(Pose.coerce(pose).motion(head.control))
+        head.mesh.points_mm
+        if not pose
+        else head.control_rig.posed_points_mm(Pose.coerce(pose).to_arrays(head.control_rig))
     )
     return head.strands.knot_positions_mm(head.mesh, points)
 

@@ -42,7 +42,9 @@ def hair(head: Head) -> Strands:
 def knots(head: Head, **pose: float) -> Floats:
     """Return the knots (n, k, 3) in space [mm]."""
     points = (
-        head.mesh.points_mm if not pose else head.control.points_mm(Pose.coerce(pose).motion(head.control))
+        head.mesh.points_mm
+        if not pose
+        else head.control_rig.posed_points_mm(Pose.coerce(pose).to_arrays(head.control_rig))
     )
     assert head.hair is not None
     strands = grow_strands(head.hair, head.mesh, points, len(head.hair))

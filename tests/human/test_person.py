@@ -58,8 +58,8 @@ def test_people_between_two_lie_between_them() -> None:
 def test_any_head_is_any_person_by_its_points(head: Head) -> None:
     person = Human(sex=1.0, age=70, targets={"nose/nose-hump-incr": 0.8})
     assert np.array_equal(person.head(subdivide=0).positions_mm, person.positions_mm)
-    motion = Pose(positions_mm=person.positions_mm).motion(head.control)
-    assert np.abs(head.control.points_mm(motion) - person.positions_mm).max() < 1e-3
+    pose_arrays = Pose(positions_mm=person.positions_mm).to_arrays(head.control_rig)
+    assert np.abs(head.control_rig.posed_points_mm(pose_arrays) - person.positions_mm).max() < 1e-3
 
 
 def test_the_same_seed_is_the_same_person() -> None:
@@ -126,11 +126,11 @@ def _border(triangles: np.ndarray, places: np.ndarray) -> set[frozenset[tuple[fl
 
 
 def test_bones_move_what_they_should(head: Head) -> None:
-    rest, rig = head.positions_mm, head.control
+    rest, rig = head.positions_mm, head.control_rig
 
     def moved(bone: str, degrees: tuple[float, float, float]) -> np.ndarray:
-        motion = Pose(bones={bone: degrees}).motion(rig)
-        return np.linalg.norm(rig.points_mm(motion) - rest, axis=1)
+        pose_arrays = Pose(bones={bone: degrees}).to_arrays(rig)
+        return np.linalg.norm(rig.posed_points_mm(pose_arrays) - rest, axis=1)
 
     skull = rest[:, 1] > 60
     chin = (rest[:, 1] < -85) & (rest[:, 2] > 10) & (rest[:, 1] > -110)

@@ -255,7 +255,9 @@ def _write_glb(
     from dermis.mesh.pose import Pose
     from dermis.scene.skin import Skin
 
-    Pose(expression).motion(head.control, EXPRESSION_OPTION)  # raises for unknown names and invalid weights
+    Pose(expression).to_arrays(
+        head.control_rig, EXPRESSION_OPTION
+    )  # raises for unknown names and invalid weights
     return write_person_glb(
         output, person, head, roughness=Skin().roughness, expression_weights=expression, eyes=eyes
     )

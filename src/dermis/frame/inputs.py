@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dermis.frame.features.diffusion.pyramid import Blur
 from dermis.frame.features.occlusion.moving import SkyViews
 from dermis.frame.features.outputs.stage_inputs import PreviousScene
-from dermis.frame.features.shape.shape import MotionBytes
+from dermis.frame.features.shape.shape import PoseBytes
 from dermis.frame.projection import Triple, Views
 from dermis.frame.resources import AtlasLayout, Resources
 from dermis.gpu import Bindings, Constants, UniformRecord
@@ -23,7 +23,7 @@ class FrameInputs:
     """Inputs of a frame: cached resources, and values that may differ between frames with equal resources.
 
     resources : cached textures, buffers and records of the frame
-    motion : pose of the head, as bytes for the shaders
+    pose_bytes : pose of the head, as bytes for the shaders
     face_movements : (9,) strength of the facial movements that change the skin maps; None if the maps are
         constant
     layouts : atlas layouts of `resources`, each with the uniform record of this frame's lights
@@ -43,7 +43,7 @@ class FrameInputs:
 
     resources: Resources
     settings: Settings
-    motion: MotionBytes
+    pose_bytes: PoseBytes
     face_movements: NDArray[np.float32] | None
     layouts: tuple[AtlasLayout, ...]
     blurs: tuple[Blur, ...]

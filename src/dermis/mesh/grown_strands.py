@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Ints
-from dermis.mesh.groom import GUIDE_KNOTS, Groom
+from dermis.mesh.groom import KNOTS_PER_GUIDE, Groom
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Roots, Strands, hair_cover_of_points, offsets_in_frames, root_frames
+from dermis.mesh.strands import Roots, Strands, hair_cover_of_points, offsets_in_root_axes, root_frames
 
 UInt32s = NDArray[np.uint32]
 MAX_EXPORTED_STRANDS = 40_000
@@ -125,7 +125,7 @@ def _posed_guides(groom: Groom, points_mm: NDArray[np.floating]) -> tuple[Double
     smooth = np.zeros_like(moved)
     for step in range(-_SMOOTHING_KNOTS, _SMOOTHING_KNOTS + 1):
         factor = 1.0 - abs(step) / (_SMOOTHING_KNOTS + 1)
-        smooth += factor * moved[:, np.clip(np.arange(GUIDE_KNOTS) + step, 0, GUIDE_KNOTS - 1)]
+        smooth += factor * moved[:, np.clip(np.arange(KNOTS_PER_GUIDE) + step, 0, KNOTS_PER_GUIDE - 1)]
         total += factor
     far = _smoothstep(*_SMOOTH_HEIGHTS_MM, guides.rest_mm[..., 3].astype(np.float64))[..., None]
     return (1.0 - far) * bound + far * (guides.rest_mm[..., :3] + smooth / total), outward
@@ -184,7 +184,7 @@ def _grow_chunk(
     edge = 1.0 - part["hairline"] * (0.45 - 0.45 * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_hairline_mm))
     radius = (part["radius_mm"] * (0.8 + 0.4 * _uniform_random(strand_number, 3)) * edge)[:, None] * taper
     return (
-        offsets_in_frames(root_axes, positions - root_mm[:, None]),
+        offsets_in_root_axes(root_axes, positions - root_mm[:, None]),
         radius,
         _strand_absorption(strand_number, part),
         part["cover"],
@@ -271,8 +271,8 @@ def _interpolate_guides(
     root_mm : (n, 3) positions of the roots [mm]
     """
     knots, normals = posed_guides
-    at = np.clip(guide_position, 0.0, 1.0) * (GUIDE_KNOTS - 1)
-    first = np.minimum(at.astype(np.int64), GUIDE_KNOTS - 2)
+    at = np.clip(guide_position, 0.0, 1.0) * (KNOTS_PER_GUIDE - 1)
+    first = np.minimum(at.astype(np.int64), KNOTS_PER_GUIDE - 2)
     part = (at - first)[..., None]
     height_mm = groom.guides.rest_mm[..., 3]
     position = np.repeat(root_mm[:, None], guide_position.shape[1], axis=1)

@@ -265,7 +265,7 @@ def _parse_camera(path: Path, table_or_preset: Any, head: Head) -> Camera:
 def _parse_pose(path: Path, pose_table: Any, head: Head) -> Pose:
     entry = _build_settings(PoseTable, path, "pose", pose_table)
     pose = Pose(entry.weights, entry.bones)
-    pose.motion(head.control, f"{path}: pose")  # for an error that names the file
+    pose.to_arrays(head.control_rig, f"{path}: pose")  # for an error that names the file
     return pose
 
 

@@ -293,17 +293,19 @@ def preset_lights(preset_name: str, head: Head | None = None) -> tuple[Light, ..
 def _place_light(light: Light, head: Head) -> Light:
     reach = head.reach_mm
     factor = reach / _HEAD_REACH_MM if reach > _MAX_HEAD_REACH_MM and not _ignores_body_size(light) else 1.0
-    if factor == 1.0 and np.array_equal(head.axes, np.eye(3)):
+    if factor == 1.0 and np.array_equal(head.front_view_axes, np.eye(3)):
         return light
     values: dict[str, Any] = {
         name: factor * getattr(light, name) for name in _LAMP_SIZE_FIELDS if hasattr(light, name)
     }
     for name in _VECTOR_FIELDS:
         if hasattr(light, name):
-            values[name] = tuple((np.array(getattr(light, name)) @ head.axes).tolist())
+            values[name] = tuple((np.array(getattr(light, name)) @ head.front_view_axes).tolist())
     if isinstance(light, PointLight):
         target = np.array(light.target)
-        values["position"] = tuple(((target + factor * (light.position - target)) @ head.axes).tolist())
+        values["position"] = tuple(
+            ((target + factor * (light.position - target)) @ head.front_view_axes).tolist()
+        )
     return light.replace(**values)
 
 

@@ -76,8 +76,8 @@ class SceneBuilder:
         pose = Pose(
             self._pose_weights(parameters, head), _bone_angles(_head_rotation(parameters), person.bones)
         )
-        motion = pose.motion(head.control)
-        camera = sampled_camera(parameters, head, person.points, motion, width / height)
+        pose_arrays = pose.to_arrays(head.control_rig)
+        camera = sampled_camera(parameters, head, person.points, pose_arrays, width / height)
         skin_values = table_values(parameters, "skin")
         if "profile" in skin_values:
             skin_values["profile"] = self._resolve_file(skin_values["profile"])
@@ -114,7 +114,9 @@ class SceneBuilder:
             head, skin = scene.head, scene.skin
         else:
             head, skin = load_head(name, subdivide=SmoothIn(size=size)), Skin()
-        return _Person(head, face_hull_indices(head), find_rotation_bones(head.control.skeleton).head, skin)
+        return _Person(
+            head, face_hull_indices(head), find_rotation_bones(head.control_rig.skeleton).head, skin
+        )
 
     def _resolve_file(self, head_or_panorama: float | str) -> str:
         """Return the path of a head or panorama file, or the argument if it names no file.
@@ -133,7 +135,7 @@ class SceneBuilder:
         return {
             name: weight
             for name, weight in table_numbers(parameters, "pose").items()
-            if weight and (name in posed or name in head.control.target_index)
+            if weight and (name in posed or name in head.control_rig.target_index)
         }
 
     def _sampled_environment(self, parameters: Parameters) -> Environment | None:
@@ -206,7 +208,7 @@ def _pose_with_gaze(
 
     camera_position_mm : position of the camera, the default gaze target [mm]
     """
-    if head.eyes is None or head.control.skeleton is None:
+    if head.eyes is None or head.control_rig.skeleton is None:
         return pose
     target = np.array(camera_position_mm)
     if parameters["gaze.at"] == GAZE_ANGLES:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.unwrap.charts import opposite_sides
 from dermis.base.arrays import Doubles, Index, Ints, Mask
-from dermis.mesh.geometry import MIN_UV_CROSS, cross_2d, tangents, triangle_areas, uv_cross, weld
+from dermis.mesh.geometry import MIN_DOUBLE_UV_AREA, cross_2d, tangents, triangle_areas, uv_cross, weld
 from dermis.mesh.mesh import Mesh
 
 _MIN_SIDE_LENGTH_MM = 1e-9
@@ -106,7 +106,7 @@ def flat_surface(mesh: Mesh) -> FlatSurface:
     # v runs down, so uv that is not mirrored has a negative cross product in (u, v)
     uv_area = -uv_cross(uv) / 2
     area = triangle_areas(corners)
-    valid = skin & (2 * np.abs(uv_area) > MIN_UV_CROSS) & (area > 0)
+    valid = skin & (2 * np.abs(uv_area) > MIN_DOUBLE_UV_AREA) & (area > 0)
     flat, axes = _planar_corners(corners)
     uv_tangents, uv_metric = _uv_tangents_and_metric(mesh, flat, axes, uv, uv_area)
     same_uv = weld(np.hstack((mesh.positions, mesh.uv)))[mesh.triangles]
@@ -205,7 +205,7 @@ def _triangle_uv_tangents(planar_corners: Doubles, uv: Doubles) -> Doubles:
     """Return the surface vectors (f, 2, 2) per unit of u and of v, constant over each triangle [mm]."""
     e, d = planar_corners[:, 1:] - planar_corners[:, :1], uv[:, 1:] - uv[:, :1]
     cross = cross_2d(d[:, 0], d[:, 1])
-    cross = np.where(np.abs(cross) > MIN_UV_CROSS, cross, np.inf)[:, None]
+    cross = np.where(np.abs(cross) > MIN_DOUBLE_UV_AREA, cross, np.inf)[:, None]
     u = (e[:, 0] * d[:, 1, 1:] - e[:, 1] * d[:, 0, 1:]) / cross
     v = (e[:, 1] * d[:, 0, :1] - e[:, 0] * d[:, 1, :1]) / cross
     return np.stack((u, v), axis=1)

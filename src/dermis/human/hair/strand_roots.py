@@ -23,7 +23,7 @@ from dermis.human.hair.guides import (
 )
 from dermis.human.hair.root_finder import RootFinder
 from dermis.human.hair.styles import BEARD, Style
-from dermis.mesh.groom import GUIDE_KNOTS, Guides, StrandRoots
+from dermis.mesh.groom import KNOTS_PER_GUIDE, Guides, StrandRoots
 from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
 STRANDS_PER_CM2 = 150.0
@@ -117,7 +117,7 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
     place = _root_locations(weight, average_control_points()[corners])
     guides = bind_guides(mesh, points_mm, knots, heights, cut_fractions(knots, style))
     clump = _clump_centre_strands(
-        root_mm, np.einsum("nk,nkc->nc", weight, knots[guide, GUIDE_KNOTS // 2]), style, rng
+        root_mm, np.einsum("nk,nkc->nc", weight, knots[guide, KNOTS_PER_GUIDE // 2]), style, rng
     )
     columns = roots.quad, roots.position, guide, weight, clump, place, -root_mm[clump, 2]
     types = np.int32, np.float32, np.int32, np.float32, np.int32, np.float32, np.float32
@@ -138,7 +138,7 @@ def _near_guide_weights(guide_weight: Doubles, guide: NDArray[np.int64], knots: 
     knots : (g, k, 3) knots of all guides [mm]
     """
     main = np.take_along_axis(guide, guide_weight.argmax(axis=1)[:, None], axis=1)
-    some = knots[:, :: GUIDE_KNOTS // 8]
+    some = knots[:, :: KNOTS_PER_GUIDE // 8]
     apart = np.linalg.norm(some[guide] - some[main], axis=-1).max(axis=2)
     agreeing = guide_weight * smoothstep(_GUIDE_SEPARATION_MM[1], _GUIDE_SEPARATION_MM[0], apart)
     return np.asarray(agreeing / agreeing.sum(axis=1, keepdims=True))

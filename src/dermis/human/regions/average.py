@@ -89,7 +89,7 @@ def is_human(head: Head) -> bool:
     rig = head.rig
     if rig is None or head.mesh.materials != tuple(MATERIAL_OF_GROUP.values()):
         return False  # without building the average head
-    average = average_head().control
+    average = average_head().control_rig
     return rig.positions_mm.shape == average.positions_mm.shape and rig.targets.names == average.targets.names
 
 
@@ -112,7 +112,7 @@ def average_positions(head: Head) -> Doubles:
     Regions defined on the average human are looked up at these points.
     """
     points_mm = average_head().positions_mm.astype(np.float64)
-    stencils = head.control.stencils
+    stencils = head.control_rig.stencils
     return np.asarray((points_mm if stencils is None else stencils.points(points_mm))[head.mesh.point])
 
 

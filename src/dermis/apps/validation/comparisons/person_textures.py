@@ -49,7 +49,7 @@ def person_textures(renderer: Renderer, scene: Scene, texture_side: int = 2048) 
 
 def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, texture_side: int) -> SkinTextures:
     head = scene.head
-    surface, device = painted_surface(head.mesh, head.control.stencils), renderer.device
+    surface, device = painted_surface(head.mesh, head.control_rig.stencils), renderer.device
     colour, gloss, rough, height = paint.paint_raw_arrays(device, surface, look, texture_side)
     height = height + _detail_heights_mm(gloss[..., 1], rough[..., 1], gloss[..., 2])
     roughness = np.maximum(scene.skin.smoothing * rough[..., 0], _MIN_ROUGHNESS)

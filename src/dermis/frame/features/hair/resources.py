@@ -12,7 +12,7 @@ from dermis.base.errors import refuse
 from dermis.frame.features.surface.record import DEFAULT_COLOUR
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Buffer, Constants, Device, Memo, Texture, UniformRecord, make_texture
-from dermis.mesh.groom import GUIDE_ANCHORS, GUIDE_KNOTS, Groom, Guides, StrandRoots
+from dermis.mesh.groom import ANCHORS_PER_GUIDE_KNOT, KNOTS_PER_GUIDE, Groom, Guides, StrandRoots
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Strands, quad_corners, quad_weights
@@ -331,7 +331,7 @@ def shader_constants() -> dict[str, float]:
         "strand_window_words": DEEP_OPACITY_HEADER_WORDS,
         "strand_window_knots": KNOTS_PER_BOUNDS_WORKGROUP,
     }
-    guides = {"guide_anchors": GUIDE_ANCHORS, "guide_knots": GUIDE_KNOTS}
+    guides = {"anchors_per_guide_knot": ANCHORS_PER_GUIDE_KNOT, "knots_per_guide": KNOTS_PER_GUIDE}
     return {"strand_tile": TILE_SIDE_PIXELS, **opacity, **words, **guides, **hair_constants()}
 
 
@@ -470,10 +470,10 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resourc
     groom = None
     if head.hair is not None:
         style = cached(make_guide_tables, device, head.hair.guides)
-        roots = cached(make_strand_roots, device, head.hair.roots, head.topology.mesh)
+        roots = cached(make_strand_roots, device, head.hair.roots, head.topology_head.mesh)
         groom = cached(make_groom_tables, device, head.hair, style, roots)
     buffers = cached(make_strand_buffers, device, capacity, casters)
-    tables = cached(make_strand_tables, device, head.bare, coarse, buffers, groom)
+    tables = cached(make_strand_tables, device, head.without_maps, coarse, buffers, groom)
     picture = cached(make_strand_picture, device, capacity, request.settings.size)
     shadows = cached(make_deep_opacity_maps, device, layers, caller_name=f"{layers} {request.view_name}")
     return Resources(tables, picture, shadows, cached(mean_skin_albedo, head))

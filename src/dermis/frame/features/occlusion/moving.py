@@ -20,7 +20,7 @@ from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.head import Head
 from dermis.mesh.morph_targets import no_targets
 from dermis.mesh.outline import Outline, RigOutline, rig_outline
-from dermis.mesh.rig import Motion
+from dermis.mesh.rig import PoseArrays
 from dermis.mesh.subdivide import coarse_triangles
 
 Floats = NDArray[np.float64]
@@ -112,7 +112,7 @@ def make_rotation_anchors(head: Head) -> RotationAnchors:
     Their weights decrease with the distance from the centre of the head, so that moving shoulders have little
     effect.
     """
-    rig = head.control
+    rig = head.control_rig
     points = np.unique(np.linspace(0, len(rig.positions_mm) - 1, _MAX_ANCHOR_COUNT).astype(np.intp))
     positions = rig.positions_mm[points].astype(np.float64)
     distance2 = ((positions - head.centre_mm) ** 2).sum(axis=1)
@@ -121,14 +121,14 @@ def make_rotation_anchors(head: Head) -> RotationAnchors:
     return RotationAnchors(points, offsets, rig_outline(rig.positions_mm, no_targets(), rig.skeleton, points))
 
 
-def head_rotation(anchors: RotationAnchors, motion: Motion) -> Floats:
+def head_rotation(anchors: RotationAnchors, pose_arrays: PoseArrays) -> Floats:
     """Return the (3, 3) rotation that best fits the motion of the control points in `anchors` [Kabsch1976].
 
     Morph targets do not rotate a head and are ignored.
     """
     rest = anchors.outline.rest_mm.copy()
-    rest[:3] = motion.positions_mm[anchors.points].T
-    posed = replace(anchors.outline, rest_mm=rest).pose(np.zeros(0, np.float32), motion.matrices)
+    rest[:3] = pose_arrays.positions_mm[anchors.points].T
+    posed = replace(anchors.outline, rest_mm=rest).pose(np.zeros(0, np.float32), pose_arrays.matrices)
     left, _, right = np.linalg.svd(posed.T.astype(np.float64) @ anchors.offsets)
     left[:, 2] *= np.sign(np.linalg.det(left @ right))
     return np.asarray(left @ right)
@@ -172,7 +172,7 @@ def make_vertex_sky_visibility(
 
     rest_geometry : the triangles of the head at rest
     """
-    count, rig, commands = len(head.mesh.positions), head.control, CommandList(device, timed=False)
+    count, rig, commands = len(head.mesh.positions), head.control_rig, CommandList(device, timed=False)
     layers = make_layers(device, (DEPTH_MAP_SIDE, DEPTH_MAP_SIDE), SKY_VIEW_COUNT, store_triangles=False)
     occluders = upload_triangles(device, coarse_triangles(head, *_OCCLUDER_MIN_FACES_AND_MAX_ERROR))
     sky = VertexSkyVisibility(

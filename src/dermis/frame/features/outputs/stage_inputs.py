@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dermis.frame.features.post.picture import Picture
 from dermis.frame.features.shading.view import ray_record
 from dermis.frame.features.shape.mesh import HeadGeometry
-from dermis.frame.features.shape.shape import MotionBytes, Shape
+from dermis.frame.features.shape.shape import PoseBytes, Shape
 from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.features.visibility.layers import ViewLayers
 from dermis.frame.projection import Triple, Views
@@ -27,11 +27,11 @@ from dermis.gpu import (
 class PreviousScene:
     """Pose and camera of the previous scene, from which motion vectors are computed.
 
-    motion : pose of the head in the previous scene, None if the pose has not changed since
+    pose_bytes : pose of the head in the previous scene, None if the pose has not changed since
     view : uniform record of the shading pass with the rays of the previous camera
     """
 
-    motion: MotionBytes | None
+    pose_bytes: PoseBytes | None
     view: UniformRecord
 
 

@@ -70,9 +70,9 @@ def _draw_surface(graph: Graph, output_planes: Planes, resources: Resources, inp
 def _draw_motion(graph: Graph, output_planes: Planes, resources: Resources, inputs: StageInputs) -> None:
     previous, vertices = inputs.previous, inputs.shape.vertices
     assert previous is not None
-    if previous.motion is not None:
+    if previous.pose_bytes is not None:
         assert resources.previous is not None
-        shape.draw(graph, resources.previous, previous.motion)
+        shape.draw(graph, resources.previous, previous.pose_bytes)
         vertices = resources.previous.vertices
     shader = stage_program(graph.device, output_planes)
     bindings = inputs.bindings(shader) | {

@@ -29,8 +29,10 @@ class Resources:
 
 def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resources:
     """Return the buffers from which the shape of the requested head is computed."""
-    cached, mesh = memo.get, request.topology.mesh
-    tables = cached(shape_tables, device, request.topology, caller_name="shared" if request.is_shared else "")
+    cached, mesh = memo.get, request.topology_head.mesh
+    tables = cached(
+        shape_tables, device, request.topology_head, caller_name="shared" if request.is_shared else ""
+    )
     return Resources(
         shape=cached(make_shape, device, tables),
         tables=tables,
