@@ -80,7 +80,7 @@ def test_report_contains_all_pictures(stripe_comparison: Comparison, tmp_path: P
 @pytest.mark.parametrize("region", REGIONS)
 def test_scenes_use_no_colour_map(light: str, region: str) -> None:
     scene = comparison_scene(BALL, light, region, "gpu-gems-3")
-    assert scene.head.maps.colour is None and scene.skin.strength == 0.0
+    assert scene.head.maps.colour is None and scene.skin.specular_strength == 0.0
     assert scene.skin.albedo == "profile" and scene.skin.energy == "none"
     assert np.isfinite(scene.camera.position).all()
 

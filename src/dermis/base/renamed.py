@@ -20,6 +20,7 @@ RENAMED_OBJECTS: Mapping[str, str] = {
     "scene.profile": "scene.side",
     "apps.inverse.unmixing.unmix.Change": "apps.inverse.unmixing.unmix.PigmentChange",
     "apps.inverse.unmixing.unmix.Share": "apps.inverse.unmixing.unmix.FractionChange",
+    "scene.smoothness.SmoothIn": "scene.smoothness.SmoothOutlineLevels",
 }
 """Old to new names of objects, both without the package's name."""
 
@@ -35,6 +36,7 @@ RENAMED_MODULES: Mapping[str, str] = {
     "gallery": "apps.gallery",
     "reference": "apps.truths",
     "registry": "base.registry",
+    "scene.talk": "scene.talk_comparisons",
     "unmixing": "apps.inverse.unmixing",
     "unmixing.change": "apps.inverse.unmixing.unmix",
     "viewer": "apps.viewer",

@@ -14,7 +14,7 @@ from dermis.frame.features.shape.shape import PoseBytes
 from dermis.frame.projection import Triple, Views
 from dermis.frame.resources import AtlasLayout, Resources
 from dermis.gpu import Bindings, Constants, UniformRecord
-from dermis.scene.camera import Window
+from dermis.scene.camera import ImageRectangle
 from dermis.scene.settings import Settings
 
 
@@ -32,7 +32,7 @@ class FrameInputs:
     shadow_views : projections of all shadow maps
     light_constants : pipeline constants of the lights in use
     camera_views : projection of the camera, with the positions of samples in a pixel
-    window : rectangle of the image plane that the picture shows
+    image_rectangle : rectangle of the image plane that the picture shows
     sky_view : views of the head from all directions, with their uniform record, to compute ambient occlusion;
         None if occlusion is not recomputed when the shape changes
     view : uniform record of the shading pass
@@ -50,7 +50,7 @@ class FrameInputs:
     shadow_views: Views
     light_constants: Constants
     camera_views: Views
-    window: Window
+    image_rectangle: ImageRectangle
     sky_view: tuple[SkyViews, UniformRecord] | None
     view: UniformRecord
     constants: Constants

@@ -159,7 +159,7 @@ class Preparation:
             shadow_views=shadow_views,
             light_constants=constants,
             camera_views=camera_views(camera, state.outline, settings.samples),
-            window=camera.window,
+            image_rectangle=camera.image_rectangle,
             sky_view=self._sky_view(head, scene.pose_arrays, state.outline) if resources.sky else None,
             view=with_camera(resources.view, camera, state.eyes),
             constants=resources.constants + constants,

@@ -231,7 +231,8 @@ def _check_matrices(bone_matrices: Doubles, bone_names: list[str], culprit: obje
 
 
 def _refuse_bone_value(culprit: str, bone_value: object) -> NoReturn:
-    expected = f"{_EXPECTED_BONE_VALUE}, no angle beyond {MAX_ROTATION_DEGREES:g}, nothing beyond {MAX_DISTANCE_MM:g}"
+    limits = f"no angle beyond {MAX_ROTATION_DEGREES:g}, nothing beyond {MAX_DISTANCE_MM:g}"
+    expected = f"{_EXPECTED_BONE_VALUE}, {limits}"
     refuse(culprit, expected, f"got {format_value(bone_value, 80)}", "Correct it")
 
 

@@ -27,7 +27,7 @@ _WORLD_UP = (0.0, 1.0, 0.0)
 _PictureFraction = Annotated[float, Field(ge=-10, le=10), BoundsReason("lenses do not shift farther")]
 
 
-class Window(NamedTuple):
+class ImageRectangle(NamedTuple):
     """Image rectangle of a camera, in the plane at distance 1 in front of the camera.
 
     The picture coordinates (x, y), each from -1 at the left or bottom to 1 at the right or top, correspond to
@@ -140,14 +140,16 @@ class Camera(FrozenModel):
 
     half_tangent = renamed_attribute("half_tangent", "half_view_tangent")
 
-    def window(self, aspect: float) -> Window:
+    def image_rectangle(self, aspect: float) -> ImageRectangle:
         """Return the image rectangle in the plane at distance 1 in front of the camera.
 
         aspect : width of the picture divided by its height
         """
         u, v = self.principal_point
         half = self.half_view_tangent
-        return Window((half * aspect * self.pixel_aspect, half), (1.0 - 2.0 * u, 2.0 * v - 1.0))
+        return ImageRectangle((half * aspect * self.pixel_aspect, half), (1.0 - 2.0 * u, 2.0 * v - 1.0))
+
+    window = renamed_attribute("window", "image_rectangle")
 
 
 def portrait(head: Head) -> Camera:

@@ -117,7 +117,7 @@ def load_head(
     subdivide : int, "auto" or callable
         Number of subdivision levels, 0 to 3, and at least 1 for the human. Meshes of quads are subdivided by
         Catmull-Clark, other meshes by Loop. "auto" uses as many levels as the outline needs to look smooth in
-        a portrait of 1024x1024 pixels; for other pictures pass `SmoothIn(camera, size)`.
+        a portrait of 1024x1024 pixels; for other pictures pass `SmoothOutlineLevels(camera, size)`.
     regions : {"auto", "none"}
         "auto" gives each region of the face its own roughness and specular strength if the regions are known
         and the head has no roughness map; "none" keeps roughness and strength uniform.

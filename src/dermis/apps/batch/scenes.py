@@ -31,7 +31,7 @@ from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
-from dermis.scene.smoothness import SmoothIn
+from dermis.scene.smoothness import SmoothOutlineLevels
 
 _FULL_HAIR_PICTURE_SIDE = 1000  # side from which pictures have all hairs [pixel]; a close-up shows 230 mm
 _MIN_HAIR_FRACTION = 0.2
@@ -113,7 +113,7 @@ class SceneBuilder:
             scene, _ = load_scene(name, size=size)
             head, skin = scene.head, scene.skin
         else:
-            head, skin = load_head(name, subdivide=SmoothIn(size=size)), Skin()
+            head, skin = load_head(name, subdivide=SmoothOutlineLevels(size=size)), Skin()
         return _Person(
             head, face_hull_indices(head), find_rotation_bones(head.control_rig.skeleton).head, skin
         )
@@ -168,7 +168,9 @@ def _subdivision_levels(picture_size: tuple[int, int]) -> int:
 
     The number is the same for all sampled people, so that all their heads have the same topology.
     """
-    return max(MIN_HUMAN_SUBDIVISION_LEVELS, SmoothIn(size=picture_size)(Human().head(subdivide=0)))
+    return max(
+        MIN_HUMAN_SUBDIVISION_LEVELS, SmoothOutlineLevels(size=picture_size)(Human().head(subdivide=0))
+    )
 
 
 def _hair_count_fraction(picture_size: tuple[int, int]) -> float:
