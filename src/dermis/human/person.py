@@ -561,9 +561,7 @@ class Human:
         }
 
     drawn = renamed_classmethod("drawn", "sampled")
-    hairdo = renamed_attribute("hairdo", "hair_look")
     on = renamed_attribute("on", "transfer_skin_to")
-    weights = renamed_attribute("weights", "target_weights")
 
 
 def _check_skin_fields(skin_ancestry: object, ita: object) -> None:

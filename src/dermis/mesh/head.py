@@ -202,10 +202,4 @@ class Head:
         x, y, z = p[near][np.argmax(p[near][:, 2])]
         return float(x), float(y), float(z)
 
-    axes = renamed_attribute("axes", "front_view_axes")
-    bare = renamed_attribute("bare", "without_maps")
-    control = renamed_attribute("control", "control_rig")
     frontmost = renamed_attribute("frontmost", "frontmost_point_mm")
-    seen_positions_mm = renamed_attribute("seen_positions_mm", "front_view_positions_mm")
-    skull_mm = renamed_attribute("skull_mm", "skull_centre_mm")
-    topology = renamed_attribute("topology", "topology_head")

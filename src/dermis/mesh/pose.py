@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from dermis.base.arrays import Doubles, Floats
 from dermis.base.errors import DermisError, format_value, refuse
 from dermis.base.quantities import checked_array, checked_number
-from dermis.base.renamed import renamed_attribute
 from dermis.base.summary import ShortRepr
 from dermis.mesh.rig import PoseArrays, Rig
 from dermis.mesh.skeleton import Skeleton
@@ -101,8 +100,6 @@ class Pose(ShortRepr):
             self._bone_matrices(rig, culprit),
             self._rest_positions(rig, culprit),
         )
-
-    motion = renamed_attribute("motion", "to_arrays")
 
     def _target_weights(self, rig: Rig, culprit: object) -> Floats:
         weights = np.zeros(len(rig.targets.names), np.float32)

@@ -149,8 +149,6 @@ class Camera(FrozenModel):
         half = self.half_view_tangent
         return ImageRectangle((half * aspect * self.pixel_aspect, half), (1.0 - 2.0 * u, 2.0 * v - 1.0))
 
-    window = renamed_attribute("window", "image_rectangle")
-
 
 def portrait(head: Head) -> Camera:
     """Return a camera that shows head and shoulders from the front.

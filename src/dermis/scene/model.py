@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from dermis.base.renamed import renamed_attribute
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.mesh.rig import PoseArrays
@@ -104,5 +103,3 @@ class Scene:
     def pose_arrays(self) -> PoseArrays | None:
         """Return the pose as arrays of target weights and bone matrices, or None for the rest pose."""
         return None if self.pose is None else self.pose.to_arrays(self.head.control_rig)
-
-    motion = renamed_attribute("motion", "pose_arrays")
