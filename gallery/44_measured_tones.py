@@ -15,7 +15,7 @@ import numpy as np
 import dermis
 from dermis.apps.gallery.script import draw_script
 from dermis.frame.features.post.meter import METERED_IRRADIANCE
-from dermis.human.skin.measured import measured_cells
+from dermis.human.skin.measured import measured_medians
 from dermis.images.colour import encode_srgb8, linear_of_lab
 
 TEN = "japanese F,caucasian,arabian,chinese,southeast asian,iraqi,south asian M,african F,african,african M"
@@ -23,7 +23,7 @@ PERSON = dermis.Human(age=32)
 
 
 def draw(studio):
-    cheeks = [one for one in measured_cells() if one.site == "cheek" and not one.age_group]
+    cheeks = [one for one in measured_medians() if one.site == "cheek" and not one.age_group]
     cells, head, panels = {f"{one.group} {one.sex}".strip(): one for one in cheeks}, PERSON.head(), {}
     for name in TEN.split(","):
         cell = cells[name]

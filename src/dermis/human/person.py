@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import check_fields, checked_integer, checked_number
-from dermis.base.renamed import renamed_attribute, renamed_classmethod
+from dermis.base.renamed import renamed_classmethod
 from dermis.human.hair.groom import add_hair
 from dermis.human.hair.look import HairLook, sample_hair, sample_recession, stubble_visibility, typical_hair
 from dermis.human.makehuman import OLD_AGE, YOUNG_AGE, human_targets
@@ -561,7 +561,6 @@ class Human:
         }
 
     drawn = renamed_classmethod("drawn", "sampled")
-    on = renamed_attribute("on", "transfer_skin_to")
 
 
 def _check_skin_fields(skin_ancestry: object, ita: object) -> None:
