@@ -79,7 +79,7 @@ def case(number: int, measured: bool = False) -> Case:
     melanin, blood = (float(10.0 ** random.uniform(*span)) for span in (_MELANIN, _BLOOD))
     roughness = float(random.uniform(*_ROUGHNESS))
     pigments = {} if measured else {"melanin": melanin, "blood": blood}
-    person = Human.drawn(100 + number, skin=pigments, hair={"style": "none", "beard_mm": 0.0})
+    person = Human.sampled(100 + number, skin=pigments, hair={"style": "none", "beard_mm": 0.0})
     melanin, blood = person.look.melanin, person.look.blood
     head = person.head()
     turn, tilt = np.radians(random.uniform(-65.0, 65.0)), np.radians(random.uniform(-10.0, 60.0))

@@ -20,7 +20,7 @@ def draw(studio):
     head, panels = PERSON.head(), {}
     for share in MELANIN:
         person = replace(PERSON, skin=replace(PERSON.look, melanin=share))
-        own = person.on(head)
+        own = person.transfer_skin_to(head)
         scene = dermis.Scene(own, camera=dermis.portrait(head))
         panels[f"{100 * share:g} % melanosomes"] = studio.render(scene, scale=0.75)
     return panels

@@ -21,7 +21,7 @@ PEOPLE = {
 def draw(studio):
     panels = {}
     for seed, pose in PEOPLE.items():
-        head = dermis.Human.drawn(seed).head(subdivide=2)
+        head = dermis.Human.sampled(seed).head(subdivide=2)
         camera = dermis.Camera(position=(0, 0, 1100), target=(0, 5, 0), frame_mm=290)
         scene = dermis.Scene(head, pose=looking_at(head, camera.position, pose), camera=camera)
         settings = {"atlas": 2048, "background": "gradient", "exposure": "auto", "samples": 16}

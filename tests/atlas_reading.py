@@ -32,7 +32,7 @@ def shown(atlas: Atlas, mesh: Mesh, own: bool = False) -> Floats:
 
     own : only texels whose light is computed
     """
-    there = atlas.lit if own else atlas.coverage
+    there = atlas.lit_mask if own else atlas.coverage
     return np.where(there[..., None], atlas.interpolate(mesh, mesh.positions), np.nan)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.mesh.mesh import Mesh, build_mesh
-from dermis.mesh.primitives import SKIN
+from dermis.mesh.primitives import SKIN_MATERIALS
 
 Floats = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def assemble(patches: Sequence[Patch], lays: Sequence[ChartPlacement]) -> Mesh:
         first += rows * columns
     places = np.round(np.concatenate(positions), 4)
     corners = np.concatenate(triangles)
-    return build_mesh(places, np.concatenate(uv), corners, np.zeros(len(corners)), SKIN)
+    return build_mesh(places, np.concatenate(uv), corners, np.zeros(len(corners)), SKIN_MATERIALS)
 
 
 def _laid(flat: Floats, lay: ChartPlacement) -> Floats:
@@ -131,7 +131,7 @@ def cut_cone(radius_mm: float, gap_degrees: float, rings: int = 16, segments: in
     mesh = assemble([Patch(points[::-1], flat[::-1])], [ChartPlacement((0.5, 0.5), 0.45 / radius_mm)])
     p = mesh.positions[mesh.triangles]
     sound = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) > 1e-9
-    return build_mesh(mesh.positions, mesh.uv, mesh.triangles[sound], mesh.material[sound], SKIN)
+    return build_mesh(mesh.positions, mesh.uv, mesh.triangles[sound], mesh.material[sound], SKIN_MATERIALS)
 
 
 def folded_sheet(side_mm: float, cells: int) -> Mesh:

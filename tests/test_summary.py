@@ -30,7 +30,7 @@ def test_head_summary_has_name_size_maps_and_rig(person: Head) -> None:
 
 def test_summaries_omit_arrays(person: Head) -> None:
     pose = dermis.Pose({f"target {k}": 1.0 for k in range(99)}, positions_mm=person.positions_mm)
-    rig = person.control
+    rig = person.control_rig
     parts = [getattr(person, one.name) for one in fields(person)]
     for thing in (person, pose, rig, rig.targets, rig.skeleton, rig.contact, rig.outline, *parts):
         assert len(repr(thing)) < 500

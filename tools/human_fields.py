@@ -42,7 +42,7 @@ def main(folder: Path) -> None:
     head = AVERAGE.head(layout="hm08", subdivide=LEVEL)
     assert head.rig is not None and head.rig.stencils is not None
     stencils = head.rig.stencils
-    places = morphed_points_mm(AVERAGE.weights())[
+    places = morphed_points_mm(AVERAGE.target_weights())[
         : mesh_point_count()
     ]  # with the published lids, which the strips of lashes fit
     points = stencils.points(np.concatenate([places, head.positions_mm[mesh_point_count() :]]))
@@ -129,7 +129,7 @@ def published_points_mm(data: Arrays) -> Doubles:
     """Return the (p, 3) published points of the average person, relative to the midpoint of the eyes [mm]."""
     names = list(map(str, data["target_names"]))
     places = MM * data["positions_dm"].astype(np.float64)
-    for name, weight in AVERAGE.weights().items():
+    for name, weight in AVERAGE.target_weights().items():
         point, delta = displacements(data, names.index(name))
         places[point] += weight * delta
     joints = list(map(str, data["joint_names"]))

@@ -57,10 +57,10 @@ class Surface:
     def _fields(self) -> Doubles:
         """Return the (p, 3) fields `BORDER_FIELDS` at the points of the fine mesh."""
         told = average_surface()[1].astype(np.float64)
-        control = np.zeros((len(self.head.control.positions_mm), len(BORDER_FIELDS)))
+        control = np.zeros((len(self.head.control_rig.positions_mm), len(BORDER_FIELDS)))
         control[: len(told)] = told
-        assert self.head.control.stencils is not None
-        return self.head.control.stencils.points(control)
+        assert self.head.control_rig.stencils is not None
+        return self.head.control_rig.stencils.points(control)
 
     @cached_property
     def skin(self) -> NDArray[np.bool_]:

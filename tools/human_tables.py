@@ -16,7 +16,7 @@ from dermis.atlas.build import build_atlas
 from dermis.atlas.interreflection import FormFactors, compute_form_factors, form_factor_table_name
 from dermis.atlas.stitched.build import find_stitched_layout, layout_table_name
 from dermis.base.command_line import run_script
-from dermis.human.model import template
+from dermis.human.model import head_template
 from dermis.mesh.mesh import Mesh
 
 OUT = Path(shipped.__file__).parent / "data"
@@ -26,7 +26,7 @@ SIDES = 1024, 2048  # of the atlas [texel]
 
 def main() -> None:
     """Compute the tables and write them."""
-    mesh = template("own", LEVELS).head.topology.mesh
+    mesh = head_template("own", LEVELS).head.topology_head.mesh
     path = OUT / shipped.table_file_name(mesh)
     path.parent.mkdir(exist_ok=True)
     path.unlink(missing_ok=True)  # `build_atlas` would use the old tables

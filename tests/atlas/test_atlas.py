@@ -12,7 +12,7 @@ from dermis.atlas.raster import find_charts
 from dermis.base.errors import DermisError
 from dermis.formats.samples import SAMPLES
 from dermis.mesh.mesh import Mesh, build_mesh
-from dermis.mesh.primitives import SKIN, plane, uv_sphere
+from dermis.mesh.primitives import SKIN_MATERIALS, plane, uv_sphere
 
 Square = tuple[float, float, float]  # left, top, side in uv
 
@@ -27,7 +27,7 @@ def patches(*squares: Square) -> Mesh:
         np.vstack([[left, top] + side * p.uv for p, (left, top, side) in zip(parts, squares, strict=True)]),
         np.vstack([p.triangles + k for p, k in zip(parts, first, strict=True)]),
         np.zeros(sum(len(p.triangles) for p in parts)),
-        SKIN,
+        SKIN_MATERIALS,
     )
 
 
@@ -71,8 +71,8 @@ def test_texel_points_have_the_uv_of_their_texel(name: str, size: int) -> None:
     assert own.any()
     off = np.abs(atlas.interpolate(mesh, mesh.uv) - centres(size))[own]
     assert off.max() < 2 / 65535  # weights are whole 65535ths of a triangle that may span the map
-    assert np.abs(atlas.weights()[atlas.coverage].sum(axis=-1) - 1).max() < 1e-12
-    assert atlas.weights()[atlas.coverage].min() >= -1e-12
+    assert np.abs(atlas.barycentric_weights()[atlas.coverage].sum(axis=-1) - 1).max() < 1e-12
+    assert atlas.barycentric_weights()[atlas.coverage].min() >= -1e-12
 
 
 def test_every_centre_on_the_surface_is_covered() -> None:
@@ -172,7 +172,7 @@ def test_only_one_of_two_mirrored_halves_is_mapped() -> None:
     positions = np.array([[x, y, 0] for x in (-50, 0, 50) for y in (-50, 50)], np.float32)
     uv = np.array([[u, v] for u in (0.9, 0.1, 0.9) for v in (0.9, 0.1)], np.float32)
     triangles = np.array([[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5]], np.int32)
-    mesh = build_mesh(positions, uv, triangles, np.zeros(4, np.int32), SKIN)
+    mesh = build_mesh(positions, uv, triangles, np.zeros(4, np.int32), SKIN_MATERIALS)
     atlas = build_atlas(mesh, 64)
     assert atlas.mapped.tolist() in ([True] * 2 + [False] * 2, [False] * 2 + [True] * 2)
     assert set(np.unique(atlas.triangle)) - {-1} == set(np.flatnonzero(atlas.mapped))

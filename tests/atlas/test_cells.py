@@ -37,7 +37,7 @@ def test_cells_are_as_large_as_the_widest_gaussian_allows(divided: Divided) -> N
 
 def test_all_lit_texels_are_in_source_and_receiver_cells(divided: Divided) -> None:
     _, atlas, cells = divided
-    y, x = (axis * cells.side // atlas.size for axis in np.nonzero(atlas.lit))
+    y, x = (axis * cells.side // atlas.size for axis in np.nonzero(atlas.lit_mask))
     expected = np.zeros_like(cells.receiver_mask)
     expected[y, x] = True
     own = np.zeros_like(expected)
@@ -56,9 +56,9 @@ def test_all_lit_texels_are_in_source_and_receiver_cells(divided: Divided) -> No
 
 def test_tiles_list_all_triangles_that_they_show(divided: Divided) -> None:
     _, atlas, cells = divided
-    y, x = np.nonzero(atlas.lit)
+    y, x = np.nonzero(atlas.lit_mask)
     corners = atlas.corner_uv[atlas.triangle[y, x]].astype(float) * atlas.size - 0.5
-    place = np.einsum("nk,nkc->nc", atlas.weights()[y, x], corners)
+    place = np.einsum("nk,nkc->nc", atlas.barycentric_weights()[y, x], corners)
     inside = np.abs(place - np.stack([x, y], axis=-1)).max(axis=1) < 0.1
     column, row = (axis[inside] * cells.side // atlas.size // CELLS_PER_TILE_SIDE for axis in (x, y))
     shown = zip(
@@ -94,5 +94,5 @@ def test_gutter_copies_are_listed_by_cell(divided: Divided) -> None:
     listed = {tuple(t): tuple(s) for t, s in zip(texel.tolist(), shown.tolist(), strict=True)}
     for t, s in zip(atlas.gutter.tolist(), np.rint(atlas.source).astype(int).tolist(), strict=True):
         assert listed[tuple(t)] == tuple(np.clip(s, 0, atlas.size - 1))
-    beside = [t for t in texel.tolist() if atlas.lit[t[1], t[0]]]
+    beside = [t for t in texel.tolist() if atlas.lit_mask[t[1], t[0]]]
     assert beside  # texels beside charts are lit themselves and show the chart's edge

@@ -9,7 +9,7 @@ import pytest
 
 from dermis.atlas.interreflection import CELLS_PER_SIDE, SAMPLES_PER_PATCH, FormFactors, compute_form_factors
 from dermis.mesh.mesh import Material, Mesh, build_mesh
-from dermis.mesh.primitives import SKIN, uv_sphere
+from dermis.mesh.primitives import SKIN_MATERIALS, uv_sphere
 
 pytestmark = pytest.mark.usefixtures("many_form_factor_lines")
 
@@ -38,7 +38,7 @@ def room() -> Mesh:
         pair = np.array([[0, 1, 2], [0, 2, 3]])
         triangles.append(4 * face + (pair[:, ::-1] if turned else pair))
     made = np.concatenate(points), np.concatenate(uv), np.concatenate(triangles)
-    return build_mesh(*made, np.zeros(12, int), SKIN)
+    return build_mesh(*made, np.zeros(12, int), SKIN_MATERIALS)
 
 
 def found(mesh: Mesh) -> FormFactors:
@@ -81,10 +81,10 @@ def test_parts_that_are_cut_out_do_not_block_light() -> None:
         np.concatenate([mesh.uv, np.zeros((3, 2))]),
         np.concatenate([mesh.triangles, [[24, 25, 26]]]),
         np.append(np.zeros(len(corners), int), 1),
-        (*SKIN, card),
+        (*SKIN_MATERIALS, card),
     )
     without, with_card = found(mesh), found(extended)
-    solid = replace(extended, materials=(*SKIN, replace(card, opacity_cutoff=0.0)))
+    solid = replace(extended, materials=(*SKIN_MATERIALS, replace(card, opacity_cutoff=0.0)))
     np.testing.assert_array_equal(without.cell_factor, with_card.cell_factor)
     assert len(found(solid).cell_factor) != len(without.cell_factor)
 

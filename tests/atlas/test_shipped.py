@@ -12,7 +12,7 @@ from dermis.atlas.build import build_atlas
 from dermis.atlas.interreflection import FormFactors, compute_form_factors, form_factor_table_name
 from dermis.atlas.shipped import shipped_arrays
 from dermis.atlas.stitched.build import LAYOUT_ARRAY_NAMES, find_stitched_layout, layout_table_name
-from dermis.human.model import template
+from dermis.human.model import head_template
 from dermis.mesh.mesh import Mesh
 
 ADVICE = "run tools/human_tables.py"
@@ -21,7 +21,7 @@ FACTOR_NAMES = [field.name for field in fields(FormFactors)]
 
 @pytest.fixture(scope="module")
 def mesh() -> Mesh:
-    return template("own", 1).head.topology.mesh
+    return head_template("own", 1).head.topology_head.mesh
 
 
 def test_layout_is_that_of_the_package(mesh: Mesh) -> None:

@@ -84,8 +84,8 @@ def test_texels_in_pieces_have_their_own_surface_point(name: str) -> None:
     x, y = np.meshgrid(np.arange(n), np.arange(n))
     centre = np.stack((x, y), axis=-1)
     sides = [_cross(corner[..., k, :], corner[..., (k + 1) % 3, :], centre) for k in range(3)]
-    inside = ((np.min(sides, axis=0) > 1e-5) | (np.max(sides, axis=0) < -1e-5)) & atlas.lit
-    shown_at = np.einsum("yxk,yxkc->yxc", atlas.weights(), corner)
+    inside = ((np.min(sides, axis=0) > 1e-5) | (np.max(sides, axis=0) < -1e-5)) & atlas.lit_mask
+    shown_at = np.einsum("yxk,yxkc->yxc", atlas.barycentric_weights(), corner)
     assert inside.sum() > 0.1 * n * n
     assert np.abs(shown_at - centre)[inside].max() < 0.01
 
@@ -115,7 +115,7 @@ def test_steps_into_the_gutter_are_as_long_as_the_metric_says(name: str) -> None
     steps = []
     for axis, after, before in ((0, np.s_[:, 1:], np.s_[:, :-1]), (1, np.s_[1:], np.s_[:-1])):
         joined = atlas.edge_distance[after][..., 2 * axis] > 0
-        edge = joined & (atlas.lit[after] != atlas.lit[before])
+        edge = joined & (atlas.lit_mask[after] != atlas.lit_mask[before])
         per_mm = atlas.stretch[..., axis].astype(np.float64)[after]
         steps.append((np.linalg.norm(points[after] - points[before], axis=-1) * per_mm)[edge])
     ratio = np.concatenate(steps)
@@ -130,7 +130,7 @@ def test_runs_end_at_gaps(name: str) -> None:
     """Check that the surface points of texels in a run are no farther apart than the run is long."""
     mesh, atlas = case(name)
     points, reach = shown(atlas, mesh), atlas.edge_distance.astype(int)
-    y, x = np.nonzero(atlas.lit)
+    y, x = np.nonzero(atlas.lit_mask)
     for n in (1, 3, 6, 10, 14):
         for k, (dy, dx) in enumerate(((0, -n), (0, n), (-n, 0), (n, 0))):
             held = reach[y, x, k] >= n
@@ -156,9 +156,11 @@ def test_gutters_have_the_requested_width() -> None:
     mesh = cut_cylinder(30.0, 80.0, 9)
     for gutter_mm in (3.0, 8.0):
         atlas = build_atlas(mesh, 256, "stitched", gutter_mm)
-        area_mm2 = (1.0 / atlas.stretch[~atlas.lit & atlas.coverage].astype(np.float64).prod(axis=-1)).sum()
+        area_mm2 = (
+            1.0 / atlas.stretch[~atlas.lit_mask & atlas.coverage].astype(np.float64).prod(axis=-1)
+        ).sum()
         seams = 2 * 3 * 80.0  # both sides of three; the first texel or two of each belong to the rim
-        rim_mm = 1.0 / atlas.stretch[atlas.lit].astype(np.float64).max(axis=-1).mean()
+        rim_mm = 1.0 / atlas.stretch[atlas.lit_mask].astype(np.float64).max(axis=-1).mean()
         assert area_mm2 == pytest.approx(seams * (gutter_mm - rim_mm), rel=0.08)
 
 
@@ -166,7 +168,9 @@ def test_no_gutter_where_the_surface_ends() -> None:
     atlas = build_atlas(plane(40.0, 4), 128, "stitched")
     assert len(atlas.gutter) == 0
     assert atlas.mapped.all()
-    assert atlas.edge_distance.astype(int).sum(axis=-1)[64, 64] == 2 * (np.count_nonzero(atlas.lit[64]) - 1)
+    assert atlas.edge_distance.astype(int).sum(axis=-1)[64, 64] == 2 * (
+        np.count_nonzero(atlas.lit_mask[64]) - 1
+    )
 
 
 def test_gutters_do_not_continue_to_other_materials_than_skin() -> None:
@@ -225,7 +229,7 @@ def test_a_collapsed_chart_is_left_out() -> None:
     atlas = build_atlas(mesh, 128, "stitched")
     assert np.bincount(find_charts(mesh), atlas.mapped).tolist() == [72, 72, 0]
     # and no gutter shows it
-    assert atlas.mapped[atlas.triangle[~atlas.lit & atlas.coverage]].all()
+    assert atlas.mapped[atlas.triangle[~atlas.lit_mask & atlas.coverage]].all()
 
 
 def test_too_many_charts_for_the_atlas_keep_their_layout() -> None:

@@ -36,7 +36,7 @@ def blurred(atlas: Atlas, light: Floats) -> list[Floats]:
 
 
 def lit(atlas: Atlas, mesh: Mesh, light: Callable[[Floats], Floats]) -> Floats:
-    return np.where(atlas.lit, light(np.nan_to_num(shown(atlas, mesh))), 0.0)
+    return np.where(atlas.lit_mask, light(np.nan_to_num(shown(atlas, mesh))), 0.0)
 
 
 def stripes(points: Floats) -> Floats:

@@ -68,10 +68,10 @@ def project(scene: Scene, positions: Any, size: tuple[int, int]) -> Any:
 def test_the_whole_face_is_in_the_picture_for_all_samples(wild: Any) -> None:
     drawn, scenes = wild
     for _, scene in scenes:
-        rig = scene.head.control
+        rig = scene.head.control_rig
         around = rig.positions_mm - np.array(scene.head.centre_mm)
         face = np.flatnonzero((np.abs(around[:, 0]) < 80) & (abs(around[:, 1]) < 90) & (around[:, 2] > 10))
-        pixels = project(scene, rig.pose_points(face.astype(np.int32), scene.motion), drawn.size)
+        pixels = project(scene, rig.pose_points(face.astype(np.int32), scene.pose_arrays), drawn.size)
         assert pixels.min() > -0.5 and (pixels < np.array(drawn.size) - 0.5).all()
 
 
@@ -79,7 +79,7 @@ def test_cameras_have_the_sampled_parameters_if_the_face_fits() -> None:
     drawn = spec("[camera]\nyaw_deg = 90\npitch_deg = 30\ndistance_mm = 1000\nframe_mm = 500\noffset_x = 0.2")
     scene, settings = SceneBuilder(drawn).build(drawn.parameters(0))
     camera, head = scene.camera, scene.head
-    face = head.control.pose_points(face_hull_indices(head), scene.motion) - np.array(head.centre_mm)
+    face = head.control_rig.pose_points(face_hull_indices(head), scene.pose_arrays) - np.array(head.centre_mm)
     middle = 0.5 * (face.min(axis=0) + face.max(axis=0))
     away = np.array(camera.position) - middle
     assert np.linalg.norm(away) == pytest.approx(1000)
@@ -101,9 +101,9 @@ def test_roll_turns_the_camera_clockwise() -> None:
 
 def test_neck_and_head_rotate_by_the_sampled_angles(wild: Any) -> None:
     for parameters, scene in wild[1][:8]:
-        head, names = scene.head, scene.head.control.skeleton.names
+        head, names = scene.head, scene.head.control_rig.skeleton.names
         nod, turn, tilt = (parameters[f"head.{name}_deg"] for name in ("pitch", "yaw", "roll"))
-        made = scene.motion.matrices[names.index("head")][:3, :3]
+        made = scene.pose_arrays.matrices[names.index("head")][:3, :3]
         assert made == pytest.approx(np.array(angles_matrix((nod, turn, tilt))), abs=1e-5)
         assert set(scene.pose.bones) == {"head", "neck01", "neck02", "neck03"} and head.rig is not None
 
@@ -113,8 +113,8 @@ def test_eyes_look_at_the_camera_or_in_the_sampled_direction() -> None:
     at_camera, at_angles = spec(text), spec(text + "[gaze]\nat = 'angles'\nyaw_deg = -15\npitch_deg = 10")
     for drawn in (at_camera, at_angles):
         scene, _ = SceneBuilder(drawn).build(drawn.parameters(0))
-        assert scene.head.eyes is not None and scene.motion is not None
-        frames = scene.head.eyes.eye_matrices(scene.head.control, scene.motion)
+        assert scene.head.eyes is not None and scene.pose_arrays is not None
+        frames = scene.head.eyes.eye_matrices(scene.head.control_rig, scene.pose_arrays)
         for frame in frames:
             if drawn is at_camera:
                 place = np.array(scene.camera.position) + scene.head.centre_mm
@@ -132,7 +132,10 @@ def test_scenes_depend_only_on_their_parameters(wild: Any) -> None:
     for k in (30, 2):
         again, before = builder.build(drawn.parameters(k))[0], scenes[k][1]
         assert again.camera == before.camera and again.lights == before.lights and again.skin == before.skin
-        assert again.motion is not None and again.motion.weights.tobytes() == before.motion.weights.tobytes()
+        assert (
+            again.pose_arrays is not None
+            and again.pose_arrays.weights.tobytes() == before.pose_arrays.weights.tobytes()
+        )
         assert again.head.positions_mm.tobytes() == before.head.positions_mm.tobytes()
     heads = [scene.head for _, scene in scenes]
     assert all(head is heads[0] for head in heads)  # forty images of one person
@@ -143,9 +146,9 @@ def test_people_follow_their_seed_except_for_sampled_fields() -> None:
         "[person]\nage = 70\ncaucasian = 1\n[person.skin]\nmelanin = 0.01\n[person.hair]\nstyle = 'none'"
     )
     parameters = drawn.parameters(3)
-    person, plain = sampled_person(parameters), Human.drawn(int(parameters["person.seed"]))
+    person, plain = sampled_person(parameters), Human.sampled(int(parameters["person.seed"]))
     assert (person.age, person.caucasian, person.african) == (70, 1, 0)
-    assert person.look.melanin == 0.01 and person.hairdo.style == "none"
+    assert person.look.melanin == 0.01 and person.hair_look.style == "none"
     assert person.look.age > 0.5 and person.sex == plain.sex
     assert person.look.seed == plain.look.seed and dict(person.targets) == dict(plain.targets)
 
@@ -153,7 +156,7 @@ def test_people_follow_their_seed_except_for_sampled_fields() -> None:
 @pytest.mark.parametrize("given", [{"age": 200}, {"african": 0}, {"skin": {"melanin": 3}}, {"sex": "male"}])
 def test_impossible_people_are_refused(given: dict[str, Any]) -> None:
     with pytest.raises(DermisError):
-        Human.drawn(3, **given)
+        Human.sampled(3, **given)
 
 
 def test_heads_are_loaded_from_files_of_people_and_scenes(tmp_path: Path) -> None:

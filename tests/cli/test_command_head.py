@@ -33,7 +33,7 @@ def test_writes_a_person_that_renders(run: Run, render: Run, folder: Path) -> No
     ended = run("head", *words, "-o", "own.glb", "--json")
     assert (ended.code, ended.stderr) == (0, "")
     report = json.loads(ended.stdout)
-    drawn = Human.drawn(3)
+    drawn = Human.sampled(3)
     assert report["head"] == "own.glb" and report["bytes"] == (folder / "own.glb").stat().st_size
     assert report["person"]["age"] == 70 and report["person"]["sex"] == drawn.sex
     assert report["person"]["targets"] == {**drawn.targets, "nose/nose-hump-incr": 0.5}
@@ -71,7 +71,7 @@ def test_fields_targets_and_expressions_add_up(run: Run, folder: Path) -> None:
     assert (person["asian"], person["sex"], person["weight"], person["age"]) == (1, 1, 0.5, 30)
     assert len(person["targets"]) == 3
     head = load_head(folder / "head.glb")
-    rest = dict(zip(head.targets, head.control.targets.rest, strict=True))  # type: ignore[arg-type]
+    rest = dict(zip(head.targets, head.control_rig.targets.rest, strict=True))  # type: ignore[arg-type]
     assert rest["jawOpen"] == pytest.approx(0.3) and rest["mouthSmileLeft"] == 1
     assert sum(map(bool, rest.values())) == 2
 

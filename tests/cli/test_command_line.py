@@ -19,7 +19,7 @@ from dermis.cli.options import option_name
 from dermis.scene.frozen_model import fields_under
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
-from dermis.scene.talk import COMPARISONS_HEADING
+from dermis.scene.talk_comparisons import COMPARISONS_HEADING
 
 Run = Callable[..., Any]
 

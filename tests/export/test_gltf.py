@@ -37,7 +37,7 @@ def person(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Return files of a head in both variants; its name contains quotes and code."""
     folder = tmp_path_factory.mktemp("glb")
     source = folder / 'x"; import os; <script>.glb'
-    human = Human.drawn(7)
+    human = Human.sampled(7)
     write_person_glb(source, human, human.head(subdivide=0), roughness=0.3)
     subject = load_subject(source, colour=brown(folder), subdivide=0)
     files = {variant: folder / f"{variant}.glb" for variant in (SCATTER_VARIANT, TRANSMISSION_VARIANT)}
@@ -176,7 +176,7 @@ def test_exported_head_reads_back_unchanged(person: dict[str, Path], variant: st
     assert back.maps.colour is not None and back.eyes is not None and "jawOpen" in back.targets
     linear = ((np.array([188, 137, 113]) / 255 + 0.055) / 1.055) ** 2.4
     np.testing.assert_allclose(back.maps.colour[10, 10], linear, atol=0.005)
-    assert back.eyes.look == Human.drawn(7).iris
+    assert back.eyes.look == Human.sampled(7).iris
 
 
 @pytest.mark.parametrize("variant", [SCATTER_VARIANT, TRANSMISSION_VARIANT])

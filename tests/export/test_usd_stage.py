@@ -88,8 +88,8 @@ def test_targets_and_bones_deform_as_in_the_package(rigged: Head, tmp_path: Path
     UsdSkel.BakeSkinning(Usd.PrimRange(stage.GetPrimAtPath("/head")))
     deformed = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/head/mesh")).GetPointsAttr().Get(0.0))
     pose = Pose(weights=weights, bones={"head": (0.0, 25.0, 0.0)})
-    expected = rigged.control.points_mm(pose.motion(rigged.control))
-    assert np.abs(expected - rigged.control.points_mm(rigged.control.rest)).max() > 10.0
+    expected = rigged.control_rig.posed_points_mm(pose.to_arrays(rigged.control_rig))
+    assert np.abs(expected - rigged.control_rig.posed_points_mm(rigged.control_rig.rest)).max() > 10.0
     np.testing.assert_allclose(1000.0 * deformed, expected, atol=10 * SINGLE_MM)
 
 

@@ -21,7 +21,7 @@ from dermis.apps.inverse.fitting.solve import SYSTEMATIC_SD
 from dermis.apps.inverse.fitting.unknowns import SKIN_UNKNOWNS, prior_unknowns
 from dermis.apps.inverse.unmixing.unknown_skin import sd_from_assumed_parameters
 from dermis.human.landmarks.points import landmark_points
-from dermis.human.skin.measured import measured_cells
+from dermis.human.skin.measured import measured_medians
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.scene.camera import Camera
@@ -36,7 +36,7 @@ SMALL = {"side": 56, "atlas": 128}
 
 @pytest.fixture(scope="module")
 def person() -> Human:
-    return Human.drawn(7, skin={"melanin": 0.05, "blood": 0.012}, hair={"style": "none"})
+    return Human.sampled(7, skin={"melanin": 0.05, "blood": 0.012}, hair={"style": "none"})
 
 
 @pytest.fixture(scope="module")
@@ -183,7 +183,7 @@ def test_stated_pigments_are_known() -> None:
 
 def test_priors_of_pigments_are_those_of_measured_people() -> None:
     """Medians of groups and sites differ less than people: nearly all are within two deviations."""
-    cells = [one for one in measured_cells() if not one.sex + one.age_group and one.people >= 50]
+    cells = [one for one in measured_medians() if not one.sex + one.age_group and one.people >= 50]
     for unknown in SKIN_UNKNOWNS[:2]:
         values = np.log([getattr(one.pigments, unknown.name) for one in cells])
         score = (values - np.log(unknown.prior_median)) / unknown.prior_sd

@@ -47,8 +47,8 @@ def written(head: Head, path: Path, **more: Any) -> Path:
 
 def posed_mm(head: Head, pose: Pose) -> np.ndarray:
     """Return the posed vertices, (v, 3)."""
-    rig = head.control
-    return np.asarray(rig.points_mm(pose.motion(rig))[head.mesh.point])
+    rig = head.control_rig
+    return np.asarray(rig.posed_points_mm(pose.to_arrays(rig))[head.mesh.point])
 
 
 @pytest.mark.parametrize("pose", POSES)
@@ -76,7 +76,7 @@ def test_targets_keep_their_rest_weights(rigged: Head, tmp_path: Path) -> None:
 
 
 def test_bones_without_a_common_parent_get_one(rigged: Head, tmp_path: Path) -> None:
-    rig = rigged.control
+    rig = rigged.control_rig
     assert rig.skeleton is not None
     local = np.linalg.inv(rig.skeleton.inverse_bind)
     skeleton = replace(rig.skeleton, parent=np.array([-1, -1], np.int32), local=local)
@@ -88,7 +88,7 @@ def test_bones_without_a_common_parent_get_one(rigged: Head, tmp_path: Path) -> 
 
 
 def test_turned_bones_keep_their_axes(rigged: Head, tmp_path: Path) -> None:
-    rig = rigged.control
+    rig = rigged.control_rig
     assert rig.skeleton is not None
     turn = np.eye(4)
     turn[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
@@ -146,11 +146,11 @@ def test_four_bones_minimise_the_error() -> None:
     plain = np.take_along_axis(mean, strongest, axis=1)
     plain /= plain.sum(axis=1, keepdims=True)
     for name, degrees in (("head", (20, 0, 0)), ("neck02", (0, 15, 0)), ("jaw", (15, 0, 0))):
-        motion = Pose(bones={name: degrees}).motion(rig)
-        meant = rig.points_mm(motion)
+        pose_arrays = Pose(bones={name: degrees}).to_arrays(rig)
+        meant = rig.posed_points_mm(pose_arrays)
         whole = np.asarray(finer @ rig.positions_mm.astype(np.float64))
         fitted, usual = (
-            ((_blended(whole, motion.matrices, *one) - meant) ** 2).sum()
+            ((_blended(whole, pose_arrays.matrices, *one) - meant) ** 2).sum()
             for one in ((bone, bone_weight), (strongest, plain))
         )
         assert fitted < 0.7 * usual

@@ -210,7 +210,7 @@ HEADS = [
 @pytest.mark.parametrize(("name", "unit_mm", "v_origin", "counts", "size"), HEADS)
 def test_real_heads_pass_every_check(sample_folder: Path, name, unit_mm, v_origin, counts, size) -> None:
     mesh = load_mesh(sample_folder / "heads" / name, unit_mm=unit_mm, v_origin=v_origin)
-    assert mesh.skull_mm is not None
+    assert mesh.skull_centre_mm is not None
     assert (len(mesh.positions), mesh.point.max() + 1, len(mesh.triangles)) == counts
     np.testing.assert_allclose(mesh.size_mm, size, atol=1)
     kinds = {m.name: m.kind for m in mesh.materials}

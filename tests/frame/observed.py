@@ -58,7 +58,7 @@ def from_edge(mask: Mask, place: NDArray[np.float64]) -> float:
 
 def people() -> dict[str, Scene]:
     """Return a person at rest, with one eye closed, from the side and turned; and another one."""
-    mean, drawn = bare(Human(sex=0.5).head()), bare(Human.drawn(4).head())
+    mean, drawn = bare(Human(sex=0.5).head()), bare(Human.sampled(4).head())
     shut = Pose({"eyeBlinkLeft": 1.0, "jawOpen": 0.6})
     return {
         "mean": Scene(mean, camera=around(mean)),

@@ -24,7 +24,7 @@ from dermis.gpu import CommandList, ComputeProgram, Constants, Device, download,
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material, Mesh, build_mesh
-from dermis.mesh.primitives import SKIN, plane
+from dermis.mesh.primitives import SKIN_MATERIALS, plane
 from dermis.scene.camera import Camera
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene
@@ -129,7 +129,11 @@ def bent_plane(size_mm: float, uv: Sequence[Sequence[float]], segments: int = 1)
     flat = plane(size_mm, segments)
     matrix = np.asarray(uv, float)
     return build_mesh(
-        flat.positions, flat.uv @ matrix[:, :2].T + matrix[:, 2], flat.triangles, flat.material, SKIN
+        flat.positions,
+        flat.uv @ matrix[:, :2].T + matrix[:, 2],
+        flat.triangles,
+        flat.material,
+        SKIN_MATERIALS,
     )
 
 

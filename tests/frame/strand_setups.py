@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.human.hair.guides import bind_guides
 from dermis.human.hair.head_hair import HAIR_PARAMETERS_DTYPE
 from dermis.mesh.geometry import split_quads
-from dermis.mesh.groom import GUIDE_KNOTS, Groom, StrandRoots
+from dermis.mesh.groom import KNOTS_PER_GUIDE, Groom, StrandRoots
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material, Mesh, build_mesh
@@ -59,7 +59,7 @@ def woolly(
     """Return a white sheet with straight coarse strands between (n, 3) points, each along a guide [mm]."""
     mesh, count = sheet(), len(begins)
     points_mm = mesh.points_mm
-    t = np.linspace(0.0, 1.0, GUIDE_KNOTS)[None, :, None]
+    t = np.linspace(0.0, 1.0, KNOTS_PER_GUIDE)[None, :, None]
     knots = (1.0 - t) * begins[:, None] + t * ends[:, None]
     guides = bind_guides(mesh, points_mm, knots, knots[..., 2], np.ones(count))
     corners = points_mm[quad_corners(mesh, np.arange(len(mesh.quads)))]

@@ -48,7 +48,7 @@ def test_wide_gaussian_in_steps_equals_one_blur(device: Device, texels_per_mm: f
     """Compare a blurred point of light with the analytic peak."""
     atlas = build_atlas(plane(256 / texels_per_mm), 256)
     coarser = _upload_coarser(
-        device, AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source)
+        device, AtlasMip(atlas.coverage, atlas.lit_mask, atlas.edge_distance, atlas.gutter, atlas.source)
     )
     textures, wanted = resting(device, atlas, coarser=coarser, median_texels_per_mm=texels_per_mm), SIX[-1:]
     source, _, r2, area = point_of_light(atlas)

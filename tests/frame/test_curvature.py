@@ -18,7 +18,7 @@ from dermis.frame.features.shape.mesh import upload_geometry
 from dermis.frame.features.shape.shape import evaluate_rest_shape, shape_tables
 from dermis.gpu import CommandList, Device
 from dermis.mesh.mesh import Mesh, build_mesh
-from dermis.mesh.primitives import SKIN, plane, uv_sphere
+from dermis.mesh.primitives import SKIN_MATERIALS, plane, uv_sphere
 
 Floats = NDArray[np.float64]
 SIDE = 64  # of the atlas, which curvature does not depend on
@@ -42,7 +42,7 @@ def half_pipe(radius_mm: float, segments: int = 48) -> Mesh:
     angle = flat.positions[:, 0] / radius_mm
     normals = np.column_stack([np.sin(angle), 0 * angle, np.cos(angle)])
     positions = radius_mm * normals + flat.positions * [0, 1, 0]
-    return build_mesh(positions, flat.uv, flat.triangles, flat.material, SKIN, normals)
+    return build_mesh(positions, flat.uv, flat.triangles, flat.material, SKIN_MATERIALS, normals)
 
 
 @pytest.mark.parametrize("radius_mm", [5.0, 20.0, 100.0])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device
 from dermis.human.hair.look import HairLook
-from dermis.human.model import template
+from dermis.human.model import head_template
 from dermis.human.person import Human
 from dermis.mesh.pose import Pose
 from dermis.scene.lights import preset_lights
@@ -85,6 +85,6 @@ def test_only_data_of_a_new_person_is_uploaded(
 
 def test_all_heads_share_the_template() -> None:
     heads = [person.head() for person in PEOPLE[:2]]
-    assert all(head.topology is template("own", 1).head for head in heads)
+    assert all(head.topology_head is head_template("own", 1).head for head in heads)
     assert np.array_equal(heads[0].mesh.positions, PEOPLE[0].head().mesh.positions)
     assert not np.array_equal(heads[0].mesh.positions, heads[1].mesh.positions)

@@ -104,7 +104,7 @@ def probed(renderer: Renderer, places: Floats, ways: Floats) -> Floats:
 def axes(head: Head, pose: Pose) -> Floats:
     """Return (2, 3) directions in which the eyes look."""
     assert head.eyes is not None
-    frames = head.eyes.eye_matrices(head.control, pose.motion(head.control))
+    frames = head.eyes.eye_matrices(head.control_rig, pose.to_arrays(head.control_rig))
     return np.asarray([frame[2, :3] / np.linalg.norm(frame[2, :3]) for frame in frames])
 
 
@@ -127,9 +127,9 @@ def test_given_rotation_adds_to_the_gaze(head: Head) -> None:
 def test_apex_lies_on_the_axis_of_the_eye_frame(head: Head) -> None:
     pose = Pose({"eyeLookOutLeft": 0.7}, {"head": (5, 20, 10)})
     assert head.eyes is not None
-    motion = pose.motion(head.control)
-    frames = head.eyes.eye_matrices(head.control, motion)
-    apexes = head.control.pose_points(head.eyes.apex, motion)
+    pose_arrays = pose.to_arrays(head.control_rig)
+    frames = head.eyes.eye_matrices(head.control_rig, pose_arrays)
+    apexes = head.control_rig.pose_points(head.eyes.apex, pose_arrays)
     for frame, apex in zip(frames, apexes, strict=True):
         np.testing.assert_allclose((frame @ np.append(apex, 1))[:3], [0, 0, apex_mm()], atol=0.1)
 
@@ -140,7 +140,7 @@ def test_both_eyes_converge(head: Head, place: tuple[float, float, float]) -> No
     pose = looking_at(head, place, Pose(bones={"head": (0, 8, 0)}))
     assert head.eyes is not None
     at = np.append(np.add(place, head.centre_mm), 1.0)
-    for frame in head.eyes.eye_matrices(head.control, pose.motion(head.control)):
+    for frame in head.eyes.eye_matrices(head.control_rig, pose.to_arrays(head.control_rig)):
         x, y, z = (frame @ at)[:3]
         assert np.degrees(np.arctan2(np.hypot(x, y), z)) < 1.0
 
@@ -171,7 +171,7 @@ def eye_pixels(renderer: Renderer, person: Human, weight: float) -> int:
 
 @pytest.mark.parametrize("seed", [None, 0, 5, 9])
 def test_closed_lids_leave_no_gap(renderer: Renderer, seed: int | None) -> None:
-    person = Human() if seed is None else Human.drawn(seed)
+    person = Human() if seed is None else Human.sampled(seed)
     assert eye_pixels(renderer, person, 0.0) > 150
     assert eye_pixels(renderer, person, 1.0) == 0
 

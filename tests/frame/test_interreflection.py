@@ -31,7 +31,7 @@ def test_integrating_sphere_matches_its_closed_form(renderer: Renderer, albedo: 
     middle = place(head, (0, 0, 0))
     lamp = PointLight(position=middle, target=(0, 0, 50), irradiance=(3.0, 3.0, 3.0), shadows=False)
     scene = scene_of(head, lamp, rho_s=0.0)
-    shown = cached_atlas(within, SIDE).lit
+    shown = cached_atlas(within, SIDE).lit_mask
     straight, all_of_it = (
         entered_light(renderer, run_frame(renderer, scene, atlas=SIDE, interreflection=on))[shown][:, :3]
         for on in (False, True)

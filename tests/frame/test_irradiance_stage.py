@@ -47,8 +47,8 @@ def test_irradiance_of_lights_on_a_sphere_matches_numpy(
     twin = twins.entering(scene, *twins.surface(atlas, PLAIN)) * twins.DEFAULT_COLOUR**0.5
     made = entered(renderer, scene)
     assert twin.max() > 0.1
-    assert np.abs(made[..., :3] - np.where(atlas.lit[..., None], twin, 0.0)).max() < close * twin.max()
-    assert np.array_equal(made[..., 3] > 0, atlas.lit)
+    assert np.abs(made[..., :3] - np.where(atlas.lit_mask[..., None], twin, 0.0)).max() < close * twin.max()
+    assert np.array_equal(made[..., 3] > 0, atlas.lit_mask)
 
 
 @pytest.mark.parametrize("mix", [0.0, 0.5, 1.0])
@@ -69,7 +69,7 @@ def test_profile_colour_uses_no_map(renderer: Renderer, close: float) -> None:
     head = head_of(SPHERE, colour=np.full((4, 4, 3), 0.2))
     scene = scene_of(head, LIGHTS["point"], albedo="profile")
     atlas = cached_atlas(SPHERE, SIZE)
-    twin = np.where(atlas.lit[..., None], twins.entering(scene, *twins.surface(atlas, head)), 0.0)
+    twin = np.where(atlas.lit_mask[..., None], twins.entering(scene, *twins.surface(atlas, head)), 0.0)
     assert np.abs(entered(renderer, scene)[..., :3] - twin).max() < close * twin.max()
 
 

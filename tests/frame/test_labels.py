@@ -74,7 +74,7 @@ def test_the_pupil_is_in_the_iris(seen: dict[str, Observation]) -> None:
 
 
 def test_hair_is_labelled_where_it_covers_most(renderer: Renderer) -> None:
-    head = Human.drawn(1).head(subdivide=0)
+    head = Human.sampled(1).head(subdivide=0)
     scene = Scene(head, camera=around(head))
     small = Settings(size=96, atlas=128, shadow_size=64, samples=4)
     names = "label", "alpha", "triangle"
@@ -91,7 +91,7 @@ def test_hair_is_labelled_where_it_covers_most(renderer: Renderer) -> None:
 
 def test_tiles_of_a_workgroup_label_the_same(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     """Many linked lists per tile, as on GPUs, give the same labels."""
-    head, shown = Human.drawn(1).head(subdivide=0), []
+    head, shown = Human.sampled(1).head(subdivide=0), []
     small = Settings(size=(75, 93), atlas=128, shadow_size=64, samples=4)  # no whole tiles
     names = "label", "label_face_synthetics"
     for ways in (1, 64):

@@ -60,13 +60,13 @@ def test_cached_halvings_equal_computed_ones(
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     first, second = upload_atlas(device, atlas), upload_atlas(device, atlas)
     assert len(list(tmp_path.rglob("*.arrays"))) == 1 and len(first.coarser) == len(second.coarser) == 3
-    sheet = AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source)
+    sheet = AtlasMip(atlas.coverage, atlas.lit_mask, atlas.edge_distance, atlas.gutter, atlas.source)
     for one, other in zip(first.coarser, second.coarser, strict=True):
         sheet = halve_mip(sheet)
         for made in (one, other):
             reach = download(device, made.resources["reach_map"])
             assert np.array_equal(reach & 0x7FFF, sheet.reach)
-            assert np.array_equal(reach[..., 0] >> 15, sheet.covered & ~sheet.lit)
+            assert np.array_equal(reach[..., 0] >> 15, sheet.covered & ~sheet.lit_mask)
         gutters = [device.handle.queue.read_buffer(made.gutter).tobytes() for made in (one, other)]
         words = np.concatenate([sheet.source.view(np.uint32), sheet.gutter], axis=1, dtype=np.uint32)
         assert one.sheared == other.sheared and gutters == [words.tobytes()] * 2
@@ -77,7 +77,7 @@ def stripes(atlas: Atlas) -> Floats:
     """Return bands of light with hard edges over the sphere."""
     y = atlas.interpolate(SPHERE, SPHERE.positions)[..., 1]
     light = (np.sin(y / 1.5) > 0)[..., None] * np.array([1.0, 0.6, 0.3]) + 0.01
-    return np.dstack([light, np.ones(y.shape)]) * atlas.lit[..., None]
+    return np.dstack([light, np.ones(y.shape)]) * atlas.lit_mask[..., None]
 
 
 def combined(
@@ -111,24 +111,24 @@ def test_coarser_levels_show_the_same(
     whole, once = combined(device, FLOAT_TEXEL_FORMAT, replace(textures, coarser=()), stripes)
     made, halvings = combined(device, texel, textures, stripes)
     assert max(once) == 0 and max(halvings) == 2
-    assert error(made, whole, atlas.lit) < HALVED
-    assert made[atlas.lit].sum() == pytest.approx(whole[atlas.lit].sum(), rel=SPREAD_ENERGY)
+    assert error(made, whole, atlas.lit_mask) < HALVED
+    assert made[atlas.lit_mask].sum() == pytest.approx(whole[atlas.lit_mask].sum(), rel=SPREAD_ENERGY)
 
 
 @pytest.mark.parametrize("texel", [FLOAT_TEXEL_FORMAT, HALF])
 def test_constant_light_stays_constant_at_every_resolution(
     device: Device, atlas: Atlas, textures: AtlasTextures, texel: str
 ) -> None:
-    made, _ = combined(device, texel, textures, np.ones((256, 256, 4)) * atlas.lit[..., None])
+    made, _ = combined(device, texel, textures, np.ones((256, 256, 4)) * atlas.lit_mask[..., None])
     close = FLAT if texel == FLOAT_TEXEL_FORMAT else HALVES
-    assert np.abs(made[atlas.lit] / WEIGHT.sum(axis=0) - 1).max() < close
+    assert np.abs(made[atlas.lit_mask] / WEIGHT.sum(axis=0) - 1).max() < close
 
 
 def test_excess_variance_of_halving_is_subtracted_from_the_next_level(device: Device) -> None:
     """With texels of 1 mm halving adds more than 0.4 mm2 to the second level; the third compensates."""
     atlas = build_atlas(plane(256.0), 256)
     coarser = _upload_coarser(
-        device, AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source)
+        device, AtlasMip(atlas.coverage, atlas.lit_mask, atlas.edge_distance, atlas.gutter, atlas.source)
     )
     textures = resting(device, atlas, coarser=coarser, median_texels_per_mm=2.0)
     variances = np.array([0.5, 0.9, 3.0])
@@ -167,8 +167,8 @@ def test_half_precision_keeps_the_light(
     light = stripes * [brightest, brightest, brightest, 1.0]
     floats, _ = combined(device, FLOAT_TEXEL_FORMAT, textures, light)
     halves, _ = combined(device, HALF, textures, light, half_precision_scale(HALF, brightest))
-    assert error(halves, floats, atlas.lit) < HALVES
-    assert halves[atlas.lit].sum() == pytest.approx(floats[atlas.lit].sum(), rel=HALVES / 4)
+    assert error(halves, floats, atlas.lit_mask) < HALVES
+    assert halves[atlas.lit_mask].sum() == pytest.approx(floats[atlas.lit_mask].sum(), rel=HALVES / 4)
 
 
 @pytest.mark.parametrize("brightest", [0.0, 5e-324, 1e-40, 1e-30, 0.3, 3.0, 1e12])
@@ -190,15 +190,17 @@ def test_resolution_falls_step_by_step(texels_per_mm: float, most: int) -> None:
 
 def test_halved_atlas_covers_the_same_surface(device: Device, atlas: Atlas, textures: AtlasTextures) -> None:
     """Stretch and distances to the edge are halved, and gutters copy the same positions."""
-    coarse = halve_mip(AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source))
-    own, made = coarse.lit, textures.coarser[0].resources
+    coarse = halve_mip(
+        AtlasMip(atlas.coverage, atlas.lit_mask, atlas.edge_distance, atlas.gutter, atlas.source)
+    )
+    own, made = coarse.lit_mask, textures.coarser[0].resources
     metric = download(device, made["stretch_map"]).astype(np.float64)
     assert np.array_equal(metric[..., 0] > 0, coarse.covered)
     y, x = np.nonzero(own)
     ratio = metric[y, x, :2] / atlas.stretch[2 * y, 2 * x].clip(1e-3)
     assert np.median(ratio) == pytest.approx(0.5, 1e-2)
     assert (2 * coarse.reach[..., 0] <= atlas.edge_distance[::2, ::2, 0].max() + 1).all()
-    assert own[atlas.lit[::2, ::2]].all() and len(coarse.gutter) > 50
+    assert own[atlas.lit_mask[::2, ::2]].all() and len(coarse.gutter) > 50
     assert not own[coarse.gutter[:, 1], coarse.gutter[:, 0]].any()
     sources = np.rint(coarse.source).astype(int)
     assert own[sources[:, 1], sources[:, 0]].mean() > 0.98

@@ -185,7 +185,7 @@ def test_outputs_follow_a_changed_light(renderer: Renderer, close: float) -> Non
 @pytest.fixture(scope="module")
 def face(renderer: Renderer) -> tuple[Human, Arrays]:
     """Return a person's eyes and open mouth."""
-    person = Human.drawn(5)
+    person = Human.sampled(5)
     camera = Camera(position=(0, -30, 600), target=(0, -30, 80), frame_mm=130.0)
     scene = Scene(person.head(), camera=camera, lights=load_lights("studio"), pose={"jawOpen": 0.4})
     names = (*PARTS, "melanin", "blood", "triangle")

@@ -46,15 +46,15 @@ def atlas(head: Head) -> Atlas:
     return build_atlas(head.mesh, SIDE, "stitched")
 
 
-def spread(device: Device, head: Head, atlas: Atlas, motion: PoseBytes, light: Floats) -> list[Floats]:
+def spread(device: Device, head: Head, atlas: Atlas, pose_bytes: PoseBytes, light: Floats) -> list[Floats]:
     """Return the levels of (n, n, 1) light on a head in motion, each at its resolution."""
     made, textures = make_shape(device, shape_tables(device, head)), upload_atlas(device, atlas)
     most = len(textures.mips_for_blurs("repeated")) - 1
     halvings = choose_halvings(BLURRED, textures.median_texels_per_mm, most)
     space = make_levels(device, SIDE, (halvings,), FLOAT_TEXEL_FORMAT)
-    upload(device, space.stacks[0], np.dstack([light, light, light, atlas.lit[..., None]]))
+    upload(device, space.stacks[0], np.dstack([light, light, light, atlas.lit_mask[..., None]]))
     frame = CommandList(device)
-    shape.draw(frame, made, motion)
+    shape.draw(frame, made, pose_bytes)
     draw_stretch(frame, upload_geometry(device, head.mesh, atlas, made), textures)
     diffuse.draw(frame, space, textures, Blur(BLURRED, np.zeros((len(BLURRED), 3)), halvings))
     frame.submit()
@@ -70,9 +70,11 @@ def test_uniform_light_stays_uniform_in_every_pose(
     device: Device, head: Head, atlas: Atlas, moment: int
 ) -> None:
     moving = with_test_rig(head, 12)
-    motion = pose_at_moment(moving, moment).motion(moving.control)
-    held = PoseBytes(words(motion.positions_mm), words(40 * motion.weights), words(motion.matrices))
-    light = np.ones((SIDE, SIDE, 1)) * atlas.lit[..., None]
+    pose_arrays = pose_at_moment(moving, moment).to_arrays(moving.control_rig)
+    held = PoseBytes(
+        words(pose_arrays.positions_mm), words(40 * pose_arrays.weights), words(pose_arrays.matrices)
+    )
+    light = np.ones((SIDE, SIDE, 1)) * atlas.lit_mask[..., None]
     for level in spread(device, moving, atlas, held, light):
         covered = level[..., 0] > 0
         assert covered.any() and np.abs(level[covered] - 1).max() < FLAT
@@ -85,7 +87,9 @@ def test_scaled_ball_spreads_light_as_a_ball_of_that_size(
     """A Gaussian of variance v reduces light that is linear in x by exp(-v / r^2)."""
     light = np.nan_to_num(shown(atlas, head.mesh, own=True))[..., :1] / RADIUS
     levels = spread(device, head, atlas, PoseBytes(words(scale * head.positions_mm)), light)
-    area = atlas.lit[..., None] / np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
+    area = atlas.lit_mask[..., None] / np.maximum(
+        atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6
+    )
     for variance, level in zip(BLURRED, levels, strict=True):
         if len(level) == SIDE:  # the others are read between their texels
             left = (area * level * light).sum() / (area * light**2).sum()

@@ -114,8 +114,10 @@ def test_moved_wall_occludes_like_a_newly_baked_one(renderer: Renderer, head: He
 def test_open_mouth_occludes_like_a_newly_baked_one(renderer: Renderer) -> None:
     human = Human().head(subdivide=0)
     scene = replace(scene_of(human), environment=SKY, pose=Pose(weights={"jawOpen": 1.0}))
-    assert scene.motion is not None
-    points = human.control.pose(scene.motion.weights.astype(float), scene.motion.matrices.astype(float))
+    assert scene.pose_arrays is not None
+    points = human.control_rig.pose(
+        scene.pose_arrays.weights.astype(float), scene.pose_arrays.matrices.astype(float)
+    )
     found = errors(renderer, human, scene, points, 256, away=True)
     assert found["baked"] < FOLLOWED < found["rest"]  # which is the mean person's
 
@@ -170,13 +172,13 @@ def test_occlusion_runs_only_when_the_shape_changes(renderer: Renderer, head: He
 
 def test_rotation_is_derived_from_points_and_bones() -> None:
     human = Human().head(subdivide=0)
-    anchors, rig = make_head_rotation_points(human), human.control
+    anchors, rig = make_head_rotation_points(human), human.control_rig
     assert np.abs(head_rotation(anchors, rig.rest) - np.eye(3)).max() < 1e-6
-    given = Pose(positions_mm=rig.positions_mm @ TURN.T).motion(rig)
+    given = Pose(positions_mm=rig.positions_mm @ TURN.T).to_arrays(rig)
     assert np.abs(head_rotation(anchors, given) - TURN).max() < 1e-5
-    spine = Pose(bones={"spine": (20.0, 60.0, -10.0)}, weights={"jawOpen": 1.0}).motion(rig)
+    spine = Pose(bones={"spine": (20.0, 60.0, -10.0)}, weights={"jawOpen": 1.0}).to_arrays(rig)
     assert np.abs(head_rotation(anchors, spine) - TURN).max() < 1e-5
-    neck = head_rotation(anchors, Pose(bones={"neck01": (0.0, 50.0, 0.0)}).motion(rig))
+    neck = head_rotation(anchors, Pose(bones={"neck01": (0.0, 50.0, 0.0)}).to_arrays(rig))
     assert 30.0 < np.degrees(np.arccos((np.trace(neck) - 1) / 2)) < 50.0
 
 

@@ -25,7 +25,7 @@ from dermis.scene.frozen_model import field_choices
 from dermis.scene.lights import LIGHTS
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
-from dermis.scene.sources import picture_sources
+from dermis.scene.sources import picture_citation_keys
 from dermis.scene.techniques import TECHNIQUES
 from dermis.specular.albedo import directional_albedo
 from dermis.specular.models import MODELS
@@ -100,7 +100,7 @@ def test_plugin_light_is_drawn_with_other_lights(renderer: Renderer, tmp_path: P
 @pytest.mark.usefixtures("glow")
 def test_plugin_light_is_cited_and_refused_by_cycles(tmp_path: Path) -> None:
     light = from_file(tmp_path)
-    assert "Phong1975" in picture_sources(Skin(specular="none"), Settings(), [light])
+    assert "Phong1975" in picture_citation_keys(Skin(specular="none"), Settings(), [light])
     with pytest.raises(DermisError, match=r"light of Cycles: expected one of point, .*got 'after-glow'"):
         cycles_lamp(light, 1)
 
@@ -128,7 +128,7 @@ def test_plugin_lobe_matches_its_formula(renderer: Renderer) -> None:
 @pytest.mark.usefixtures("chalk")
 def test_plugin_lobe_is_known_to_other_modules() -> None:
     assert field_choices(Skin, "specular")[-2:] == ("blue-chalk", "none")
-    assert "Phong1975" in picture_sources(Skin(specular="blue-chalk"), Settings())
+    assert "Phong1975" in picture_citation_keys(Skin(specular="blue-chalk"), Settings())
     assert directional_albedo([0.2, 0.9], 0.3, MODELS["blue-chalk"].lobe) == pytest.approx(ALBEDO, rel=1e-4)
 
 
@@ -142,7 +142,7 @@ def test_plugin_technique_is_drawn(renderer: Renderer) -> None:
 
     with TECHNIQUES.including("dim", TECHNIQUE):
         assert "dim" in field_choices(Settings, "technique")
-        assert "Borshukov2003" in picture_sources(Skin(), Settings(technique="dim"))
+        assert "Borshukov2003" in picture_citation_keys(Skin(), Settings(technique="dim"))
         dimmed = below("dim")
         assert "dim" in renderer.graph.executed_stages
         middle = (slice(8, -8),) * 2  # away from the map's edges

@@ -46,7 +46,7 @@ def head() -> Head:
 
 @pytest.fixture(scope="module")
 def surface(head: Head) -> PaintedSurface:
-    return painted_surface(head.mesh, head.control.stencils)
+    return painted_surface(head.mesh, head.control_rig.stencils)
 
 
 def painted(device: Device, surface: PaintedSurface, look: SkinLook = BARE, side: int = SIDE) -> Maps:
@@ -193,7 +193,7 @@ def test_the_finest_mesh_is_painted_as_the_coarsest(
 ) -> None:
     """The finest mesh has the largest number of triangles."""
     fine = Human().head(subdivide=3)
-    finest = painted_surface(fine.mesh, fine.control.stencils)
+    finest = painted_surface(fine.mesh, fine.control_rig.stencils)
     assert finest.triangle_count == 16 * surface.triangle_count
     both = [painted(device, one).colour for one in (surface, finest)]
     assert both[0] is not None and both[1] is not None
@@ -233,7 +233,7 @@ def test_raised_brows_deepen_the_forehead_and_leave_the_chin(renderer: Renderer,
         lit = renderer.prepare(scene, chosen).bindings
         found.append(download(renderer.device, lit["relief_map"]).astype(np.float32)[..., :2])
     change = np.abs(found[1] - found[0]).max(axis=-1)
-    surface = painted_surface(head.mesh, head.control.stencils)
+    surface = painted_surface(head.mesh, head.control_rig.stencils)
     kinds = np.array([one.kind == "skin" for one in head.mesh.materials])[head.mesh.material]
     texel, triangle = rasterise(head.mesh, 512, np.flatnonzero(kinds))
     y = np.full(512 * 512, np.nan)
@@ -254,7 +254,7 @@ def test_movements_are_those_of_their_targets() -> None:
 def test_unposed_people_share_the_painted_places() -> None:
     """Positions and fields are those of the average person for all people."""
     one, other = (
-        painted_surface(h.mesh, h.control.stencils) for h in (Human().head(), Human(age=80, sex=1).head())
+        painted_surface(h.mesh, h.control_rig.stencils) for h in (Human().head(), Human(age=80, sex=1).head())
     )
     np.testing.assert_allclose(one.vertices[:, 2:5], other.vertices[:, 2:5], atol=1e-4)
     assert np.array_equal(one.triangles, other.triangles)

@@ -23,7 +23,7 @@ LOOK = SkinLook(freckles=0.5)
 @pytest.fixture(scope="module")
 def surface() -> PaintedSurface:
     head = Human().head()
-    return painted_surface(head.mesh, head.control.stencils)
+    return painted_surface(head.mesh, head.control_rig.stencils)
 
 
 @pytest.fixture

@@ -64,7 +64,7 @@ def test_both_visibility_methods_cut_the_same_holes(renderer: Renderer, compute:
     )
     layers = make_layers(renderer.device, (64, 64), 1, store_triangles=True, use_compute_pass=compute)
     frame = CommandList(renderer.device)
-    shape.draw(frame, inputs.resources.shape.shape, inputs.motion)
+    shape.draw(frame, inputs.resources.shape.shape, inputs.pose_bytes)
     draw_layers(frame, "nearest", layers, replace_samples(inputs.camera_views), inputs.resources.head)
     frame.submit()
     triangle = download(renderer.device, layers.texture, layer=0)

@@ -54,7 +54,7 @@ def test_a_ball_is_lit_past_its_terminator(renderer: Renderer) -> None:
     made = entered(renderer, head_of(BALL), LIGHT)
     atlas = cached_atlas(BALL, SIZE)
     _, normals = twins.surface(atlas, head_of(BALL))
-    told = atlas.lit & (np.hypot(normals[..., 0], normals[..., 2]) > STEEP)
+    told = atlas.lit_mask & (np.hypot(normals[..., 0], normals[..., 2]) > STEEP)
     wanted = expected(normals, RADIUS)
     past = told & (normals[..., 0] < 0.0) & (wanted[..., 1] > 0.05 * wanted.max())
     assert past.sum() > 0.05 * told.sum()  # a good part of what the light does not face
@@ -66,7 +66,7 @@ def test_lambertian_skin_is_dark_past_the_terminator(renderer: Renderer) -> None
     made = entered(renderer, head_of(BALL), LIGHT, direction="lambertian")
     atlas = cached_atlas(BALL, SIZE)
     _, normals = twins.surface(atlas, head_of(BALL))
-    assert not made[atlas.lit & (normals[..., 0] < -0.05)].any()
+    assert not made[atlas.lit_mask & (normals[..., 0] < -0.05)].any()
 
 
 def test_uniform_light_on_a_plane_is_unchanged(renderer: Renderer) -> None:

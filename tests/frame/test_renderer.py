@@ -18,7 +18,7 @@ from dermis.frame.seams import SEAM_METHODS
 from dermis.gpu import CommandList, download
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import build_mesh
-from dermis.mesh.primitives import SKIN, plane, uv_sphere
+from dermis.mesh.primitives import SKIN_MATERIALS, plane, uv_sphere
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
 
@@ -29,7 +29,9 @@ SLAB = head_of(
     bent_plane(50.0, [[0.5, 0, 0.2], [0, 0.9, 0]], 2), colour=np.random.default_rng(0).random((16, 16, 3))
 )
 FLAT = uv_sphere(30.0, 24, 12)
-LEAF = head_of(build_mesh(FLAT.positions * (1, 1, 0.1), FLAT.uv, FLAT.triangles, FLAT.material, SKIN))
+LEAF = head_of(
+    build_mesh(FLAT.positions * (1, 1, 0.1), FLAT.uv, FLAT.triangles, FLAT.material, SKIN_MATERIALS)
+)
 LEANING = head_of(
     bent_plane(50.0, [[0.5, 0.3, 0.1], [0, 0.9, 0]], 2), colour=np.random.default_rng(1).random((16, 16, 3))
 )

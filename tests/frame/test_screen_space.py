@@ -19,7 +19,7 @@ from dermis.frame.techniques.screen_space import (
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.optics.fits.separable import SeparableKernel, preintegrated_kernel
 from dermis.optics.profiles import load_profile
-from dermis.scene.camera import Window
+from dermis.scene.camera import ImageRectangle
 
 Floats = NDArray[np.float64]
 PROFILE = load_profile("gpu-gems-3")
@@ -54,7 +54,7 @@ def spread(device: Device, view: View, light: Floats, depth: Floats) -> Floats:
     upload(device, apart.layers, np.dstack([light, depth]), layer=0)
     upload(device, apart.layers, np.ones((*depth.shape, 4)), layer=1)
     over, frame = make_texture(device, view.size, "rgba32float"), CommandList(device)
-    result = draw(frame, apart, make_kernel(device, PROFILE), Window(view.half, (0.0, 0.0)), over)
+    result = draw(frame, apart, make_kernel(device, PROFILE), ImageRectangle(view.half, (0.0, 0.0)), over)
     frame.submit()
     return download(device, result)[..., :3].astype(float)
 

@@ -17,7 +17,7 @@ from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download, upload
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import build_mesh
-from dermis.mesh.primitives import SKIN, plane, uv_sphere
+from dermis.mesh.primitives import SKIN_MATERIALS, plane, uv_sphere
 from dermis.optics.profiles import load_profile
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene
@@ -200,7 +200,7 @@ def tailed() -> Head:
     v = np.array([0.05, 0.45, 0.05, 0.45, 0.2510, 0.2515, 0.2510, 0.2515])
     triangles = [[2 * k + i for i in corner] for k in range(3) for corner in ((0, 3, 2), (0, 1, 3))]
     positions = np.column_stack([x, y, 0 * x])
-    return head_of(build_mesh(positions, np.column_stack([u, v]), triangles, np.zeros(6), SKIN))
+    return head_of(build_mesh(positions, np.column_stack([u, v]), triangles, np.zeros(6), SKIN_MATERIALS))
 
 
 def test_a_thin_tail_of_a_chart_is_not_left_dark(renderer: Renderer) -> None:

@@ -43,10 +43,10 @@ def rebuilt(mesh: Mesh, points: Floats) -> Mesh:
     return build_mesh(places, mesh.uv, mesh.triangles, mesh.material, mesh.materials, point=mesh.point)
 
 
-def evaluated(device: Device, head: Head, motion: PoseBytes) -> tuple[Shape, NDArray[np.float32]]:
+def evaluated(device: Device, head: Head, pose_bytes: PoseBytes) -> tuple[Shape, NDArray[np.float32]]:
     """Return the shape in motion, and its (v, 16) vertices."""
     made, frame = make_shape(device, shape_tables(device, head)), CommandList(device)
-    shape.draw(frame, made, motion)
+    shape.draw(frame, made, pose_bytes)
     frame.submit()
     table = download(device, made.surface["vertex_table"]).reshape(-1, 16)
     return made, table[: len(head.mesh.positions)]
@@ -112,7 +112,7 @@ def rigged(head: Head) -> Head:
 
 def test_targets_bones_and_stencils_match_the_rig(device: Device, head: Head) -> None:
     moving, weights = rigged(head), np.array([0.6, -0.3])
-    rig = moving.control
+    rig = moving.control_rig
     assert rig.skeleton is not None and rig.stencils is not None
     local = rig.skeleton.local.copy()
     local[1, :3, :3] = [[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]]
@@ -184,7 +184,7 @@ def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Fl
 def test_gutter_sources_at_rest_equal_the_atlas(device: Device, head: Head) -> None:
     """Scale and rotation of the whole head do not change the gutters."""
     atlas = build_atlas(head.mesh, 256, "stitched")
-    sheet = AtlasMip(atlas.coverage, atlas.lit, atlas.edge_distance, atlas.gutter, atlas.source)
+    sheet = AtlasMip(atlas.coverage, atlas.lit_mask, atlas.edge_distance, atlas.gutter, atlas.source)
     turn = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], float)
     for points in (head.positions_mm, head.positions_mm @ turn.T):
         fine, coarse, *_ = sources(device, head, atlas, points)

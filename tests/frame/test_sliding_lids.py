@@ -30,34 +30,37 @@ Floats = NDArray[np.float64]
 
 
 def bare(levels: int = 0) -> Head:
-    return subdivide_head(build_head(Human().weights(), Maps(), "own", EyeLook(redness=0.0)), levels)
+    return subdivide_head(build_head(Human().target_weights(), Maps(), "own", EyeLook(redness=0.0)), levels)
 
 
 def test_lid_sliding_matches_numpy(device: Device) -> None:
     head = bare()
-    rig = head.control
+    rig = head.control_rig
     pose = Pose({"eyeBlinkLeft": 0.5, "eyeBlinkRight": 0.3, "eyeLookDownLeft": 0.6}, {"head": (5, 20, 0)})
-    motion = pose.motion(rig)
+    pose_arrays = pose.to_arrays(rig)
     made, frame = make_shape(device, shape_tables(device, head)), CommandList(device)
     words = (
-        part.astype(np.float32).tobytes() for part in (rig.positions_mm, motion.weights, motion.matrices)
+        part.astype(np.float32).tobytes()
+        for part in (rig.positions_mm, pose_arrays.weights, pose_arrays.matrices)
     )
     shape.draw(frame, made, PoseBytes(*words))
     frame.submit()
     found = np.frombuffer(device.handle.queue.read_buffer(made.surface["points"]), np.float32).reshape(-1, 3)
     assert rig.contact is not None
-    expected = rig.points_mm(motion)
+    expected = rig.posed_points_mm(pose_arrays)
     assert np.abs(found - expected).max() < SHAPE * np.abs(expected).max()
-    free = replace(rig, contact=None).points_mm(motion)
+    free = replace(rig, contact=None).posed_points_mm(pose_arrays)
     assert np.abs(free - expected)[rig.contact.point].max() > 0.3  # it matters here
 
 
 def test_lid_edges_lie_on_the_surface() -> None:
     for levels in (0, 1):
         head = bare(levels)
-        motion = Pose({"eyeWideLeft": 0.8, "jawOpen": 0.3}, {"head": (0, 15, 0)}).motion(head.control)
-        points = replace(head.control, contact=None).points_mm(motion)
-        edges = head.control.lid_edges_mm(motion)
+        pose_arrays = Pose({"eyeWideLeft": 0.8, "jawOpen": 0.3}, {"head": (0, 15, 0)}).to_arrays(
+            head.control_rig
+        )
+        points = replace(head.control_rig, contact=None).posed_points_mm(pose_arrays)
+        edges = head.control_rig.lid_edges_mm(pose_arrays)
         np.testing.assert_allclose(edges, points[lid_rings()[..., 1]], atol=1e-3)
 
 

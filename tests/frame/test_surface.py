@@ -90,8 +90,8 @@ def test_oil_smoothes_a_roughness_map_too(renderer: Renderer) -> None:
 
 
 def test_strength_stays_within_one() -> None:
-    assert Skin(rho_s=0.9, oiliness=1.0).strength == 1.0
-    assert Skin(rho_s=0.9, specular="none").strength == 0.0
+    assert Skin(rho_s=0.9, oiliness=1.0).specular_strength == 1.0
+    assert Skin(rho_s=0.9, specular="none").specular_strength == 0.0
 
 
 class WaxedSkin(Skin):

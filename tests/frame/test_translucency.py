@@ -179,7 +179,7 @@ def test_surface_distances_match_numpy(thin: Thin) -> None:
     nowhere = thin.offset == 0x80008000
     low, high = (along(thin.atlas, thin.taken, thin.given, same) for same in (1.6, 0.4))
     low, high = (far[thin.receiver, thin.source] for far in (low, high))
-    texel = 1.0 / thin.atlas.stretch[thin.atlas.lit].astype(float).min()
+    texel = 1.0 / thin.atlas.stretch[thin.atlas.lit_mask].astype(float).min()
     near, radius = high < thin.cells.radius_mm - 2 * texel, thin.cells.radius_mm
     assert near.mean() > 0.1 and (~near).mean() > 0.1
     assert not nowhere[near].any()

@@ -15,7 +15,7 @@ from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import build_mesh
-from dermis.mesh.primitives import SKIN, plane, uv_sphere
+from dermis.mesh.primitives import SKIN_MATERIALS, plane, uv_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
 
@@ -131,7 +131,11 @@ def test_triangles_crossing_the_camera_plane_are_clipped(renderer: Renderer, com
     floor = plane(400.0)
     head = head_of(
         build_mesh(
-            floor.positions[:, [0, 2, 1]] * [1, 1, -1], floor.uv, floor.triangles, floor.material, SKIN
+            floor.positions[:, [0, 2, 1]] * [1, 1, -1],
+            floor.uv,
+            floor.triangles,
+            floor.material,
+            SKIN_MATERIALS,
         )
     )
     camera = Camera(position=place(head, (0, 30, 0)), target=place(head, (0, 0, -60)), frame_mm=60)

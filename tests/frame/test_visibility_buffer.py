@@ -19,7 +19,7 @@ from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import build_mesh
-from dermis.mesh.primitives import SKIN, plane, uv_sphere
+from dermis.mesh.primitives import SKIN_MATERIALS, plane, uv_sphere
 from dermis.scene.camera import Camera
 
 Floats = NDArray[np.float64]
@@ -38,7 +38,7 @@ def soup(count: int, seed: int = 3) -> Head:
     uv = np.add(cell, [(0.1, 0.1), (0.9, 0.1), (0.1, 0.9)]) / cells
     positions = (middle + side * rng.uniform(-0.5, 0.5, (count, 3, 3))).reshape(-1, 3)
     corners = np.arange(3 * count).reshape(-1, 3)
-    return head_of(build_mesh(positions, uv.reshape(-1, 2), corners, np.zeros(count), SKIN))
+    return head_of(build_mesh(positions, uv.reshape(-1, 2), corners, np.zeros(count), SKIN_MATERIALS))
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def shown(layers: ViewLayers, renderer: Renderer, head: Head, camera: Camera, sa
     settings = settings_of(size=SIZE, samples=samples)
     inputs = renderer.prepare(scene_of(head, frontal(), camera=camera), settings)
     frame = CommandList(renderer.device)
-    shape.draw(frame, inputs.resources.shape.shape, inputs.motion)
+    shape.draw(frame, inputs.resources.shape.shape, inputs.pose_bytes)
     draw_layers(frame, "nearest", layers, inputs.camera_views, inputs.resources.head)
     frame.submit()
     made = [download(renderer.device, layers.texture, layer=k) for k in range(layers.count)]

@@ -9,7 +9,7 @@ from dermis.apps.truths.irradiance_samples import MeshPoints, sample_irradiance
 from dermis.apps.truths.radial_table import GaussianSum as Profile
 from dermis.apps.truths.surface_integral import integrate_exitance
 from dermis.mesh.mesh import Mesh, build_mesh
-from dermis.mesh.primitives import SKIN
+from dermis.mesh.primitives import SKIN_MATERIALS
 from dermis.optics.gaussians import GaussianSum
 
 Floats = NDArray[np.float64]
@@ -37,7 +37,7 @@ def hook(thick: float = 2.2, bend: float = 4.5, length: float = 36.0) -> Mesh:
     row, column = (axis.ravel() for axis in np.mgrid[: len(rows) - 1, : len(line) - 1])
     a, b = row * len(line) + column, (row + 1) * len(line) + column
     triangles = np.column_stack((a, b + 1, a + 1, a, b, b + 1)).reshape(-1, 3)
-    return build_mesh(positions, uv, triangles, np.zeros(len(triangles)), SKIN, normals)
+    return build_mesh(positions, uv, triangles, np.zeros(len(triangles)), SKIN_MATERIALS, normals)
 
 
 def straight(mesh: Mesh, places: Floats, blurred: GaussianSum) -> Floats:

@@ -79,7 +79,7 @@ def unit(vectors: Floats) -> Floats:
 def taking(mesh: Mesh, atlas: Atlas, side: int) -> Points:
     """Return the receivers: middles of cells with texels of their own or beside such cells, in order."""
     own = np.zeros((side + 2, side + 2), bool)
-    y, x = np.stack(np.nonzero(atlas.lit)) * side // atlas.size
+    y, x = np.stack(np.nonzero(atlas.lit_mask)) * side // atlas.size
     for row, column in np.ndindex(3, 3):
         own[y + row, x + column] = True
     middle = ((np.arange(side) + 0.5) * atlas.size / side).astype(np.int64)
@@ -92,7 +92,7 @@ def taking(mesh: Mesh, atlas: Atlas, side: int) -> Points:
 
 def giving(mesh: Mesh, atlas: Atlas, side: int) -> Points:
     """Return the sources: cells with surface of their own, with its centre, area and normal."""
-    y, x = np.nonzero(atlas.lit)
+    y, x = np.nonzero(atlas.lit_mask)
     corners = atlas.corner_uv[atlas.triangle[y, x]].astype(float) * atlas.size
     b = atlas.barycentric[y, x] / 65535.0
     place = np.einsum("nk,nkc->nc", np.column_stack([1 - b.sum(axis=1), b]), corners) - 0.5
@@ -159,7 +159,7 @@ def along(atlas: Atlas, taken: Points, given: Points, same: float) -> Floats:
     same : distance of positions in the atlas that count as one [texel]
     """
     corners = atlas.corner_uv[np.maximum(atlas.triangle, 0)].astype(float)
-    place = np.einsum("yxk,yxkc->yxc", atlas.weights(), corners) * atlas.size - 0.5
+    place = np.einsum("yxk,yxkc->yxc", atlas.barycentric_weights(), corners) * atlas.size - 0.5
     away = np.full((len(taken.texel), len(given.texel)), np.inf)
     rows, columns = np.indices(atlas.triangle.shape)
     for j, texel in enumerate(given.texel):

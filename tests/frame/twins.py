@@ -211,5 +211,5 @@ def surface(atlas: Atlas, head: Head) -> tuple[Floats, Floats]:
     point = atlas.interpolate(head.mesh, head.mesh.positions)
     normal = atlas.interpolate(head.mesh, head.mesh.normals)
     length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
-    covered = atlas.lit[..., None]
+    covered = atlas.lit_mask[..., None]
     return np.where(covered, point, 0.0), np.where(covered, normal / length, 0.0)

@@ -18,7 +18,7 @@ PEOPLE = [
     Human(),
     Human(sex=1.0, age=75, african=1, asian=0, caucasian=0, weight=0.5),
     Human(asian=1, african=0, caucasian=0, age=25),
-    Human.drawn(4),
+    Human.sampled(4),
 ]
 
 
@@ -31,7 +31,9 @@ def knots(head: Head, **pose: float) -> Floats:
     """Return the knots (n, k, 3) in space [mm]."""
     assert head.strands is not None
     points = (
-        head.mesh.points_mm if not pose else head.control.points_mm(Pose.coerce(pose).motion(head.control))
+        head.mesh.points_mm
+        if not pose
+        else head.control_rig.posed_points_mm(Pose.coerce(pose).to_arrays(head.control_rig))
     )
     return head.strands.knot_positions_mm(head.mesh, points)
 
@@ -109,9 +111,9 @@ def test_brows_rise_with_the_skin() -> None:
 
 
 def test_people_at_random_have_hair_of_their_ancestry() -> None:
-    fair = [Human.drawn(seed, caucasian=1.0).hair_eumelanin for seed in range(100)]
-    dark = [one.hair_eumelanin for one in map(Human.drawn, range(300)) if one.caucasian < 0.2]
-    dark += [Human.drawn(seed, skin_ancestry="south asian").hair_eumelanin for seed in range(50)]
+    fair = [Human.sampled(seed, caucasian=1.0).hair_eumelanin for seed in range(100)]
+    dark = [one.hair_eumelanin for one in map(Human.sampled, range(300)) if one.caucasian < 0.2]
+    dark += [Human.sampled(seed, skin_ancestry="south asian").hair_eumelanin for seed in range(50)]
     assert min(dark) > 3.0 and min(fair) < 0.6 and np.median(fair) < 2.5 < 6.0 < np.median(dark)
 
 

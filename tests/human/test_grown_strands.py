@@ -18,8 +18,8 @@ _BY_STYLE = {"long": 0.3, "cornrows": 0.9, "bun": 0.1, "afro": 0.95, "twists": 0
 
 
 def styled(style: str, curl: float, seed: int = 5, **look: Any) -> Head:
-    person = Human.drawn(seed)
-    hair = replace(person.hairdo, style=style, length_mm=styles()[style].length_mm, curl=curl, **look)
+    person = Human.sampled(seed)
+    hair = replace(person.hair_look, style=style, length_mm=styles()[style].length_mm, curl=curl, **look)
     return replace(person, hair=hair).head()
 
 

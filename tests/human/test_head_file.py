@@ -15,7 +15,7 @@ from dermis.human.person_file import write_person_glb
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 
-PERSON = Human.drawn(7)
+PERSON = Human.sampled(7)
 SAME_MM = 0.02  # no eye sees it; displacements below a thousandth are left out
 EXPRESSIONS = (Pose({"jawOpen": 1.0}), Pose({"mouthSmileLeft": 1.0, "eyeBlinkRight": 0.5}))
 TURNS = (Pose(bones={"head": (0, 25, 0)}), Pose({"jawOpen": 0.5}, {"head": (15, 0, 10), "eye.L": (0, 20, 0)}))
@@ -29,8 +29,8 @@ def written(folder: Path, head: Head, **more: object) -> Path:
 
 def posed_mm(head: Head, pose: Pose) -> np.ndarray:
     """Return the vertices (v, 3) in a pose without lid contact, which files do not have."""
-    rig = replace(head.control, contact=None)
-    return np.asarray(rig.points_mm(pose.motion(rig))[head.mesh.point])
+    rig = replace(head.control_rig, contact=None)
+    return np.asarray(rig.posed_points_mm(pose.to_arrays(rig))[head.mesh.point])
 
 
 def in_file(head: Head) -> np.ndarray:
@@ -126,7 +126,9 @@ def test_the_persons_own_eyes_stand_where_the_written_ones_are(tmp_path: Path) -
     back = load_head(written(tmp_path, head), subdivide=0)
     assert head.eyes is not None and back.eyes is not None and back.bones == head.bones
     for pose in (Pose(), Pose(bones={"eye.L": (4.0, 12.0, 0.0), "head": (5.0, 10.0, 0.0)})):
-        (own, found) = (one.eyes.eye_matrices(one.control, pose.motion(one.control)) for one in (head, back))
+        (own, found) = (
+            one.eyes.eye_matrices(one.control_rig, pose.to_arrays(one.control_rig)) for one in (head, back)
+        )
         places = np.linalg.inv(own)[:, :3, 3]
         np.testing.assert_allclose(np.linalg.inv(found)[:, :3, 3], places, atol=0.3)
         ways = [one[:, 2, :3] / np.linalg.norm(one[:, 2, :3], axis=1, keepdims=True) for one in (own, found)]

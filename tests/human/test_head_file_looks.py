@@ -23,7 +23,7 @@ from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import LIMBUS_MM, EyeTextures, eye_uv, surface_distance_mm
 
 LOOK = EyeLook(eumelanin=0.1, pupil_mm=2.5, redness=0.0, seed=3)
-PERSON = replace(Human.drawn(7), eyes=LOOK)
+PERSON = replace(Human.sampled(7), eyes=LOOK)
 SIDE = 256
 
 
@@ -135,10 +135,10 @@ def test_lashes_go_along_with_a_lid(path: Path) -> None:
     rest = document.read_floats(found["attributes"]["POSITION"]) * 1e3
     strands = head.strands
     assert strands is not None
-    rig = head.control
-    points = rig.points_mm(Pose({"eyeBlinkLeft": 1.0}).motion(rig))
+    rig = head.control_rig
+    points = rig.posed_points_mm(Pose({"eyeBlinkLeft": 1.0}).to_arrays(rig))
     before, after = (
-        strands.knot_positions_mm(head.mesh, p)[:, -1] for p in (rig.points_mm(rig.rest), points)
+        strands.knot_positions_mm(head.mesh, p)[:, -1] for p in (rig.posed_points_mm(rig.rest), points)
     )
     tip = np.arange(len(strands)) * 13 + 12
     np.testing.assert_allclose(rest[tip], before, atol=0.01)

@@ -42,7 +42,9 @@ def hair(head: Head) -> Strands:
 def knots(head: Head, **pose: float) -> Floats:
     """Return the knots (n, k, 3) in space [mm]."""
     points = (
-        head.mesh.points_mm if not pose else head.control.points_mm(Pose.coerce(pose).motion(head.control))
+        head.mesh.points_mm
+        if not pose
+        else head.control_rig.posed_points_mm(Pose.coerce(pose).to_arrays(head.control_rig))
     )
     assert head.hair is not None
     strands = grow_strands(head.hair, head.mesh, points, len(head.hair))
@@ -150,34 +152,34 @@ def test_brows_lie_on_all_skin(monkeypatch: pytest.MonkeyPatch, seed: int) -> No
     def every(root_finder: RootFinder) -> NDArray[np.int64]:
         return np.arange(len(root_finder.subdivided_mesh.positions))
 
-    some = Human.drawn(seed).head().strands
+    some = Human.sampled(seed).head().strands
     monkeypatch.setattr(groom, "skin_vertices_near_brows", every)
-    whole = Human.drawn(seed).head().strands
+    whole = Human.sampled(seed).head().strands
     assert some is not None and whole is not None and np.array_equal(some.knots_mm, whole.knots_mm)
 
 
 def test_recession_bares_temples_and_crown() -> None:
     temple, crown = np.array([[33.0, 75.0, -12.0, -50.0]]), np.array([[0.0, 95.0, -122.0, -50.0]])
     middle = np.array([[0.0, 100.0, -50.0, -50.0]])
-    full, thin = density.scalp_density(0.0).relative, density.scalp_density(1.0).relative
+    full, thin = density.scalp_density(0.0).relative_density, density.scalp_density(1.0).relative_density
     assert full(temple) > 0.4 > 0.05 > thin(temple)
     assert full(crown) > 0.95 and thin(crown) < 0.3 and thin(middle) > 0.9 * full(middle)
 
 
 def test_hair_depends_on_the_person() -> None:
-    people = [Human.drawn(seed) for seed in range(200)]
+    people = [Human.sampled(seed) for seed in range(200)]
     men, women = ([one for one in people if (one.sex > 0.5) == man] for man in (True, False))
-    bald = [np.mean([one.hairdo.style == "none" for one in group]) for group in (men, women)]
+    bald = [np.mean([one.hair_look.style == "none" for one in group]) for group in (men, women)]
     assert 0.04 < bald[0] < 0.25 and bald[1] < 0.1
-    assert not any(one.hairdo.beard_mm for one in women) and any(one.hairdo.beard_mm > 3 for one in men)
-    coiled = {one.hairdo.style for one in people if one.hairdo.curl > 0.6}
+    assert not any(one.hair_look.beard_mm for one in women) and any(one.hair_look.beard_mm > 3 for one in men)
+    coiled = {one.hair_look.style for one in people if one.hair_look.curl > 0.6}
     assert "afro" in coiled and "long" not in coiled
-    assert {"long", "bob", "ponytail"} <= {one.hairdo.style for one in women}
+    assert {"long", "bob", "ponytail"} <= {one.hair_look.style for one in women}
     assert all(one.look.recession == 0.0 for one in women)
     assert np.mean([one.look.recession for one in men if one.age > 55]) > np.mean(
         [one.look.recession for one in men if one.age < 40]
     )
-    assert Human(age=85).hairdo.grey > 0.5 > Human(age=30).hairdo.grey == 0.0
+    assert Human(age=85).hair_look.grey > 0.5 > Human(age=30).hair_look.grey == 0.0
     assert Human(hair=HairLook()).head(subdivide=0).hair is None
 
 
@@ -200,6 +202,6 @@ def test_invalid_hair_is_refused(bad: dict[str, object]) -> None:
 
 def test_places_on_the_average_person_are_below_the_crown() -> None:
     """Check also the edge of the chest, which the file stores far above."""
-    places = density.average_points()[:, :3]
+    places = density.average_control_points()[:, :3]
     assert places[:, 1].max() < 130.0 and places[:, 1].min() < -330.0
     assert (knots(grown("cropped"))[:, 0, 1] > -110.0).all()

@@ -20,7 +20,7 @@ from dermis.images.io import read_image
 from dermis.mesh.head import Head
 
 SCRIPT = Path(__file__).with_name("opened_in_blender.py")
-PERSON = Human.drawn(7)
+PERSON = Human.sampled(7)
 MOVES = {
     "rest": Pose(),
     "moved": Pose({"mouthSmileLeft": 1.0}),
@@ -68,8 +68,8 @@ def test_names_are_those_of_the_head(told: dict[str, Any], head: Head) -> None:
 @pytest.mark.parametrize("move", MOVES)
 def test_vertices_move_as_a_pose_says(folder: Path, head: Head, move: str) -> None:
     """Compare vertices; in Blender Z is up and -Y is the front."""
-    motion = MOVES[move].motion(head.control)
-    meant = head.control.points_mm(motion)[head.mesh.point]
+    pose_arrays = MOVES[move].to_arrays(head.control_rig)
+    meant = head.control_rig.posed_points_mm(pose_arrays)[head.mesh.point]
     with np.load(folder / "places.npz") as found:
         x, y, z = 1e3 * found[move][: len(meant)].T  # hairs come last
     assert np.abs(np.column_stack([x, z, -y]) - meant).max() < SAME_MM

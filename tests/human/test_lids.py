@@ -41,22 +41,22 @@ POSES: list[Mapping[str, float]] = [
 
 
 def person_of(seed: int | None) -> Human:
-    return Human() if seed is None else Human.drawn(seed)
+    return Human() if seed is None else Human.sampled(seed)
 
 
 @cache
 def head_of(seed: int | None) -> Head:
     person = person_of(seed)
-    return subdivide_head(build_head(person.weights(), Maps(), "own", person.iris), 1)
+    return subdivide_head(build_head(person.target_weights(), Maps(), "own", person.iris), 1)
 
 
 def rings(seed: int | None, weights: Mapping[str, float]) -> tuple[Floats, Floats]:
     """Return the left eye's rings (28, 4, 3) in the eye's coordinates, and their distances from it [mm]."""
     head = head_of(seed)
     assert head.eyes is not None
-    motion = Pose(weights).motion(head.control)
-    points = head.control.points_mm(motion)[lid_rings()[0]]
-    frame = head.eyes.eye_matrices(head.control, motion)[0]
+    pose_arrays = Pose(weights).to_arrays(head.control_rig)
+    points = head.control_rig.posed_points_mm(pose_arrays)[lid_rings()[0]]
+    frame = head.eyes.eye_matrices(head.control_rig, pose_arrays)[0]
     own = points @ frame[:3, :3].T + frame[:3, 3]
     far, surface = radial_distances_mm(own, np.array([0.0, 0.0, 1.0]))
     return own, far - surface
@@ -84,11 +84,11 @@ def test_targets_together_take_no_lid_into_the_eye(seed: int | None) -> None:
 @pytest.mark.parametrize("seed", PEOPLE)
 def test_without_contact_a_lid_that_travels_straight_cuts_into_the_eye(seed: int | None) -> None:
     head = head_of(seed)
-    rig = head.control
+    rig = head.control_rig
     assert rig.contact is not None
-    motion = Pose({"eyeBlinkLeft": 0.5}).motion(rig)
+    pose_arrays = Pose({"eyeBlinkLeft": 0.5}).to_arrays(rig)
     straight = rig.positions_mm.astype(float)
-    each = np.repeat(motion.weights, np.diff(rig.targets.first))
+    each = np.repeat(pose_arrays.weights, np.diff(rig.targets.first))
     np.add.at(straight, rig.targets.point, each[:, None] * rig.targets.delta_mm)
     moved = np.linalg.norm(rig.contact.push_out(straight) - straight, axis=1)
     assert 0.4 < moved.max() < 2.5
@@ -106,7 +106,7 @@ def test_closed_lids_touch(seed: int | None) -> None:
 @pytest.mark.parametrize("seed", PEOPLE)
 def test_seen_from_the_front_the_opening_stays_as_published(seed: int | None) -> None:
     person = person_of(seed)
-    places = morphed_points_mm(person.weights())
+    places = morphed_points_mm(person.target_weights())
     head = head_of(seed)
     crest = lid_rings()[..., CREST]
     off = head.positions_mm[crest] - places[crest]
@@ -128,23 +128,23 @@ def test_skin_far_from_the_eyes_stays_where_it_is() -> None:
 
 def test_lids_fit_other_people() -> None:
     """Check that contact uses the positions of that person's eyes."""
-    head, other = head_of(None), Human.drawn(7)
-    motion = Pose({"eyeBlinkLeft": 0.5}, positions_mm=other.positions_mm).motion(head.control)
+    head, other = head_of(None), Human.sampled(7)
+    pose_arrays = Pose({"eyeBlinkLeft": 0.5}, positions_mm=other.positions_mm).to_arrays(head.control_rig)
     assert head.eyes is not None
-    points = head.control.points_mm(motion)[lid_rings()[0]]
-    frame = head.eyes.eye_matrices(head.control, motion)[0]
+    points = head.control_rig.posed_points_mm(pose_arrays)[lid_rings()[0]]
+    frame = head.eyes.eye_matrices(head.control_rig, pose_arrays)[0]
     far, surface = radial_distances_mm(points @ frame[:3, :3].T + frame[:3, 3], np.array([0.0, 0.0, 1.0]))
     assert (far - surface)[ON_BALL, CREST].min() > 0.0
 
 
 def test_targets_are_corrected_wherever_they_move_a_lid() -> None:
     """Compare with a correction of both eyes for each target; blinks move the other eye's inner corner."""
-    places = morphed_points_mm(Human.drawn(3).weights())
+    places = morphed_points_mm(Human.sampled(3).target_weights())
     sockets = _eye_sockets(places)
     found, resting = fit_lid_targets(places, sockets), fit_lids(places, sockets)
     targets = expression_targets()
     for name in ("eyeBlinkLeft", "eyeLookOutRight", "eyeLookUpLeft", "eyeWideRight"):
-        part, moved = targets.displacement_rows(targets.index[name]), places.copy()
+        part, moved = targets.displacement_rows(targets.index_by_name[name]), places.copy()
         point = targets.point[part]
         moved[point] += targets.delta_mm[part]
         drawn = fit_lids(moved, sockets, "Blink" in name, gaze_axes().get(name, lids.REST_GAZE))

@@ -90,7 +90,7 @@ def test_the_neck_has_less_blood_than_the_cheek() -> None:
 
 @pytest.mark.parametrize("angle", [-60.0, -30.0, 0.0, 30.0, 60.0])
 def test_people_have_the_ita_that_is_asked_for(angle: float) -> None:
-    people = [Human(ita=angle), *(Human.drawn(seed, ita=angle) for seed in range(6))]
+    people = [Human(ita=angle), *(Human.sampled(seed, ita=angle) for seed in range(6))]
     people += [Human(ita=angle, african=1, asian=0, caucasian=0), Human(ita=angle, skin_ancestry="asian")]
     for person in people:
         assert ita(person) == pytest.approx(angle, abs=0.05)
@@ -98,25 +98,25 @@ def test_people_have_the_ita_that_is_asked_for(angle: float) -> None:
 
 
 def test_ancestry_follows_the_ita_unless_it_is_given() -> None:
-    dark, light = ([Human.drawn(seed, ita=angle) for seed in range(30)] for angle in (-55.0, 45.0))
+    dark, light = ([Human.sampled(seed, ita=angle) for seed in range(30)] for angle in (-55.0, 45.0))
     assert np.mean([one.african for one in dark]) > 0.6
     assert np.mean([one.african for one in light]) < 0.1
-    given = Human.drawn(3, ita=-55.0, asian=1.0)
+    given = Human.sampled(3, ita=-55.0, asian=1.0)
     assert (given.asian, given.african) == (1.0, 0.0) and ita(given) == pytest.approx(-55.0, abs=0.05)
 
 
 def test_skin_and_shape_vary_apart() -> None:
-    plain, other = (Human.drawn(4, african=1.0, **more) for more in ({}, {"skin_ancestry": "japanese"}))
+    plain, other = (Human.sampled(4, african=1.0, **more) for more in ({}, {"skin_ancestry": "japanese"}))
     assert np.array_equal(plain.positions_mm, other.positions_mm)
     assert lab(mean_colour(other.look))[0] > lab(mean_colour(plain.look))[0] + 8.0
-    shape = Human.drawn(4, skin_ancestry="south asian")
+    shape = Human.sampled(4, skin_ancestry="south asian")
     assert shape.caucasian > 0.3 and shape.hair_eumelanin > 4.0
 
 
 def test_given_values_are_kept() -> None:
-    person = Human.drawn(7, skin={"melanin": 0.123, "blood": 0.02})
+    person = Human.sampled(7, skin={"melanin": 0.123, "blood": 0.02})
     assert (person.look.melanin, person.look.blood) == (0.123, 0.02)
-    assert replace_pigments(person) == replace_pigments(Human.drawn(7))
+    assert replace_pigments(person) == replace_pigments(Human.sampled(7))
 
 
 def replace_pigments(person: Human) -> dict[str, object]:
@@ -125,11 +125,11 @@ def replace_pigments(person: Human) -> dict[str, object]:
 
 def test_contradictions_and_unknown_names_are_refused() -> None:
     with pytest.raises(DermisError, match=r"ita: expected an ITA or the melanin"):
-        Human.drawn(1, ita=10, skin={"melanin": 0.1})
+        Human.sampled(1, ita=10, skin={"melanin": 0.1})
     with pytest.raises(DermisError, match=r"skin_ancestry: expected one of caucasian"):
         Human(skin_ancestry="martian")
     with pytest.raises(DermisError, match=r"ita: expected a number from -65 to 70"):
-        Human.drawn(1, ita=75)
+        Human.sampled(1, ita=75)
 
 
 def test_hair_and_eyes_follow_the_skin() -> None:
@@ -139,7 +139,7 @@ def test_hair_and_eyes_follow_the_skin() -> None:
 
 
 def test_one_colour_is_computed_in_two_ways() -> None:
-    look = Human.drawn(2).look
+    look = Human.sampled(2).look
     values = [np.log2(look.melanin), np.log2(look.blood), look.oxygen, np.log2(look.epidermis_mm)]
     table = skin_colour_table(look.eumelanin, look.oxygen, look.epidermis_mm)
     colour = table.lookup(np.array([look.melanin]), np.array([look.blood]))[0]

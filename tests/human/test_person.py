@@ -30,7 +30,7 @@ def head() -> Head:
 
 def test_shares_of_ancestry_sex_and_age_add_up() -> None:
     person = Human(african=0.2, asian=0.4, caucasian=0.2, sex=0.3, age=50)
-    found = person.weights()
+    found = person.target_weights()
     assert sum(found.values()) == pytest.approx(1.0)
     old = (50 - 25) / 65
     assert found["macrodetails/asian-male-old"] == pytest.approx(0.5 * 0.3 * old)
@@ -38,10 +38,10 @@ def test_shares_of_ancestry_sex_and_age_add_up() -> None:
 
 
 def test_the_average_build_needs_no_target() -> None:
-    assert not any("universal" in name for name in Human().weights())
-    heavy = Human(age=25, weight=1.0).weights()
+    assert not any("universal" in name for name in Human().target_weights())
+    heavy = Human(age=25, weight=1.0).target_weights()
     assert heavy["macrodetails/universal-female-young-averagemuscle-maxweight"] == 1.0
-    both = Human(age=25, weight=0.5, muscle=-0.5).weights()
+    both = Human(age=25, weight=0.5, muscle=-0.5).target_weights()
     assert both["macrodetails/universal-female-young-minmuscle-maxweight"] == 0.25
     assert sum(weight for name, weight in both.items() if "universal" in name) == pytest.approx(0.75)
 
@@ -58,17 +58,17 @@ def test_people_between_two_lie_between_them() -> None:
 def test_any_head_is_any_person_by_its_points(head: Head) -> None:
     person = Human(sex=1.0, age=70, targets={"nose/nose-hump-incr": 0.8})
     assert np.array_equal(person.head(subdivide=0).positions_mm, person.positions_mm)
-    motion = Pose(positions_mm=person.positions_mm).motion(head.control)
-    assert np.abs(head.control.points_mm(motion) - person.positions_mm).max() < 1e-3
+    pose_arrays = Pose(positions_mm=person.positions_mm).to_arrays(head.control_rig)
+    assert np.abs(head.control_rig.posed_points_mm(pose_arrays) - person.positions_mm).max() < 1e-3
 
 
 def test_the_same_seed_is_the_same_person() -> None:
-    assert Human.drawn(5) == Human.drawn(5) != Human.drawn(6)
-    assert np.array_equal(Human.drawn(5).positions_mm, Human.drawn(5).positions_mm)
+    assert Human.sampled(5) == Human.sampled(5) != Human.sampled(6)
+    assert np.array_equal(Human.sampled(5).positions_mm, Human.sampled(5).positions_mm)
 
 
 def test_a_thousand_people_are_adults_of_all_kinds() -> None:
-    people = [Human.drawn(seed) for seed in range(1000)]
+    people = [Human.sampled(seed) for seed in range(1000)]
     ages = np.array([one.age for one in people])
     sexes = np.array([one.sex for one in people])
     assert 35 < ages.mean() < 60 and ages.std() > 10
@@ -81,7 +81,7 @@ def test_a_thousand_people_are_adults_of_all_kinds() -> None:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_faces_at_random_are_faces(seed: int) -> None:
-    places = Human.drawn(seed).positions_mm
+    places = Human.sampled(seed).positions_mm
     assert np.isfinite(places).all()
     low, high = places.min(axis=0), places.max(axis=0)
     assert 75 < high[1] < 150 and 300 < high[0] - low[0] < 600  # crown over the eyes; upper arms
@@ -126,11 +126,11 @@ def _border(triangles: np.ndarray, places: np.ndarray) -> set[frozenset[tuple[fl
 
 
 def test_bones_move_what_they_should(head: Head) -> None:
-    rest, rig = head.positions_mm, head.control
+    rest, rig = head.positions_mm, head.control_rig
 
     def moved(bone: str, degrees: tuple[float, float, float]) -> np.ndarray:
-        motion = Pose(bones={bone: degrees}).motion(rig)
-        return np.linalg.norm(rig.points_mm(motion) - rest, axis=1)
+        pose_arrays = Pose(bones={bone: degrees}).to_arrays(rig)
+        return np.linalg.norm(rig.posed_points_mm(pose_arrays) - rest, axis=1)
 
     skull = rest[:, 1] > 60
     chin = (rest[:, 1] < -85) & (rest[:, 2] > 10) & (rest[:, 1] > -110)
@@ -176,7 +176,7 @@ def test_unknown_targets_and_seeds_are_refused() -> None:
     with pytest.raises(DermisError, match="expected a published target"):
         _ = Human(targets={"wings": 1.0}).positions_mm
     with pytest.raises(DermisError, match="seed: expected a whole number"):
-        Human.drawn(-1)
+        Human.sampled(-1)
 
 
 def test_maps_of_files_leave_the_others_painted(tmp_path: Path) -> None:
@@ -188,12 +188,12 @@ def test_maps_of_files_leave_the_others_painted(tmp_path: Path) -> None:
 
 
 def test_a_look_is_put_on_painted_people_alone(head: Head) -> None:
-    person = Human.drawn(5)
-    dressed = person.on(head)
+    person = Human.sampled(5)
+    dressed = person.transfer_skin_to(head)
     assert isinstance(dressed.maps, PaintedMaps) and dressed.maps.look == person.look
     assert dressed.mesh is head.mesh and dressed.eyes is not None and dressed.eyes.look == person.iris
     with pytest.raises(DermisError, match="painted skin"):
-        person.on(replace(head, maps=Maps()))
+        person.transfer_skin_to(replace(head, maps=Maps()))
 
 
 def test_levels_that_cannot_be_are_refused() -> None:
@@ -202,7 +202,7 @@ def test_levels_that_cannot_be_are_refused() -> None:
 
 
 def test_sizes_of_tables_are_theirs() -> None:
-    folds = face.fold_curves()
+    folds = face.skin_folds()
     tables = {
         "zones": face.zone_table(),
         "folds": folds.curves,

@@ -18,7 +18,7 @@ from dermis.human.skin.measured import SiteDifferences
 
 @pytest.mark.parametrize("seed", [0, 7, 12])
 def test_the_same_person_comes_back(tmp_path: Path, seed: int) -> None:
-    person = Human.drawn(seed)
+    person = Human.sampled(seed)
     write_person_json(tmp_path / "one.json", person)
     found = read_person(tmp_path / "one.json")
     assert np.array_equal(found.positions_mm, person.positions_mm)
@@ -74,6 +74,6 @@ def test_what_is_no_person_is_refused(tmp_path: Path, text: str) -> None:
 
 
 def test_numbers_are_plain(tmp_path: Path) -> None:
-    write_person_json(tmp_path / "one.json", Human.drawn(3))
+    write_person_json(tmp_path / "one.json", Human.sampled(3))
     told: dict[str, Any] = json.loads((tmp_path / "one.json").read_text())["person"]
-    assert told["skin"]["melanin"] == Human.drawn(3).look.melanin and isinstance(told["targets"], dict)
+    assert told["skin"]["melanin"] == Human.sampled(3).look.melanin and isinstance(told["targets"], dict)

@@ -140,7 +140,7 @@ def test_landmarks_of_the_human_lie_on_its_outer_skin() -> None:
 
 
 @pytest.mark.parametrize(
-    ("person", "unlike"), [(AVERAGE_HUMAN, 0.05), (Human(sex=1, age=80), 0.05), (Human.drawn(4), 0.25)]
+    ("person", "unlike"), [(AVERAGE_HUMAN, 0.05), (Human(sex=1, age=80), 0.05), (Human.sampled(4), 0.25)]
 )
 def test_people_have_all_regions_on_both_sides(person: Human, unlike: float) -> None:
     right, left = _areas(person.head(), load_region_table("default"), 1024)

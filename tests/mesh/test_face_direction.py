@@ -28,7 +28,7 @@ def turned(positions: np.ndarray, quarters: int) -> np.ndarray:
 
 @cache
 def person(seed: int) -> Mesh:
-    return Human.drawn(seed).head(subdivide=1).mesh
+    return Human.sampled(seed).head(subdivide=1).mesh
 
 
 @TURNS

@@ -31,7 +31,7 @@ def head(path: Path, **options: object) -> Head:
 def eyes_of(made: Head, pose: Pose | None = None) -> tuple[Floats, Floats, Floats]:
     """Return the centres of the balls [mm], their directions of gaze, and radii [mm]."""
     assert made.eyes is not None
-    frames = made.eyes.eye_matrices(made.control, (pose or Pose()).motion(made.control))
+    frames = made.eyes.eye_matrices(made.control_rig, (pose or Pose()).to_arrays(made.control_rig))
     scale = np.linalg.norm(frames[:, 2, :3], axis=1)
     middle = np.column_stack([np.zeros((2, 2)), made.eyes.centre_offset_mm])
     inverse = np.linalg.inv(frames)
@@ -149,7 +149,7 @@ def test_subdivision_keeps_eyes_round(tmp_path: Path) -> None:
     middles, _, radii = eyes_of(made)
     np.testing.assert_allclose(middles, [EYE_MM, EYE_MM * MIRROR], atol=0.05)
     np.testing.assert_allclose(radii, 12.0, rtol=5e-3)
-    posed = made.control.points_mm(made.control.rest)[made.mesh.point]
+    posed = made.control_rig.posed_points_mm(made.control_rig.rest)[made.mesh.point]
     np.testing.assert_allclose(posed, made.mesh.positions, atol=1e-3)
 
 

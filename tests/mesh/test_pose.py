@@ -38,28 +38,28 @@ def _origins() -> np.ndarray:
 
 
 def test_empty_pose_is_the_rest_pose() -> None:
-    motion = Pose().motion(RIG)
-    np.testing.assert_array_equal(motion.weights, np.zeros(8))
-    np.testing.assert_allclose(motion.matrices, np.tile(np.eye(3, 4), (4, 1, 1)), atol=1e-4)
-    assert motion.positions_mm is RIG.positions_mm
-    assert [one.dtype for one in motion] == [np.float32] * 3
+    pose_arrays = Pose().to_arrays(RIG)
+    np.testing.assert_array_equal(pose_arrays.weights, np.zeros(8))
+    np.testing.assert_allclose(pose_arrays.matrices, np.tile(np.eye(3, 4), (4, 1, 1)), atol=1e-4)
+    assert pose_arrays.positions_mm is RIG.positions_mm
+    assert [one.dtype for one in pose_arrays] == [np.float32] * 3
 
 
 def test_weights_are_stored_by_target() -> None:
-    motion = Pose({"target6": 0.25, "target1": -2}).motion(RIG)
-    assert motion.weights.tolist() == [0, -2, 0, 0, 0, 0, 0.25, 0]
+    pose_arrays = Pose({"target6": 0.25, "target1": -2}).to_arrays(RIG)
+    assert pose_arrays.weights.tolist() == [0, -2, 0, 0, 0, 0, 0.25, 0]
 
 
 def test_weights_count_from_those_at_rest() -> None:
     targets = replace(RIG.targets, rest=np.array([0.5, 0, 0, 0, 0, 0, 0, 0.25], np.float32))
-    motion = Pose({"target0": 0.0, "target1": 1.0}).motion(Rig(RIG.positions_mm, targets))
-    assert motion.weights.tolist() == [-0.5, 1, 0, 0, 0, 0, 0, 0]
-    assert motion.matrices.shape == (0, 3, 4)
+    pose_arrays = Pose({"target0": 0.0, "target1": 1.0}).to_arrays(Rig(RIG.positions_mm, targets))
+    assert pose_arrays.weights.tolist() == [-0.5, 1, 0, 0, 0, 0, 0, 0]
+    assert pose_arrays.matrices.shape == (0, 3, 4)
 
 
 def test_angles_rotate_about_head_axes_at_the_bone() -> None:
     neck, jaw = (10.0, -40.0, 25.0), (20.0, 0.0, 0.0)
-    matrices = Pose(bones={"jaw": jaw, "neck": neck}).motion(RIG).matrices
+    matrices = Pose(bones={"jaw": jaw, "neck": neck}).to_arrays(RIG).matrices
     origins = _origins()
     turned = _about(origins[1], neck)
     expected = [np.eye(4), turned, turned, turned @ _about(origins[3], jaw)]
@@ -67,11 +67,11 @@ def test_angles_rotate_about_head_axes_at_the_bone() -> None:
 
 
 def test_nod_does_not_depend_on_bone_orientation() -> None:
-    motion = Pose(bones={"head": (30.0, 0.0, 0.0)}).motion(RIG)
+    pose_arrays = Pose(bones={"head": (30.0, 0.0, 0.0)}).to_arrays(RIG)
     nose = np.array([0.0, -70.0, 100.0])
-    moved = motion.matrices[2, :, :3] @ nose + motion.matrices[2, :, 3]
+    moved = pose_arrays.matrices[2, :, :3] @ nose + pose_arrays.matrices[2, :, 3]
     assert moved[0] == pytest.approx(0, abs=1e-3) and moved[1] < nose[1] - 40  # down, not to a side
-    turned = Pose(bones={"head": (0.0, 30.0, 0.0)}).motion(RIG).matrices[2]
+    turned = Pose(bones={"head": (0.0, 30.0, 0.0)}).to_arrays(RIG).matrices[2]
     assert (turned[:, :3] @ nose + turned[:, 3])[0] > 40  # to the head's own left
 
 
@@ -83,11 +83,11 @@ def test_matrices_are_relative_to_rest(bones: tuple[str, ...]) -> None:
         change = np.eye(4)
         change[:3, :3] = Rotation.random(random_state=7).as_matrix() * rng.uniform(0.8, 1.2)
         change[:3, 3] = rng.normal(scale=0.01, size=3)
-        local[SKELETON.index[name]] = local[SKELETON.index[name]] @ change
-    pose = Pose(bones={name: local[SKELETON.index[name]] for name in bones})
-    np.testing.assert_allclose(pose.motion(RIG).matrices, SKELETON.matrices(local), atol=2e-4)
-    listed = Pose(bones={name: local[SKELETON.index[name]].tolist() for name in bones})
-    np.testing.assert_array_equal(listed.motion(RIG).matrices, pose.motion(RIG).matrices)
+        local[SKELETON.index_by_name[name]] = local[SKELETON.index_by_name[name]] @ change
+    pose = Pose(bones={name: local[SKELETON.index_by_name[name]] for name in bones})
+    np.testing.assert_allclose(pose.to_arrays(RIG).matrices, SKELETON.matrices(local), atol=2e-4)
+    listed = Pose(bones={name: local[SKELETON.index_by_name[name]].tolist() for name in bones})
+    np.testing.assert_array_equal(listed.to_arrays(RIG).matrices, pose.to_arrays(RIG).matrices)
 
 
 @pytest.mark.parametrize("moved", [5, 30])
@@ -110,8 +110,8 @@ def test_many_bones_match_few_bones(moved: int) -> None:
         chosen = rng.permutation(30)[:moved]
         posed[chosen, :3, :3] = Rotation.random(moved, random_state=2).as_matrix()
         pose = Pose(bones={names[k]: posed[k] for k in chosen})
-        motion = pose.motion(Rig(RIG.positions_mm, skeleton=skeleton))
-        np.testing.assert_allclose(motion.matrices, skeleton.matrices(posed), atol=tolerance)
+        pose_arrays = pose.to_arrays(Rig(RIG.positions_mm, skeleton=skeleton))
+        np.testing.assert_allclose(pose_arrays.matrices, skeleton.matrices(posed), atol=tolerance)
 
 
 def test_bones_bound_elsewhere_than_they_rest() -> None:
@@ -122,14 +122,14 @@ def test_bones_bound_elsewhere_than_they_rest() -> None:
     rig = Rig(RIG.positions_mm, RIG.targets, shifted)
     local = SKELETON.local.copy()
     local[1] = local[1] @ _about(np.zeros(3), (0, 0, 30))
-    motion = Pose(bones={"neck": local[1]}).motion(rig)
-    np.testing.assert_allclose(motion.matrices, shifted.matrices(local), atol=5e-4)
+    pose_arrays = Pose(bones={"neck": local[1]}).to_arrays(rig)
+    np.testing.assert_allclose(pose_arrays.matrices, shifted.matrices(local), atol=5e-4)
 
 
 def test_given_positions_are_used_unchanged() -> None:
     places = RIG.positions_mm + np.float32(1)
-    assert Pose(positions_mm=places).motion(RIG).positions_mm is places
-    listed = Pose(positions_mm=places.astype(float).tolist()).motion(RIG).positions_mm
+    assert Pose(positions_mm=places).to_arrays(RIG).positions_mm is places
+    listed = Pose(positions_mm=places.astype(float).tolist()).to_arrays(RIG).positions_mm
     np.testing.assert_array_equal(listed, places)
 
 
@@ -162,13 +162,13 @@ FLAT = np.diag([1.0, 1, 0, 1])
 )  # fmt: skip
 def test_invalid_poses_are_refused(pose: Pose, words: str) -> None:
     with pytest.raises(DermisError, match=words):
-        pose.motion(RIG)
+        pose.to_arrays(RIG)
 
 
 def test_head_without_targets_or_bones_is_named() -> None:
     for pose, kind in ((Pose({"a": 1}), "morph target"), (Pose(bones={"b": (0, 0, 0)}), "bone")):
         with pytest.raises(DermisError, match=f"a {kind} of the head, but got '.' and it has none"):
-            pose.motion(Rig(RIG.positions_mm))
+            pose.to_arrays(Rig(RIG.positions_mm))
 
 
 def test_a_scene_checks_its_pose_and_takes_a_mapping() -> None:
@@ -183,10 +183,10 @@ def test_a_scene_checks_its_pose_and_takes_a_mapping() -> None:
     head = Head("ball", ball, Maps(), rig=Rig(points, targets))
     assert head.targets == ("smile",) and head.bones == () and head.positions_mm is points
     scene = Scene(head, pose={"smile": 0.5})
-    assert isinstance(scene.pose, Pose) and scene.motion is not None
-    assert scene.motion.weights.tolist() == [0.5]
-    assert Scene(head).motion is None
-    assert replace(scene, pose=Pose({"smile": 1.0})).motion.weights.tolist() == [1.0]
+    assert isinstance(scene.pose, Pose) and scene.pose_arrays is not None
+    assert scene.pose_arrays.weights.tolist() == [0.5]
+    assert Scene(head).pose_arrays is None
+    assert replace(scene, pose=Pose({"smile": 1.0})).pose_arrays.weights.tolist() == [1.0]
     with pytest.raises(DermisError, match="Nearest: smile"):
         Scene(head, pose={"smyle": 0.5})
     with pytest.raises(DermisError, match="a Pose or a mapping"):
@@ -196,5 +196,5 @@ def test_a_scene_checks_its_pose_and_takes_a_mapping() -> None:
 def test_head_without_rig_accepts_positions() -> None:
     head = Head("ball", uv_sphere(100.0, 16, 8), Maps())
     scene = Scene(head, pose=Pose(positions_mm=2 * head.positions_mm))
-    assert scene.motion is not None
-    np.testing.assert_array_equal(scene.motion.positions_mm[head.mesh.point], 2 * head.mesh.positions)
+    assert scene.pose_arrays is not None
+    np.testing.assert_array_equal(scene.pose_arrays.positions_mm[head.mesh.point], 2 * head.mesh.positions)

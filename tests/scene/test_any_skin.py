@@ -12,7 +12,7 @@ from small_figure import CENTRE, arm, figure, patch, write_obj
 import dermis
 from dermis.formats.parts import DEFAULT_COLOUR
 from dermis.frame.features.shading.view import camera_views, world_space_pinhole
-from dermis.human.skin.measured import measured_cells
+from dermis.human.skin.measured import measured_medians
 from dermis.images.colour import lab
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -157,7 +157,7 @@ def lab_of(path: Path, site: str) -> np.ndarray:
 def test_skin_of_a_named_site_has_its_measured_colour(tmp_path: Path) -> None:
     """Palms are lighter than backs of hands; the difference is the largest in dark skin."""
     path = write_obj(tmp_path / "arm.obj", arm())
-    cell = next(one for one in measured_cells() if (one.group, one.site) == ("african", "palm"))
+    cell = next(one for one in measured_medians() if (one.group, one.site) == ("african", "palm"))
     with pytest.warns(
         dermis.base.errors.DermisWarning, match="african palm, the median of 47 measured people"
     ):

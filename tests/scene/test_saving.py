@@ -157,7 +157,7 @@ def test_pose_round_trip(tmp_path: Path) -> None:
     assert isinstance(made.pose, Pose)
     assert made.pose.weights == {"mouth open": 0.1, "é": -2.0, "target2": 1.0}
     assert made.pose.bones == {"head": [1, 2, 3], "jaw": [0.5, 0, 0], "neck": matrix.tolist()}
-    for mine, other in zip(made.motion, given.motion(rig), strict=True):
+    for mine, other in zip(made.pose_arrays, given.to_arrays(rig), strict=True):
         np.testing.assert_array_equal(mine, other)
 
 

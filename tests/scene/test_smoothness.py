@@ -19,7 +19,7 @@ from dermis.scene.smoothness import (
     MAX_SILHOUETTE_DEVIATION_PX,
     MAX_SMOOTH_TRIANGLES,
     Silhouette,
-    SmoothIn,
+    SmoothOutlineLevels,
     silhouette,
     smooth_subdivision_levels,
 )
@@ -55,17 +55,17 @@ def test_outline_deviation_is_weighted_by_length() -> None:
 
 @pytest.mark.parametrize("side", SIZES)
 def test_levels_grow_with_the_picture(side: int) -> None:
-    assert SmoothIn(portrait, (side, side))(ball()) == SIZES[side]
+    assert SmoothOutlineLevels(portrait, (side, side))(ball()) == SIZES[side]
 
 
 def test_levels_grow_as_the_camera_comes_near() -> None:
     size = 512, 512
     near = Camera(position=(120.0, 0.0, 400.0), target=(120.0, 0.0, 0.0), frame_mm=40.0)
-    assert SmoothIn(lambda head: near, size)(ball()) > SmoothIn(portrait, size)(ball())
+    assert SmoothOutlineLevels(lambda head: near, size)(ball()) > SmoothOutlineLevels(portrait, size)(ball())
 
 
 def test_fine_heads_are_unchanged_and_size_is_limited() -> None:
-    assert SmoothIn()(ball(128)) == 0
+    assert SmoothOutlineLevels()(ball(128)) == 0
     assert smooth_subdivision_levels(1e3, 1000) == 3
     for triangles in (5_000, 50_000, 80_000, 500_000):
         levels = smooth_subdivision_levels(1e3, triangles)
@@ -88,7 +88,7 @@ def test_head_without_picture_size_assumes_a_portrait(tmp_path: Path) -> None:
     path = write_head(tmp_path / "head.obj")
     plain = dermis.load_head(path, subdivide=0)
     assert plain.levels == 0
-    assert dermis.load_head(path).levels == SmoothIn()(plain) > 0
+    assert dermis.load_head(path).levels == SmoothOutlineLevels()(plain) > 0
     assert dermis.load_head(path, subdivide=2).levels == 2
     with pytest.raises(DermisError, match="subdivide: expected auto or 0 to 3 levels, but got 'most'"):
         dermis.load_head(path, subdivide="most")  # type: ignore[arg-type]
@@ -96,7 +96,7 @@ def test_head_without_picture_size_assumes_a_portrait(tmp_path: Path) -> None:
 
 def test_people_keep_their_subdivision_level() -> None:
     assert dermis.load_head("human").levels == 1
-    assert dermis.load_head("human", subdivide=SmoothIn(size=(16, 16))).levels == 1
+    assert dermis.load_head("human", subdivide=SmoothOutlineLevels(size=(16, 16))).levels == 1
 
 
 def test_picture_size_of_options_and_files_sets_the_level(

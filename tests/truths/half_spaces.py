@@ -9,7 +9,7 @@ from dermis.apps.truths.path_traced import PathTraced, path_trace
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import build_mesh
-from dermis.mesh.primitives import SKIN, plane
+from dermis.mesh.primitives import SKIN_MATERIALS, plane
 from dermis.optics.media import Layer, Medium
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
@@ -25,7 +25,7 @@ def pan(side_mm: float, depth_mm: float, segments: int = 48) -> Head:
     flat = plane(side_mm, segments)
     rim = np.abs(flat.positions[:, :2]).max(axis=1) > 0.499 * side_mm
     places = flat.positions - np.outer(rim * np.float32(depth_mm), [0, 0, 1])
-    return Head("pan", build_mesh(places, flat.uv, flat.triangles, flat.material, SKIN), Maps())
+    return Head("pan", build_mesh(places, flat.uv, flat.triangles, flat.material, SKIN_MATERIALS), Maps())
 
 
 def traced(

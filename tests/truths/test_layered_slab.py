@@ -11,7 +11,7 @@ from dermis.apps.truths.slab_mc import trace_medium
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh, build_mesh
-from dermis.mesh.primitives import SKIN
+from dermis.mesh.primitives import SKIN_MATERIALS
 from dermis.optics.media import published_media
 
 pytest.importorskip("mitsuba")
@@ -38,7 +38,9 @@ def cube() -> Mesh:
     points, point = np.unique(np.array(positions), axis=0, return_inverse=True)
     vertices = HALF_WIDTH_MM * points[point.ravel()]
     uv = 0.5 + 0.5 * vertices[:, :2] / HALF_WIDTH_MM
-    return build_mesh(vertices, uv, np.array(triangles), np.zeros(len(triangles)), SKIN, point=point.ravel())
+    return build_mesh(
+        vertices, uv, np.array(triangles), np.zeros(len(triangles)), SKIN_MATERIALS, point=point.ravel()
+    )
 
 
 def disc_light(radius_mm: float, middle_mm: tuple[float, float, float]) -> dict[str, object]:

@@ -10,7 +10,7 @@ from dermis.apps.truths.mitsuba_solid import ClosedSurface, closed_skin, offset_
 from dermis.base.errors import DermisError
 from dermis.mesh.geometry import edges
 from dermis.mesh.mesh import Material, Mesh, build_mesh
-from dermis.mesh.primitives import SKIN, uv_sphere
+from dermis.mesh.primitives import SKIN_MATERIALS, uv_sphere
 
 
 def is_closed(solid: ClosedSurface) -> bool:
@@ -27,7 +27,7 @@ def box(side_mm: float) -> Mesh:
     faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     triangles = [half for a, b, c, d in faces for half in ([a, b, c], [a, c, d])]
     uv = np.random.default_rng(1).random((8, 2))
-    return build_mesh(corner, uv, triangles, np.zeros(12), SKIN)
+    return build_mesh(corner, uv, triangles, np.zeros(12), SKIN_MATERIALS)
 
 
 def without(mesh: Mesh, kept: np.ndarray) -> Mesh:
@@ -78,7 +78,12 @@ def test_only_skin_counts() -> None:
 def test_inverted_mesh_is_refused() -> None:
     sphere = uv_sphere(10.0, 32, 16)
     turned = build_mesh(
-        sphere.positions, sphere.uv, sphere.triangles[:, ::-1], sphere.material, SKIN, -sphere.normals
+        sphere.positions,
+        sphere.uv,
+        sphere.triangles[:, ::-1],
+        sphere.material,
+        SKIN_MATERIALS,
+        -sphere.normals,
     )
     with pytest.raises(DermisError, match="it is a sheet or inside out"):
         closed_skin(turned, "sphere")
@@ -108,7 +113,9 @@ def test_folds_are_refused() -> None:
 def test_creases_tighter_than_the_depth_are_refused() -> None:
     ball = uv_sphere(10.0, 64, 64)
     wave = 1.0 + 0.1 * np.sin(10.0 * np.arctan2(ball.positions[:, 0], ball.positions[:, 2]))
-    creased = build_mesh(ball.positions * wave[:, None], ball.uv, ball.triangles, ball.material, SKIN)
+    creased = build_mesh(
+        ball.positions * wave[:, None], ball.uv, ball.triangles, ball.material, SKIN_MATERIALS
+    )
     solid = closed_skin(creased, "gear")
     with pytest.raises(DermisError, match=r"gear: .* [0-9.]+% of the surface folds over"):
         offset_inwards(solid, np.full(len(solid.positions), 2.0), "gear")

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from dermis.apps.truths.surface_diffusion import diffuse_on_surface, welded_surface
 from dermis.mesh.mesh import Mesh, build_mesh
-from dermis.mesh.primitives import SKIN
+from dermis.mesh.primitives import SKIN_MATERIALS
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ def cylinder(seam: int) -> Mesh:
     b, c, d = a + 1, a + AROUND + 1, a + AROUND + 2
     triangles = np.vstack((np.column_stack((a, b, d)), np.column_stack((a, d, c))))
     uv = np.column_stack(((column / AROUND).ravel(), (row / ALONG).ravel()))
-    return build_mesh(positions, uv, triangles, np.zeros(len(triangles)), SKIN)
+    return build_mesh(positions, uv, triangles, np.zeros(len(triangles)), SKIN_MATERIALS)
 
 
 def light(positions: Floats) -> Floats:

@@ -17,7 +17,7 @@ from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import build_mesh
-from dermis.mesh.primitives import SKIN, uv_sphere
+from dermis.mesh.primitives import SKIN_MATERIALS, uv_sphere
 from dermis.scene.heads import load_head
 from dermis.scene.settings import Settings
 
@@ -80,7 +80,7 @@ def test_report_contains_all_pictures(stripe_comparison: Comparison, tmp_path: P
 @pytest.mark.parametrize("region", REGIONS)
 def test_scenes_use_no_colour_map(light: str, region: str) -> None:
     scene = comparison_scene(BALL, light, region, "gpu-gems-3")
-    assert scene.head.maps.colour is None and scene.skin.strength == 0.0
+    assert scene.head.maps.colour is None and scene.skin.specular_strength == 0.0
     assert scene.skin.albedo == "profile" and scene.skin.energy == "none"
     assert np.isfinite(scene.camera.position).all()
 
@@ -116,7 +116,7 @@ def test_a_picture_without_the_head_is_refused_early(monkeypatch: pytest.MonkeyP
     hits = np.vstack([ball.positions + np.array([x, 0, 0]) for x in (-60, 60)])
     uv = np.vstack([ball.uv * (0.5, 1) + (x, 0) for x in (0, 0.5)])
     triangles = np.vstack([ball.triangles, ball.triangles + len(ball.positions)])
-    balls = Head("balls", build_mesh(hits, uv, triangles, np.tile(ball.material, 2), SKIN), Maps())
+    balls = Head("balls", build_mesh(hits, uv, triangles, np.tile(ball.material, 2), SKIN_MATERIALS), Maps())
     with pytest.raises(DermisError, match="the picture: expected a pixel that shows nothing but the head"):
         single = Settings(size=(1, 1), atlas=64)
         compare(balls, "surface-integral", ("none",), settings=single, adapter=ADAPTER)

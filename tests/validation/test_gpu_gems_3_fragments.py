@@ -16,7 +16,7 @@ from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENT_PASS
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, download
 from dermis.mesh.mesh import build_mesh
-from dermis.mesh.primitives import SKIN, uv_sphere
+from dermis.mesh.primitives import SKIN_MATERIALS, uv_sphere
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
 from dermis.scene.techniques import TECHNIQUES
@@ -46,7 +46,7 @@ def renderer() -> Renderer:
 def leaf() -> Scene:
     """Return a flat head lit from two sides, so that light is transmitted; its colour map is noise."""
     ball = uv_sphere(30.0, 24, 12)
-    mesh = build_mesh(ball.positions * (1, 1, 0.1), ball.uv, ball.triangles, ball.material, SKIN)
+    mesh = build_mesh(ball.positions * (1, 1, 0.1), ball.uv, ball.triangles, ball.material, SKIN_MATERIALS)
     head = head_of(mesh, colour=np.random.default_rng(0).random((16, 16, 3)))
     lights = (
         DirectionalLight(direction=(1, -0.4, -1), irradiance=(2.0, 1.5, 1.0)),

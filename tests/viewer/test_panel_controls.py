@@ -19,7 +19,7 @@ from dermis.scene.environment import Environment
 from dermis.scene.frozen_model import FrozenModel, field_help, slider
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer
-from dermis.scene.talk import COMPARISONS_HEADING
+from dermis.scene.talk_comparisons import COMPARISONS_HEADING
 
 BUTTONS = {"undo", "redo", "help", "hide", "save", "load", "screenshot", "reset", "freeze"}
 BUTTONS |= {"open", "search", "bones", "size", "head", "seed", "dice", "path", "open file"}

@@ -44,7 +44,7 @@ def test_reset_target_is_at_rest(rigged_head: Head) -> None:
 
 
 def test_rest_weight_is_shown(rigged_head: Head) -> None:
-    targets = replace(rigged_head.control.targets, rest=np.array([0.5, 0, 0, 0], np.float32))
+    targets = replace(rigged_head.control_rig.targets, rest=np.array([0.5, 0, 0, 0], np.float32))
     rig = Rig(rigged_head.positions_mm, targets)
     scene = Scene(replace(rigged_head, rig=rig))
     assert target_weight(scene, "jawOpen") == 0.5
@@ -60,7 +60,7 @@ def test_the_person_stays_at_rest(rigged_head: Head) -> None:
 
 
 def test_angles_match_the_rotation_matrix(rigged_head: Head) -> None:
-    skeleton = rigged_head.control.skeleton
+    skeleton = rigged_head.control_rig.skeleton
     assert skeleton is not None
     local = skeleton.local[1].copy()
     local[:3, :3] = 1.3 * np.array(angles_matrix((10.0, -20.0, 30.0)))
@@ -110,7 +110,7 @@ def test_pose_is_an_undo_step(rigged: ViewerState) -> None:
 
 
 def test_saved_pose_is_restored(rigged: ViewerState, tmp_path: Path) -> None:
-    skeleton = rigged.scene.head.control.skeleton
+    skeleton = rigged.scene.head.control_rig.skeleton
     assert skeleton is not None
     pose = Pose({"jawOpen": 1 / 3}, {"neck": (1.0, -2.0, 0.1), "head": skeleton.local[1]})
     moved = replace(rigged.with_pose(pose), rig="")

@@ -67,7 +67,7 @@ class Atlas:
         return np.asarray(self.triangle >= 0)
 
     @property
-    def lit(self) -> Mask:
+    def lit_mask(self) -> Mask:
         """Return the (n, n) mask of texels whose light is computed, not copied from other texels."""
         lit = self.coverage
         lit[self.gutter[:, 1], self.gutter[:, 0]] = False
@@ -78,7 +78,7 @@ class Atlas:
         skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
         return float(1.0 - self.mapped[skin].mean()) if skin.any() else 0.0
 
-    def weights(self, rows: slice = _ALL_ROWS) -> Doubles:
+    def barycentric_weights(self, rows: slice = _ALL_ROWS) -> Doubles:
         """Return the (n, n, 3) barycentric weights of all three corners at each texel.
 
         rows : rows of the map for which the weights are computed
@@ -94,4 +94,4 @@ class Atlas:
         rows : rows of the map for which the attribute is interpolated
         """
         corners = vertex_values[mesh.triangles[np.maximum(self.triangle[rows], 0)]].astype(float)
-        return np.asarray(np.einsum("yxk,yxkc->yxc", self.weights(rows), corners))
+        return np.asarray(np.einsum("yxk,yxkc->yxc", self.barycentric_weights(rows), corners))

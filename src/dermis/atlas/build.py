@@ -16,7 +16,7 @@ from dermis.base.progress import logged_step
 from dermis.mesh.mesh import Mesh
 
 ATLAS_LAYOUTS = ("mesh", "stitched", "unwrapped")
-MIN_ATLAS_SIZE = 64
+MIN_ATLAS_SIDE = 64
 _ATLAS_CACHE_VERSION = 7  # increment when the result of `build_atlas` for a mesh changes
 
 
@@ -31,8 +31,8 @@ def build_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: fl
 
     Raises DermisError if `atlas_side` is less than 64 or the layout is unknown.
     """
-    if atlas_side < MIN_ATLAS_SIZE:
-        expected = f"a size of {MIN_ATLAS_SIZE} texels or more"
+    if atlas_side < MIN_ATLAS_SIDE:
+        expected = f"a size of {MIN_ATLAS_SIDE} texels or more"
         refuse("atlas", expected, f"it is {atlas_side}", "Choose --atlas 1024 or 2048")
     if layout not in ATLAS_LAYOUTS:
         refuse("layout", f"one of {', '.join(ATLAS_LAYOUTS)}", f"got {layout}", "Choose one of these")
@@ -52,11 +52,13 @@ def cached_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: f
     names = [field.name for field in fields(Atlas)]
 
     @logged_step("mapping the skin to the atlas")
-    def make_arrays() -> Arrays:
+    def make_atlas_arrays() -> Arrays:
         atlas = build_atlas(mesh, atlas_side, layout, gutter_mm)
         return {name: getattr(atlas, name) for name in names}
 
-    return Atlas(**load_or_make("atlas", _atlas_key(mesh, atlas_side, layout, gutter_mm), names, make_arrays))
+    return Atlas(
+        **load_or_make("atlas", _atlas_key(mesh, atlas_side, layout, gutter_mm), names, make_atlas_arrays)
+    )
 
 
 def cached_occlusion(mesh: Mesh, atlas: Atlas, inputs_key: str, bake_occlusion: Callable[[], Array]) -> Array:
@@ -66,7 +68,7 @@ def cached_occlusion(mesh: Mesh, atlas: Atlas, inputs_key: str, bake_occlusion: 
     inputs_key : text that identifies all inputs of `bake_occlusion` except the mesh and the atlas
     """
     digest = hashlib.sha256(f"{_atlas_key(mesh, atlas.size)} {inputs_key}".encode())
-    for array in (mesh.positions, mesh.normals, atlas.corner_uv, np.packbits(atlas.lit)):
+    for array in (mesh.positions, mesh.normals, atlas.corner_uv, np.packbits(atlas.lit_mask)):
         digest.update(np.ascontiguousarray(array).tobytes())
     return load_or_make("occlusion", digest.hexdigest()[:40], ["open"], lambda: {"open": bake_occlusion()})[
         "open"

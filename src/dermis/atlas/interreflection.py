@@ -27,8 +27,8 @@ SAMPLES_PER_PATCH = 8
 LINE_BUNDLE_COUNT, LINES_PER_SIDE_RANGE = 128, (96, 256)
 _TRIAL_BUNDLE_COUNT, _TRIAL_LINES_PER_SIDE = 12, 64  # for a test whether any skin faces other skin
 _FORM_FACTOR_CACHE_VERSION = 5  # increment when `compute_form_factors` gives other results
-_MAX_TRACED_TRIANGLES = 300_000  # above this, points closer than _MERGE_DISTANCE_LINES are merged
-_MERGE_DISTANCE_LINES = 1.5  # distance below which points are merged, in spacings of adjacent lines
+_MAX_TRACED_TRIANGLES = 300_000  # above this, points closer than _MERGE_DISTANCE_LINE_SPACINGS are merged
+_MERGE_DISTANCE_LINE_SPACINGS = 1.5  # distance below which points are merged, in spacings of adjacent lines
 _MIN_FORM_FACTOR = 1e-3  # smaller form factors are dropped, and the remaining ones of a cell scaled up
 _LINE_RANDOM_SEED = 20
 _MAX_TRACING_THREADS = 8
@@ -92,11 +92,13 @@ def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) -
         digest.update(np.ascontiguousarray(array).tobytes())
 
     @logged_step("computing form factors of the skin")
-    def make_arrays() -> dict[str, NDArray[np.generic]]:
+    def make_form_factor_arrays() -> dict[str, NDArray[np.generic]]:
         form_factors = compute_form_factors(mesh, corner_uv, mapped_triangles)
         return {name: getattr(form_factors, name) for name in names}
 
-    return FormFactors(**load_or_make("interreflection", digest.hexdigest()[:40], names, make_arrays))
+    return FormFactors(
+        **load_or_make("interreflection", digest.hexdigest()[:40], names, make_form_factor_arrays)
+    )
 
 
 def form_factor_table_name(mapped_triangles: Mask) -> str:
@@ -148,7 +150,7 @@ def _trace_lines(
     vertices -= 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     per_mm = 0.5 * lines_per_side / (float(np.linalg.norm(vertices, axis=1).max()) or 1.0)
     if len(corner) > _MAX_TRACED_TRIANGLES:
-        vertices, corner = merge_near_points(vertices, corner, _MERGE_DISTANCE_LINES / per_mm)
+        vertices, corner = merge_near_points(vertices, corner, _MERGE_DISTANCE_LINE_SPACINGS / per_mm)
         proper = np.flatnonzero((corner != np.roll(corner, 1, axis=1)).all(axis=1))
         corner, corner_uv, mapped_triangles = corner[proper], corner_uv[proper], mapped_triangles[proper]
     x, y, z = np.ascontiguousarray(vertices.T)[:, :, None]
@@ -193,7 +195,7 @@ def intersect_lines(corners: Doubles) -> tuple[Index, Doubles, Mask, Index, Doub
     corners : (f, 3, 3) corners of the triangles
     """
     x, y, z = np.ascontiguousarray(corners.transpose(2, 1, 0))
-    (left, width), (bottom, height) = _integer_range(x), _integer_range(y)
+    (left, width), (bottom, height) = _crossed_lines(x), _crossed_lines(y)
     count = width * height
     triangle, line_in_box = expand_runs(np.zeros_like(count), count)
     row, column = np.divmod(line_in_box, width[triangle])
@@ -210,7 +212,7 @@ def intersect_lines(corners: Doubles) -> tuple[Index, Doubles, Mask, Index, Doub
     return line, depth_a + depth_b + depth_c, area > 0.0, triangle, weights
 
 
-def _integer_range(corner_coordinates: Doubles) -> tuple[Doubles, Index]:
+def _crossed_lines(corner_coordinates: Doubles) -> tuple[Doubles, Index]:
     """Return the lowest integer in each triangle's extent along one axis, and the number of integers in it.
 
     corner_coordinates : (3, f) coordinate of the triangles' corners along this axis

@@ -9,7 +9,15 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER_TEXELS, MAX_SHEAR, Atlas
 from dermis.base.arrays import Doubles, Index, Ints, Mask
-from dermis.mesh.geometry import MIN_UV_CROSS, cross_2d, edges, expand_runs, label_components, uv_cross, weld
+from dermis.mesh.geometry import (
+    MIN_DOUBLE_UV_AREA,
+    cross_2d,
+    edges,
+    expand_runs,
+    label_components,
+    uv_cross,
+    weld,
+)
 from dermis.mesh.mesh import Mesh
 
 _EDGE_TOLERANCE_TEXELS = 1e-6  # texel centres this far outside an edge still count as covered [texel]
@@ -55,7 +63,7 @@ def usable_triangles(mesh: Mesh, map_side: int, min_texels: float = _MIN_BLURRED
     """
     chart = find_charts(mesh)
     large_enough = chart_uv_area(mesh, chart) * map_side**2 >= min_texels
-    return np.asarray(large_enough[chart] & (2 * triangle_uv_area(mesh) > MIN_UV_CROSS))
+    return np.asarray(large_enough[chart] & (2 * triangle_uv_area(mesh) > MIN_DOUBLE_UV_AREA))
 
 
 def texel_corners(mesh: Mesh, map_side: int, triangle_index: NDArray[np.integer]) -> Doubles:

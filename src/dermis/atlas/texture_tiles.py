@@ -20,7 +20,7 @@ UV_TOLERANCE = 2e-2
 """Distance by which uv may lie outside [0, 1] without the picture being repeated there [-]."""
 TILE_PADDING_TEXELS = 8
 """Texels around each tile that continue its border, so that mip levels do not mix materials."""
-_PLAIN_TILE_SIDE = 16  # side of a tile without pictures that is not skin [texel]
+_UNTEXTURED_TILE_SIDE = 16  # side of a tile without pictures that is not skin [texel]
 _MIN_SKIN_TILE_SIDE = 256  # smallest side of a tile of skin without pictures [texel]
 _MAP_SIDE_GROWTH_FACTOR = 1.02  # step by which the side of the map grows until all tiles fit
 
@@ -164,7 +164,7 @@ def _set_sizes_without_pictures(
             side = (
                 max(_MIN_SKIN_TILE_SIDE, round(float(np.sqrt(median_density * mm2))))
                 if is_skin
-                else _PLAIN_TILE_SIDE
+                else _UNTEXTURED_TILE_SIDE
             )
             tile = Tile(
                 tile.material, tile.vertices, tile.triangles, tile.uv, tile.low, tile.high, (side, side)

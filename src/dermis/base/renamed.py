@@ -24,6 +24,7 @@ RENAMED_OBJECTS: Mapping[str, str] = {
     "apps.truths.lights.MITSUBA": "apps.truths.lights.MITSUBA_LIGHTS",
     "apps.inverse.unmixing.unmix.Change": "apps.inverse.unmixing.unmix.PigmentChange",
     "apps.inverse.unmixing.unmix.Share": "apps.inverse.unmixing.unmix.FractionChange",
+    "scene.smoothness.SmoothIn": "scene.smoothness.SmoothOutlineLevels",
 }
 """Old to new names of objects, both without the package's name."""
 
@@ -39,6 +40,7 @@ RENAMED_MODULES: Mapping[str, str] = {
     "gallery": "apps.gallery",
     "reference": "apps.truths",
     "registry": "base.registry",
+    "scene.talk": "scene.talk_comparisons",
     "unmixing": "apps.inverse.unmixing",
     "unmixing.change": "apps.inverse.unmixing.unmix",
     "viewer": "apps.viewer",
@@ -94,6 +96,17 @@ def renamed_attribute(old_name: str, new_name: str) -> property:
         return getattr(instance, new_name)
 
     return property(get)
+
+
+def renamed_classmethod(old_name: str, new_name: str) -> classmethod[Any, ..., Any]:
+    """Return a class method for the old name of a class method; it warns and calls the renamed method."""
+
+    def call(cls: type[Any], *args: Any, **kwargs: Any) -> Any:
+        text = f"{cls.__name__}.{old_name} is now {new_name}"
+        warnings.warn(f"{text}; {_REMOVAL_NOTICE}", DeprecationWarning, stacklevel=2)
+        return getattr(cls, new_name)(*args, **kwargs)
+
+    return classmethod(call)
 
 
 def install_renamed_module_finder() -> None:

@@ -75,13 +75,13 @@ def _comparison_sources(reference_solution: str, technique: str | None) -> tuple
 def _picture_sources(scene_file: Path | None, settings: Options, skin: Options) -> tuple[str, ...]:
     from dermis.scene import load_scene
     from dermis.scene.lights import studio
-    from dermis.scene.sources import picture_sources
+    from dermis.scene.sources import picture_citation_keys
 
     if scene_file is None:
-        return picture_sources(Skin(**skin), Settings(**settings), studio())
+        return picture_citation_keys(Skin(**skin), Settings(**settings), studio())
     scene, scene_settings = load_scene(scene_file)
     maps = scene.head.maps
-    return picture_sources(
+    return picture_citation_keys(
         Skin(**(scene.skin.model_dump() | dict(skin))),
         Settings(**(scene_settings.model_dump() | dict(settings))),
         scene.lights,

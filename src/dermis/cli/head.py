@@ -168,7 +168,7 @@ def head(
         person,
         skin=_look_with_values(person.look, skin, "--skin"),
         eyes=_look_with_values(person.iris, eye, "--eye"),
-        hair=_hair_look_with_values(person.hairdo, hair),
+        hair=_hair_look_with_values(person.hair_look, hair),
     )
     report: Options = {"head": str(output), "person": person_parameters(person)}
     if output.suffix.lower() == ".json":
@@ -201,7 +201,7 @@ def _build_person(
     """
     from dermis.human.person import Human
 
-    base = Human(**skin_tone) if seed is None else Human.drawn(seed, **skin_tone)
+    base = Human(**skin_tone) if seed is None else Human.sampled(seed, **skin_tone)
     return replace(base, **field_values, targets={**base.targets, **target_weights})
 
 
@@ -255,7 +255,9 @@ def _write_glb(
     from dermis.mesh.pose import Pose
     from dermis.scene.skin import Skin
 
-    Pose(expression).motion(head.control, EXPRESSION_OPTION)  # raises for unknown names and invalid weights
+    Pose(expression).to_arrays(
+        head.control_rig, EXPRESSION_OPTION
+    )  # raises for unknown names and invalid weights
     return write_person_glb(
         output, person, head, roughness=Skin().roughness, expression_weights=expression, eyes=eyes
     )

@@ -157,7 +157,7 @@ def pose_from_options(
     parts = {POSE_OPTION: Pose(target_weights), BONE_OPTION: Pose(bones=bone_angles)}
     for option, part in parts.items():
         try:
-            part.motion(head.control, option)
+            part.to_arrays(head.control_rig, option)
         except DermisError as fault:
             if not (head.targets or head.bones):
                 raise

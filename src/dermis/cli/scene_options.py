@@ -204,7 +204,7 @@ def _base_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Setti
     """Return the scene and settings of a scene file, or default ones for a head, before options apply."""
     from dermis.scene import Scene, load_camera, load_scene
     from dermis.scene.files import load_head_and_skin
-    from dermis.scene.smoothness import SmoothIn
+    from dermis.scene.smoothness import SmoothOutlineLevels
 
     if Path(head_or_scene).suffix.lower() == ".toml":
         refuse_options(options.head, HEAD_OPTION_NAMES, "with a scene file", "Set it in the file's [head]")
@@ -215,7 +215,7 @@ def _base_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Setti
         actual = "it is given with --regions, which sets it for each region"
         refuse(option_name("rho_s"), "only one of the two", actual, "Remove one, or use --oiliness")
     camera_for = partial(load_camera, options.camera or "portrait")
-    picture = SmoothIn(camera_for, Settings(**options.settings).size)
+    picture = SmoothOutlineLevels(camera_for, Settings(**options.settings).size)
     head, skin = load_head_and_skin(table, Skin(), Path(), picture)
     return Scene(head, skin=skin), Settings()
 

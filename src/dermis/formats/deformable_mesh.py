@@ -54,7 +54,7 @@ class DeformableMesh:
     @property
     def rig(self) -> Rig:
         """Return the head's rig, which acts on the control points."""
-        return self.head.control
+        return self.head.control_rig
 
     @cached_property
     def subdivision_matrix(self) -> csr_array | None:

@@ -62,7 +62,7 @@ def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, cul
         note = f"its unit is not stated; {made}; --unit-mm sets another"
     elif (
         size > _SIZE_RANGE_OF_MM_FILES[1]
-        and mesh.skull_mm is None
+        and mesh.skull_centre_mm is None
         and not (rigged.rig and rigged.rig.skeleton)
     ):
         note = f"it is {_size_text(mesh.size_mm)} at {unit:g} mm per unit; --unit-mm sets another"

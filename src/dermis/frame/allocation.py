@@ -100,7 +100,7 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         outputs=outputs.make_resources(memo, device, request, shapes.tables, thin),
         suns=len(request.environment_map.suns),
         gaussians=len(request.profile.variance_mm2),
-        unscattered_fraction=cached(atlases[0][0].unscattered_fraction, request.atlas_head.mesh),
+        unscattered_fraction=cached(atlases[0][0].unscattered_fraction, request.topology_head.mesh),
     )
 
 
@@ -135,7 +135,7 @@ def _shadow_maps(memo: Memo, device: Device, request: FrameRequest) -> ShadowMap
     return memo.get(
         _make_shadow_maps,
         device,
-        request.atlas_head,
+        request.topology_head,
         layers,
         size,
         caller_name=f"{layers} {request.view_name}",
@@ -171,8 +171,8 @@ def _cached_sky_visibility(
     memo: Memo, device: Device, request: FrameRequest, layout: AtlasLayout, shape_resources: shape.Resources
 ) -> VertexSkyVisibility:
     """Return the sky visibility at the vertices of the head in its rest pose, cached if possible."""
-    at_rest = rest_geometry(memo, device, layout.head, shape_resources.tables, request.atlas_head, None, 0)
-    return memo.get(make_vertex_sky_visibility, device, request.atlas_head, untracked_arguments=(at_rest,))
+    at_rest = rest_geometry(memo, device, layout.head, shape_resources.tables, request.topology_head, None, 0)
+    return memo.get(make_vertex_sky_visibility, device, request.topology_head, untracked_arguments=(at_rest,))
 
 
 def _cached_uploaded_atlas(
@@ -181,7 +181,7 @@ def _cached_uploaded_atlas(
     stretch = request.technique.stretch_correction(request.settings)
     atlas = memo.get(
         cached_atlas,
-        request.atlas_head.mesh,
+        request.topology_head.mesh,
         request.atlas_plan.side,
         layout_name,
         caller_name=str(layout_index),
@@ -211,7 +211,7 @@ def _make_layout(
     cached, layout_key, head, (atlas, textures) = (
         memo.get,
         str(layout_index),
-        request.atlas_head,
+        request.topology_head,
         uploaded_atlas,
     )
     geometry = cached(

@@ -187,7 +187,7 @@ def _bake_points(
 def _bake_bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> MutableBindings:
     """Return the resources of bake.wgsl: resources of a rendered frame, plus curvature and thickness."""
     resources, device = inputs.resources, renderer.device
-    skin_curvature = make_curvature(device, scene.head.topology.mesh)
+    skin_curvature = make_curvature(device, scene.head.topology_head.mesh)
     frame = CommandList(device, timed=False)
     curvature.draw(frame, resources.head, skin_curvature)
     frame.submit()

@@ -28,9 +28,9 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
     The graph runs only the passes whose inputs have changed.
     """
     resources, bindings, view = inputs.resources, inputs.bindings, inputs.view
-    shape.draw(graph, resources.shape.shape, inputs.motion)
+    shape.draw(graph, resources.shape.shape, inputs.pose_bytes)
     if resources.shape.rest_shape:
-        shape.draw(graph, resources.shape.rest_shape, inputs.motion.at_rest)
+        shape.draw(graph, resources.shape.rest_shape, inputs.pose_bytes.at_rest)
     if resources.expression_maps and inputs.face_movements is not None:
         draw_expression(graph, resources.expression_maps, inputs.face_movements)
     area_lights = ("SHAPES", 1) in inputs.light_constants

@@ -14,7 +14,7 @@ from dermis.frame.features.shape.shape import PoseBytes
 from dermis.frame.projection import Triple, Views
 from dermis.frame.resources import AtlasLayout, Resources
 from dermis.gpu import Bindings, Constants, UniformRecord
-from dermis.scene.camera import Window
+from dermis.scene.camera import ImageRectangle
 from dermis.scene.settings import Settings
 
 
@@ -23,7 +23,7 @@ class FrameInputs:
     """Inputs of a frame: cached resources, and values that may differ between frames with equal resources.
 
     resources : cached textures, buffers and records of the frame
-    motion : pose of the head, as bytes for the shaders
+    pose_bytes : pose of the head, as bytes for the shaders
     face_movements : (9,) strength of the facial movements that change the skin maps; None if the maps are
         constant
     layouts : atlas layouts of `resources`, each with the uniform record of this frame's lights
@@ -32,7 +32,7 @@ class FrameInputs:
     shadow_views : projections of all shadow maps
     light_constants : pipeline constants of the lights in use
     camera_views : projection of the camera, with the positions of samples in a pixel
-    window : rectangle of the image plane that the picture shows
+    image_rectangle : rectangle of the image plane that the picture shows
     sky_view : views of the head from all directions, with their uniform record, to compute ambient occlusion;
         None if occlusion is not recomputed when the shape changes
     view : uniform record of the shading pass
@@ -43,14 +43,14 @@ class FrameInputs:
 
     resources: Resources
     settings: Settings
-    motion: PoseBytes
+    pose_bytes: PoseBytes
     face_movements: NDArray[np.float32] | None
     layouts: tuple[AtlasLayout, ...]
     blurs: tuple[Blur, ...]
     shadow_views: Views
     light_constants: Constants
     camera_views: Views
-    window: Window
+    image_rectangle: ImageRectangle
     sky_view: tuple[SkyViews, UniformRecord] | None
     view: UniformRecord
     constants: Constants

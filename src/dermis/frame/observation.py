@@ -130,6 +130,6 @@ def pair_with_previous(
     latest = previous
     for one in scenes:
         scene = Scene.coerce(one)
-        same_head = latest is not None and are_equal(latest.head.bare, scene.head.bare)
+        same_head = latest is not None and are_equal(latest.head.without_maps, scene.head.without_maps)
         yield scene, latest if same_head else None
         latest = scene

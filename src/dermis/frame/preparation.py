@@ -39,7 +39,7 @@ from dermis.gpu.memory import OutOfMemoryError
 from dermis.human.skin.face import movement_weights
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
-from dermis.mesh.rig import Motion
+from dermis.mesh.rig import PoseArrays
 from dermis.scene.lights import Light
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -54,7 +54,7 @@ RequestedNames = tuple[str, ...]
 class HeadState(NamedTuple):
     """Current state of a head: its pose, the outline of the posed shape, and the poses of its eyes."""
 
-    motion: PoseBytes
+    pose_bytes: PoseBytes
     outline: Outline
     eyes: EyePoses | None
 
@@ -107,12 +107,17 @@ class Preparation:
         view: str,
         requested_names: tuple[RequestedNames, RequestedNames],
     ) -> FrameInputs:
-        cached, device, head, environment = self.memo.get, self.device, scene.head.bare, scene.environment
+        cached, device, head, environment = (
+            self.memo.get,
+            self.device,
+            scene.head.without_maps,
+            scene.environment,
+        )
         (profile, *others), blend_weights = self._profiles(scene.skin, technique)
         name, owner = (environment.name, "") if environment else (None, "none")
         environment_map = cached(load_environment_map, device, name, caller_name=owner)
         scene = add_suns(self.memo, scene, environment_map)
-        state = self._head_state(head, scene.motion)
+        state = self._head_state(head, scene.pose_arrays)
         light_inputs = head, tuple(scene.lights), state.outline, settings.shadow_size
         lights, shadow_views, part_counts = cached(
             _light_resources, *light_inputs, untracked_arguments=(device, scene)
@@ -128,7 +133,7 @@ class Preparation:
             technique=technique,
             light_part_counts=part_counts,
             shadow_layers=len(shadow_views.clips),
-            posed=scene.motion is not None,
+            posed=scene.pose_arrays is not None,
             view_name=view,
             other_profiles=tuple(others),
             blend_weights=blend_weights,
@@ -149,15 +154,15 @@ class Preparation:
         return FrameInputs(
             resources=resources,
             settings=settings,
-            motion=state.motion,
-            face_movements=cached(_face_movements, head, scene.motion) if animated else None,
+            pose_bytes=state.pose_bytes,
+            face_movements=cached(_face_movements, head, scene.pose_arrays) if animated else None,
             layouts=tuple(with_lights(layout, lights) for layout in resources.layouts),
             blurs=cached(_scaled_blurs, resources.diffusion.blurs, scale),
             shadow_views=shadow_views,
             light_constants=constants,
             camera_views=camera_views(camera, state.outline, settings.samples),
-            window=camera.window,
-            sky_view=self._sky_view(head, scene.motion, state.outline) if resources.sky else None,
+            image_rectangle=camera.image_rectangle,
+            sky_view=self._sky_view(head, scene.pose_arrays, state.outline) if resources.sky else None,
             view=with_camera(resources.view, camera, state.eyes),
             constants=resources.constants + constants,
             centre_mm=head.centre_mm,
@@ -174,15 +179,15 @@ class Preparation:
         return (self.profiles.profile(skin),), None
 
     def _sky_view(
-        self, head: Head, motion: Motion | None, outline: Outline
+        self, head: Head, pose_arrays: PoseArrays | None, outline: Outline
     ) -> tuple[SkyViews, UniformRecord]:
         """Return the views of the posed head that ambient occlusion needs, and their uniform record."""
-        rotation_points, motion = (
-            self.memo.get(make_head_rotation_points, head.topology),
-            motion or head.control.rest,
+        rotation_points, pose_arrays = (
+            self.memo.get(make_head_rotation_points, head.topology_head),
+            pose_arrays or head.control_rig.rest,
         )
         return self.memo.get(
-            _sky_view, outline, untracked_arguments=(motion, self.device, head, rotation_points)
+            _sky_view, outline, untracked_arguments=(pose_arrays, self.device, head, rotation_points)
         )
 
     def _previous_scene(self, scene: Scene, previous: Scene, inputs: FrameInputs) -> PreviousScene:
@@ -190,21 +195,23 @@ class Preparation:
 
         Raises DermisError if the two scenes show different heads.
         """
-        head = scene.head.bare
-        if not are_equal(previous.head.bare, head):
+        head = scene.head.without_maps
+        if not are_equal(previous.head.without_maps, head):
             actual, advice = f"got {previous.head.name!r}", "Leave it out when the head changes"
             refuse("previous", "a scene of the same head", actual, advice)
-        motion = self.memo.get(_rest_pose_bytes, head)
-        if previous.motion is not None:
-            motion = self.memo.get(_pose_bytes, head, previous.motion, motion, caller_name="before")
+        pose_bytes = self.memo.get(_rest_pose_bytes, head)
+        if previous.pose_arrays is not None:
+            pose_bytes = self.memo.get(
+                _pose_bytes, head, previous.pose_arrays, pose_bytes, caller_name="before"
+            )
         camera = world_space_pinhole(previous.camera, head, inputs.settings)
         view = with_camera(inputs.resources.view, camera, None)
-        return PreviousScene(None if motion == inputs.motion else motion, view)
+        return PreviousScene(None if pose_bytes == inputs.pose_bytes else pose_bytes, view)
 
-    def _head_state(self, head: Head, motion: Motion | None) -> HeadState:
-        """Return the pose, outline and eyes of a head; if `motion` is None, the head is at rest."""
+    def _head_state(self, head: Head, pose_arrays: PoseArrays | None) -> HeadState:
+        """Return the pose, outline and eyes of a head; if `pose_arrays` is None, the head is at rest."""
         at_rest = self.memo.get(_rest_pose_bytes, head)
-        return self.memo.get(_posed_state, head, motion or head.control.rest, at_rest)
+        return self.memo.get(_posed_state, head, pose_arrays or head.control_rig.rest, at_rest)
 
 
 def interreflection_constants(resources: Resources) -> Constants:
@@ -212,14 +219,14 @@ def interreflection_constants(resources: Resources) -> Constants:
     return (("INTERREFLECTION", 1),) if resources.layouts[0].interreflection else ()
 
 
-def _pose_bytes(head: Head, motion: Motion, rest_bytes: PoseBytes) -> PoseBytes:
+def _pose_bytes(head: Head, pose_arrays: PoseArrays, rest_bytes: PoseBytes) -> PoseBytes:
     """Return a pose as bytes for the shaders.
 
     rest_bytes : bytes of the rest pose; its positions are reused if the pose has the same control points
     """
-    weights, matrices = motion.weights.tobytes(), motion.matrices.tobytes()
-    is_rest = motion.positions_mm is head.control.positions_mm
-    positions = rest_bytes.positions if is_rest else motion.positions_mm.tobytes()
+    weights, matrices = pose_arrays.weights.tobytes(), pose_arrays.matrices.tobytes()
+    is_rest = pose_arrays.positions_mm is head.control_rig.positions_mm
+    positions = rest_bytes.positions if is_rest else pose_arrays.positions_mm.tobytes()
     return rest_bytes._replace(positions=positions, weights=weights, matrices=matrices)
 
 
@@ -228,39 +235,41 @@ def _rest_positions_mm(scene: Scene) -> NDArray[np.float32] | None:
 
     The result is None for a person whose control points are those of the shared mesh.
     """
-    motion = scene.motion or scene.head.control.rest
-    positions_mm = motion.positions_mm
-    return None if positions_mm is scene.head.topology.control.positions_mm else positions_mm
+    pose_arrays = scene.pose_arrays or scene.head.control_rig.rest
+    positions_mm = pose_arrays.positions_mm
+    return None if positions_mm is scene.head.topology_head.control_rig.positions_mm else positions_mm
 
 
-def _face_movements(head: Head, motion: Motion | None) -> NDArray[np.float32]:
-    assert motion is not None
-    return movement_weights(head.targets, motion.weights)
+def _face_movements(head: Head, pose_arrays: PoseArrays | None) -> NDArray[np.float32]:
+    assert pose_arrays is not None
+    return movement_weights(head.targets, pose_arrays.weights)
 
 
 def _rest_pose_bytes(head: Head) -> PoseBytes:
-    return rest_pose_bytes(head.control)
+    return rest_pose_bytes(head.control_rig)
 
 
-def _eye_poses(head: Head, motion: Motion) -> EyePoses | None:
+def _eye_poses(head: Head, pose_arrays: PoseArrays) -> EyePoses | None:
     if head.eyes is None:
         return None
-    rig = head.control
-    edges = None if rig.contact is None else rig.lid_edges_mm(motion)
-    return EyePoses(head.eyes.eye_matrices(rig, motion), edges)
+    rig = head.control_rig
+    edges = None if rig.contact is None else rig.lid_edges_mm(pose_arrays)
+    return EyePoses(head.eyes.eye_matrices(rig, pose_arrays), edges)
 
 
-def _posed_state(head: Head, motion: Motion, rest_bytes: PoseBytes) -> HeadState:
-    rig, posed = head.control, _pose_bytes(head, motion, rest_bytes)
+def _posed_state(head: Head, pose_arrays: PoseArrays, rest_bytes: PoseBytes) -> HeadState:
+    rig, posed = head.control_rig, _pose_bytes(head, pose_arrays, rest_bytes)
     if posed == rest_bytes:  # the outline of the mesh is exact
-        return HeadState(posed, head.mesh.outline, _eye_poses(head, motion))
-    return HeadState(posed, Outline(rig.outline_mm(motion), _OUTLINE_MARGIN_MM), _eye_poses(head, motion))
+        return HeadState(posed, head.mesh.outline, _eye_poses(head, pose_arrays))
+    return HeadState(
+        posed, Outline(rig.outline_mm(pose_arrays), _OUTLINE_MARGIN_MM), _eye_poses(head, pose_arrays)
+    )
 
 
 def _sky_view(
-    outline: Outline, motion: Motion, device: Device, head: Head, rotation_points: HeadRotationPoints
+    outline: Outline, pose_arrays: PoseArrays, device: Device, head: Head, rotation_points: HeadRotationPoints
 ) -> tuple[SkyViews, UniformRecord]:
-    views = sky_views(outline, head_rotation(rotation_points, motion))
+    views = sky_views(outline, head_rotation(rotation_points, pose_arrays))
     return views, sky_views_record(device, views, len(head.mesh.positions))
 
 

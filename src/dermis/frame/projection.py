@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.mesh.outline import Outline
-from dermis.scene.camera import Window
+from dermis.scene.camera import ImageRectangle
 from dermis.scene.lights import PointLight
 
 Vectors = NDArray[np.float64]
@@ -24,7 +24,7 @@ MatrixRows = tuple[MatrixRow, MatrixRow, MatrixRow]
 _MAX_HALF_VIEW_TANGENT = math.tan(math.radians(80.0))
 _MIN_LIGHT_DISTANCE_MM = 1.0
 _UP_DIRECTION = 0.0, 1.0, 0.0
-_NO_WINDOW_SHIFT = 0.0, 0.0
+_NO_RECTANGLE_SHIFT = 0.0, 0.0
 PIXEL_CENTRE = np.full((1, 2), 0.5)
 """Sample position of views with one sample per pixel."""
 
@@ -144,20 +144,20 @@ def view_rows(eye: Triple, axes: Axes) -> MatrixRows:
 
 
 def perspective_rows(
-    view_matrix_rows: MatrixRows, window: Window, near: float, far: float
+    view_matrix_rows: MatrixRows, image_rectangle: ImageRectangle, near: float, far: float
 ) -> list[Sequence[float]]:
-    """Return the rows of the matrix from world to clip space for a window on the image plane.
+    """Return the rows of the matrix from world to clip space for a rectangle of the image plane.
 
     Depth is reversed, which gives a similar precision at all distances, because floats are densest near 0.
 
     view_matrix_rows : upper three rows of the view matrix
-    window : rectangle of the image plane that the picture shows
+    image_rectangle : rectangle of the image plane that the picture shows
     near, far : distances at which depth is 1 and 0 [mm]
     """
     scale = -near / (far - near)
     depth = [scale * c for c in view_matrix_rows[2]]
     depth[3] -= far * scale
-    lateral = zip(view_matrix_rows, window.half, window.shift, strict=False)
+    lateral = zip(view_matrix_rows, image_rectangle.half, image_rectangle.shift, strict=False)
     across = [
         [c / half - shift * w for c, w in zip(row, view_matrix_rows[2], strict=True)]
         for row, half, shift in lateral
@@ -206,7 +206,7 @@ def point_shadow_views(
         for h, n, f in zip(steepest, near, far, strict=True)
     ]
     clips = [
-        perspective_rows(r, Window((h, h), _NO_WINDOW_SHIFT), n, f)
+        perspective_rows(r, ImageRectangle((h, h), _NO_RECTANGLE_SHIFT), n, f)
         for r, (h, n, f) in zip(rows, bounds, strict=True)
     ]
     return [

@@ -26,7 +26,7 @@ class FrameRequest:
 
     profile : diffusion profile of the skin; the first profile if the skin has several (`other_profiles`)
     rest_positions_mm : (p, 3) positions of the person's control points in the rest pose [mm]; None if they
-        are the control points of `atlas_head`, the template whose mesh several people can share
+        are the control points of `topology_head`, the template whose mesh several people can share
     environment : light from all directions around the head, None if there is none
     environment_map : prefiltered panorama of `environment`
     light_part_counts : number of parts into which each light is divided. The last lights are those that
@@ -60,14 +60,14 @@ class FrameRequest:
     landmarks: tuple[str, ...] = ()
 
     @property
-    def atlas_head(self) -> Head:
+    def topology_head(self) -> Head:
         """Return the head for which the atlas is computed: the template that people share, or `head`."""
-        return self.head.topology
+        return self.head.topology_head
 
     @property
     def has_shared_mesh(self) -> bool:
         """Return whether several people share the mesh, and thus also the atlas and other resources."""
-        return self.atlas_head is not self.head.bare
+        return self.topology_head is not self.head.without_maps
 
     @property
     def takes_albedo_from_map(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dermis.atlas.build import MIN_ATLAS_SIZE
+from dermis.atlas.build import MIN_ATLAS_SIDE
 from dermis.scene.settings import Settings
 
 FEATHER_WIDTH_MM = 3.0  # width over which an edited stretch map narrows the blur towards an edge
@@ -67,4 +67,4 @@ def plan_atlases(method: SeamMethod, settings: Settings, blur_count: int, has_oc
     layouts = method.layouts
     if blur_count:
         return AtlasPlan(layouts, settings.atlas)
-    return AtlasPlan(layouts[:1], settings.atlas) if has_occlusion else AtlasPlan(("mesh",), MIN_ATLAS_SIZE)
+    return AtlasPlan(layouts[:1], settings.atlas) if has_occlusion else AtlasPlan(("mesh",), MIN_ATLAS_SIDE)

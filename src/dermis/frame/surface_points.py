@@ -53,7 +53,7 @@ def _find_surface_points(renderer: Renderer, scene: Scene, settings: Settings) -
     inputs = renderer.prepare(scene, single)
     frame = CommandList(renderer.device)
     resources = inputs.resources
-    shape.draw(frame, resources.shape.shape, inputs.motion)
+    shape.draw(frame, resources.shape.shape, inputs.pose_bytes)
     visibility_buffer.draw(frame, resources.visibility, inputs.camera_views, resources.head)
     frame.submit()
     renderer.graph.invalidate()  # this frame bypassed the graph
@@ -79,8 +79,12 @@ def _barycentric_weights(
     forward, right, up, eye, shift = (shade_record[name].astype(np.float64) for name in names)
     x, y = x + shift[0], y + shift[1]
     ray = forward + x[:, None] * right + y[:, None] * up
-    mesh, motion = scene.head.mesh, scene.motion
-    points = mesh.positions if motion is None else scene.head.control.points_mm(motion)[mesh.point]
+    mesh, pose_arrays = scene.head.mesh, scene.pose_arrays
+    points = (
+        mesh.positions
+        if pose_arrays is None
+        else scene.head.control_rig.posed_points_mm(pose_arrays)[mesh.point]
+    )
     a, b, c = (points[mesh.triangles[triangle_index, k]].astype(np.float64) - eye for k in range(3))
     sides = (np.cross(b, c), np.cross(c, a), np.cross(a, b))
     weights = np.stack([(side * ray).sum(axis=1) for side in sides], axis=-1)
@@ -128,7 +132,7 @@ def _compute_irradiance(
     entering = make_texture(device, (side, side), "rgba32float")
     frame = CommandList(device)
     resources = inputs.resources
-    shape.draw(frame, resources.shape.shape, inputs.motion)
+    shape.draw(frame, resources.shape.shape, inputs.pose_bytes)
     shadows.draw(frame, resources.shadow_maps, inputs.shadow_views, resources.head)
     layout = LitAtlas(point_atlas, first.head, first.bindings, make_surface_texture(device, side), entering)
     surface_texels.draw(frame, layout)

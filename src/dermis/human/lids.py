@@ -18,9 +18,9 @@ BoolArray = NDArray[np.bool_]
 
 MAKEHUMAN_EYE_RADIUS_MM = 15.4
 """Mean radius of MakeHuman's eyeball of the average person, which MakeHuman's lids touch [mm]."""
-EYE_OFFSET_MM = 2.2
+EYE_FORWARD_OFFSET_MM = 2.2
 """How far the smaller anatomical eyeball is in front of MakeHuman's, to align the corneas [mm]."""
-CONTROL_MESH_SCALE = 1.0045
+EYEBALL_CONTROL_MESH_SCALE = 1.0045
 """Size of an eyeball's control mesh relative to its smooth surface."""
 _MAX_SKIN_TO_LID_MM = 15.0  # distance up to which skin follows the lids
 _SKIN_BLEND_DISTANCE_MM = 1.0  # blend distance between the lid points that skin follows
@@ -81,7 +81,7 @@ class LidSide(NamedTuple):
     contact: Index
     clearances_mm: Points
 
-    def reindexed(self, sorted_points: Index) -> LidSide:
+    def with_renumbered_points(self, sorted_points: Index) -> LidSide:
         """Return a copy with indices into the array `sorted_points` instead of point indices.
 
         sorted_points : sorted point indices, which include all points of the lids
@@ -130,8 +130,8 @@ def _project_lids(
     points[..., lid_side.point, :] += lid_side.weights @ _lid_displacements(
         points[..., lid_side.rings, :], socket, is_closed
     )
-    centre = socket.centre + socket.size * EYE_OFFSET_MM * REST_GAZE
-    size = CONTROL_MESH_SCALE * socket.size
+    centre = socket.centre + socket.size * EYE_FORWARD_OFFSET_MM * REST_GAZE
+    size = EYEBALL_CONTROL_MESH_SCALE * socket.size
     relative = (points[..., lid_side.contact, :] - centre) / size
     distance, surface = radial_distances_mm(relative, gaze_axis)
     scale = np.maximum(1.0, (surface + lid_side.clearances_mm) / distance)
@@ -184,7 +184,7 @@ def _lid_displacements(rings: Points, socket: EyeSocket, lid_is_closed: bool | B
     across = np.linalg.norm(relative[..., :2], axis=-1)
     target_radius = radius * _compress_radius(across / radius)
     floor = np.where(is_closed[..., None], 0.0, _CARUNCLE_RISE_MM.ravel())
-    depth = EYE_OFFSET_MM + np.sqrt(radius**2 - target_radius**2) + floor
+    depth = EYE_FORWARD_OFFSET_MM + np.sqrt(radius**2 - target_radius**2) + floor
     front = relative[..., :2] * (target_radius / np.maximum(across, 1e-9))[..., None]
     return np.asarray(socket.size * (np.concatenate([front, depth[..., None]], axis=-1) - published))
 
@@ -311,7 +311,7 @@ def _lid_targets() -> _LidTargets:
         np.array(["Blink" in name for name in names]),
         np.array([gaze_axes().get(name, REST_GAZE) for name in names])[:, None],
         point,
-        tuple(side.reindexed(point) for side in sides),
+        tuple(side.with_renumbered_points(point) for side in sides),
         tuple(np.flatnonzero(one) for one in near),
         row,
         np.repeat(np.arange(len(rows)), [len(one) for one in rows]),
@@ -335,10 +335,10 @@ def eyeball_mesh() -> tuple[Doubles, Index]:
 
     The eyeball looks along +Z.
     """
-    return build_eyeball(position_scale=CONTROL_MESH_SCALE)
+    return build_eyeball(position_scale=EYEBALL_CONTROL_MESH_SCALE)
 
 
 def place_eyeball(socket: EyeSocket) -> tuple[Doubles, Doubles]:
     """Return the control points (n, 3) and the centre (3,) of the anatomical eyeball in a socket [mm]."""
-    centre = socket.centre + socket.size * EYE_OFFSET_MM * REST_GAZE
+    centre = socket.centre + socket.size * EYE_FORWARD_OFFSET_MM * REST_GAZE
     return centre + socket.size * eyeball_mesh()[0], centre

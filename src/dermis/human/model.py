@@ -175,7 +175,9 @@ class Template:
 
         control_head : the person's head before subdivision, in the same uv layout as `head`
         """
-        rig = replace(control_head.control, stencils=self.head.control.stencils, template=self.head.control)
+        rig = replace(
+            control_head.control_rig, stencils=self.head.control_rig.stencils, template=self.head.control_rig
+        )
         mesh = control_head.mesh
         if self.refinement is not None:
             mesh = self.refinement.subdivided_mesh(mesh)
@@ -183,13 +185,13 @@ class Template:
 
 
 @cache
-def template(layout: Layout, levels: int) -> Template:
+def head_template(layout: Layout, levels: int) -> Template:
     """Return the template for a uv layout and a number of subdivision levels; templates are cached."""
     head = control_head = build_head(MEAN_PERSON_WEIGHTS, Maps(), layout, EyeLook())
     refined = refinement(control_head.mesh, levels) if levels else None
     if refined is not None:
-        rig = replace(control_head.control, stencils=refined.stencils)
+        rig = replace(control_head.control_rig, stencils=refined.stencils)
         head = replace(control_head, mesh=refined.subdivided_mesh(control_head.mesh), rig=rig, levels=levels)
-    mean_mm = control_head.control.positions_mm.astype(np.float64)
+    mean_mm = control_head.control_rig.positions_mm.astype(np.float64)
     root_finder = RootFinder(control_head.mesh, mean_mm, eye_centres(control_head.mesh), head.mesh)
     return Template(head, root_finder, refined)

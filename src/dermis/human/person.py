@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import check_fields, checked_integer, checked_number
+from dermis.base.renamed import renamed_classmethod
 from dermis.human.hair.groom import add_hair
 from dermis.human.hair.look import HairLook, sample_hair, sample_recession, stubble_visibility, typical_hair
 from dermis.human.makehuman import OLD_AGE, YOUNG_AGE, human_targets
-from dermis.human.model import Layout, build_head, control_points_mm, template
+from dermis.human.model import Layout, build_head, control_points_mm, head_template
 from dermis.human.skin.look import (
     Demographics,
     SkinLook,
@@ -26,7 +27,7 @@ from dermis.human.skin.look import (
     typical_skin,
 )
 from dermis.human.skin.measured import (
-    ANCESTRY_UNIONS,
+    GROUPS_OF_ANCESTRY,
     ITA_RANGE,
     SKIN_ANCESTRIES,
     group_probabilities,
@@ -42,10 +43,10 @@ from dermis.mesh.subdivide import resolve_levels
 _MAX_SEED = 2**32 - 1
 _MIN_BEARD_SHADOW = 0.6  # shadow of shaved hair below a beard
 _ANCESTRY_CONCENTRATION = 0.35  # of a Dirichlet distribution; small, so that mostly one ancestry prevails
-_SEX_DEVIATION = 0.08  # standard deviation of `sex` from 0 or 1
+_SEX_SD = 0.08  # standard deviation of `sex` from 0 or 1
 _OPPOSITE_SUFFIXES = {"decr": "incr", "down": "up", "in": "out", "backward": "forward", "concave": "convex"}
 """Suffixes of the names of targets with opposite effects."""
-_WEIGHT_DEVIATION_OF_FOLDER = {  # standard deviation of the weights of targets by folder
+_WEIGHT_SD_BY_FOLDER = {  # standard deviation of the weights of targets by folder
     "head": 0.1,
     "forehead": 0.25,
     "eyebrows": 0.25,
@@ -59,8 +60,8 @@ _WEIGHT_DEVIATION_OF_FOLDER = {  # standard deviation of the weights of targets 
 }
 # Words in the names of targets for macro quantities and for shifts of whole parts, which are not sampled:
 _EXCLUDED_TARGETS = ("trans", "age", "fat", "measure", "push")
-_RELATIVE_SIDE_DEVIATION = 0.2  # of the difference between left and right, relative to that of the weight
-_ASYMMETRY_DEVIATION = 0.1
+_RELATIVE_SIDE_DIFFERENCE_SD = 0.2  # of the difference between left and right, relative to that of the weight
+_ASYMMETRY_SD = 0.1
 _HEAD_SHAPES = ("diamond", "invertedtriangular", "oval", "rectangular", "round", "square", "triangular")
 _MAX_HEAD_SHAPE_WEIGHT = 0.3
 _ANCESTRIES = "african", "asian", "caucasian"
@@ -108,7 +109,7 @@ def sample_fields(seed: int, fixed_fields: Mapping[str, Any]) -> dict[str, Any]:
     ancestry, groups = _sample_ancestry(
         np.random.default_rng((int(seed), 3)), fixed_numbers, sampled, fixed_fields
     )
-    sex = min(abs(rng.normal(0.0, _SEX_DEVIATION)), 0.3)
+    sex = min(abs(rng.normal(0.0, _SEX_SD)), 0.3)
     sex = fixed_numbers.get("sex", 1.0 - sex if rng.random() < 0.5 else sex)
     old = rng.beta(1.2, 2.2)
     old = (fixed_numbers["age"] - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE) if "age" in fixed_numbers else old
@@ -190,7 +191,7 @@ def _sample_ancestry(
     groups: dict[str, float] = {}
     for fraction, people, pick in zip(ancestry, _ANCESTRIES, picks, strict=True):
         other = people == "caucasian" and not shape_given and chance < _OTHER_SKIN_ANCESTRY_FRACTION
-        names = _OTHER_SKIN_ANCESTRIES if other else ANCESTRY_UNIONS.get(people, (people,))
+        names = _OTHER_SKIN_ANCESTRIES if other else GROUPS_OF_ANCESTRY.get(people, (people,))
         groups[names[min(int(pick * len(names)), len(names) - 1)]] = float(fraction)
     return ancestry, groups
 
@@ -253,9 +254,9 @@ def _sample_targets(rng: np.random.Generator) -> Iterator[tuple[str, float]]:
         if one.truncated:
             value = min(max(value, -2 * one.spread), 2 * one.spread)
         if one.shared_name:  # left and right are nearly alike
-            value = common.setdefault(one.shared_name, value) + _RELATIVE_SIDE_DEVIATION * one.spread * next(
-                samples
-            )
+            value = common.setdefault(
+                one.shared_name, value
+            ) + _RELATIVE_SIDE_DIFFERENCE_SD * one.spread * next(samples)
         yield (one.more if value > 0 else one.less), abs(value)
     yield f"head/head-{rng.choice(_HEAD_SHAPES)}", float(rng.uniform(0.0, _MAX_HEAD_SHAPE_WEIGHT))
 
@@ -284,15 +285,15 @@ def _opposite_targets() -> tuple[_OppositeTargets, ...]:
     for name in known:
         folder, local_name = name.split("/")
         if folder == "asym" and name.endswith("-l"):
-            pairs.append(_OppositeTargets(f"{name[:-1]}r", name, _ASYMMETRY_DEVIATION, False, ""))
-        if folder not in _WEIGHT_DEVIATION_OF_FOLDER or any(word in local_name for word in _EXCLUDED_TARGETS):
+            pairs.append(_OppositeTargets(f"{name[:-1]}r", name, _ASYMMETRY_SD, False, ""))
+        if folder not in _WEIGHT_SD_BY_FOLDER or any(word in local_name for word in _EXCLUDED_TARGETS):
             continue
         sided = local_name[:2] in ("l-", "r-")
         for low, high in _OPPOSITE_SUFFIXES.items():
             stem = name.removesuffix(low)
             if stem != name and f"{stem}{high}" in known:
                 shared_name = f"{folder}/{local_name[2:].removesuffix(low)}" if sided else ""
-                deviation = _WEIGHT_DEVIATION_OF_FOLDER[folder]
+                deviation = _WEIGHT_SD_BY_FOLDER[folder]
                 pairs.append(_OppositeTargets(name, f"{stem}{high}", deviation, True, shared_name))
     return tuple(pairs)
 
@@ -338,7 +339,7 @@ class Human:
     --------
     >>> import dermis
     >>> person = dermis.Human(age=60, sex=1, targets={"nose/nose-hump-incr": 0.5})
-    >>> person.positions_mm.shape[1], person.weights()["nose/nose-hump-incr"]
+    >>> person.positions_mm.shape[1], person.target_weights()["nose/nose-hump-incr"]
     (3, 0.5)
     """
 
@@ -376,7 +377,7 @@ class Human:
                 refuse(name, f"a {kind.__name__}", f"got {format_value(look)}", "Make one, or leave it out")
 
     @classmethod
-    def drawn(cls, seed: int, **given: Any) -> Human:
+    def sampled(cls, seed: int, **given: Any) -> Human:
         """Return a random plausible adult, mostly of one ancestry and slightly asymmetric.
 
         Parameters
@@ -402,7 +403,7 @@ class Human:
         Examples
         --------
         >>> import dermis
-        >>> dermis.Human.drawn(7, age=70).age
+        >>> dermis.Human.sampled(7, age=70).age
         70.0
         """
         for name in given.keys() & _FIELD_RANGES.keys():
@@ -447,12 +448,12 @@ class Human:
             refuse("layout", f"one of {', '.join(get_args(Layout))}", actual, "Choose one")
         checked_number("hairs", hairs, _MIN_HAIR_FRACTION, 1.0)
         painted = maps or PaintedMaps(look=self.look)
-        control_head = build_head(self.weights(), painted, layout, self.iris)
-        shared = template(layout, resolve_levels(control_head, subdivide))
+        control_head = build_head(self.target_weights(), painted, layout, self.iris)
+        shared = head_template(layout, resolve_levels(control_head, subdivide))
         head = shared.refine_head(control_head)
-        return add_hair(head, control_head, shared.root_finder, self.hairdo, self.look.recession, hairs)
+        return add_hair(head, control_head, shared.root_finder, self.hair_look, self.look.recession, hairs)
 
-    def on(self, head: Head) -> Head:
+    def transfer_skin_to(self, head: Head) -> Head:
         """Return the head of another person with the skin and eyes of this person.
 
         A pose `Pose(positions_mm=person.positions_mm)` gives the head the shape of this person too. This is
@@ -489,7 +490,7 @@ class Human:
         """Return the field `skin`, or the typical skin look for the person's ancestry, sex and age."""
         if self.skin is not None:
             return self.skin
-        typical, visibility = typical_skin(self._demographics), stubble_visibility(self.hairdo)
+        typical, visibility = typical_skin(self._demographics), stubble_visibility(self.hair_look)
         return replace(typical, stubble=visibility * typical.stubble, beard=visibility * typical.beard)
 
     @property
@@ -498,7 +499,7 @@ class Human:
         return typical_eyes(self._demographics) if self.eyes is None else self.eyes
 
     @property
-    def hairdo(self) -> HairLook:
+    def hair_look(self) -> HairLook:
         """Return the field `hair`, or the typical hair look for the person's ancestry, sex and age."""
         if self.hair is not None:
             return self.hair
@@ -522,9 +523,9 @@ class Human:
 
         Raises DermisError if `targets` contains names that are not morph targets of MakeHuman.
         """
-        return control_points_mm(self.weights())
+        return control_points_mm(self.target_weights())
 
-    def weights(self) -> dict[str, float]:
+    def target_weights(self) -> dict[str, float]:
         """Return the nonzero weights of MakeHuman's morph targets for this person, by target name."""
         weights = {**self._ancestry_weights(), **self._physique_weights()}
         for name, weight in self.targets.items():
@@ -558,6 +559,8 @@ class Human:
             for sex, sex_fraction in (("female", 1.0 - self.sex), ("male", self.sex))
             for age, age_fraction in (("young", 1.0 - old), ("old", old))
         }
+
+    drawn = renamed_classmethod("drawn", "sampled")
 
 
 def _check_skin_fields(skin_ancestry: object, ita: object) -> None:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.build import MIN_ATLAS_SIZE, build_atlas
+from dermis.atlas.build import MIN_ATLAS_SIDE, build_atlas
 from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import DermisError, error_context, format_value, refuse
 from dermis.base.reading import parse_json, read_text
@@ -36,7 +36,7 @@ def person_parameters(person: Human) -> dict[str, Any]:
     """
     numbers = {one.name: getattr(person, one.name) for one in fields(person)}
     numbers |= {"targets": dict(person.targets), "skin": asdict(person.look)}
-    return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hairdo)}
+    return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hair_look)}
 
 
 def write_person_json(path: Path, person: Human) -> int:
@@ -128,10 +128,10 @@ def relief_slopes(head: Head) -> NDArray[np.float32] | None:
     if head.maps.normal is not None or height is None:
         return None
     side = len(height)
-    if side != height.shape[1] or side < MIN_ATLAS_SIZE:
+    if side != height.shape[1] or side < MIN_ATLAS_SIDE:
         return None
     down, right = np.gradient(height)
-    coarse = max(MIN_ATLAS_SIZE, min(side, _STRETCH_ATLAS_SIDE))
+    coarse = max(MIN_ATLAS_SIDE, min(side, _STRETCH_ATLAS_SIDE))
     stretch = build_atlas(head.mesh, coarse).stretch.astype(np.float32)
     if side > coarse:
         texels = np.arange(side) * coarse // side

@@ -23,7 +23,7 @@ QUADS_PER_EDGE = 10
 """Quads along each edge of the cube that becomes a ball; even, so that a point is on the axis."""
 UV_RADIUS_OF_BACK = 0.49
 """Distance of the back of the eye from the centre of the uv layout [-]."""
-UV_DECAY_ANGLE_RADIANS = 0.9
+UV_RADIUS_FALLOFF_RADIANS = 0.9
 """Constant a: at the angle t from the axis, the distance in uv is proportional to 1 - exp(-t / a) [rad]."""
 
 
@@ -190,8 +190,8 @@ def eye_uv(points: Doubles) -> Floats:
     angle = np.arctan2(across, points[:, 2])
     radius = (
         UV_RADIUS_OF_BACK
-        * np.expm1(-angle / UV_DECAY_ANGLE_RADIANS)
-        / np.expm1(-np.pi / UV_DECAY_ANGLE_RADIANS)
+        * np.expm1(-angle / UV_RADIUS_FALLOFF_RADIANS)
+        / np.expm1(-np.pi / UV_RADIUS_FALLOFF_RADIANS)
     )
     direction = points[:, :2] * [1.0, -1.0] / np.maximum(across, 1e-12)[:, None]
     return np.asarray(0.5 + radius[:, None] * direction, np.float32)

@@ -10,7 +10,7 @@ from dermis.base.arrays import Doubles, Ints
 from dermis.base.summary import ShortRepr
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm
-from dermis.mesh.rig import Motion, Rig
+from dermis.mesh.rig import PoseArrays, Rig
 
 
 @dataclass(frozen=True, repr=False)
@@ -36,14 +36,14 @@ class Eyes(ShortRepr):
     centre_offset_mm: Doubles = field(default_factory=lambda: np.zeros(2))
     gaze: Doubles = field(default_factory=lambda: np.tile([0.0, 0.0, 1.0], (2, 1)))
 
-    def eye_matrices(self, rig: Rig, motion: Motion) -> Doubles:
+    def eye_matrices(self, rig: Rig, pose_arrays: PoseArrays) -> Doubles:
         """Return the matrices (k, 4, 4) from head coordinates [mm] to the coordinates of each eye.
 
         Eye coordinates are scaled to an eye with a cornea of adult size [mm], with z along the axis of the
         eye. The position of the cornea in eye coordinates does not depend on the size of the ball.
         """
         count = len(self.apex)
-        points = rig.pose_points(np.concatenate([self.apex, self.back, self.side]), motion)
+        points = rig.pose_points(np.concatenate([self.apex, self.back, self.side]), pose_arrays)
         apex, back, side = points.reshape(3, count, 3)
         length = np.linalg.norm(apex - back, axis=1, keepdims=True)
         behind = (self.radius_mm - self.centre_offset_mm)[:, None]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.base.arrays import Doubles, Floats, Index, Ints
 
-MIN_UV_CROSS = 1e-12
+MIN_DOUBLE_UV_AREA = 1e-12
 """Twice the signed uv area below which u and v have no direction on a triangle (1/70 texel at 8192)."""
 T = TypeVar("T", np.float32, np.float64)
 
@@ -192,7 +192,7 @@ def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) ->
     """
     p, q = positions[triangles].astype(np.float64), uv[triangles].astype(np.float64)
     cross, weight = uv_cross(q), triangle_areas(p)
-    valid = (np.abs(cross) > MIN_UV_CROSS) & (weight > 0)
+    valid = (np.abs(cross) > MIN_DOUBLE_UV_AREA) & (weight > 0)
     p, q, cross, weight = p[valid], q[valid], cross[valid, None], weight[valid, None]
     e1, e2, d1, d2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]
     dpdu = (e1 * d2[:, 1:] - e2 * d1[:, 1:]) / cross

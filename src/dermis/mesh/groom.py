@@ -12,15 +12,15 @@ from dermis.base.summary import ShortRepr
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, refine_roots
 
-GUIDE_KNOTS = 40
+KNOTS_PER_GUIDE = 40
 """Number of knots of each guide."""
-GUIDE_ANCHORS = 4
+ANCHORS_PER_GUIDE_KNOT = 4
 """Number of quads that each knot of a guide follows."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Guides(ShortRepr):
-    """Guide curves of `GUIDE_KNOTS` knots from root to tip; each knot follows the quads nearest to it.
+    """Guide curves of `KNOTS_PER_GUIDE` knots from root to tip; each knot follows the quads nearest to it.
 
     The arrays are for g guides with k knots each, where each knot follows m quads.
 

@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Ints
-from dermis.mesh.groom import GUIDE_KNOTS, Groom
+from dermis.mesh.groom import KNOTS_PER_GUIDE, Groom
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Roots, Strands, offsets_in_frames, root_frames
+from dermis.mesh.strands import Roots, Strands, offsets_in_root_axes, root_frames
 
 UInt32s = NDArray[np.uint32]
 MAX_EXPORTED_STRANDS = 40_000
 """Number of strands with which exports and path tracing show hair."""
 _SMOOTHING_KNOTS, _SMOOTH_HEIGHTS_MM = 8, (2.0, 18.0)
-_MIN_HEIGHT_MM, _RISE_LENGTH_MM = 0.35, 4.0
+_MIN_HEIGHT_ABOVE_SKIN_MM, _RISE_LENGTH_MM = 0.35, 4.0
 _HAIRLINE_FADE_MM, _SHORT_HAIR_HEIGHTS_MM = (-3.0, 11.0), (-2.0, 14.0)
 _HAIRLINE_STEP_DEGREES = 2.0
 _TIP_FRACTION, _TIP_WIDTH_RATIO = 0.12, 0.35
@@ -112,7 +112,7 @@ def _posed_guides(groom: Groom, points_mm: NDArray[np.floating]) -> tuple[Double
     smooth = np.zeros_like(moved)
     for step in range(-_SMOOTHING_KNOTS, _SMOOTHING_KNOTS + 1):
         factor = 1.0 - abs(step) / (_SMOOTHING_KNOTS + 1)
-        smooth += factor * moved[:, np.clip(np.arange(GUIDE_KNOTS) + step, 0, GUIDE_KNOTS - 1)]
+        smooth += factor * moved[:, np.clip(np.arange(KNOTS_PER_GUIDE) + step, 0, KNOTS_PER_GUIDE - 1)]
         total += factor
     far = _smoothstep(*_SMOOTH_HEIGHTS_MM, guides.rest_mm[..., 3].astype(np.float64))[..., None]
     return (1.0 - far) * bound + far * (guides.rest_mm[..., :3] + smooth / total), outward
@@ -165,13 +165,13 @@ def _grow_chunk(
     across = across + _frizz_offsets(strand_number, part, s)
     varied = across[0][..., None] * side + across[1][..., None] * other
     height = (1.0 - pull) * own.height + pull * at.height + (varied * own.normal).sum(axis=-1)
-    least = _MIN_HEIGHT_MM * np.minimum(s / _RISE_LENGTH_MM, 1.0)
+    least = _MIN_HEIGHT_ABOVE_SKIN_MM * np.minimum(s / _RISE_LENGTH_MM, 1.0)
     positions = own.position + to_middle + varied + np.maximum(least - height, 0.0)[..., None] * own.normal
     taper = 1.0 - (1.0 - _TIP_WIDTH_RATIO) * _smoothstep(1.0 - _TIP_FRACTION, 1.0, t)
     edge = 1.0 - part["hairline"] * (0.45 - 0.45 * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_hairline_mm))
     radius = (part["radius_mm"] * (0.8 + 0.4 * _uniform_random(strand_number, 3)) * edge)[:, None] * taper
     return (
-        offsets_in_frames(root_axes, positions - root_mm[:, None]),
+        offsets_in_root_axes(root_axes, positions - root_mm[:, None]),
         radius,
         _strand_absorption(strand_number, part),
         part["cover"],
@@ -258,8 +258,8 @@ def _interpolate_guides(
     root_mm : (n, 3) positions of the roots [mm]
     """
     knots, normals = posed_guides
-    at = np.clip(guide_position, 0.0, 1.0) * (GUIDE_KNOTS - 1)
-    first = np.minimum(at.astype(np.int64), GUIDE_KNOTS - 2)
+    at = np.clip(guide_position, 0.0, 1.0) * (KNOTS_PER_GUIDE - 1)
+    first = np.minimum(at.astype(np.int64), KNOTS_PER_GUIDE - 2)
     part = (at - first)[..., None]
     height_mm = groom.guides.rest_mm[..., 3]
     position = np.repeat(root_mm[:, None], guide_position.shape[1], axis=1)

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from dermis.base.arrays import Doubles, Floats
+from dermis.base.renamed import renamed_attribute
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyes import Eyes
 from dermis.mesh.file_vertices import FileVertices
@@ -87,14 +88,14 @@ class Head:
         return f"<Head {self.name!r}: {size}\n {'; '.join(parts)}>"
 
     @cached_property
-    def control(self) -> Rig:
+    def control_rig(self) -> Rig:
         """Return the rig; a head without a rig gets a rig of its points that has no targets and no bones."""
         if self.rig is not None:
             return self.rig
         return Rig(self.mesh.points_mm.astype(np.float32))
 
     @cached_property
-    def bare(self) -> Head:
+    def without_maps(self) -> Head:
         """Return the head without maps and with default eyes, for caches that depend on shape only."""
         if self.rig is None:
             return self
@@ -102,16 +103,15 @@ class Head:
         return replace(self, maps=Maps(), eyes=eyes)
 
     @property
-    def topology(self) -> Head:
+    def topology_head(self) -> Head:
         """Return the head from which the uv atlas and other data that depend on topology are computed.
 
-        Heads with the same `template` share these data: for them, it is the template. It is `bare`, this head
-        without maps, if there is no template, or if the template's rig is not the `Rig.template` of this
-        head's rig.
+        Heads with the same `template` share these data: for them, it is the template. It is `without_maps` if
+        there is no template, or if the template's rig is not the `Rig.template` of this head's rig.
         """
         template = self.template
         if template is None or self.rig is None or self.rig.template is not template.rig:
-            return self.bare
+            return self.without_maps
         return template
 
     @property
@@ -120,22 +120,24 @@ class Head:
 
         Points of fitted eyeballs are left out, because they are not in the file, see `Rig.rigid_followers`.
         """
-        positions = self.control.positions_mm
-        return positions[: self.control.file_point_count] if self.control.rigid_followers else positions
+        positions = self.control_rig.positions_mm
+        return (
+            positions[: self.control_rig.file_point_count] if self.control_rig.rigid_followers else positions
+        )
 
     @property
     def targets(self) -> tuple[str, ...]:
         """Return the names of the morph targets."""
-        return self.control.targets.names
+        return self.control_rig.targets.names
 
     @property
     def bones(self) -> tuple[str, ...]:
         """Return the names of the bones."""
-        skeleton = self.control.skeleton
+        skeleton = self.control_rig.skeleton
         return skeleton.names if skeleton else ()
 
     @cached_property
-    def skull_mm(self) -> Point | None:
+    def skull_centre_mm(self) -> Point | None:
         """Return the centre of the skull [mm]; None for a mesh without a head.
 
         Neck, shoulders and body do not shift this centre. If the mesh is a whole body whose skeleton has a
@@ -144,33 +146,42 @@ class Head:
         skeleton = None if self.mesh.is_head_sized or self.rig is None else self.rig.skeleton
         bone = None if skeleton is None else head_bone(skeleton.names)
         if skeleton is None or bone is None:
-            return self.mesh.skull_mm
+            return self.mesh.skull_centre_mm
         follows = ((skeleton.bone == bone) & (skeleton.weight > _MIN_HEAD_BONE_WEIGHT)).any(axis=1)
-        points = self.control.positions_mm[follows]
-        return centre_of_box(points) if len(points) else self.mesh.skull_mm
+        points = self.control_rig.positions_mm[follows]
+        return centre_of_box(points) if len(points) else self.mesh.skull_centre_mm
 
     @cached_property
     def centre_mm(self) -> Point:
         """Return the origin of the scene: the centre of the skull, or of a mesh without a head [mm]."""
-        return self.skull_mm or centre_of_box(self.mesh.positions)
+        return self.skull_centre_mm or centre_of_box(self.mesh.positions)
 
     @cached_property
-    def axes(self) -> Doubles:
+    def front_view_axes(self) -> Doubles:
         """Return unit vectors to the viewer's right, upwards and to the front, as rows (3, 3).
 
         For a head the directions are x, y and z. The front of a flat patch of skin is the side to which its
         normals point.
         """
-        return np.eye(3) if self.skull_mm is not None else facing_axes(self.mesh.positions, self.mesh.normals)
+        return (
+            np.eye(3)
+            if self.skull_centre_mm is not None
+            else facing_axes(self.mesh.positions, self.mesh.normals)
+        )
 
     @property
-    def seen_positions_mm(self) -> Floats:
+    def front_view_positions_mm(self) -> Floats:
         """Return the positions (v, 3) of the vertices as seen from the front, relative to the centre [mm].
 
-        Along the directions `axes`: x to the viewer's right, y up, and z to the front, towards the viewer.
+        Along the directions `front_view_axes`: x to the viewer's right, y up, and z to the front, towards the
+        viewer.
         """
         positions = self.mesh.positions - np.array(self.centre_mm, dtype=np.float32)
-        return positions if self.skull_mm is not None else positions @ self.axes.T.astype(np.float32)
+        return (
+            positions
+            if self.skull_centre_mm is not None
+            else positions @ self.front_view_axes.T.astype(np.float32)
+        )
 
     @cached_property
     def reach_mm(self) -> float:
@@ -178,15 +189,17 @@ class Head:
         offsets = self.mesh.positions - np.array(self.centre_mm)
         return float(np.sqrt(np.einsum("vi,vi->v", offsets, offsets).max()))
 
-    def frontmost(self, x_mm: float, y_mm: float) -> tuple[float, float, float]:
+    def frontmost_point_mm(self, x_mm: float, y_mm: float) -> tuple[float, float, float]:
         """Return the position (x, y, z) of the frontmost vertex near a point seen from the front [mm].
 
         The position is relative to the head's centre.
 
         x_mm, y_mm : position to the viewer's right and upwards, relative to the head's centre [mm]
         """
-        p = self.seen_positions_mm
+        p = self.front_view_positions_mm
         distance = np.hypot(p[:, 0] - x_mm, p[:, 1] - y_mm)
         near = distance <= max(6.0, float(distance.min()) + 1.0)
         x, y, z = p[near][np.argmax(p[near][:, 2])]
         return float(x), float(y), float(z)
+
+    frontmost = renamed_attribute("frontmost", "frontmost_point_mm")

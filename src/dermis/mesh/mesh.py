@@ -104,7 +104,7 @@ class Mesh(ShortRepr):
         return is_head_sized(self.positions)
 
     @cached_property
-    def skull_mm(self) -> Point | None:
+    def skull_centre_mm(self) -> Point | None:
         """Return the centre of the skull [mm]; None for a mesh without a head.
 
         Neck, shoulders and body do not shift this centre.

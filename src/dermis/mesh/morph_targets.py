@@ -29,7 +29,7 @@ class MorphTargets(ShortRepr):
     rest: Floats | None = None
 
     @cached_property
-    def index(self) -> dict[str, int]:
+    def index_by_name(self) -> dict[str, int]:
         """Return a dictionary from the name of each target to its index."""
         return {name: index for index, name in enumerate(self.names)}
 

@@ -14,11 +14,11 @@ from dermis.base.arrays import Doubles, Floats
 from dermis.base.errors import DermisError, format_value, refuse
 from dermis.base.quantities import checked_array, checked_number
 from dermis.base.summary import ShortRepr
-from dermis.mesh.rig import Motion, Rig
+from dermis.mesh.rig import PoseArrays, Rig
 from dermis.mesh.skeleton import Skeleton
 
 MAX_WEIGHT = 100.0
-MAX_DEGREES = 1e5
+MAX_ROTATION_DEGREES = 1e5
 MAX_DISTANCE_MM = 1e6
 _EXPECTED_BONE_VALUE = "three angles [degrees] or a (4, 4) matrix"
 _MAX_SUGGESTED_NAMES = 3  # names that an error message proposes
@@ -75,7 +75,7 @@ class Pose(ShortRepr):
             refuse("pose", expected, f"got {format_value(value)}", "Correct it")
         return cls(weights=value)
 
-    def motion(self, rig: Rig, culprit: object = "pose") -> Motion:
+    def to_arrays(self, rig: Rig, culprit: object = "pose") -> PoseArrays:
         """Return the pose as arrays for a rig: target weights, bone matrices and rest positions of points.
 
         Parameters
@@ -87,7 +87,7 @@ class Pose(ShortRepr):
 
         Returns
         -------
-        Motion
+        PoseArrays
             Weights of the morph targets, matrices of the bones, and rest positions of the control points.
 
         Raises
@@ -95,7 +95,7 @@ class Pose(ShortRepr):
         DermisError
             For names that the rig does not have, and for invalid numbers and shapes.
         """
-        return Motion(
+        return PoseArrays(
             self._target_weights(rig, culprit),
             self._bone_matrices(rig, culprit),
             self._rest_positions(rig, culprit),
@@ -120,7 +120,7 @@ class Pose(ShortRepr):
             return rig.rest.matrices
         if rig.skeleton is None:
             _refuse_name(f"{culprit}: bones", next(iter(bone_values)), (), "bone")
-        index = rig.skeleton.index
+        index = rig.skeleton.index_by_name
         for name in bone_values:
             if name not in index:
                 _refuse_name(f"{culprit}: bones", name, index, "bone")
@@ -192,7 +192,9 @@ def _bone_transforms(
     for k, (bone, name) in enumerate(ordered_bones):
         try:
             if len(bone_values[name]) == 3:
-                angles = checked_array(culprit, bone_values[name], (3,), -MAX_DEGREES, MAX_DEGREES)
+                angles = checked_array(
+                    culprit, bone_values[name], (3,), -MAX_ROTATION_DEGREES, MAX_ROTATION_DEGREES
+                )
                 rows.append(skeleton.joint_rotation_matrix(bone, angles.tolist()))
                 by_angles.append(k)
             else:
@@ -226,7 +228,8 @@ def _check_matrices(bone_matrices: Doubles, bone_names: list[str], culprit: obje
 
 
 def _refuse_bone_value(culprit: str, bone_value: object) -> NoReturn:
-    expected = f"{_EXPECTED_BONE_VALUE}, no angle beyond {MAX_DEGREES:g}, nothing beyond {MAX_DISTANCE_MM:g}"
+    limits = f"no angle beyond {MAX_ROTATION_DEGREES:g}, nothing beyond {MAX_DISTANCE_MM:g}"
+    expected = f"{_EXPECTED_BONE_VALUE}, {limits}"
     refuse(culprit, expected, f"got {format_value(bone_value, 80)}", "Correct it")
 
 

@@ -8,7 +8,7 @@ from dermis.base.arrays import Ints
 from dermis.base.errors import refuse
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 
-SKIN = (Material("skin"),)
+SKIN_MATERIALS = (Material("skin"),)
 # Faces of a box. For each: its corners (x, y, z) in 0..1, clockwise from the top left as seen from outside;
 # and the left, top and side length of its chart in uv.
 _WEDGE_FACES = (
@@ -49,7 +49,7 @@ def plane(size_mm: float, segments: int = 1, uv_scale: float = 1.0) -> Mesh:
     positions = size_mm * np.column_stack((u - 0.5, 0.5 - v, np.zeros_like(u)))
     triangles = np.vstack(_grid_triangles(segments, segments))
     uv = uv_scale * np.column_stack((u, v))
-    return build_mesh(positions, uv, triangles, np.zeros(len(triangles)), SKIN)
+    return build_mesh(positions, uv, triangles, np.zeros(len(triangles)), SKIN_MATERIALS)
 
 
 def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
@@ -78,7 +78,7 @@ def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
     used, compact = np.unique(triangles, return_inverse=True)
     corners = compact.reshape(-1, 3)
     material = np.zeros(len(corners))
-    return build_mesh(radius_mm * normals[used], uv[used], corners, material, SKIN, normals[used])
+    return build_mesh(radius_mm * normals[used], uv[used], corners, material, SKIN_MATERIALS, normals[used])
 
 
 def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells_per_side: int = 4) -> Mesh:
@@ -111,5 +111,10 @@ def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells_per_side: int =
         triangles.append(quads + index * len(points))
     count = sum(map(len, triangles))
     return build_mesh(
-        np.vstack(positions), np.vstack(uv), np.vstack(triangles), np.zeros(count), SKIN, np.vstack(normals)
+        np.vstack(positions),
+        np.vstack(uv),
+        np.vstack(triangles),
+        np.zeros(count),
+        SKIN_MATERIALS,
+        np.vstack(normals),
     )

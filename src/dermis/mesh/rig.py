@@ -21,7 +21,7 @@ __all__ = [
     "BONES_PER_POINT",
     "BoneRotation",
     "MorphTargets",
-    "Motion",
+    "PoseArrays",
     "Rig",
     "RigidFollowers",
     "Skeleton",
@@ -32,7 +32,7 @@ __all__ = [
 _CACHE_VERSION = "outline 6"  # change it when the search returns other points
 
 
-class Motion(NamedTuple):
+class PoseArrays(NamedTuple):
     """Pose of a rig as arrays for the GPU.
 
     weights : (t,) weights of the targets, minus their weights in the rest pose
@@ -113,10 +113,10 @@ class Rig(ShortRepr):
     template: Rig | None = None
 
     @cached_property
-    def rest(self) -> Motion:
+    def rest(self) -> PoseArrays:
         """Return the rest pose as arrays."""
         bones = np.zeros((0, 3, 4), np.float32) if self.skeleton is None else self.skeleton.rest_matrices
-        return Motion(np.zeros(len(self.targets.names), np.float32), bones, self.positions_mm)
+        return PoseArrays(np.zeros(len(self.targets.names), np.float32), bones, self.positions_mm)
 
     @property
     def file_point_count(self) -> int:
@@ -138,7 +138,7 @@ class Rig(ShortRepr):
     @property
     def target_index(self) -> dict[str, int]:
         """Return a dictionary from the name of each target to its index."""
-        return self.targets.index
+        return self.targets.index_by_name
 
     @cached_property
     def outline(self) -> RigOutline:
@@ -149,14 +149,14 @@ class Rig(ShortRepr):
         """
         return rig_outline(self.positions_mm, self.targets, self.skeleton, self._outline_points)
 
-    def outline_mm(self, motion: Motion) -> Floats:
+    def outline_mm(self, pose_arrays: PoseArrays) -> Floats:
         """Return points (s, 3) whose convex hull contains the posed head, to about a millimetre [mm].
 
-        If `motion` replaces the rest positions, the extreme points of the new positions are added.
+        If `pose_arrays` replaces the rest positions, the extreme points of the new positions are added.
         """
-        if motion.positions_mm is self.positions_mm:
-            return self.outline.pose(motion.weights, motion.matrices)
-        return self._outline_for(motion.positions_mm).pose(motion.weights, motion.matrices)
+        if pose_arrays.positions_mm is self.positions_mm:
+            return self.outline.pose(pose_arrays.weights, pose_arrays.matrices)
+        return self._outline_for(pose_arrays.positions_mm).pose(pose_arrays.weights, pose_arrays.matrices)
 
     def _outline_for(self, rest_positions: Floats) -> RigOutline:
         """Return the points that bound the mesh in every pose, after a change of the rest positions.
@@ -187,21 +187,21 @@ class Rig(ShortRepr):
             sources, _CACHE_VERSION, lambda: find_outline_points(self.positions_mm, targets, skeleton)
         ).astype(np.intp)
 
-    def points_mm(self, motion: Motion) -> Doubles:
+    def posed_points_mm(self, pose_arrays: PoseArrays) -> Doubles:
         """Return the points (q, 3) of the mesh in a pose, after any subdivision [mm]."""
-        rig = replace(self, positions_mm=motion.positions_mm)
-        control = rig.pose(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
+        rig = replace(self, positions_mm=pose_arrays.positions_mm)
+        control = rig.pose(pose_arrays.weights.astype(np.float64), pose_arrays.matrices.astype(np.float64))
         return control if self.stencils is None else self.stencils.points(control)
 
-    def lid_edges_mm(self, motion: Motion) -> Doubles:
+    def lid_edges_mm(self, pose_arrays: PoseArrays) -> Doubles:
         """Return points (k, r, 3) along the lid edges in a pose, on the subdivided surface [mm].
 
         There are k eyes with r points around each opening, see `LidContact.edge`.
         """
         assert self.contact is not None
         points, weights, outline = self._posable_lid_edges
-        rest = np.vstack([motion.positions_mm[points].T, outline.rest_mm[3]])
-        posed = replace(outline, rest_mm=rest).pose(motion.weights, motion.matrices)
+        rest = np.vstack([pose_arrays.positions_mm[points].T, outline.rest_mm[3]])
+        posed = replace(outline, rest_mm=rest).pose(pose_arrays.weights, pose_arrays.matrices)
         return np.asarray(weights @ posed).reshape(*self.contact.edge.shape, 3)
 
     @cached_property
@@ -222,18 +222,18 @@ class Rig(ShortRepr):
                 row[np.searchsorted(points, self.stencils.point[part])] = self.stencils.weight[part]
         return points, weights, rig_outline(self.positions_mm, self.targets, self.skeleton, points)
 
-    def pose_points(self, points: Ints, motion: Motion) -> Doubles:
+    def pose_points(self, points: Ints, pose_arrays: PoseArrays) -> Doubles:
         """Return selected control points (n, 3) in a pose [mm].
 
         points : (n,) indices of the control points
         """
-        positions = motion.positions_mm[points].astype(np.float64)
+        positions = pose_arrays.positions_mm[points].astype(np.float64)
         if self._target_moved_mask[points].any():
-            positions += np.einsum("t,tpk->pk", motion.weights, self._dense_displacements(points))
+            positions += np.einsum("t,tpk->pk", pose_arrays.weights, self._dense_displacements(points))
         if self.skeleton is None:
             return positions
         homogeneous = np.concatenate([positions, np.ones((len(positions), 1))], axis=1)
-        weight, matrices = self.skeleton.weight[points], motion.matrices[self.skeleton.bone[points]]
+        weight, matrices = self.skeleton.weight[points], pose_arrays.matrices[self.skeleton.bone[points]]
         return np.asarray(np.einsum("pk,pkij,pj->pi", weight, matrices, homogeneous))
 
     @cached_property

@@ -48,7 +48,7 @@ class Skeleton(ShortRepr):
         return np.asarray(matrices[:, :3])
 
     @cached_property
-    def index(self) -> dict[str, int]:
+    def index_by_name(self) -> dict[str, int]:
         """Return a dictionary from the name of each bone to its index."""
         return {name: index for index, name in enumerate(self.names)}
 
@@ -90,7 +90,9 @@ class Skeleton(ShortRepr):
             without the motion of its parent [mm]
         """
         transforms = (
-            self._accumulate_in_order if len(bones) <= _MAX_SEQUENTIAL_BONES else self._accumulate_by_depth
+            self._compose_bone_by_bone
+            if len(bones) <= _MAX_SEQUENTIAL_BONES
+            else self._compose_level_by_level
         )
         transform = transforms(bones, bone_changes)
         if self._is_bound_at_rest:
@@ -100,7 +102,7 @@ class Skeleton(ShortRepr):
         matrices[:, :, :3] = transform[:, :3, :3] @ self.rest_matrices[:, :, :3]
         return matrices.astype(np.float32)
 
-    def _accumulate_in_order(self, bones: Sequence[int], bone_changes: Doubles) -> Doubles:
+    def _compose_bone_by_bone(self, bones: Sequence[int], bone_changes: Doubles) -> Doubles:
         """Return the head-space transform (b, 4, 4) of every bone of the skeleton, relative to its rest pose.
 
         It is the product of the changes of the bone's moved ancestors, topmost first, and of its own change.
@@ -114,8 +116,8 @@ class Skeleton(ShortRepr):
             nearest[self._descendants[bone]] = index
         return transform[nearest]
 
-    def _accumulate_by_depth(self, bones: Sequence[int], bone_changes: Doubles) -> Doubles:
-        """Return the same transforms (b, 4, 4) as `_accumulate_in_order`, from the same parameters.
+    def _compose_level_by_level(self, bones: Sequence[int], bone_changes: Doubles) -> Doubles:
+        """Return the same transforms (b, 4, 4) as `_compose_bone_by_bone`, from the same parameters.
 
         All bones at the same level of the hierarchy are handled at once, which is fast if many bones move.
         """

@@ -78,10 +78,10 @@ def to_root_frames(mesh: Mesh, roots: Roots, offsets_mm: Doubles) -> Floats:
 
     offsets_mm : (n, k, 3) offsets in head space, on the mesh at rest
     """
-    return offsets_in_frames(root_frames(mesh, roots, mesh.points_mm)[1], offsets_mm)
+    return offsets_in_root_axes(root_frames(mesh, roots, mesh.points_mm)[1], offsets_mm)
 
 
-def offsets_in_frames(root_axes: Doubles, offsets_mm: Doubles) -> Floats:
+def offsets_in_root_axes(root_axes: Doubles, offsets_mm: Doubles) -> Floats:
     """Express knot offsets (n, k, 3), measured from each root, in the frame of that root.
 
     root_axes : (n, 3, 3) axes of the frames as rows, as returned by `root_frames`

@@ -78,7 +78,7 @@ def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
         return head
     strands = head.strands and head.strands.refined(head.mesh, mesh, levels)
     hair = head.hair and head.hair.refined(head.mesh, levels)
-    rig = replace(head.control, stencils=stencils)
+    rig = replace(head.control_rig, stencils=stencils)
     return replace(head, mesh=mesh, rig=rig, strands=strands, hair=hair, levels=int(levels), template=None)
 
 

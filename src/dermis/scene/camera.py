@@ -27,7 +27,7 @@ _WORLD_UP = (0.0, 1.0, 0.0)
 _PictureFraction = Annotated[float, Field(ge=-10, le=10), BoundsReason("lenses do not shift farther")]
 
 
-class Window(NamedTuple):
+class ImageRectangle(NamedTuple):
     """Image rectangle of a camera, in the plane at distance 1 in front of the camera.
 
     The picture coordinates (x, y), each from -1 at the left or bottom to 1 at the right or top, correspond to
@@ -140,14 +140,14 @@ class Camera(FrozenModel):
 
     half_tangent = renamed_attribute("half_tangent", "half_view_tangent")
 
-    def window(self, aspect: float) -> Window:
+    def image_rectangle(self, aspect: float) -> ImageRectangle:
         """Return the image rectangle in the plane at distance 1 in front of the camera.
 
         aspect : width of the picture divided by its height
         """
         u, v = self.principal_point
         half = self.half_view_tangent
-        return Window((half * aspect * self.pixel_aspect, half), (1.0 - 2.0 * u, 2.0 * v - 1.0))
+        return ImageRectangle((half * aspect * self.pixel_aspect, half), (1.0 - 2.0 * u, 2.0 * v - 1.0))
 
 
 def portrait(head: Head) -> Camera:
@@ -253,8 +253,8 @@ def cheek(head: Head) -> Camera:
 
     The key light of the light preset "studio" meets the skin there at grazing incidence.
     """
-    beside = (40.0, -35.0) if head.skull_mm is not None else (0.0, 0.0)
-    focus = _to_scene_axes(head, head.frontmost(*beside))
+    beside = (40.0, -35.0) if head.skull_centre_mm is not None else (0.0, 0.0)
+    focus = _to_scene_axes(head, head.frontmost_point_mm(*beside))
     view_direction = _to_scene_axes(head, _direction_at_azimuth(58.0))
     position = _offset_point(focus, view_direction, 300.0)
     return Camera(position=position, target=focus, up=_to_scene_axes(head, _WORLD_UP), frame_mm=48.0)
@@ -262,7 +262,7 @@ def cheek(head: Head) -> Camera:
 
 def ear(head: Head) -> Camera:
     """Return a camera for a close-up of the left ear."""
-    p = head.seen_positions_mm
+    p = head.front_view_positions_mm
     near_ear = p[(np.abs(p[:, 1] + 10.0) < 40.0) & (np.abs(p[:, 2]) < 60.0)]
     x, y, z = (near_ear if len(near_ear) else p)[np.argmax((near_ear if len(near_ear) else p)[:, 0])]
     focus = _to_scene_axes(head, (float(x), float(y), float(z)))
@@ -300,7 +300,7 @@ def find_camera_preset(preset_name: str) -> Callable[[Head], Camera] | None:
 
 
 def _camera_at_azimuth(head: Head, azimuth_degrees: float) -> Camera:
-    if head.skull_mm is None:
+    if head.skull_centre_mm is None:
         return _camera_showing_all(head, azimuth_degrees)
     middle = (0.0, -25.0, 0.0)
     return Camera(
@@ -316,7 +316,7 @@ def _camera_showing_all(head: Head, azimuth_degrees: float) -> Camera:
     """
     x, _, z = _direction_at_azimuth(azimuth_degrees)
     # rows: to the right, up and towards the camera
-    axes = np.array([[z, 0.0, -x], [0.0, 1.0, 0.0], [x, 0.0, z]]) @ head.axes
+    axes = np.array([[z, 0.0, -x], [0.0, 1.0, 0.0], [x, 0.0, z]]) @ head.front_view_axes
     points = (head.mesh.outline.points_mm - np.array(head.centre_mm)) @ axes.T
     low, high = points.min(axis=0), points.max(axis=0)
     middle, distance = (
@@ -333,7 +333,7 @@ def _camera_showing_all(head: Head, azimuth_degrees: float) -> Camera:
 
 def _to_scene_axes(head: Head, vector: Vector) -> Vector:
     """Convert a vector from the axes of a head (left, up, front) to the axes of the scene."""
-    return _vector_tuple(np.array(vector) @ head.axes)
+    return _vector_tuple(np.array(vector) @ head.front_view_axes)
 
 
 def _vector_tuple(vector: Doubles) -> Vector:

@@ -20,7 +20,7 @@ _INT_ERROR_TYPES = {"int_type", "int_parsing", "int_from_float", "int_parsing_si
 _NUMBER_ERROR_TYPES = {"float_type", "float_parsing"} | _INT_ERROR_TYPES
 _TEXT_TYPES = (str, bytes, bytearray)
 _MAX_NAME_LENGTH = 80
-_MAX_TABLE_LENGTH = 160
+_MAX_QUOTED_TABLE_LENGTH = 160
 
 
 class AcceptedWords:
@@ -144,7 +144,7 @@ def _format_error(pydantic_error: ErrorDetails, model: type[BaseModel]) -> str:
         pydantic_error["input"], dict
     ):  # inconsistent values of several fields
         values = ", ".join(f"{name} {format_value(value)}" for name, value in pydantic_error["input"].items())
-        actual = shorten(values, _MAX_TABLE_LENGTH)
+        actual = shorten(values, _MAX_QUOTED_TABLE_LENGTH)
     return f"expected {expected}, but got {actual}"
 
 

@@ -24,7 +24,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.scene.file_surfaces import (
-    directly_usable_material,
+    unpacked_skin_material,
     unused_properties,
     with_file_textures,
     with_generated_uv,
@@ -146,7 +146,7 @@ def _with_materials(
 
     The notes name properties of the materials that are not drawn.
     """
-    direct = directly_usable_material(rigged, materials)
+    direct = unpacked_skin_material(rigged, materials)
     pack_skin = direct is None and not map_options.user_files
     mesh, packed, notes = with_file_textures(rigged, materials, pack_skin)
     loaded, faults = _unpacked_maps(path, direct or FileMaterial(), map_options)

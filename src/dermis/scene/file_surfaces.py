@@ -38,7 +38,7 @@ def with_generated_uv(rigged: RiggedMesh) -> RiggedMesh:
     return rigged._replace(mesh=laid_out, notes=(*rigged.notes, note), surface=changed)
 
 
-def directly_usable_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
+def unpacked_skin_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
     """Return the only skin material of a file if its pictures can be used unchanged as skin maps.
 
     Otherwise, the result is None, and the pictures of the skin materials must be packed into common maps.
@@ -112,7 +112,7 @@ def with_file_textures(
 
     rigged : mesh of the file
     materials : materials of the file
-    pack_skin : whether pictures of the skin are packed too; False if `directly_usable_material` returns a
+    pack_skin : whether pictures of the skin are packed too; False if `unpacked_skin_material` returns a
         material
     """
     mesh, maps, notes = rigged.mesh, Maps(), list[str]()

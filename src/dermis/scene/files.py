@@ -26,7 +26,7 @@ from dermis.scene.lights import LIGHTS, NO_LIGHTS, Light, light_presets, preset_
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.skin import SKIN_PRESETS, Skin
-from dermis.scene.smoothness import SmoothIn
+from dermis.scene.smoothness import SmoothOutlineLevels
 
 P = TypeVar("P", bound=FrozenModel)
 _SCENE_TABLE_NAMES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
@@ -152,7 +152,7 @@ def load_scene(
     _check_rho_s_given_once(path, head_entry, skin)
     entry = table.get("camera", "portrait")
     resolve_camera = partial(_parse_camera, path, entry) if camera is None else partial(load_camera, camera)
-    picture = SmoothIn(resolve_camera, size or settings.size)
+    picture = SmoothOutlineLevels(resolve_camera, size or settings.size)
     with error_context(path):
         if head is None:
             head, skin = load_head_and_skin(head_entry, skin, path.parent, picture)
@@ -192,7 +192,7 @@ def with_absolute_paths(head_fields: Mapping[str, Any], scene_folder: Path) -> d
 
 
 def load_head_and_skin(
-    head_fields: HeadTable, skin: Skin, scene_folder: Path, smooth_in: SmoothIn | None = None
+    head_fields: HeadTable, skin: Skin, scene_folder: Path, outline_levels: SmoothOutlineLevels | None = None
 ) -> tuple[Head, Skin]:
     """Return the head of a [head] table, and the skin settings of the head.
 
@@ -201,8 +201,8 @@ def load_head_and_skin(
 
     skin : skin settings of the scene file
     scene_folder : folder to which file names are relative
-    smooth_in : choice of the subdivision levels for a camera and picture size; used if the table does not
-        state levels
+    outline_levels : choice of the subdivision levels for a camera and picture size; used if the table does
+        not state levels
 
     Raises DermisError for files that cannot be used.
     """
@@ -215,8 +215,8 @@ def load_head_and_skin(
     if regions is not None:
         options["regions"] = NO_REGIONS
     options |= {role: scene_folder / options[role] for role in _MAP_ROLES if role in options}
-    if smooth_in is not None and head_fields.subdivide == AUTO:
-        options["subdivide"] = smooth_in
+    if outline_levels is not None and head_fields.subdivide == AUTO:
+        options["subdivide"] = outline_levels
     head = load_head(_resolve_file(scene_folder, head_fields.name), **options)
     if regions is None:
         return head, skin
@@ -265,7 +265,7 @@ def _parse_camera(path: Path, table_or_preset: Any, head: Head) -> Camera:
 def _parse_pose(path: Path, pose_table: Any, head: Head) -> Pose:
     entry = _build_settings(PoseTable, path, "pose", pose_table)
     pose = Pose(entry.weights, entry.bones)
-    pose.motion(head.control, f"{path}: pose")  # for an error that names the file
+    pose.to_arrays(head.control_rig, f"{path}: pose")  # for an error that names the file
     return pose
 
 

@@ -186,19 +186,19 @@ def field_slider_range(model: type[BaseModel], field: str) -> SliderRange | None
     return _slider_range(model.model_fields[field])
 
 
-class Heading(str):
+class HelpHeading(str):
     """Annotation of a field that groups it under a heading in help texts and in the viewer's panels."""
 
     __slots__ = ()
 
 
 def field_heading(model: type[BaseModel], field: str) -> str:
-    """Return the heading under which help texts list a field; "" for fields without a `Heading`."""
-    return next((one for one in model.model_fields[field].metadata if isinstance(one, Heading)), "")
+    """Return the heading under which help texts list a field; "" for fields without a `HelpHeading`."""
+    return next((one for one in model.model_fields[field].metadata if isinstance(one, HelpHeading)), "")
 
 
 def fields_under(heading: str, model: type[BaseModel]) -> list[str]:
-    """Return the names of the fields under a heading; "" selects the fields without a `Heading`."""
+    """Return the names of the fields under a heading; "" selects the fields without a `HelpHeading`."""
     return [name for name in model.model_fields if field_heading(model, name) == heading]
 
 

@@ -39,7 +39,7 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
 
     Raises DermisError for heads without anatomical eyes and for invalid points.
     """
-    base, rig, eyes = Pose.coerce(pose) or Pose(), head.control, head.eyes
+    base, rig, eyes = Pose.coerce(pose) or Pose(), head.control_rig, head.eyes
     if eyes is None or rig.skeleton is None:
         advice = f"{head.note}. {_NO_EYES_ADVICE}" if head.note else _NO_EYES_ADVICE
         refuse(head.name, "a head with eyes that turn", "it has none", advice)
@@ -49,7 +49,7 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
     gaze_targets = {rotation.target for rotation in rig.bone_rotations if rotation.bone in eye_bones}
     weights = {name: value for name, value in base.weights.items() if name not in gaze_targets}
     bones = {name: value for name, value in base.bones.items() if name not in eye_bones}
-    frames = eyes.eye_matrices(rig, Pose(weights, bones, base.positions_mm).motion(rig))
+    frames = eyes.eye_matrices(rig, Pose(weights, bones, base.positions_mm).to_arrays(rig))
     resting = eyes.eye_matrices(rig, rig.rest)
     for k, (frame, rest, bone) in enumerate(zip(frames, resting, eye_bones, strict=True)):
         to_target = (frame @ np.append(point_mm + np.array(head.centre_mm), 1.0))[:3]

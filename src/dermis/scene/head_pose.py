@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.rig import Motion
+from dermis.mesh.rig import PoseArrays
 from dermis.scene.model import Scene
 from dermis.scene.opencv import extrinsics
 
@@ -30,11 +30,11 @@ def gaze_directions(scene: Scene) -> Doubles | None:
 
     The result is None for heads without anatomical eyes.
     """
-    head, motion = scene.head, _pose_motion(scene)
+    head, pose_arrays = scene.head, _pose_arrays(scene)
     if head.eyes is None:
         return None
     directions = np.einsum(
-        "kij,ki->kj", head.eyes.eye_matrices(head.control, motion)[:, :3, :3], head.eyes.gaze
+        "kij,ki->kj", head.eyes.eye_matrices(head.control_rig, pose_arrays)[:, :3, :3], head.eyes.gaze
     )
     in_camera = (
         directions / np.linalg.norm(directions, axis=1, keepdims=True) @ _camera_extrinsics(scene)[0].T
@@ -47,8 +47,8 @@ def _camera_extrinsics(scene: Scene) -> tuple[Doubles, Doubles]:
     return extrinsics(camera.position, camera.target, camera.up)
 
 
-def _pose_motion(scene: Scene) -> Motion:
-    return scene.head.control.rest if scene.motion is None else scene.motion
+def _pose_arrays(scene: Scene) -> PoseArrays:
+    return scene.head.control_rig.rest if scene.pose_arrays is None else scene.pose_arrays
 
 
 def _head_bone_motion(scene: Scene) -> tuple[Doubles, Doubles]:
@@ -57,6 +57,6 @@ def _head_bone_motion(scene: Scene) -> tuple[Doubles, Doubles]:
     bone = next((k for k, name in enumerate(names) if [part.lower() for part in name] == [_HEAD_BONE]), None)
     if bone is None:
         return np.eye(3), np.zeros(3)
-    matrix, centre = _pose_motion(scene).matrices[bone].astype(np.float64), np.array(scene.head.centre_mm)
+    matrix, centre = _pose_arrays(scene).matrices[bone].astype(np.float64), np.array(scene.head.centre_mm)
     head_rotation = matrix[:, :3] / np.cbrt(np.linalg.det(matrix[:, :3]))
     return head_rotation, matrix[:, :3] @ centre + matrix[:, 3] - centre

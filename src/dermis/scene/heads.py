@@ -117,7 +117,7 @@ def load_head(
     subdivide : int, "auto" or callable
         Number of subdivision levels, 0 to 3, and at least 1 for the human. Meshes of quads are subdivided by
         Catmull-Clark, other meshes by Loop. "auto" uses as many levels as the outline needs to look smooth in
-        a portrait of 1024x1024 pixels; for other pictures pass `SmoothIn(camera, size)`.
+        a portrait of 1024x1024 pixels; for other pictures pass `SmoothOutlineLevels(camera, size)`.
     regions : {"auto", "none"}
         "auto" gives each region of the face its own roughness and specular strength if the regions are known
         and the head has no roughness map; "none" keeps roughness and strength uniform.
@@ -274,7 +274,7 @@ def load_person(head_name: str) -> Human:
     if not words.isdecimal() or len(words) > _MAX_SEED_DIGITS:
         actual = f"got {format_value(words)}"
         refuse(head_name, f"{HUMAN}, or {HUMAN}:SEED with a whole number", actual, f"Try {HUMAN}:7")
-    return Human.drawn(int(words))
+    return Human.sampled(int(words))
 
 
 def _head_names() -> list[str]:

@@ -292,22 +292,28 @@ def preset_lights(preset_name: str, head: Head | None = None) -> tuple[Light, ..
 
 def _place_light(light: Light, head: Head) -> Light:
     reach = head.reach_mm
-    factor = reach / _HEAD_REACH_MM if reach > _MAX_HEAD_REACH_MM and not _ignores_body_size(light) else 1.0
-    if factor == 1.0 and np.array_equal(head.axes, np.eye(3)):
+    factor = (
+        reach / _HEAD_REACH_MM
+        if reach > _MAX_HEAD_REACH_MM and not _is_independent_of_body_size(light)
+        else 1.0
+    )
+    if factor == 1.0 and np.array_equal(head.front_view_axes, np.eye(3)):
         return light
     values: dict[str, Any] = {
         name: factor * getattr(light, name) for name in _LAMP_SIZE_FIELDS if hasattr(light, name)
     }
     for name in _VECTOR_FIELDS:
         if hasattr(light, name):
-            values[name] = tuple((np.array(getattr(light, name)) @ head.axes).tolist())
+            values[name] = tuple((np.array(getattr(light, name)) @ head.front_view_axes).tolist())
     if isinstance(light, PointLight):
         target = np.array(light.target)
-        values["position"] = tuple(((target + factor * (light.position - target)) @ head.axes).tolist())
+        values["position"] = tuple(
+            ((target + factor * (light.position - target)) @ head.front_view_axes).tolist()
+        )
     return light.replace(**values)
 
 
-def _ignores_body_size(light: Light) -> bool:
+def _is_independent_of_body_size(light: Light) -> bool:
     """Return whether a light is placed independently of the body's size: parallel light or a narrow spot."""
     return not isinstance(light, PointLight) or (
         isinstance(light, SpotLight) and light.outer_degrees < _NARROW_SPOT_DEGREES

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
-from dermis.mesh.rig import Motion
+from dermis.mesh.rig import PoseArrays
 from dermis.scene.camera import Camera, portrait
 from dermis.scene.conversions import as_camera, as_environment, as_head, as_lights, as_model
 from dermis.scene.environment import Environment
@@ -82,7 +82,7 @@ class Scene:
         self._set_field("camera", portrait(self.head) if camera is None else as_camera(camera, self.head))
         self._set_field("pose", Pose.coerce(pose))
         if self.pose is not None:
-            self.motion  # noqa: B018 checks the pose
+            self.pose_arrays  # noqa: B018 checks the pose
 
     @classmethod
     def coerce(cls, scene: object) -> Scene:
@@ -100,6 +100,6 @@ class Scene:
         object.__setattr__(self, field_name, field_value)
 
     @cached_property
-    def motion(self) -> Motion | None:
+    def pose_arrays(self) -> PoseArrays | None:
         """Return the pose as arrays of target weights and bone matrices, or None for the rest pose."""
-        return None if self.pose is None else self.pose.motion(self.head.control)
+        return None if self.pose is None else self.pose.to_arrays(self.head.control_rig)

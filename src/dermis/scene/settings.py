@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from dermis.base.registry import RegisteredName
 from dermis.scene.field_errors import AcceptedWords, BoundsReason
 from dermis.scene.frozen_model import Colour, FrozenModel, slider
-from dermis.scene.talk import GammaHandling, SeamColour, SeamTreatment, StretchCorrection
+from dermis.scene.talk_comparisons import GammaHandling, SeamColour, SeamTreatment, StretchCorrection
 from dermis.scene.techniques import TECHNIQUES
 
 _PictureSide = Annotated[int, Field(ge=1, le=16384), BoundsReason("pixels: what the largest GPUs hold")]

@@ -8,11 +8,12 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from dermis.base.errors import format_value, refuse
+from dermis.base.renamed import renamed_attribute
 from dermis.optics.pigments.parameters import Structure
 from dermis.optics.reduced_scattering import check_reduced
 from dermis.scene.field_errors import BoundsReason
 from dermis.scene.frozen_model import FrozenModel, slider
-from dermis.scene.talk import EnergyConservation, SpecularColour
+from dermis.scene.talk_comparisons import EnergyConservation, SpecularColour
 from dermis.specular.models import FresnelName, SpecularName
 
 DiffuseDirectionName = Literal["lambertian", "half-space"]
@@ -101,7 +102,7 @@ class Skin(FrozenModel):
     --------
     >>> import dermis
     >>> skin = dermis.Skin(oiliness=0.5)
-    >>> round(skin.strength, 3), skin.replace(mix=0).mix
+    >>> round(skin.specular_strength, 3), skin.replace(mix=0).mix
     (0.675, 0.0)
     """
 
@@ -181,15 +182,18 @@ class Skin(FrozenModel):
         return self.pigments is not None or bool(self.layers)
 
     @property
-    def strength(self) -> float:
+    def specular_strength(self) -> float:
         """Return the specular strength: rho_s increased by oiliness, at most 1; 0 without a lobe [-]."""
         oily = min(1.0, self.rho_s * (1.0 + (_OILY_RHO_S_FACTOR - 1.0) * self.oiliness))
         return 0.0 if self.specular == "none" else oily
 
     @property
-    def smoothing(self) -> float:
+    def roughness_factor(self) -> float:
         """Return the factor, at most 1, by which the roughness is multiplied to account for oiliness [-]."""
         return 1.0 - (1.0 - _OILY_ROUGHNESS_FACTOR) * self.oiliness
+
+    smoothing = renamed_attribute("smoothing", "roughness_factor")
+    strength = renamed_attribute("strength", "specular_strength")
 
 
 def lobe_name(skin: Skin) -> str:

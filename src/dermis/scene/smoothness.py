@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
+from dermis.base.renamed import successor
 from dermis.mesh.geometry import edges, sum_by_index
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -23,7 +24,7 @@ Subdivide = SubdivisionLevels | Literal["auto"]
 """Levels of subdivision, "auto" for a portrait of 1024x1024, or a function of the head before subdivision."""
 Doubles = NDArray[np.float64]
 MAX_SMOOTH_TRIANGLES = 300_000
-"""Largest number of triangles that `SmoothIn` subdivides to."""
+"""Largest number of triangles that `SmoothOutlineLevels` subdivides to."""
 MAX_SILHOUETTE_DEVIATION_PX = 0.6
 """Largest deviation of a silhouette from its smooth curve that the pixel filter hides."""
 _TYPICAL_DEVIATION_QUANTILE = (
@@ -33,7 +34,7 @@ _NEAR_PLANE_MM = 1.0
 
 
 @dataclass(frozen=True)
-class SmoothIn:
+class SmoothOutlineLevels:
     """Choice of the subdivision levels at which the outline of a head looks smooth in a picture.
 
     An instance is a function from a head to the number of levels; `load_head` accepts it as `subdivide`. The
@@ -60,12 +61,12 @@ def resolve_levels(subdivide: Subdivide) -> SubdivisionLevels:
     """Return subdivision levels, or a function of the head that returns the levels.
 
     subdivide : number of levels or a function, which are returned unchanged, or "auto", which gives
-        `SmoothIn()`
+        `SmoothOutlineLevels()`
 
     Raises DermisError for other text.
     """
     if subdivide == AUTO:
-        return SmoothIn()
+        return SmoothOutlineLevels()
     if isinstance(subdivide, str):
         refuse(
             "subdivide", f"{AUTO} or 0 to {MAX_SUBDIVISION_LEVELS} levels", f"got {subdivide!r}", "Choose one"
@@ -140,3 +141,10 @@ def _faces_camera(pixels: Doubles, triangles: NDArray[np.int32]) -> NDArray[np.b
     a, b, c = (pixels[triangles[:, corner]] for corner in range(3))
     one, other = b - a, c - a
     return np.asarray(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0] < 0)
+
+
+def __getattr__(name: str) -> Any:
+    """Return an object of this module by the name that it had in the last release, for compatibility."""
+    if new := successor(__name__, name):
+        return globals()[new]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -11,17 +11,17 @@ from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
 
 _FRAME_CITATION_KEYS = ("dEonLuebke2007", "Burns2013")
-_FRESNEL_SOURCES = {"schlick": ("Schlick1994", "Dudash2007"), "exact": ("CookTorrance1982",)}
-_HALF_SPACE_SOURCES = ("Chandrasekhar1960", "Jensen2001")
-_ANISOTROPY_SOURCES = ("HenyeyGreenstein1941", "Wiscombe1977")
-_TONE_MAPPING_SOURCES = {"none": (), "filmic": ("Hable2010",), "neutral": ("Khronos2024",)}
-_SHADOW_SOURCES = ("Williams1978", "Reeves1987", "Hanika2021")
-_RELIEF_SOURCES = ("Mikkelsen2010", "OlanoBaker2010")
-_ENVIRONMENT_SOURCES = ("RamamoorthiHanrahan2001", "KautzMcCool2000", "Karis2013", "Debevec2005")
-_OCCLUSION_SOURCES = ("Keinert2015", "Jimenez2016", "LagardeRousiers2014")
+_FRESNEL_CITATION_KEYS = {"schlick": ("Schlick1994", "Dudash2007"), "exact": ("CookTorrance1982",)}
+_HALF_SPACE_CITATION_KEYS = ("Chandrasekhar1960", "Jensen2001")
+_ANISOTROPY_CITATION_KEYS = ("HenyeyGreenstein1941", "Wiscombe1977")
+_TONE_MAPPING_CITATION_KEYS = {"none": (), "filmic": ("Hable2010",), "neutral": ("Khronos2024",)}
+_SHADOW_CITATION_KEYS = ("Williams1978", "Reeves1987", "Hanika2021")
+_RELIEF_CITATION_KEYS = ("Mikkelsen2010", "OlanoBaker2010")
+_ENVIRONMENT_CITATION_KEYS = ("RamamoorthiHanrahan2001", "KautzMcCool2000", "Karis2013", "Debevec2005")
+_OCCLUSION_CITATION_KEYS = ("Keinert2015", "Jimenez2016", "LagardeRousiers2014")
 
 
-def picture_sources(
+def picture_citation_keys(
     skin: Skin,
     settings: Settings,
     lights: Sequence[Light] = (),
@@ -35,20 +35,20 @@ def picture_sources(
 
     Raises DermisError for an unknown profile.
     """
-    keys = [*_FRAME_CITATION_KEYS, *scattering_sources(settings), *_surface_sources(skin)]
-    keys += profile_sources(skin)
+    keys = [*_FRAME_CITATION_KEYS, *scattering_citation_keys(settings), *_surface_citation_keys(skin)]
+    keys += profile_citation_keys(skin)
     if skin.direction == "half-space":
-        keys += _HALF_SPACE_SOURCES + _ANISOTROPY_SOURCES * (skin.anisotropy > 0)
-    keys += _RELIEF_SOURCES * has_relief
-    keys += _light_sources(lights)
+        keys += _HALF_SPACE_CITATION_KEYS + _ANISOTROPY_CITATION_KEYS * (skin.anisotropy > 0)
+    keys += _RELIEF_CITATION_KEYS * has_relief
+    keys += _light_citation_keys(lights)
     if environment is not None:
-        keys += _ENVIRONMENT_SOURCES + _OCCLUSION_SOURCES * (settings.occlusion != "none")
-    keys += _TONE_MAPPING_SOURCES[settings.tone]
+        keys += _ENVIRONMENT_CITATION_KEYS + _OCCLUSION_CITATION_KEYS * (settings.occlusion != "none")
+    keys += _TONE_MAPPING_CITATION_KEYS[settings.tone]
     keys += ("BurtAdelson1983",) * (settings.bloom > 0)
     return tuple(dict.fromkeys(keys))
 
 
-def scattering_sources(settings: Settings) -> tuple[str, ...]:
+def scattering_citation_keys(settings: Settings) -> tuple[str, ...]:
     """Return the bibliography keys of the scattering technique, the seam treatment, and translucency."""
     technique = TECHNIQUES[settings.technique]
     substituted = settings.seams != "stitch" or not technique.stitches_seams
@@ -58,7 +58,7 @@ def scattering_sources(settings: Settings) -> tuple[str, ...]:
     return keys
 
 
-def profile_sources(skin: Skin) -> tuple[str, ...]:
+def profile_citation_keys(skin: Skin) -> tuple[str, ...]:
     """Return the bibliography keys of a skin's diffusion profile; empty for Gaussians from a user's file."""
     from dermis.optics.profiles import find_gaussians
     from dermis.scene.tissue import skin_tissue
@@ -68,15 +68,15 @@ def profile_sources(skin: Skin) -> tuple[str, ...]:
     return skin_tissue(skin).profile().sources
 
 
-def _surface_sources(skin: Skin) -> tuple[str, ...]:
+def _surface_citation_keys(skin: Skin) -> tuple[str, ...]:
     from dermis.specular.models import MODELS
 
     if skin.specular == "none":
         return ()
     energy = ("Kelemen2001",) * (skin.energy != "none")
-    return MODELS[skin.specular].sources + _FRESNEL_SOURCES[skin.fresnel] + energy
+    return MODELS[skin.specular].sources + _FRESNEL_CITATION_KEYS[skin.fresnel] + energy
 
 
-def _light_sources(lights: Sequence[Light]) -> tuple[str, ...]:
-    keys: tuple[str, ...] = _SHADOW_SOURCES * any(light.shadows for light in lights)
+def _light_citation_keys(lights: Sequence[Light]) -> tuple[str, ...]:
+    keys: tuple[str, ...] = _SHADOW_CITATION_KEYS * any(light.shadows for light in lights)
     return keys + tuple(key for light in lights for key in light.sources)

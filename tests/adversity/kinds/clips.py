@@ -97,7 +97,7 @@ def _take_clip(plan: Plan) -> None:
     clip = load_motion(plan["file"], head)
     for share in (0.0, 0.37, 1.0):
         pose = clip.pose_at(share * clip.duration_s)
-        check_finite(pose.motion(head.control), "pose")
+        check_finite(pose.to_arrays(head.control_rig), "pose")
 
 
 KINDS = (Kind("clip", _clip, _take_clip, share=16),)

@@ -191,7 +191,7 @@ def take_head(plan: Plan) -> Any:
     head = load_head(plan["file"])
     check_finite((head.mesh, head.maps, head.rig), "head")
     if head.targets:
-        check_finite(Pose(dict.fromkeys(head.targets, 1.0)).motion(head.control), "pose")
+        check_finite(Pose(dict.fromkeys(head.targets, 1.0)).to_arrays(head.control_rig), "pose")
     return head
 
 

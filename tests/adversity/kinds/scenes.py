@@ -158,7 +158,7 @@ def _person(rng: Random) -> Input:
     from dermis.human.person import Human
     from dermis.human.person_file import person_parameters
 
-    numbers = json.dumps({"person": person_parameters(Human.drawn(rng.randrange(100)))}, default=float)
+    numbers = json.dumps({"person": person_parameters(Human.sampled(rng.randrange(100)))}, default=float)
     return Input({"person.json": numbers.encode()}, {"file": "person.json", "words": ["person.json"]})
 
 
@@ -166,7 +166,7 @@ def _take_person(plan: Plan) -> None:
     from dermis.human.person_file import read_person
 
     person = read_person(Path(plan["file"]))
-    check_finite((person.positions_mm, person.look, person.iris, person.hairdo), "person")
+    check_finite((person.positions_mm, person.look, person.iris, person.hair_look), "person")
 
 
 def _regions(rng: Random) -> Input:

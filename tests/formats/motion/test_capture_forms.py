@@ -105,7 +105,7 @@ def _load(path: Path, *notes: str, fps: float | None = None) -> Clip:
 def _check_motion(clip: Clip) -> None:
     assert clip.duration_s == pytest.approx(0.066)
     assert clip.pose_at(0.0495).weights == pytest.approx({"jawOpen": 0.375, "eyeBlinkLeft": 0.125})
-    turned = clip.pose_at(0.0).motion(HEAD.control).matrices[2, :, :3]
+    turned = clip.pose_at(0.0).to_arrays(HEAD.control_rig).matrices[2, :, :3]
     np.testing.assert_allclose(turned, TURN.as_matrix(), atol=1e-5)
 
 
@@ -146,7 +146,7 @@ def test_utf_16_lines_of_windows_redirection_are_read(tmp_path: Path) -> None:
 def test_javascript_result_is_read(sample_folder: Path) -> None:
     clip = _load(sample_folder / "field" / "motion" / "n02_js_result.jsonl")
     assert clip.rate == 30.0
-    turned = clip.pose_at(0.5).motion(HEAD.control).matrices[2, :, :3]
+    turned = clip.pose_at(0.5).to_arrays(HEAD.control_rig).matrices[2, :, :3]
     angles = Rotation.from_matrix(turned).as_euler("zxy", degrees=True)
     assert angles == pytest.approx([0.0, 0.0, 22.92], abs=0.01)
 
@@ -194,7 +194,7 @@ def test_rotation_without_translation_is_read_in_api_order(tmp_path: Path) -> No
     pure[:3, :3] = TURN.as_matrix()
     for stored in ([pure.T.ravel().tolist()], [pure.tolist()], pure.ravel().tolist(), pure.tolist()):
         path = _file(tmp_path, [{"time": 0, "matrix": stored, "blendshapes": {"jawOpen": 0}}])
-        turned = _load(path).pose_at(0.0).motion(HEAD.control).matrices[2, :, :3]
+        turned = _load(path).pose_at(0.0).to_arrays(HEAD.control_rig).matrices[2, :, :3]
         np.testing.assert_allclose(turned, TURN.as_matrix(), atol=1e-5)
 
 
@@ -270,7 +270,7 @@ def _check_take(clip: Clip, rate: float = 60.0) -> None:
     pose = clip.pose_at(1.5 / rate)
     assert pose.weights == pytest.approx({"jawOpen": 0.375, "eyeBlinkLeft": 0.125})
     np.testing.assert_allclose(pose.bones["head"], clip.pose_at(0.0).bones["head"], atol=1e-9)
-    turned = pose.motion(HEAD.control).matrices[2, :, :3]
+    turned = pose.to_arrays(HEAD.control_rig).matrices[2, :, :3]
     expected = Rotation.from_euler("zxy", [0.05, 0.1, 0.4]).as_matrix()
     np.testing.assert_allclose(turned, expected, atol=1e-5)
 

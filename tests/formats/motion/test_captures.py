@@ -37,9 +37,9 @@ def test_live_link_rows_are_read(tmp_path: Path) -> None:
     pose = clip.pose_at(0.5 / 60)
     assert pose.weights == pytest.approx({"eyeBlinkLeft": 0.2, "jawOpen": 0.3})
     np.testing.assert_allclose(pose.bones["LeftEye"], np.degrees([0.1, 0.05, 0]))
-    motion = clip.pose_at(2 / 60).motion(HEAD.control)
+    pose_arrays = clip.pose_at(2 / 60).to_arrays(HEAD.control_rig)
     expected = Rotation.from_euler("zxy", [0, 0.1, 0.6]).as_matrix()
-    np.testing.assert_allclose(motion.matrices[2, :, :3], expected, atol=1e-5)
+    np.testing.assert_allclose(pose_arrays.matrices[2, :, :3], expected, atol=1e-5)
 
 
 def test_columns_are_identified_by_name(tmp_path: Path) -> None:
@@ -175,8 +175,8 @@ def test_mediapipe_lines_are_read(tmp_path: Path, form: str) -> None:
     assert clip.targets == ("jawOpen",) and clip.left_out == ("tongueOut",)
     assert clip.pose_at(0.02).weights["jawOpen"] == pytest.approx(0.4)
     for seconds, turn in zip((0.0, 0.04), turns, strict=True):
-        motion = clip.pose_at(seconds).motion(HEAD.control)
-        np.testing.assert_allclose(motion.matrices[2, :, :3], turn.as_matrix(), atol=1e-5)
+        pose_arrays = clip.pose_at(seconds).to_arrays(HEAD.control_rig)
+        np.testing.assert_allclose(pose_arrays.matrices[2, :, :3], turn.as_matrix(), atol=1e-5)
 
 
 def test_lines_without_time_use_the_frame_rate(tmp_path: Path) -> None:

@@ -82,10 +82,10 @@ def test_clip_of_the_head_file_is_read(tmp_path: Path) -> None:
         np.testing.assert_allclose(pose.bones["root"], root_local, atol=1e-6)
         weights = [np.interp(seconds, [0, 0.5, 2], column) for column in WEIGHTS.T]
         assert list(pose.weights.values()) == pytest.approx(weights)
-        motion = pose.motion(head.control)
-        local = head.control.skeleton.local.copy()
+        pose_arrays = pose.to_arrays(head.control_rig)
+        local = head.control_rig.skeleton.local.copy()
         local[:] = [pose.bones[name] for name in head.bones]
-        np.testing.assert_allclose(motion.matrices, head.control.skeleton.matrices(local), atol=2e-3)
+        np.testing.assert_allclose(pose_arrays.matrices, head.control_rig.skeleton.matrices(local), atol=2e-3)
     for outside, inside in ((-3.0, 0.0), (7.0, 2.0)):
         assert clip.pose_at(outside).weights == clip.pose_at(inside).weights
 

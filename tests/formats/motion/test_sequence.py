@@ -62,9 +62,9 @@ def test_a_sequence_moves_the_points(folder: Path) -> None:
     clip = dermis.load_motion(folder, head, fps=10)
     assert (clip.name, clip.duration_s, clip.rate) == ("take", pytest.approx(0.3), 10)
     for index, factor in enumerate(FACTORS):
-        positions = clip.pose_at(index / 10).motion(head.control).positions_mm
+        positions = clip.pose_at(index / 10).to_arrays(head.control_rig).positions_mm
         np.testing.assert_allclose(positions, factor * head.positions_mm, rtol=1e-5, atol=1e-3)
-    between = clip.pose_at(0.125).motion(head.control).positions_mm
+    between = clip.pose_at(0.125).to_arrays(head.control_rig).positions_mm
     np.testing.assert_allclose(between, 1.05 * head.positions_mm, rtol=1e-5, atol=1e-3)
     assert clip.frame_count(10) == 4
     assert dermis.load_motion(folder, head).duration_s == pytest.approx(3 / 30)
@@ -72,9 +72,9 @@ def test_a_sequence_moves_the_points(folder: Path) -> None:
 
 def test_posed_frame_equals_the_head_loaded_from_that_file(folder: Path) -> None:
     head, other = _head(folder), _head(folder, "face_11.obj")
-    motion = dermis.Scene(head, pose=dermis.load_motion(folder, head).pose_at(1.0)).motion
-    assert motion is not None
-    np.testing.assert_array_equal(motion.positions_mm[head.mesh.point], other.mesh.positions)
+    pose_arrays = dermis.Scene(head, pose=dermis.load_motion(folder, head).pose_at(1.0)).pose_arrays
+    assert pose_arrays is not None
+    np.testing.assert_array_equal(pose_arrays.positions_mm[head.mesh.point], other.mesh.positions)
 
 
 def test_sequence_uses_the_units_and_axes_of_the_head(tmp_path: Path) -> None:

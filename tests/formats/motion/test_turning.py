@@ -72,7 +72,7 @@ def test_bone_shares_add_up_to_the_full_rotation(names: tuple[str, ...]) -> None
     angles = head_bone_angles(find_rotation_bones(skeleton), turns.as_quat())
     for frame, turn in enumerate(turns):
         pose = Pose(bones={name: rows[frame] for name, rows in angles.items()})
-        matrices = pose.motion(Rig(random_rig().positions_mm, skeleton=skeleton)).matrices
+        matrices = pose.to_arrays(Rig(random_rig().positions_mm, skeleton=skeleton)).matrices
         np.testing.assert_allclose(matrices[2, :, :3], turn.as_matrix(), atol=1e-5)
 
 

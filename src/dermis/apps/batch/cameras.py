@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.apps.batch.lighting import direction_from_angles
 from dermis.apps.batch.sampling import Parameters, table_numbers
 from dermis.mesh.head import Head
-from dermis.mesh.rig import Motion
+from dermis.mesh.rig import PoseArrays
 from dermis.scene.camera import Camera
 
 _SENSOR_HEIGHT_MM = 24.0
@@ -31,7 +31,7 @@ def face_hull_indices(head: Head, direction_count: int = 64) -> NDArray[np.int32
 
     direction_count : number of directions; the point that lies farthest in each direction is included
     """
-    positions = head.control.positions_mm - np.array(head.centre_mm, np.float32)
+    positions = head.control_rig.positions_mm - np.array(head.centre_mm, np.float32)
     low, high = np.array(_FACE_BOX_MM, np.float32)
     inside = np.flatnonzero(((positions > low) & (positions < high)).all(axis=1))
     if not len(inside):
@@ -42,7 +42,11 @@ def face_hull_indices(head: Head, direction_count: int = 64) -> NDArray[np.int32
 
 
 def sampled_camera(
-    parameters: Parameters, head: Head, face_point_indices: NDArray[np.int32], motion: Motion, aspect: float
+    parameters: Parameters,
+    head: Head,
+    face_point_indices: NDArray[np.int32],
+    pose_arrays: PoseArrays,
+    aspect: float,
 ) -> Camera:
     """Return the camera with an image's sampled parameters, moved so that the whole face is in the picture.
 
@@ -50,10 +54,10 @@ def sampled_camera(
     the picture's centre.
 
     face_point_indices : indices of points that bound the face, from `face_hull_indices`
-    motion : displacement of the head's points by the pose
+    pose_arrays : displacement of the head's points by the pose
     aspect : ratio of the picture's width to its height [-]
     """
-    face = head.control.pose_points(face_point_indices, motion) - np.array(head.centre_mm)
+    face = head.control_rig.pose_points(face_point_indices, pose_arrays) - np.array(head.centre_mm)
     values = table_numbers(parameters, "camera")
     distance = values["distance_mm"]
     frame = values.get("frame_mm") or distance * _SENSOR_HEIGHT_MM / values["focal_mm"]

@@ -31,7 +31,7 @@ from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
-from dermis.scene.smoothness import SmoothIn
+from dermis.scene.smoothness import SmoothOutlineLevels
 
 _FULL_HAIR_PICTURE_SIDE = 1000  # side from which pictures have all hairs [pixel]; a close-up shows 230 mm
 _MIN_HAIR_FRACTION = 0.2
@@ -76,8 +76,8 @@ class SceneBuilder:
         pose = Pose(
             self._pose_weights(parameters, head), _bone_angles(_head_rotation(parameters), person.bones)
         )
-        motion = pose.motion(head.control)
-        camera = sampled_camera(parameters, head, person.points, motion, width / height)
+        pose_arrays = pose.to_arrays(head.control_rig)
+        camera = sampled_camera(parameters, head, person.points, pose_arrays, width / height)
         skin_values = table_values(parameters, "skin")
         if "profile" in skin_values:
             skin_values["profile"] = self._resolve_file(skin_values["profile"])
@@ -113,8 +113,10 @@ class SceneBuilder:
             scene, _ = load_scene(name, size=size)
             head, skin = scene.head, scene.skin
         else:
-            head, skin = load_head(name, subdivide=SmoothIn(size=size)), Skin()
-        return _Person(head, face_hull_indices(head), find_rotation_bones(head.control.skeleton).head, skin)
+            head, skin = load_head(name, subdivide=SmoothOutlineLevels(size=size)), Skin()
+        return _Person(
+            head, face_hull_indices(head), find_rotation_bones(head.control_rig.skeleton).head, skin
+        )
 
     def _resolve_file(self, head_or_panorama: float | str) -> str:
         """Return the path of a head or panorama file, or the argument if it names no file.
@@ -133,7 +135,7 @@ class SceneBuilder:
         return {
             name: weight
             for name, weight in table_numbers(parameters, "pose").items()
-            if weight and (name in posed or name in head.control.target_index)
+            if weight and (name in posed or name in head.control_rig.target_index)
         }
 
     def _sampled_environment(self, parameters: Parameters) -> Environment | None:
@@ -157,7 +159,7 @@ def sampled_person(parameters: Parameters) -> Human:
             appearance.setdefault(part, {})[field] = value
         elif name not in _PARAMETERS_NOT_OF_HUMAN:
             fields[name] = value
-    return Human.drawn(int(parameters[_SEED_PARAMETER]), **fields, **appearance)
+    return Human.sampled(int(parameters[_SEED_PARAMETER]), **fields, **appearance)
 
 
 @cache
@@ -166,7 +168,9 @@ def _subdivision_levels(picture_size: tuple[int, int]) -> int:
 
     The number is the same for all sampled people, so that all their heads have the same topology.
     """
-    return max(MIN_HUMAN_SUBDIVISION_LEVELS, SmoothIn(size=picture_size)(Human().head(subdivide=0)))
+    return max(
+        MIN_HUMAN_SUBDIVISION_LEVELS, SmoothOutlineLevels(size=picture_size)(Human().head(subdivide=0))
+    )
 
 
 def _hair_count_fraction(picture_size: tuple[int, int]) -> float:
@@ -206,7 +210,7 @@ def _pose_with_gaze(
 
     camera_position_mm : position of the camera, the default gaze target [mm]
     """
-    if head.eyes is None or head.control.skeleton is None:
+    if head.eyes is None or head.control_rig.skeleton is None:
         return pose
     target = np.array(camera_position_mm)
     if parameters["gaze.at"] == GAZE_ANGLES:

@@ -145,7 +145,7 @@ def pick(scene: Scene, camera: Camera, x: float, y: float, aspect_ratio: float) 
     Source: [MollerTrumbore1997].
     """
     right, up, forward = camera_axes(camera)
-    half_size, shift = camera.window(aspect_ratio)
+    half_size, shift = camera.image_rectangle(aspect_ratio)
     ray = forward + (x + shift[0]) * half_size[0] * right + (y + shift[1]) * half_size[1] * up
     head, positions = scene.head, posed_positions(scene)
     origin = np.array(camera.position) + head.centre_mm

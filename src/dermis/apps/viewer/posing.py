@@ -39,14 +39,14 @@ def bone_angles(scene: Scene, bone_name: str) -> Angles:
 
     If the pose stores the rotation as a matrix, the matrix is converted to angles.
     """
-    rotation, skeleton = _pose_or_rest(scene).bones.get(bone_name), scene.head.control.skeleton
+    rotation, skeleton = _pose_or_rest(scene).bones.get(bone_name), scene.head.control_rig.skeleton
     if rotation is None or skeleton is None:
         return 0.0, 0.0, 0.0
     values = np.asarray(rotation, np.float64)
     if values.shape == (3,):
         x, y, z = values.tolist()
         return x, y, z
-    matrix = skeleton.head_space_transforms([skeleton.index[bone_name]], values[None])[0, :3, :3]
+    matrix = skeleton.head_space_transforms([skeleton.index_by_name[bone_name]], values[None])[0, :3, :3]
     return matrix_angles(matrix / np.linalg.norm(matrix, axis=0))
 
 
@@ -87,11 +87,11 @@ def poses_equal(
 
 def posed_positions(scene: Scene) -> NDArray[np.floating]:
     """Return the vertex positions (v, 3) of the posed mesh, equal to those computed on the device [mm]."""
-    mesh, vertex_motion = scene.head.mesh, scene.motion
-    if vertex_motion is None:
+    mesh, pose_arrays = scene.head.mesh, scene.pose_arrays
+    if pose_arrays is None:
         return mesh.positions
-    rig = replace(scene.head.control, positions_mm=vertex_motion.positions_mm)
-    points = rig.pose(vertex_motion.weights.astype(np.float64), vertex_motion.matrices.astype(np.float64))
+    rig = replace(scene.head.control_rig, positions_mm=pose_arrays.positions_mm)
+    points = rig.pose(pose_arrays.weights.astype(np.float64), pose_arrays.matrices.astype(np.float64))
     if rig.stencils is not None:
         points = rig.stencils.points(points)
     return np.asarray(points[mesh.point])
@@ -113,8 +113,8 @@ def _none_if_rest(pose: Pose) -> Pose | None:
 
 
 def _rest_weight(head: Head, target_name: str) -> float:
-    targets = head.control.targets
-    return 0.0 if targets.rest is None else float(targets.rest[targets.index[target_name]])
+    targets = head.control_rig.targets
+    return 0.0 if targets.rest is None else float(targets.rest[targets.index_by_name[target_name]])
 
 
 def _arrays_equal(first_array: ArrayLike, second_array: ArrayLike) -> bool:

@@ -44,7 +44,7 @@ def find_chart_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
     A piece is a chart, or a part of a chart whose uv is mirrored. Triangles in no piece have the index -1.
     If uv is multiplied by the scales, all pieces have a similar texel density.
     """
-    mirrored = (surface.area_uv < 0).astype(np.int64)
+    mirrored = (surface.uv_area < 0).astype(np.int64)
     neighbour = surface.uv_neighbour
     chart = connected_pieces(np.zeros(len(mirrored), np.int64), neighbour)
     piece = connected_pieces(2 * chart + mirrored, neighbour)
@@ -86,7 +86,7 @@ def _uv_density(surface: FlatSurface, triangle_piece: Index) -> tuple[Doubles, f
     on the surface.
     """
     inside, index = triangle_piece >= 0, np.maximum(triangle_piece, 0)
-    uv = np.bincount(index, np.abs(surface.area_uv) * inside)
+    uv = np.bincount(index, np.abs(surface.uv_area) * inside)
     mm2 = np.bincount(index, surface.area_mm2 * inside)
     mean = float(np.sqrt(uv.sum() / max(mm2.sum(), 1e-12)))
     return np.where(inside, np.sqrt(uv / np.maximum(mm2, 1e-12))[index], mean), mean

@@ -143,12 +143,12 @@ def _mirrored_triangles(surface: FlatSurface, member_piece: Index, member_triang
     member_piece : (t,) piece of each triangle to examine
     member_triangles : (t,) indices of these triangles
     """
-    total = np.bincount(member_piece, surface.area_uv[member_triangles])
-    return np.asarray(np.sign(total)[member_piece] != np.sign(surface.area_uv[member_triangles]))
+    total = np.bincount(member_piece, surface.uv_area[member_triangles])
+    return np.asarray(np.sign(total)[member_piece] != np.sign(surface.uv_area[member_triangles]))
 
 
 def _extend_surface_edge(
-    coverage: Coverage, triangle_piece: Index, beyond_end: Mask, y: Index, x: Index
+    coverage: Coverage, triangle_piece: Index, is_beyond_surface: Mask, y: Index, x: Index
 ) -> None:
     """Copy neighbouring texels to gutter texels just beyond an edge at which the surface ends.
 
@@ -156,15 +156,15 @@ def _extend_surface_edge(
 
     coverage : surface points that the texels represent, changed in place
     triangle_piece : (f,) index of each triangle's chart piece, -1 for triangles in no piece
-    beyond_end : (h, w) mask of texels beyond the end of the surface
-    y, x : (n,) row and column of each gutter texel to fill; `beyond_end` is True at these texels
+    is_beyond_surface : (h, w) mask of texels beyond the end of the surface
+    y, x : (n,) row and column of each gutter texel to fill; `is_beyond_surface` is True at these texels
     """
-    last = np.array(beyond_end.shape) - 1
+    last = np.array(is_beyond_surface.shape) - 1
     piece_of_texel, from_y, from_x = triangle_piece[coverage.anchor_triangle[y, x]], y.copy(), x.copy()
     for dy, dx in ((0, -1), (0, 1), (-1, 0), (1, 0)):
         next_y, next_x = np.clip(y + dy, 0, last[0]), np.clip(x + dx, 0, last[1])
         anchor = coverage.anchor_triangle[next_y, next_x]
-        same = (anchor >= 0) & ~beyond_end[next_y, next_x] & (triangle_piece[anchor] == piece_of_texel)
+        same = (anchor >= 0) & ~is_beyond_surface[next_y, next_x] & (triangle_piece[anchor] == piece_of_texel)
         from_y, from_x = np.where(same, next_y, from_y), np.where(same, next_x, from_x)
     for grid in (coverage.triangle, coverage.weights):
         grid[y, x] = grid[from_y, from_x]

@@ -29,7 +29,7 @@ class Geodesics(NamedTuple):
 
     Points are complex numbers in the plane of the first triangle of the geodesic; the start is at 0.
 
-    ray : index of each geodesic in the arrays of `trace_geodesics`
+    row : index of each geodesic in the arrays of `trace_geodesics`
     triangle : index of the current triangle
     exit_side : side (0, 1, 2) through which the geodesic leaves this triangle
     side_start, side_end : end points of that side
@@ -37,7 +37,7 @@ class Geodesics(NamedTuple):
     orientation : 1, or -1 if the current triangle faces the opposite way to the first triangle
     """
 
-    ray: Index
+    row: Index
     triangle: Index
     exit_side: Index
     side_start: Complex
@@ -64,7 +64,7 @@ class GeodesicEnds(NamedTuple):
 
     def set_ends(
         self,
-        rays: Geodesics,
+        geodesics: Geodesics,
         first_corner: Index,
         second_weight: Doubles,
         third_weight: Doubles,
@@ -72,16 +72,16 @@ class GeodesicEnds(NamedTuple):
     ) -> None:
         """Store the end points of some geodesics.
 
-        rays : geodesics that end in their current triangle
+        geodesics : geodesics that end in their current triangle
         first_corner : corner (0, 1, 2) of the triangle with the weight 1 - second_weight - third_weight
         second_weight, third_weight : weights of the two corners that follow corner `first_corner`
         reached_target : whether the geodesics reached their target
         """
         weights = np.column_stack((1.0 - second_weight - third_weight, second_weight, third_weight))
         order = (np.arange(3) - first_corner[:, None]) % 3
-        self.triangle[rays.ray] = rays.triangle
-        self.weights[rays.ray] = np.take_along_axis(weights, order, axis=1)[:, 1:]
-        self.complete[rays.ray] = reached_target
+        self.triangle[geodesics.row] = geodesics.triangle
+        self.weights[geodesics.row] = np.take_along_axis(weights, order, axis=1)[:, 1:]
+        self.complete[geodesics.row] = reached_target
 
 
 def trace_geodesics(
@@ -96,13 +96,13 @@ def trace_geodesics(
     ends = GeodesicEnds(
         np.array(triangle, np.int32), np.full((len(triangle), 2), 1 / 3), np.zeros(len(triangle), bool)
     )
-    rays = _leave_first_triangle(
+    geodesics = _leave_first_triangle(
         adjacency, np.asarray(triangle, np.int64), _as_complex(start), _as_complex(target), ends
     )
     for _ in range(_MAX_CROSSED_EDGES):
-        if not len(rays.ray):
+        if not len(geodesics.row):
             break
-        rays = _cross_edge(adjacency, rays, ends)
+        geodesics = _cross_edge(adjacency, geodesics, ends)
     return ends
 
 
@@ -121,48 +121,50 @@ def _leave_first_triangle(
     leaves_through = (_cross(direction[:, None], corners) <= 0.0) & (_cross(direction[:, None], after) >= 0.0)
     leaves_through &= _cross(after - corners, direction[:, None] - corners) < 0.0
     rows, side = np.arange(len(triangle)), leaves_through.argmax(axis=1)
-    rays = Geodesics(
+    geodesics = Geodesics(
         rows, triangle, side, corners[rows, side], after[rows, side], direction, np.ones(len(triangle))
     )
     leaves = np.asarray(leaves_through.any(axis=1))
-    inside, (a, b, c) = rays.select(~leaves), corners[~leaves].T
+    inside, (a, b, c) = geodesics.select(~leaves), corners[~leaves].T
     ends.set_ends(inside, np.zeros(len(a), np.int64), *_clipped_weights(a, b, c, inside.direction), True)
-    return rays.select(leaves)
+    return geodesics.select(leaves)
 
 
-def _cross_edge(adjacency: Adjacency, rays: Geodesics, ends: GeodesicEnds) -> Geodesics:
+def _cross_edge(adjacency: Adjacency, geodesics: Geodesics, ends: GeodesicEnds) -> Geodesics:
     """Continue geodesics into the next triangle, and return those that leave it again.
 
     The end points of all others are stored in `ends`.
     """
-    neighbour = adjacency.neighbour[rays.triangle, rays.exit_side]
+    neighbour = adjacency.neighbour[geodesics.triangle, geodesics.exit_side]
     ended = (neighbour < 0) | ~adjacency.passable[neighbour]
     if ended.any():
-        stopped = rays.select(ended)
-        ends.set_ends(stopped, stopped.exit_side, _exit_fraction(stopped), np.zeros(len(stopped.ray)), False)
-        rays, neighbour = rays.select(~ended), neighbour[~ended]
-    neighbour_side = adjacency.neighbour_side[rays.triangle, rays.exit_side].astype(np.int64)
-    flipped = adjacency.flipped[rays.triangle, rays.exit_side]
-    orientation = np.where(flipped, -rays.orientation, rays.orientation)
+        stopped = geodesics.select(ended)
+        ends.set_ends(stopped, stopped.exit_side, _exit_fraction(stopped), np.zeros(len(stopped.row)), False)
+        geodesics, neighbour = geodesics.select(~ended), neighbour[~ended]
+    neighbour_side = adjacency.neighbour_side[geodesics.triangle, geodesics.exit_side].astype(np.int64)
+    flipped = adjacency.flipped[geodesics.triangle, geodesics.exit_side]
+    orientation = np.where(flipped, -geodesics.orientation, geodesics.orientation)
     # positions of the corners at both ends of the shared edge, and of the apex, after unfolding
     a, b = (
-        np.where(flipped, rays.side_start, rays.side_end),
-        np.where(flipped, rays.side_end, rays.side_start),
+        np.where(flipped, geodesics.side_start, geodesics.side_end),
+        np.where(flipped, geodesics.side_end, geodesics.side_start),
     )
     along, up = adjacency.apex[neighbour, neighbour_side].T
     apex = a + (along + 1j * orientation * up) * (b - a)
     # the geodesic leaves through one of the two edges at the apex
-    left, a_left = _cross(rays.direction, apex) > 0.0, _cross(rays.direction, a) > 0.0
+    left, a_left = _cross(geodesics.direction, apex) > 0.0, _cross(geodesics.direction, a) > 0.0
     exits_at_a = left != a_left
     side = (neighbour_side + np.where(exits_at_a, 2, 1)) % 3
     opposite, p, q = np.where(exits_at_a, b, a), np.where(exits_at_a, apex, b), np.where(exits_at_a, a, apex)
     inner = _cross(q - p, opposite - p)
-    arrived = (inner != 0.0) & (_cross(q - p, rays.direction - p) * inner >= 0.0)
-    rays = Geodesics(rays.ray, neighbour.astype(np.int64), side, p, q, rays.direction, orientation)
-    done = rays.select(arrived)
+    arrived = (inner != 0.0) & (_cross(q - p, geodesics.direction - p) * inner >= 0.0)
+    geodesics = Geodesics(
+        geodesics.row, neighbour.astype(np.int64), side, p, q, geodesics.direction, orientation
+    )
+    done = geodesics.select(arrived)
     weights = _clipped_weights(a[arrived], b[arrived], apex[arrived], done.direction)
     ends.set_ends(done, neighbour_side[arrived], *weights, True)
-    return rays.select(~arrived)
+    return geodesics.select(~arrived)
 
 
 def _as_complex(points: Doubles) -> Complex:
@@ -174,12 +176,15 @@ def _cross(first_vector: Complex, second_vector: Complex) -> Doubles:
     return np.asarray(first_vector.real * second_vector.imag - first_vector.imag * second_vector.real)
 
 
-def _exit_fraction(rays: Geodesics) -> Doubles:
+def _exit_fraction(geodesics: Geodesics) -> Doubles:
     """Return where each geodesic leaves its current triangle, as a position (n,) along the exit side [-].
 
     The position is 0 at the first end point of this side (`side_start`), and 1 at the second (`side_end`).
     """
-    here, there = _cross(rays.direction, rays.side_start), _cross(rays.direction, rays.side_end)
+    here, there = (
+        _cross(geodesics.direction, geodesics.side_start),
+        _cross(geodesics.direction, geodesics.side_end),
+    )
     return np.clip(here / np.where(here == there, np.inf, here - there), 0.0, 1.0)
 
 

@@ -82,7 +82,7 @@ def border_sides(
     """
     triangle, both = border.triangle, (border.side, (border.side + 1) % 3)
     ends = np.stack([packing.corners[triangle, k] for k in both], axis=1)
-    steps = np.stack([surface.uv_steps[triangle, k] for k in both], axis=1)
+    steps = np.stack([surface.uv_tangents[triangle, k] for k in both], axis=1)
     steps = steps / packing.texels_per_uv[triangle][:, None, None, None]
     # slivers may be stretched a hundredfold, where gutters in proportion would waste space
     max_texels = np.minimum(

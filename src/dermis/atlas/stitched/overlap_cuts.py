@@ -33,12 +33,12 @@ from dermis.mesh.geometry import label_components
 _MIN_TEXEL_MM = 0.9  # smallest texel of the grids on which overlaps are searched
 _MAX_PIECE_TEXELS = 100_000  # largest number of texels of a piece on such a grid
 _MAX_GRID_TEXELS = 600_000  # largest number of texels of the whole grid
-_CONFLICT_RANGE_FRACTION = 0.6  # fraction of the gutter width within which conflicts are counted
+_CONFLICT_RANGE_GUTTER_WIDTHS = 0.6  # fraction of the gutter width within which conflicts are counted
 _CLUSTER_CELL_GUTTER_WIDTHS = (
     0.7  # size of cells for clusters, in gutter widths; adjacent cells form one cluster
 )
 _CELLS_PER_GUTTER = 8  # cells of the grid for distances, per gutter width
-_MIN_CONFLICT_GUTTER_WIDTHS = 1.0  # shortest length of conflicts that is worth a cut, in gutter widths
+_MIN_CONFLICT_LENGTH_GUTTER_WIDTHS = 1.0  # shortest length of conflicts that is worth a cut, in gutter widths
 _MIN_CONFLICTS_PER_CUT_TEXEL = 0.2  # fewest separated conflicts per texel of a cut
 _LINE_DIRECTION_COUNT, _LINE_OFFSET_COUNT = 8, 16  # number of directions and offsets of lines that are tried
 _CUT_LENGTH_BIAS_TEXELS = (
@@ -103,13 +103,13 @@ def find_gutter_conflicts(
     member_triangles : (t,) indices of the triangles of this piece
     gutter_mm : width of the gutters [mm]
     """
-    mm2, area_uv = surface.area_mm2[member_triangles].sum(), np.abs(surface.area_uv[member_triangles]).sum()
+    mm2, uv_area = surface.area_mm2[member_triangles].sum(), np.abs(surface.uv_area[member_triangles]).sum()
     low, high = surface.uv[member_triangles].min(axis=(0, 1)), surface.uv[member_triangles].max(axis=(0, 1))
-    box_mm2 = float((high - low).prod()) * mm2 / area_uv
+    box_mm2 = float((high - low).prod()) * mm2 / uv_area
     texel_mm = float(
         max(_MIN_TEXEL_MM, np.sqrt(mm2 / _MAX_PIECE_TEXELS), np.sqrt(box_mm2 / _MAX_GRID_TEXELS))
     )
-    texels_per_uv = float(np.sqrt(mm2 / area_uv) / texel_mm)
+    texels_per_uv = float(np.sqrt(mm2 / uv_area) / texel_mm)
     width = GutterWidth(gutter_mm, np.ceil(2 * gutter_mm / texel_mm))
     margin, ones = width.max_texels + 2, np.ones(len(mapped_triangles))
     corners = np.zeros(surface.uv.shape)
@@ -135,7 +135,7 @@ def _draw_piece_grid(
     surface: FlatSurface, border: Border, packing: Packing, gutter_width: GutterWidth, texel_triangle: Ints
 ) -> _PieceGrid:
     sides = border_sides(surface, border, packing, gutter_width)
-    sides = sides._replace(gutter_mm=_CONFLICT_RANGE_FRACTION * sides.gutter_mm)
+    sides = sides._replace(gutter_mm=_CONFLICT_RANGE_GUTTER_WIDTHS * sides.gutter_mm)
     nearest, covered = nearest_border_points(sides, texel_triangle >= 0), np.flatnonzero(texel_triangle >= 0)
     f, texel = texel_triangle.ravel()[covered], np.concatenate((covered, nearest.texel))
     row, labels = np.full(texel_triangle.shape, -1), np.where(texel_triangle >= 0, texel_triangle, -2)
@@ -253,7 +253,7 @@ def _cut_piece(
     reach = gutter_mm / conflicts.texel_mm
     part = np.zeros(len(member_triangles), np.int64)
     for row, cluster in enumerate(_conflict_clusters(conflicts, reach), start=1):
-        if len(cluster) * conflicts.texel_mm < _MIN_CONFLICT_GUTTER_WIDTHS * gutter_mm:
+        if len(cluster) * conflicts.texel_mm < _MIN_CONFLICT_LENGTH_GUTTER_WIDTHS * gutter_mm:
             continue
         overlap = conflicts._replace(first=conflicts.first[cluster], second=conflicts.second[cluster])
         normal, offset, separated = _best_cut_line(overlap, reach)

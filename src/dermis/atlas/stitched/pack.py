@@ -25,7 +25,7 @@ _FINE_BISECTION_COUNT, _MAX_FINE_SCALE_GAIN = (
 _PACKING_ORDER_COUNT = 6  # number of packing orders: by area, height and width, each by rows and by columns
 _MIN_SCALE_GAIN = 1.003  # gain of scale for which the search is repeated with another order
 _MAX_MASK_ATTEMPTS = 4  # number of attempts with masks of different scales
-_MIN_MASK_SCALE_RATIO = (
+_MIN_SCALE_RATIO_TO_KEEP_MASKS = (
     0.65  # masks are computed again if the ratio of the found scale to their scale is smaller
 )
 _NEXT_MASK_SCALE_RATIO = 1.15  # ratio of the scale of the next masks to the found scale
@@ -200,7 +200,7 @@ def _prepare_piece(
     border = border._replace(triangle=index_in_piece[border.triangle])
     uv, subset = surface.uv[member_triangles] * uv_scale, surface.subset(member_triangles)
     uv -= uv.min(axis=(0, 1))
-    uv_per_mm = uv_scale * float(np.sqrt(np.abs(subset.area_uv).sum() / subset.area_mm2.sum()))
+    uv_per_mm = uv_scale * float(np.sqrt(np.abs(subset.uv_area).sum() / subset.area_mm2.sum()))
     return _Piece(subset, uv, uv.max(axis=(0, 1)), uv_scale, uv_per_mm, border)
 
 
@@ -215,11 +215,11 @@ def _search_piece_layout(
     """
     cells = min(map_side, MAX_CELLS_PER_SIDE)
     gutter_width = gutter_width._replace(max_texels=gutter_width.max_texels * cells / map_side)
-    area = sum(float(np.abs(one.surface.area_uv).sum()) * one.scale**2 for one in pieces)
+    area = sum(float(np.abs(one.surface.uv_area).sum()) * one.scale**2 for one in pieces)
     top = cells / float(np.sqrt(area))
     for _ in range(_MAX_MASK_ATTEMPTS):
         found = _find_largest_scale([_piece_mask(one, top, gutter_width) for one in pieces], cells, top)
-        if found is None or found.scale > _MIN_MASK_SCALE_RATIO * top:
+        if found is None or found.scale > _MIN_SCALE_RATIO_TO_KEEP_MASKS * top:
             return found
         top = _NEXT_MASK_SCALE_RATIO * found.scale
     return None
@@ -363,7 +363,7 @@ def _cell_runs(cell_mask: Mask) -> Index:
 
 def _gutter_extent(piece: _Piece, scale: float, gutter_width: GutterWidth) -> Doubles:
     """Return the largest width (2,) of a piece's gutters along u and v [cell]."""
-    steps = piece.surface.uv_steps[piece.border.triangle] / (piece.scale * scale)
+    steps = piece.surface.uv_tangents[piece.border.triangle] / (piece.scale * scale)
     if not len(steps):
         return np.ones(2)
     e, g = ((steps[..., k, :] ** 2).sum(axis=-1) for k in (0, 1))

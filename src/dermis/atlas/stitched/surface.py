@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.unwrap.charts import opposite_sides
 from dermis.base.arrays import Doubles, Index, Ints, Mask
-from dermis.mesh.geometry import MIN_UV_CROSS, cross_2d, tangents, triangle_areas, uv_cross, weld
+from dermis.mesh.geometry import MIN_DOUBLE_UV_AREA, cross_2d, tangents, triangle_areas, uv_cross, weld
 from dermis.mesh.mesh import Mesh
 
 _MIN_SIDE_LENGTH_MM = 1e-9
@@ -47,26 +47,26 @@ class FlatSurface:
     corners : (f, 3, 3) positions of the corners [mm]
     uv : (f, 3, 2) uv of the corners in the mesh's own layout
     area_mm2 : (f,) area on the surface [mm2]
-    area_uv : (f,) area in uv, negative where uv is mirrored as seen from outside
+    uv_area : (f,) area in uv, negative where uv is mirrored as seen from outside
     skin : (f,) mask of skin triangles, the only triangles that geodesics may cross
     valid : (f,) mask of skin triangles with an area in space and in uv
     adjacency : neighbours in space, for geodesics
     uv_neighbour : (f, 3) index of the triangle across each side in uv; the triangle itself at a seam
-    uv_steps : (f, 3, 2, 2) surface vectors per unit of u and of v at each corner, in the triangle's plane
+    uv_tangents : (f, 3, 2, 2) surface vectors per unit of u and of v at each corner, in the triangle's plane
         [mm]
-    uv_metric : (f, 3, 3) lengths of the two vectors in `uv_steps` [mm], and the cosine of the angle between
-        these vectors [-]
+    uv_metric : (f, 3, 3) lengths of the two vectors in `uv_tangents` [mm], and the cosine of the angle
+        between these vectors [-]
     """
 
     corners: Doubles
     uv: Doubles
     area_mm2: Doubles
-    area_uv: Doubles
+    uv_area: Doubles
     skin: Mask
     valid: Mask
     adjacency: Adjacency
     uv_neighbour: Index
-    uv_steps: Doubles
+    uv_tangents: Doubles
     uv_metric: Doubles
 
     def points(self, triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> Doubles:
@@ -104,23 +104,23 @@ def flat_surface(mesh: Mesh) -> FlatSurface:
     uv = mesh.uv[mesh.triangles].astype(np.float64)
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     # v runs down, so uv that is not mirrored has a negative cross product in (u, v)
-    area_uv = -uv_cross(uv) / 2
+    uv_area = -uv_cross(uv) / 2
     area = triangle_areas(corners)
-    valid = skin & (2 * np.abs(area_uv) > MIN_UV_CROSS) & (area > 0)
+    valid = skin & (2 * np.abs(uv_area) > MIN_DOUBLE_UV_AREA) & (area > 0)
     flat, axes = _planar_corners(corners)
-    uv_steps, uv_metric = _uv_steps(mesh, flat, axes, uv, area_uv)
+    uv_tangents, uv_metric = _uv_tangents_and_metric(mesh, flat, axes, uv, uv_area)
     same_uv = weld(np.hstack((mesh.positions, mesh.uv)))[mesh.triangles]
     uv_neighbour = (opposite_sides(same_uv.astype(np.int64)) % len(uv)).reshape(3, -1).T
     return FlatSurface(
         corners,
         uv,
         area,
-        area_uv,
+        uv_area,
         skin,
         valid,
         Adjacency(flat, *side_neighbours(mesh), _apexes(flat), skin),
         uv_neighbour,
-        uv_steps,
+        uv_tangents,
         uv_metric,
     )
 
@@ -173,39 +173,39 @@ def _apexes(planar_corners: Doubles) -> Doubles:
     return np.stack((along, left), axis=-1)
 
 
-def _uv_steps(
-    mesh: Mesh, planar_corners: Doubles, plane_axes: Doubles, uv: Doubles, area_uv: Doubles
+def _uv_tangents_and_metric(
+    mesh: Mesh, planar_corners: Doubles, plane_axes: Doubles, uv: Doubles, uv_area: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """Return the fields `uv_steps` and `uv_metric` of `FlatSurface`.
+    """Return the fields `uv_tangents` and `uv_metric` of `FlatSurface`.
 
     Both fields are averaged over those triangles around a vertex that have the same orientation in uv.
 
     planar_corners, plane_axes : results of `_planar_corners`
-    uv, area_uv : as in `FlatSurface`
+    uv, uv_area : as in `FlatSurface`
     """
     count = len(mesh.positions)
-    corner = mesh.triangles + count * (area_uv < 0)[:, None].astype(np.int32)
+    corner = mesh.triangles + count * (uv_area < 0)[:, None].astype(np.int32)
     positions, uvs, normals = (np.concatenate((a, a)) for a in (mesh.positions, mesh.uv, mesh.normals))
     steps = np.stack(tangents(positions, uvs, normals, corner), axis=1)[corner].astype(np.float64)
     length = np.linalg.norm(steps, axis=-1)
     product = length.prod(axis=-1)
     cosine = (steps[:, :, 0] * steps[:, :, 1]).sum(axis=-1) / np.maximum(product, 1e-12)
     # projected to the triangle's plane, with the length preserved
-    uv_steps = np.einsum("fksi,fai->fksa", steps, plane_axes)
-    uv_steps *= (length / np.maximum(np.linalg.norm(uv_steps, axis=-1), 1e-12))[..., None]
-    triangle_steps = _triangle_steps(planar_corners, uv)[:, None]
+    uv_tangents = np.einsum("fksi,fai->fksa", steps, plane_axes)
+    uv_tangents *= (length / np.maximum(np.linalg.norm(uv_tangents, axis=-1), 1e-12))[..., None]
+    triangle_steps = _triangle_uv_tangents(planar_corners, uv)[:, None]
     # the mean over triangles of very different normals may be meaningless: use the triangle's own steps there
-    area = cross_2d(uv_steps[..., 0, :], uv_steps[..., 1, :])
-    is_meaningless = area * np.sign(area_uv)[:, None] >= -0.05 * product
-    uv_steps = np.where(is_meaningless[..., None, None], triangle_steps, uv_steps)
-    return uv_steps, np.concatenate((length, cosine[..., None]), axis=-1)
+    area = cross_2d(uv_tangents[..., 0, :], uv_tangents[..., 1, :])
+    is_meaningless = area * np.sign(uv_area)[:, None] >= -0.05 * product
+    uv_tangents = np.where(is_meaningless[..., None, None], triangle_steps, uv_tangents)
+    return uv_tangents, np.concatenate((length, cosine[..., None]), axis=-1)
 
 
-def _triangle_steps(planar_corners: Doubles, uv: Doubles) -> Doubles:
+def _triangle_uv_tangents(planar_corners: Doubles, uv: Doubles) -> Doubles:
     """Return the surface vectors (f, 2, 2) per unit of u and of v, constant over each triangle [mm]."""
     e, d = planar_corners[:, 1:] - planar_corners[:, :1], uv[:, 1:] - uv[:, :1]
     cross = cross_2d(d[:, 0], d[:, 1])
-    cross = np.where(np.abs(cross) > MIN_UV_CROSS, cross, np.inf)[:, None]
+    cross = np.where(np.abs(cross) > MIN_DOUBLE_UV_AREA, cross, np.inf)[:, None]
     u = (e[:, 0] * d[:, 1, 1:] - e[:, 1] * d[:, 0, 1:]) / cross
     v = (e[:, 1] * d[:, 0, :1] - e[:, 0] * d[:, 1, :1]) / cross
     return np.stack((u, v), axis=1)

@@ -44,12 +44,12 @@ class Cells:
     max_sigma_mm : standard deviation of the widest Gaussian of the diffusion profiles [mm]
     cell_mm : median side of a cell on the surface [mm]
     stride : a source cell averages the light of every `stride`-th texel along each axis [texel]
-    receiver_mask : (side, side) mask of the cells that receive light: cells with texels of `Atlas.lit`, and
-        their neighbours
+    receiver_mask : (side, side) mask of the cells that receive light: cells with texels of `Atlas.lit_mask`,
+        and their neighbours
     receivers, receiver_first : (m,) uint32 packed x and y of the receiving cells, sorted by tile
     receiver_points : (m, 2) uint32 surface point at the centre of each receiving cell: triangle index, and
         packed barycentric weights
-    sources, source_first : (n,) indices of the cells with texels of `Atlas.lit`, sorted by tile
+    sources, source_first : (n,) indices of the cells with texels of `Atlas.lit_mask`, sorted by tile
     triangles, triangle_first : (k,) uint32 indices of the triangles that overlap each tile
     gutter_copies, gutter_copy_first : (c, 2) uint32 packed x and y of a gutter texel, and of the texel that
         it copies, sorted by cell
@@ -95,7 +95,7 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: flo
     stride = max(1, atlas.size // max(_MAX_AVERAGED_TEXELS_PER_SIDE, side))
     tiles = -(-side // CELLS_PER_TILE_SIDE)
     centre = _centre_texels(atlas.size, side)
-    lit = _cells_with_marked_texels(atlas.lit[::stride, ::stride], atlas.size, side, stride)
+    lit = _cells_with_marked_texels(atlas.lit_mask[::stride, ::stride], atlas.size, side, stride)
     triangle = atlas.triangle[np.ix_(centre, centre)]
     receiver = _dilate_cells(lit) & (triangle >= 0)
     weights = atlas.barycentric[np.ix_(centre, centre)][receiver]
@@ -118,9 +118,9 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: flo
 
 
 def _median_texel_mm(atlas: Atlas) -> float:
-    """Return the median side length on the surface of texels whose light is computed (`Atlas.lit`) [mm]."""
+    """Return the median side length on the surface of texels in `Atlas.lit_mask` [mm]."""
     step = max(1, atlas.size // _MAX_AVERAGED_TEXELS_PER_SIDE)
-    lit, stretch = atlas.lit[::step, ::step], atlas.stretch[::step, ::step].astype(np.float32)
+    lit, stretch = atlas.lit_mask[::step, ::step], atlas.stretch[::step, ::step].astype(np.float32)
     density = stretch[..., 0][lit] * stretch[..., 1][lit]
     return float(1.0 / np.sqrt(np.median(density))) if len(density) else 1.0
 
@@ -234,10 +234,10 @@ def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], Floats]:
     computed, not copied. Each represents a surface point that is also inside the chart of its triangle.
     Both arrays are (r, 2): x and y of the texels, and positions in the atlas [texel].
     """
-    inner, view = np.pad(atlas.lit, GUTTER_TEXELS), np.lib.stride_tricks.sliding_window_view
+    inner, view = np.pad(atlas.lit_mask, GUTTER_TEXELS), np.lib.stride_tricks.sliding_window_view
     for axis in (0, 1):
         inner = np.logical_and.reduce(view(inner, 2 * GUTTER_TEXELS + 1, axis), -1)
-    y, x = np.nonzero(atlas.lit & ~inner)
+    y, x = np.nonzero(atlas.lit_mask & ~inner)
     texel, weights = np.stack([x, y], axis=-1), _pack_words(*atlas.barycentric[y, x].T)
     uv = np.stack(_atlas_uv(atlas, atlas.triangle[y, x], weights), axis=-1)
     uv = uv * np.float32(atlas.size) - np.float32(0.5)

@@ -8,9 +8,7 @@ from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.geometry import edges, label_components, sum_by_index, triangle_areas
 
 _SMOOTHING_STEP_COUNT = 4
-_BEND_DISTANCE_FACTOR = (
-    3.0  # extra length that a step across a right angle counts, relative to the step's length
-)
+_BEND_PENALTY = 3.0  # extra length that a step across a right angle counts, relative to the step's length
 
 
 def opposite_sides(triangles: Index) -> Index:
@@ -128,7 +126,7 @@ def grow_charts(positions: Doubles, triangles: Index, chart_count: int, seed: in
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     bend = 1 - np.einsum("fi,fi->f", normal[here], normal[there])
-    distance = np.linalg.norm(centre[here] - centre[there], axis=1) * (1 + _BEND_DISTANCE_FACTOR * bend)
+    distance = np.linalg.norm(centre[here] - centre[there], axis=1) * (1 + _BEND_PENALTY * bend)
     graph = coo_array((distance, (here, there)), shape=(len(triangles),) * 2).tocsr()
     seeds = _seed_triangles(
         corners, connected_pieces(np.zeros(len(triangles), dtype=np.int64), adjacent), chart_count, seed

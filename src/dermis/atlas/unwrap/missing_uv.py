@@ -65,9 +65,9 @@ def _cached_layout(unwrapped_mesh: Mesh) -> Arrays:
         digest.update(np.ascontiguousarray(array).tobytes())
 
     @logged_step("unwrapping the mesh")
-    def make_arrays() -> Arrays:
+    def make_layout_arrays() -> Arrays:
         laid_out = unwrap_mesh(unwrapped_mesh)
         used_vertices, triangles = compact_vertices(laid_out.triangles)
         return {"uv": laid_out.uv[used_vertices], "triangles": triangles.astype(np.int32)}
 
-    return load_or_make("layouts", digest.hexdigest()[:40], ["uv", "triangles"], make_arrays)
+    return load_or_make("layouts", digest.hexdigest()[:40], ["uv", "triangles"], make_layout_arrays)

@@ -49,11 +49,11 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
     best, cells = 0.0, None
     for order in _packing_orders(size):
         low, high = best, bound
-        if cells is not None and _drop_charts(shifted, order, best * _MIN_SCALE_GAIN, padding) is None:
+        if cells is not None and _place_charts(shifted, order, best * _MIN_SCALE_GAIN, padding) is None:
             continue
         for _ in range(_BISECTION_COUNT):
             scale = (low + high) / 2
-            found = _drop_charts(shifted, order, scale, padding)
+            found = _place_charts(shifted, order, scale, padding)
             if found is None:
                 high = scale
             else:
@@ -75,7 +75,7 @@ def _packing_orders(chart_sizes: Doubles) -> Iterator[Index]:
         yield random.permutation(len(chart_sizes))
 
 
-def _drop_charts(
+def _place_charts(
     chart_edges: list[Doubles], chart_order: Index, scale: float, padding: float
 ) -> Doubles | None:
     """Drop charts onto each other on a square grid; return their lower left corners (c, 2) [cell].

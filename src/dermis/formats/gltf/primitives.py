@@ -102,7 +102,7 @@ class SurfacePrimitive:
     def _eye_uv(self) -> Floats:
         head = self._head
         assert head.eyes is not None
-        frame = head.eyes.eye_matrices(head.control, head.control.rest)[self.eye]
+        frame = head.eyes.eye_matrices(head.control_rig, head.control_rig.rest)[self.eye]
         return eye_uv(head.mesh.positions[self.used_vertices] @ frame[:3, :3].T + frame[:3, 3])
 
     def _has_quads(self) -> bool:

@@ -178,7 +178,7 @@ def _gltf_nodes(head: Head, buffer_builder: BufferBuilder) -> tuple[list[Tree], 
     The nodes are the bones, then the mesh. The list contains one glTF skin, which binds the mesh to the
     bones; it is empty for a head without bones.
     """
-    skeleton = head.control.skeleton
+    skeleton = head.control_rig.skeleton
     if skeleton is None:
         return [{"name": _mesh_name(head), "mesh": 0}], [0], []
     nodes, inverse_bind = _bone_nodes(skeleton)

@@ -50,7 +50,7 @@ def load_gltf_clip(path: Path, head: Head, clip_name: str | None) -> Clip:
 
     Raises DermisError for a damaged clip, and if no name matches the head.
     """
-    clip, skeleton = read_clip(path, clip_name), head.control.skeleton
+    clip, skeleton = read_clip(path, clip_name), head.control_rig.skeleton
     bones = _matched_names([track for track in clip.tracks if track.path != "weights"], head.bones)
     targets = _matched_names([track for track in clip.tracks if track.path == "weights"], head.targets)
     names = tuple(dict.fromkeys(name for track in clip.tracks for name in track.names))
@@ -103,7 +103,7 @@ def _match_track(track: AnimationTrack, used_names: list[str]) -> _MatchedTrack:
 
 def _rest_transforms(skeleton: Skeleton, bones: list[str]) -> _BoneTransforms:
     """Return the translations, rotations and scales of the named bones at rest."""
-    local = skeleton.local[[skeleton.index[name] for name in bones]]
+    local = skeleton.local[[skeleton.index_by_name[name] for name in bones]]
     linear = local[:, :3, :3]
     scale = np.linalg.norm(linear, axis=1)
     scale[np.linalg.det(linear) < 0, 0] *= -1

@@ -93,7 +93,7 @@ def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
     """
     table = _read_table(path, fps)
     is_angle = np.array([plain_key(name) in _ANGLE_COLUMNS for name in table.names])
-    bones = find_rotation_bones(head.control.skeleton)
+    bones = find_rotation_bones(head.control_rig.skeleton)
     angles, unused = _bone_angles(table, bones)
     names = tuple(name for name, angle in zip(table.names, is_angle, strict=True) if not angle)
     samples = CaptureSamples(table.times_s, names, table.values[:, ~is_angle], angles, unused)

@@ -119,7 +119,7 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
             row[frame.columns] = frame.weights
     weights = weights_as_fractions(path, weights)
     check_weights([frame.culprit for frame in frames], names, weights)
-    angles, unused = _head_angles(path, frames, times, find_rotation_bones(head.control.skeleton))
+    angles, unused = _head_angles(path, frames, times, find_rotation_bones(head.control_rig.skeleton))
     samples = CaptureSamples(times, names, fill_gaps(times, weights), angles, unused)
     return capture_clip(path, path.stem, samples, head)
 

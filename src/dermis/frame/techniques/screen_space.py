@@ -26,7 +26,7 @@ from dermis.gpu import (
 from dermis.gpu.textures import make_view, texture_from_array
 from dermis.optics.fits.separable import SeparableKernel, preintegrated_kernel
 from dermis.optics.gaussians import GaussianSum
-from dermis.scene.camera import Window
+from dermis.scene.camera import ImageRectangle
 from dermis.scene.settings import Settings
 
 TECHNIQUES_FOLDER = Path(__file__).parent
@@ -99,7 +99,7 @@ class ScreenSpace(Technique):
         """Declare the passes that diffuse the subsurface light, and return the picture with this light."""
         layers = inputs.resources.technique
         assert isinstance(layers, SubsurfaceLayers) and layers.kernel is not None
-        return draw(graph, layers, layers.kernel, inputs.window, radiance)
+        return draw(graph, layers, layers.kernel, inputs.image_rectangle, radiance)
 
     def blur_subsurface_layers(
         self, graph: Graph, inputs: FrameInputs
@@ -112,7 +112,7 @@ class ScreenSpace(Technique):
         layers, picture_layers = inputs.resources.output_layers, inputs.resources.technique
         assert isinstance(layers, SubsurfaceLayers) and isinstance(picture_layers, SubsurfaceLayers)
         assert picture_layers.kernel is not None
-        draw_blur(graph, layers, picture_layers.kernel, inputs.window)
+        draw_blur(graph, layers, picture_layers.kernel, inputs.image_rectangle)
         return layers.subsurface, layers.transmittance
 
 
@@ -145,18 +145,18 @@ def draw(
     graph: Recorder,
     subsurface_layers: SubsurfaceLayers,
     kernel: KernelTexture,
-    window: Window,
+    image_rectangle: ImageRectangle,
     surface_light: Texture,
 ) -> Texture:
     """Declare the passes that diffuse the subsurface light, and return the picture with this light.
 
     subsurface_layers : textures that hold the subsurface light, and textures for the results of the passes
     kernel : diffusion kernel of the profile
-    window : rectangle of the image plane that the picture shows
+    image_rectangle : rectangle of the image plane that the picture shows
     surface_light : shaded picture without the subsurface light
     """
     assert subsurface_layers.result is not None
-    draw_blur(graph, subsurface_layers, kernel, window)
+    draw_blur(graph, subsurface_layers, kernel, image_rectangle)
     bound: MutableBindings = {
         "surface": surface_light,
         "subsurface": subsurface_layers.subsurface,
@@ -169,20 +169,25 @@ def draw(
 
 
 def draw_blur(
-    graph: Recorder, subsurface_layers: SubsurfaceLayers, kernel: KernelTexture, window: Window
+    graph: Recorder,
+    subsurface_layers: SubsurfaceLayers,
+    kernel: KernelTexture,
+    image_rectangle: ImageRectangle,
 ) -> None:
     """Declare the passes that diffuse the subsurface light along rows, then along columns.
 
     subsurface_layers : texture of the subsurface light, which the second pass overwrites with the diffused
         light; and the texture to which the first pass, along rows, writes
     kernel : diffusion kernel of the profile
-    window : rectangle of the image plane that the picture shows
+    image_rectangle : rectangle of the image plane that the picture shows
     """
     device, size = graph.device, subsurface_layers.scratch.size[:2]
     programs = [
         program(device, TECHNIQUES_FOLDER / "screen_space.wgsl", (("AXIS", axis),)) for axis in (0, 1)
     ]
-    record = programs[0].make_record("Blur", half=window.half, shift=window.shift, reach=kernel.reach_mm)
+    record = programs[0].make_record(
+        "Blur", half=image_rectangle.half, shift=image_rectangle.shift, reach=kernel.reach_mm
+    )
     passes: tuple[tuple[TextureOrView, TextureOrView], ...] = (
         (subsurface_layers.subsurface, subsurface_layers.scratch),
         (subsurface_layers.scratch, subsurface_layers.subsurface),

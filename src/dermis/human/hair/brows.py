@@ -88,7 +88,7 @@ class BrowSurface:
         slopes = [tangent.reshape(-1, 3) for tangent in tangents]
         self._node = np.concatenate([node_mm, normal, *slopes, plane], axis=1)
 
-    def sample(self, side_sign: Doubles, x: Doubles, y: Doubles) -> SurfacePoints:
+    def points_at(self, side_sign: Doubles, x: Doubles, y: Doubles) -> SurfacePoints:
         """Return the n skin points with given x and y; positions outside the grid are moved to its border.
 
         side_sign : (n,) 1 for the left brow, -1 for the right brow
@@ -206,7 +206,7 @@ def grow_brow_hairs(
     (x, y), (first_angle, bend, length, rise, radius) = root_xy_mm, shape_parameters
     t = np.linspace(0.0, 1.0, KNOTS_PER_HAIR)
     height = rise[:, None] * (1 - (1 - t) ** 2.2) * (1 - 0.35 * t) - 0.25 * (1 - t) ** 8
-    skin_points = skin.sample(side_sign, x, y)
+    skin_points = skin.points_at(side_sign, x, y)
     root_offset = tangent_component(root_mm - skin_points.position_mm, skin_points.normal)
     base_points, normals = [skin_points.position_mm + root_offset], [skin_points.normal]
     for k in range(2, KNOTS_PER_HAIR, 2):  # odd knots are interpolated, with an error of at most 0.16 mm
@@ -214,7 +214,7 @@ def grow_brow_hairs(
         direction = np.stack([side_sign * np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=-1)
         across, up = skin_points.xy_steps(direction, 2 * length / (KNOTS_PER_HAIR - 1))
         x, y = x + across, y + up
-        skin_points = skin.sample(side_sign, x, y)
+        skin_points = skin.points_at(side_sign, x, y)
         base = skin_points.position_mm + root_offset
         base_points += [(base_points[-1] + base) / 2, base]
         normals += [(normals[-1] + skin_points.normal) / 2, skin_points.normal]

@@ -37,17 +37,19 @@ _MIN_BEARD_AMOUNT = 0.02  # zone amount above which quads may have a beard
 class HairDensity(NamedTuple):
     """Relative density of scalp hair or beard over the skin.
 
-    relative : function that returns the relative density (n,), 0 to 1, at n skin points; its argument is an
-        array (n, 4) with the columns of `average_points`
+    relative_density : function that returns the relative density (n,), 0 to 1, at n skin points; its
+        argument is an array (n, 4) with the columns of `average_control_points`
     candidates : (p,) mask of the control points near which hair may grow; a quad with no corner among
         them gets no hair roots
     """
 
-    relative: Callable[[Doubles], Doubles]
+    relative_density: Callable[[Doubles], Doubles]
     candidates: NDArray[np.bool_]
 
 
-def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.random.Generator) -> Roots:
+def sample_roots(
+    mesh: Mesh, density: HairDensity, max_roots_per_cm2: float, rng: np.random.Generator
+) -> Roots:
     """Return random hair roots, ordered by quad, whose number per area follows `density`.
 
     Within a quad, the candidates are points of a low-discrepancy sequence, so that roots do not cluster. No
@@ -55,11 +57,11 @@ def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.rando
 
     mesh : control mesh of the person
     density : relative density over the skin
-    per_cm2 : number of roots per area where the relative density is 1 [1/cm2]
+    max_roots_per_cm2 : number of roots per area where the relative density is 1 [1/cm2]
     """
     quad = _hairy_quads(mesh)
     corner_points = quad_corners(mesh, quad)
-    counts = np.floor(per_cm2 * quad_areas_cm2(mesh, quad) + rng.random(len(quad))).astype(np.int64)
+    counts = np.floor(max_roots_per_cm2 * quad_areas_cm2(mesh, quad) + rng.random(len(quad))).astype(np.int64)
     starts, threshold = rng.random((len(quad), 2)), rng.random(int(counts.sum()))
     near = density.candidates[corner_points].any(axis=1)
     quad_index = np.repeat(np.flatnonzero(near), counts[near])
@@ -68,9 +70,9 @@ def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.rando
     step = threshold_index - (np.cumsum(counts) - counts)[quad_index]
     position = starts.take(quad_index, axis=0) + step[:, None] * _R2_SEQUENCE_STEPS
     position -= np.floor(position)
-    values = average_points().T.take(corner_points.T.take(quad_index, axis=1), axis=1)
-    relative = density.relative(interpolate_quads(position, values).T)
-    accepted = np.flatnonzero(threshold.take(threshold_index) < relative)
+    values = average_control_points().T.take(corner_points.T.take(quad_index, axis=1), axis=1)
+    relative_density = density.relative_density(interpolate_quads(position, values).T)
+    accepted = np.flatnonzero(threshold.take(threshold_index) < relative_density)
     rooted = quad.take(quad_index.take(accepted)).astype(np.int32)
     return Roots(rooted, position.take(accepted, axis=0).astype(np.float32))
 
@@ -116,7 +118,7 @@ def scalp_density(recession: float) -> HairDensity:
     column = _amount_column("hair")
     receding = zone_table(recession)[:, column] != zone_table()[:, column]
 
-    def relative(points: Doubles) -> Doubles:
+    def relative_density(points: Doubles) -> Doubles:
         above = height_above_hairline(points, recession)
         low, high = _HAIRLINE_FADE_MM
         margin = len(_HAIRLINE_WAVES)
@@ -126,7 +128,7 @@ def scalp_density(recession: float) -> HairDensity:
         thinned = _sum_zones("hair", zone_table(recession)[receding], points)
         return np.asarray(fraction * np.clip(1.0 + thinned, 0.0, 1.0))
 
-    return HairDensity(relative, _scalp_point_mask())
+    return HairDensity(relative_density, _scalp_point_mask())
 
 
 def beard_density() -> HairDensity:
@@ -136,12 +138,12 @@ def beard_density() -> HairDensity:
 
 @cache
 def _scalp_point_mask() -> NDArray[np.bool_]:
-    return height_above_hairline(average_points()) > -_SCALP_MARGIN_MM
+    return height_above_hairline(average_control_points()) > -_SCALP_MARGIN_MM
 
 
 @cache
 def _beard_point_mask() -> NDArray[np.bool_]:
-    return _sum_zones("beard", zone_table(), average_points()) > _MIN_BEARD_AMOUNT
+    return _sum_zones("beard", zone_table(), average_control_points()) > _MIN_BEARD_AMOUNT
 
 
 def _beard_amount(points: Doubles) -> Doubles:
@@ -202,7 +204,7 @@ def _amount_column(amount_name: str) -> int:
 
 
 @cache
-def average_points() -> Doubles:
+def average_control_points() -> Doubles:
     """Return the control points (p, 4) of the average person.
 
     The columns are x, y, z and the signed distance to the border of the lips, positive on the lips [mm].

@@ -20,7 +20,7 @@ from dermis.human.hair.look import HairLook
 from dermis.human.hair.root_finder import SIDE_SIGNS, RootFinder, eye_centres
 from dermis.human.hair.skin_surface import GrowthSurface, HairGroup, RootFrames, SkinSurface
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Roots, Strands, offsets_in_frames
+from dermis.mesh.strands import Roots, Strands, offsets_in_root_axes
 from dermis.specular.hair import absorption_per_mm
 
 _LASH_PIGMENT_FACTOR = 1.6
@@ -118,7 +118,7 @@ def _hair_group(
     knots_mm, radius_mm : (n, k, 3) positions and (n, k) radii of the knots [mm]
     pigment_factor : pigment concentrations relative to those of the person's look [-]
     """
-    offsets = offsets_in_frames(root_frames.frame, knots_mm - root_frames.positions_mm[:, None])
+    offsets = offsets_in_root_axes(root_frames.frame, knots_mm - root_frames.positions_mm[:, None])
     return HairGroup(root_frames.roots, offsets, radius_mm.astype(np.float32), pigment_factor)
 
 

@@ -12,14 +12,14 @@ from dermis.base.arrays import Doubles
 from dermis.human.hair.root_finder import RootFinder
 from dermis.human.hair.skin_surface import SkinSurface, tangent_component
 from dermis.human.hair.styles import Style
-from dermis.mesh.groom import GUIDE_ANCHORS, GUIDE_KNOTS, Guides
+from dermis.mesh.groom import ANCHORS_PER_GUIDE_KNOT, KNOTS_PER_GUIDE, Guides
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import quad_corners
 
 CORNROW_SPACING_MM = 14.0
 """Distance between the middles of cornrows [mm]."""
 _MAX_STEP_MM = 5.0  # largest step of the growth of guides
-_MIN_HEIGHT_MM = 0.5  # least height of guides above the skin, away from their roots
+_MIN_HEIGHT_ABOVE_SKIN_MM = 0.5  # least height of guides above the skin, away from their roots
 _LAYER_LENGTH_MM = 35.0  # length along which hair rises to the outermost layer
 _WHORL_MM = np.array([9.0, 86.0, -131.0])
 _SKULL_CENTRE_MM = np.array([0.0, 12.0, -66.0])
@@ -217,9 +217,9 @@ def grow_guides(root_finder: RootFinder, roots_mm: Doubles, style: Style) -> tup
     state = Growth(roots_mm, normal, roots_mm, _root_directions(roots_mm, normal, style), normal,
                    np.zeros(count), np.zeros(count), np.full(count, np.inf))  # fmt: skip
     knots = [(roots_mm, normal, state.height_mm)]
-    segment = style.max_length_mm / (GUIDE_KNOTS - 1)
+    segment = style.max_length_mm / (KNOTS_PER_GUIDE - 1)
     substeps = max(1, int(np.ceil(segment / _MAX_STEP_MM)))
-    for _ in range(GUIDE_KNOTS - 1):
+    for _ in range(KNOTS_PER_GUIDE - 1):
         for _ in range(substeps):
             state = _grow_one_step(surface, state, segment / substeps, style)
         knots.append((state.position_mm, state.skin_normal, state.height_mm))
@@ -252,7 +252,7 @@ def _grow_one_step(surface: SkinSurface, growth: Growth, step_mm: float, style: 
     height = ((moved - base) * normal).sum(axis=1)
     height_of_ears = _EAR_HEIGHT_MM * ear_weight(base) if style.comb in _COMBS_OVER_EARS else 0.0
     layer = style.volume_mm * (1.0 - np.exp(-length / _LAYER_LENGTH_MM)) * np.minimum(length / 20.0, 1.0)
-    least = np.minimum(length / 6.0, 1.0) * (_MIN_HEIGHT_MM + layer + height_of_ears)
+    least = np.minimum(length / 6.0, 1.0) * (_MIN_HEIGHT_ABOVE_SKIN_MM + layer + height_of_ears)
     pushed = np.clip(least - height, 0.0, 0.8 * step_mm)[:, None]
     moved += pushed * normal
     if style.comb == "fall":
@@ -376,8 +376,8 @@ def cut_fractions(knots: Doubles, style: Style) -> Doubles:
         radius = np.linalg.norm((knots - _SKULL_CENTRE_MM) / _ROUND_CUT_RADII_MM, axis=2)
         limit = 1.0 + style.round * style.max_length_mm / 90.0
         outside = radius > limit
-        first = np.where(outside.any(axis=1), outside.argmax(axis=1), GUIDE_KNOTS - 1)
-        cut = np.minimum(cut, first / (GUIDE_KNOTS - 1))
+        first = np.where(outside.any(axis=1), outside.argmax(axis=1), KNOTS_PER_GUIDE - 1)
+        cut = np.minimum(cut, first / (KNOTS_PER_GUIDE - 1))
     return cut
 
 
@@ -394,7 +394,7 @@ def _first_crossing_fractions(knots: Doubles, height_mm: Doubles) -> Doubles:
     first = crosses.argmax(axis=1)
     row = np.arange(len(y))
     part = y[row, first] / np.maximum(y[row, first] - y[row, first + 1], 1e-9)
-    return np.where(crosses.any(axis=1), (first + part) / (GUIDE_KNOTS - 1), 1.0)
+    return np.where(crosses.any(axis=1), (first + part) / (KNOTS_PER_GUIDE - 1), 1.0)
 
 
 def bind_guides(
@@ -413,7 +413,7 @@ def bind_guides(
     skin = np.flatnonzero(control_mesh.material[control_mesh.quads[:, 0]] == 0)
     corners = quad_corners(control_mesh, skin)
     around = points_mm[corners]
-    distance, near = cKDTree(around.mean(axis=1)).query(knots, k=GUIDE_ANCHORS)
+    distance, near = cKDTree(around.mean(axis=1)).query(knots, k=ANCHORS_PER_GUIDE_KNOT)
     weight = np.asarray(1.0 / (distance**2 + _ANCHOR_SOFTENING_MM**2))
     weight /= weight.sum(axis=-1, keepdims=True)
     origin, axes = quad_frames(around)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.root_finder import RootFinder
-from dermis.human.hair.strand_roots import BEARD_STRANDS_PER_CM2, STRANDS_PER_CM2, style_strands
+from dermis.human.hair.strand_roots import BEARD_STRANDS_PER_CM2, STRANDS_PER_CM2, strands_of_style
 from dermis.human.hair.styles import BEARD, Style, styles
 from dermis.human.skin.face import hairline_heights
 from dermis.mesh.groom import Groom
@@ -22,10 +22,10 @@ _MIN_EUMELANIN = 0.07  # white hair is not quite white
 _SEED_COUNT = 1 << 24  # seeds are exact as float32
 # Radius and pitch of the curls of hair, by the dial `HairLook.curl` [mm].
 _CURL_NODES = np.array([0.0, 0.1, 0.3, 0.6, 0.8, 1.0])
-_CURL_RADIUS_MM = np.array([0.0, 0.5, 5.0, 6.5, 3.6, 1.7])
-_CURL_PITCH_MM = np.array([150.0, 130.0, 95.0, 34.0, 15.0, 7.5])
-_CURL_INCOHERENCE = np.array([0.3, 0.3, 0.12, 0.2, 0.5, 1.0])
-_FRIZZ_MM = np.array([0.25, 0.35, 0.6, 0.9, 0.8, 0.5])
+_COIL_RADIUS_BY_CURL_MM = np.array([0.0, 0.5, 5.0, 6.5, 3.6, 1.7])
+_COIL_PITCH_BY_CURL_MM = np.array([150.0, 130.0, 95.0, 34.0, 15.0, 7.5])
+_INCOHERENCE_BY_CURL = np.array([0.3, 0.3, 0.12, 0.2, 0.5, 1.0])
+_FRIZZ_BY_CURL_MM = np.array([0.25, 0.35, 0.6, 0.9, 0.8, 0.5])
 _FLYAWAY_FRACTION = 0.012
 _KNOTS_PER_TURN = 7.0
 _STRAIGHT_SEGMENT_MM = 14.0  # length of the segments of straight hair
@@ -67,7 +67,7 @@ def make_groom(
         scalp = None
     if scalp is None and not bearded:
         return None
-    tables = style_strands(scalp, bearded, root_finder, subdivision_levels)
+    tables = strands_of_style(scalp, bearded, root_finder, subdivision_levels)
     parts = [_scalp_parameters(scalp, hair_look, recession)] if scalp else []
     parts += [_beard_parameters(hair_look)] if bearded else []
     parameters, strands = np.array(parts, HAIR_PARAMETERS_DTYPE), round(hair_fraction * len(tables.roots))
@@ -115,7 +115,12 @@ def _parameter_row(
     hairs_per_strand = hairs_per_cm2 / strands_per_cm2
     curl_mm, pitch_mm, incoherence, frizz_mm = (
         float(np.interp(hair_look.curl, _CURL_NODES, column))
-        for column in (_CURL_RADIUS_MM, _CURL_PITCH_MM, _CURL_INCOHERENCE, _FRIZZ_MM)
+        for column in (
+            _COIL_RADIUS_BY_CURL_MM,
+            _COIL_PITCH_BY_CURL_MM,
+            _INCOHERENCE_BY_CURL,
+            _FRIZZ_BY_CURL_MM,
+        )
     )
     rope = style.rope_mm > 0.0
     radius = hairs_per_strand * hair_radius_mm

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dermis.base.arrays import Doubles
 from dermis.human.hair.brows import KNOTS_PER_HAIR
 
-_LENGTH_POSITIONS = np.array([0.0, 0.15, 0.35, 0.55, 0.75, 0.9, 1.0])
+_POSITIONS_ALONG_ROW = np.array([0.0, 0.15, 0.35, 0.55, 0.75, 0.9, 1.0])
 
 
 class LashRow(NamedTuple):
@@ -19,7 +19,7 @@ class LashRow(NamedTuple):
     edge_points : control points along the edge of the left lid, from the nose outwards
     hairs : number of lashes
     start, end : ends of the row, as fractions of the arc length of the edge
-    length : (7,) lengths of lashes at the positions `_LENGTH_POSITIONS` along the row [mm]
+    length : (7,) lengths of lashes at the positions `_POSITIONS_ALONG_ROW` along the row [mm]
     rise : elevation of lashes above the forward direction at root and tip, negative downwards [rad]
     splay : sideways inclination of lashes at the inner and the outer end of the row [-]
     radius : radius of the lashes at the root [mm]
@@ -83,7 +83,7 @@ def sample_shapes(
     splay = np.interp(fraction, [0, 1], lash_row.splay) + rng.normal(0, 0.1, n)
     first = lash_row.rise[0] + rng.normal(0, 0.12, n)
     last = lash_row.rise[1] + rng.normal(0, 0.18, n)
-    length = np.interp(fraction, _LENGTH_POSITIONS, lash_row.length) * rng.uniform(0.7, 1.08, n)
+    length = np.interp(fraction, _POSITIONS_ALONG_ROW, lash_row.length) * rng.uniform(0.7, 1.08, n)
     clump = np.empty(n)  # neighbours that stick together
     clump[np.argsort(edge_position)] = first_clump + np.cumsum(rng.random(n) < 0.4)
     pull = rng.uniform(0.2, 0.7, n)

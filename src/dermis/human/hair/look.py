@@ -24,12 +24,12 @@ FIELD_RANGES = {
 # Artist's values.
 _TYPICAL_CURL = {"african": 0.95, "asian": 0.0, "caucasian": 0.2}
 _MIN_TIGHT_CURL = 0.6  # curl above which hair is worn in the styles of tightly coiled hair
-_BALD_CHANCE_BY_IS_MAN = {
+_BALD_CHANCE_BY_SEX = {
     False: 0.01,
     True: 0.1,
 }  # of women and of men; those of the styles are in styles.toml
-_BALD_STYLE = Style("up", max_length_mm=500.0, length_mm=6.0)
-_MAX_BEARD_MM = 14.0
+_FALLBACK_STYLE = Style("up", max_length_mm=500.0, length_mm=6.0)
+_MAX_SAMPLED_BEARD_MM = 14.0
 _DARK_EUMELANIN = 3.0  # eumelanin above which shaved hair has full visibility
 
 
@@ -96,7 +96,7 @@ class HairLook:
             refuse(
                 "style", f"one of {', '.join(HAIR_STYLES)}", f"got {format_value(self.style)}", "Choose one"
             )
-        style = styles().get(self.style, _BALD_STYLE)
+        style = styles().get(self.style, _FALLBACK_STYLE)
         for name in ("length_mm", "fade"):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, getattr(style, name))
@@ -117,7 +117,7 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
     eumelanin, pheomelanin : pigment concentrations of the hair, see `HairLook`
     """
     old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
-    curl, woman = demographics.shape_weighted_mean(_TYPICAL_CURL), demographics.sex < 0.5
+    curl, woman = demographics.mean_over_shape_ancestry(_TYPICAL_CURL), demographics.sex < 0.5
     loose, tight = ("shoulder-length", "afro") if woman else ("short", "cropped")
     return HairLook(
         style=tight if curl > _MIN_TIGHT_CURL else loose,
@@ -139,9 +139,9 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
     man = demographics.sex > 0.5
     curl = float(np.clip(typical.curl + 0.12 * n[0], 0.0, 1.0))
     name = _pick_style(style_chance, man, curl > _MIN_TIGHT_CURL)
-    style = styles().get(name, _BALD_STYLE)
+    style = styles().get(name, _FALLBACK_STYLE)
     length = style.length_mm * float(np.exp(0.2 * n[1]))
-    beard = float(np.exp(rng.uniform(np.log(0.8), np.log(_MAX_BEARD_MM))))
+    beard = float(np.exp(rng.uniform(np.log(0.8), np.log(_MAX_SAMPLED_BEARD_MM))))
     return replace(
         typical,
         style=name,
@@ -163,7 +163,7 @@ def _pick_style(uniform_sample: float, is_man: bool, is_tightly_coiled: bool) ->
     """
     worn = {name: one for name, one in styles().items() if (one.tight if is_tightly_coiled else one.loose)}
     chances = np.array(
-        [_BALD_CHANCE_BY_IS_MAN[is_man], *(one.men if is_man else one.women for one in worn.values())]
+        [_BALD_CHANCE_BY_SEX[is_man], *(one.men if is_man else one.women for one in worn.values())]
     )
     index = int(np.searchsorted(np.cumsum(chances) / chances.sum(), uniform_sample, side="right"))
     return ("none", *worn)[min(index, len(worn))]

@@ -201,8 +201,8 @@ class RootFinder:
         return _FrontTriangles(triangle_lists, quad, half, corner)
 
 
-def _bounding_box(corner: Doubles) -> tuple[Doubles, Doubles]:
-    return corner[..., :2].min(axis=1), corner[..., :2].max(axis=1)
+def _bounding_box(corners: Doubles) -> tuple[Doubles, Doubles]:
+    return corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
 
 
 def _mirrored_points(points_mm: Doubles, point_index: Index) -> Index:

@@ -29,7 +29,7 @@ class SkinSurface:
 
     def project(self, points_mm: Doubles) -> tuple[Doubles, Doubles]:
         """Project points (n, 3) onto the skin along its normals; return projections [mm] and unit normals."""
-        distance, near = self._tree.query(points_mm, k=_NEIGHBOUR_COUNT)
+        distance, near = self._vertex_kd_tree.query(points_mm, k=_NEIGHBOUR_COUNT)
         weights = 1.0 / (distance**2 + 0.05)
         weights /= weights.sum(axis=1, keepdims=True)
         plane = np.einsum("nk,nkc->nc", weights, self._planes.take(near, axis=0))
@@ -38,7 +38,7 @@ class SkinSurface:
         return points_mm - height[:, None] * normal, normal
 
     @cached_property
-    def _tree(self) -> Any:
+    def _vertex_kd_tree(self) -> Any:
         from scipy.spatial import cKDTree
 
         return cKDTree(self._positions_mm, compact_nodes=False, balanced_tree=False)

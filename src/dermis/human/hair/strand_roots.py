@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.base.arrays import Doubles
 from dermis.base.disk import Arrays, cached_arrays
 from dermis.human.hair import density
-from dermis.human.hair.density import average_points, recession_effect
+from dermis.human.hair.density import average_control_points, recession_effect
 from dermis.human.hair.guides import (
     CORNROW_SPACING_MM,
     bind_guides,
@@ -23,7 +23,7 @@ from dermis.human.hair.guides import (
 )
 from dermis.human.hair.root_finder import RootFinder
 from dermis.human.hair.styles import BEARD, Style
-from dermis.mesh.groom import GUIDE_KNOTS, Guides, StrandRoots
+from dermis.mesh.groom import KNOTS_PER_GUIDE, Guides, StrandRoots
 from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
 STRANDS_PER_CM2 = 150.0
@@ -54,7 +54,7 @@ class StyleStrands(NamedTuple):
 
 
 @lru_cache(_MAX_CACHED_LOOKS)
-def style_strands(
+def strands_of_style(
     scalp_style: Style | None, has_beard: bool, root_finder: RootFinder, subdivision_levels: int
 ) -> StyleStrands:
     """Return the guides and the roots of a hair style and a beard.
@@ -99,8 +99,8 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
     mesh, rng = root_finder.mesh, np.random.default_rng(_SEED)
     beard = style is BEARD
     where = density.beard_density() if beard else density.scalp_density(0.0)
-    per_cm2 = BEARD_STRANDS_PER_CM2 if beard else STRANDS_PER_CM2
-    roots = density.sample_roots(mesh, where, per_cm2, rng)
+    max_roots_per_cm2 = BEARD_STRANDS_PER_CM2 if beard else STRANDS_PER_CM2
+    roots = density.sample_roots(mesh, where, max_roots_per_cm2, rng)
     corners = quad_corners(mesh, roots.quad)
     points, guide = np.unique(corners, return_inverse=True)
     guide = guide.reshape(corners.shape)
@@ -114,10 +114,10 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
         total = one_sided.sum(axis=1, keepdims=True)
         weight = np.where(total > 1e-3, one_sided / np.maximum(total, 1e-9), weight)
     weight = _near_guide_weights(weight, guide, knots)
-    place = _root_locations(weight, average_points()[corners])
+    place = _root_locations(weight, average_control_points()[corners])
     guides = bind_guides(mesh, points_mm, knots, heights, cut_fractions(knots, style))
     clump = _clump_centre_strands(
-        root_mm, np.einsum("nk,nkc->nc", weight, knots[guide, GUIDE_KNOTS // 2]), style, rng
+        root_mm, np.einsum("nk,nkc->nc", weight, knots[guide, KNOTS_PER_GUIDE // 2]), style, rng
     )
     columns = roots.quad, roots.position, guide, weight, clump, place, -root_mm[clump, 2]
     types = np.int32, np.float32, np.int32, np.float32, np.int32, np.float32, np.float32
@@ -138,7 +138,7 @@ def _near_guide_weights(guide_weight: Doubles, guide: NDArray[np.int64], knots: 
     knots : (g, k, 3) knots of all guides [mm]
     """
     main = np.take_along_axis(guide, guide_weight.argmax(axis=1)[:, None], axis=1)
-    some = knots[:, :: GUIDE_KNOTS // 8]
+    some = knots[:, :: KNOTS_PER_GUIDE // 8]
     apart = np.linalg.norm(some[guide] - some[main], axis=-1).max(axis=2)
     agreeing = guide_weight * smoothstep(_GUIDE_SEPARATION_MM[1], _GUIDE_SEPARATION_MM[0], apart)
     return np.asarray(agreeing / agreeing.sum(axis=1, keepdims=True))
@@ -152,7 +152,7 @@ def _root_locations(corner_weight: Doubles, corner_points: Doubles) -> Doubles:
     nape (0) to the top of the head (1).
 
     corner_weight : (n, 4) weights of the corners of the quad on which each strand is rooted
-    corner_points : (n, 4, 4) rows of `average_points` at these corners
+    corner_points : (n, 4, 4) rows of `average_control_points` at these corners
     """
     points = np.einsum("nk,nkc->nc", corner_weight, corner_points)
     angle = density.hairline_angle(points)

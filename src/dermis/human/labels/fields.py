@@ -85,9 +85,9 @@ def dense_label_fields() -> tuple[Doubles, Doubles]:
     The fields are the signed distances of `label_fields` at the points of a subdivided mesh.
     """
     head = AVERAGE_HUMAN.head(subdivide=_DENSE_SUBDIVISION_LEVELS)
-    assert head.control.stencils is not None
+    assert head.control_rig.stencils is not None
     skin = np.unique(head.mesh.point[head.mesh.triangles[head.mesh.material == 0]])
-    fields = head.control.stencils.points(label_fields().T.copy())[skin].T
+    fields = head.control_rig.stencils.points(label_fields().T.copy())[skin].T
     outer = fields[HUMAN_FIELD_CLASSES.index("mouth_interior")] < 0
     return head.mesh.points_mm[skin][outer], fields[:, outer]
 
@@ -217,7 +217,7 @@ def _iris_fields(head: Head) -> dict[str, Doubles]:
         return {}
     mesh, points = head.mesh, head.mesh.points_mm
     fields = {}
-    frames = head.eyes.eye_matrices(head.control, head.control.rest)
+    frames = head.eyes.eye_matrices(head.control_rig, head.control_rig.rest)
     for frame, material, side in zip(frames, head.eyes.material, reversed(SIDE_NAMES), strict=False):
         eyeball_points = np.unique(mesh.point[mesh.triangles[mesh.material == material]])
         local = points[eyeball_points] @ frame[:3, :3].T + frame[:3, 3]
@@ -239,7 +239,7 @@ def _skin_fields(head: Head) -> dict[str, Doubles]:
     mesh = head.mesh
     count = int(mesh.point.max()) + 1
     if is_human(head):
-        stencils = head.control.stencils
+        stencils = head.control_rig.stencils
         refined: Callable[[Doubles], Doubles] = stencils.points if stencils else lambda values: values
         fields = dict(zip(HUMAN_FIELD_CLASSES, refined(label_fields().T.copy()).T, strict=True))
     elif (landmarks := known_landmarks(head)) is not None:

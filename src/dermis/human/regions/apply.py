@@ -33,7 +33,7 @@ REGION_BLUR_MM = 2.5
 """Standard deviation of the blur of borders between regions [mm]."""
 _DETAIL_BLUR_MM = 6.0  # finer detail is taken from the head's own maps, the rest from the table
 _MIN_RELATIVE_LOCAL_MEAN = 0.4  # smallest local mean of a map, relative to its mean
-_MAX_RELATIVE_DETAIL = 3.0  # largest value of a map, relative to its local mean
+_MAX_RATIO_TO_LOCAL_MEAN = 3.0  # largest value of a map, relative to its local mean
 _BLUR_GRID_CELL_MM = 2.0
 _MAX_BLUR_GRID_CELLS = 256  # along the longest side of the grid
 _BLUR_TRUNCATION_SIGMAS = 3  # radius of the blur kernel in standard deviations
@@ -114,7 +114,7 @@ def _region_map(
     shape = max(height, MIN_MAP_SIDE), max(width, MIN_MAP_SIDE)
     detail = np.minimum(
         _resize_map(existing_map, shape) / _resize_map(_texel_image(atlas, local_mean), shape),
-        _MAX_RELATIVE_DETAIL,
+        _MAX_RATIO_TO_LOCAL_MEAN,
     )
     return np.asarray(detail * _resize_map(_texel_image(atlas, region_values), shape))
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.tables import read_rows
-from dermis.human.model import MATERIAL_OF_GROUP, build_head, template
+from dermis.human.model import MATERIAL_OF_GROUP, build_head, head_template
 from dermis.human.person import Human
 from dermis.human.regions.region_table import Doubles, classify_regions
 from dermis.mesh.eye_look import EyeLook
@@ -59,7 +59,9 @@ def average_skin() -> DenseSkin:
 
 def _bare_head(levels: int) -> Head:
     """Return the head of the average human, subdivided `levels` times and without its hair."""
-    return template("own", levels).refine_head(build_head(AVERAGE_HUMAN.weights(), Maps(), "own", EyeLook()))
+    return head_template("own", levels).refine_head(
+        build_head(AVERAGE_HUMAN.target_weights(), Maps(), "own", EyeLook())
+    )
 
 
 def landmark_indices() -> dict[str, int]:
@@ -87,7 +89,7 @@ def is_human(head: Head) -> bool:
     rig = head.rig
     if rig is None or head.mesh.materials != tuple(MATERIAL_OF_GROUP.values()):
         return False  # without building the average head
-    average = average_head().control
+    average = average_head().control_rig
     return rig.positions_mm.shape == average.positions_mm.shape and rig.targets.names == average.targets.names
 
 
@@ -110,7 +112,7 @@ def average_positions(head: Head) -> Doubles:
     Regions defined on the average human are looked up at these points.
     """
     points_mm = average_head().positions_mm.astype(np.float64)
-    stencils = head.control.stencils
+    stencils = head.control_rig.stencils
     return np.asarray((points_mm if stencils is None else stencils.points(points_mm))[head.mesh.point])
 
 

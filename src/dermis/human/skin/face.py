@@ -143,7 +143,7 @@ class Folds(NamedTuple):
 
 
 @cache
-def fold_curves() -> Folds:
+def skin_folds() -> Folds:
     """Return the skin folds of folds.csv as smooth polylines with their dimensions."""
     knots, curves = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
     for _, group in groupby(read_rows(__package__, "folds"), key=lambda row: row["fold"]):

@@ -30,7 +30,7 @@ SITES_FIELD = "sites"
 _TYPICAL_FRECKLES = {"african": 0.02, "asian": 0.06, "caucasian": 0.16}
 _TYPICAL_IRIS_EUMELANIN = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
 _AGE_SPOTS_FROM_YEARS = 45.0  # age from which there are age spots [years]
-_MAX_AGE_FOLDS = 1.0  # `SkinLook.age` of people of 90 years
+_FOLD_STRENGTH_AT_90_YEARS = 1.0  # `SkinLook.age` of people of 90 years
 
 
 @dataclass(frozen=True)
@@ -148,11 +148,11 @@ class Demographics(NamedTuple):
     skin_groups: Mapping[str, float]
     ita: float | None = None
 
-    def shape_weighted_mean(self, value_of_ancestry: dict[str, float]) -> float:
+    def mean_over_shape_ancestry(self, value_of_ancestry: dict[str, float]) -> float:
         """Return the mean of values for three ancestries, weighted by the ancestry fractions of the shape."""
         return _weighted_mean((self.african, self.asian, self.caucasian), value_of_ancestry)
 
-    def skin_weighted_mean(self, value_of_ancestry: dict[str, float]) -> float:
+    def mean_over_skin_ancestry(self, value_of_ancestry: dict[str, float]) -> float:
         """Return the mean of values for three ancestries, weighted by the ancestry fractions of the skin."""
         return _weighted_mean(pigment_ancestry(self.skin_groups), value_of_ancestry)
 
@@ -182,13 +182,13 @@ def _typical_skin_look(
     spot_progress = max(demographics.age - _AGE_SPOTS_FROM_YEARS, 0.0) / (OLD_AGE - _AGE_SPOTS_FROM_YEARS)
     return SkinLook(
         **pigments._asdict(),
-        freckles=demographics.skin_weighted_mean(_TYPICAL_FRECKLES),
+        freckles=demographics.mean_over_skin_ancestry(_TYPICAL_FRECKLES),
         moles=0.3,
         spots=0.7 * spot_progress * (0.4 + 0.6 * pigment_ancestry(demographics.skin_groups)[2]),
         veins=0.2 + 0.5 * old,
         beard=0.45 * max(2.0 * demographics.sex - 1.0, 0.0),
         oil=0.45 - 0.25 * old,
-        age=0.04 + (_MAX_AGE_FOLDS - 0.04) * old**1.5,
+        age=0.04 + (_FOLD_STRENGTH_AT_90_YEARS - 0.04) * old**1.5,
         sites=site_differences,
     )
 
@@ -202,7 +202,7 @@ def _typical_pigment_arguments(
 def typical_eyes(demographics: Demographics) -> EyeLook:
     """Return the typical eye look: brown irises, lighter for a larger fraction of European ancestry."""
     redness = 0.15 + 0.2 * (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
-    return EyeLook(eumelanin=demographics.skin_weighted_mean(_TYPICAL_IRIS_EUMELANIN), redness=redness)
+    return EyeLook(eumelanin=demographics.mean_over_skin_ancestry(_TYPICAL_IRIS_EUMELANIN), redness=redness)
 
 
 def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook:

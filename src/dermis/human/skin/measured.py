@@ -46,11 +46,11 @@ SITES: Final = (
 """Sites of the archive, in the order of its codes from 1."""
 FACE_SITES: Final = ("cheekbone", "forehead", "chin", "nose_tip", "ear_lobe", "neck")
 """Sites of the head beside the cheek, as fields of `SiteDifferences`."""
-ANCESTRY_UNIONS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+GROUPS_OF_ANCESTRY: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {"asian": ("chinese", "japanese", "southeast asian"), "middle eastern": ("iraqi", "arabian")}
 )
 """Names that each stand for several groups with equal weights."""
-SKIN_ANCESTRIES: Final = (*GROUP_OF_CODE.values(), *ANCESTRY_UNIONS)
+SKIN_ANCESTRIES: Final = (*GROUP_OF_CODE.values(), *GROUPS_OF_ANCESTRY)
 """Names of skin ancestries."""
 ITA_RANGE: Final = (-65.0, 70.0)
 """Range of the individual typology angle (ITA) that can be requested for a person [degrees]."""
@@ -64,7 +64,7 @@ _MAX_CHEEK_DEVIATION_DOUBLINGS = 0.7
 _MELANIN_RANGE, _BLOOD_RANGE = (5e-4, 0.7), (3e-4, 0.08)
 _EPIDERMIS_RANGE_MM = (0.02, 0.2)
 # half width of the interval over which the density of an ITA is averaged [degrees]
-_ITA_HALF_WIDTH_DEGREES = 1.0
+_ITA_WINDOW_HALF_WIDTH_DEGREES = 1.0
 _MAX_NORMAL_SCORE = 2.9  # largest absolute normal score of an ITA
 # Numbers of melanin fractions, of bisections between two of them, and of changes of the other pigments:
 _MELANIN_NODE_COUNT, _BISECTION_COUNT, _MAX_ITA_STEPS = 257, 40, 15
@@ -154,7 +154,7 @@ class MeasuredTable(NamedTuple):
     probabilities : (k,) cumulative probabilities, 0 to 1, to which the k quantiles of each variable belong
     groups : mapping from group name to distribution
     sex, age : (4,) changes of the variables from female to male, and from young to old
-    mean_age_term : mean of `age_term` over the ages that `Human.drawn` samples
+    mean_age_term : mean of `age_term` over the ages that `Human.sampled` samples
     site_slope : (12, 2) slope of the difference between each site and the cheek as a function of the cheek's
         own value, for log2 of melanin and for log2 of blood [-]
     site_spread : (12, 2) standard deviations of the differences between each site and the cheek among people,
@@ -263,16 +263,16 @@ def group_weights(
     skin_ancestry : name of the ancestry of the skin, which replaces the fractions; "" for none
     """
     if skin_ancestry:
-        return _split_union_weight(skin_ancestry, 1.0)
+        return _split_ancestry_weight(skin_ancestry, 1.0)
     parts = {"african": african, "asian": asian, "caucasian": caucasian}
     weights: dict[str, float] = {}
     for name, fraction in parts.items():
-        weights |= {one: part for one, part in _split_union_weight(name, fraction).items() if part > 0.0}
+        weights |= {one: part for one, part in _split_ancestry_weight(name, fraction).items() if part > 0.0}
     return weights
 
 
-def _split_union_weight(union_name: str, weight: float) -> dict[str, float]:
-    members = ANCESTRY_UNIONS.get(union_name, (union_name,))
+def _split_ancestry_weight(ancestry_name: str, weight: float) -> dict[str, float]:
+    members = GROUPS_OF_ANCESTRY.get(ancestry_name, (ancestry_name,))
     return {one: weight / len(members) for one in members}
 
 
@@ -299,7 +299,7 @@ def group_probabilities(ita: float) -> dict[str, float]:
     density = {}
     for name, group in table.groups.items():
         low, high = _ita_scores(
-            np.array([ita - _ITA_HALF_WIDTH_DEGREES, ita + _ITA_HALF_WIDTH_DEGREES]), group.ita
+            np.array([ita - _ITA_WINDOW_HALF_WIDTH_DEGREES, ita + _ITA_WINDOW_HALF_WIDTH_DEGREES]), group.ita
         )
         density[name] = float(np.exp(-0.125 * (low + high) ** 2) * (high - low))  # normal density times width
     total = sum(density.values())
@@ -463,7 +463,7 @@ def symmetric_square_root(covariance: Doubles) -> Doubles:
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
 
-class MeasuredCell(NamedTuple):
+class MeasuredMedians(NamedTuple):
     """Median colour and pigments of one group of measured people at one site of the body.
 
     group : name of the group of people, one of the values of `GROUP_OF_CODE`
@@ -486,7 +486,7 @@ class MeasuredCell(NamedTuple):
 
 
 @cache
-def measured_cells() -> tuple[MeasuredCell, ...]:
+def measured_medians() -> tuple[MeasuredMedians, ...]:
     """Return the medians of measured skin for each group of people and each site of the body.
 
     At each site, a group has one entry for all its people, and further entries for people of one sex or of
@@ -498,7 +498,7 @@ def measured_cells() -> tuple[MeasuredCell, ...]:
     colours = float_columns(rows, "L a b").tolist()
     pigments = float_columns(rows, "melanin blood oxygen thickness_mm").tolist()
     return tuple(
-        MeasuredCell(
+        MeasuredMedians(
             row["group"], row["site"], row["sex"], row["age"], int(row["people"]),
             (colour[0], colour[1], colour[2]), MeasuredPigments(*values),
         )
@@ -530,13 +530,13 @@ def measured_tone(tone_name: str) -> MeasuredTone:
     if not site or (group and group not in SKIN_ANCESTRIES):
         expected = f"one of {', '.join(SITES)}, alone or after one of {', '.join(SKIN_ANCESTRIES)}"
         refuse("skin_site", expected, f"got {format_value(tone_name)}", "Correct it")
-    members = ANCESTRY_UNIONS.get(group, (group,)) if group else tuple(GROUP_OF_CODE.values())
-    cells = [
+    members = GROUPS_OF_ANCESTRY.get(group, (group,)) if group else tuple(GROUP_OF_CODE.values())
+    medians = [
         one
-        for one in measured_cells()
+        for one in measured_medians()
         if one.group in members and one.site == site and not one.sex + one.age_group
     ]
-    measured = [one for one in cells if one.people] or cells
+    measured = [one for one in medians if one.people] or medians
     colour = linear_of_lab(np.mean([one.cielab for one in measured], axis=0))
     people = sum(one.people for one in measured)
     source = f"the median of {people:,} measured people" if people else "an estimate from other groups"

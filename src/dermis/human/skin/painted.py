@@ -13,7 +13,7 @@ from dermis.human.skin.colours import skin_colour_table
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.maps import Maps
 
-LIP_THICKNESS_RATIO = 0.6
+LIP_EPIDERMIS_THICKNESS_RATIO = 0.6
 """Thickness of the epidermis of the lips relative to the cheek [-]."""
 _MIN_OXYGEN_RANGE = 1e-3
 MIN_SIDE, MAX_SIDE = 256, 4096
@@ -41,7 +41,7 @@ def painted_colour_tables(skin_look: SkinLook) -> NDArray[np.float32]:
 
     The first two tables are for skin at the two ends of `oxygen_range`, the third table is for lips.
     """
-    lips = skin_look.oxygen, LIP_THICKNESS_RATIO * skin_look.epidermis_mm
+    lips = skin_look.oxygen, LIP_EPIDERMIS_THICKNESS_RATIO * skin_look.epidermis_mm
     kinds = *((oxygen, skin_look.epidermis_mm) for oxygen in oxygen_range(skin_look)), lips
     return np.stack([skin_colour_table(skin_look.eumelanin, *kind).colours for kind in kinds]).astype(
         np.float32

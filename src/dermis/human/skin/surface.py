@@ -21,8 +21,8 @@ BORDER_FIELDS = ("lips", "mouth", "lids")
 """Signed distances to borders [mm]: of the lips, positive inside; of the mouth, negative inside; of the
 eyelids, negative on the side of the eye."""
 _STORED_UNIT_MM = 0.01
-_WALL_AND_EDGE_LID_DISTANCES_MM = -2.0, -0.6  # lid distances of the wall and edge columns of lid_rings.csv
-_CREST_LID_DISTANCE_LIMITS_MM = 0.15, 0.8  # limits of the lid distance in the crest column
+_LID_WALL_DISTANCE_MM, _LID_EDGE_DISTANCE_MM = -2.0, -0.6  # lid distances of these columns of lid_rings.csv
+_LID_CREST_DISTANCE_RANGE_MM = 0.15, 0.8  # limits of the lid distance in the crest column
 
 
 @cache
@@ -34,8 +34,8 @@ def average_surface() -> tuple[Floats, Floats]:
     """
     points_mm, fields = _load_array("places"), _load_array("fields")
     rings = lid_rings()
-    fields[rings[..., :2], 2] = _WALL_AND_EDGE_LID_DISTANCES_MM
-    fields[rings[..., 2], 2] = fields[rings[..., 2], 2].clip(*_CREST_LID_DISTANCE_LIMITS_MM)
+    fields[rings[..., :2], 2] = _LID_WALL_DISTANCE_MM, _LID_EDGE_DISTANCE_MM
+    fields[rings[..., 2], 2] = fields[rings[..., 2], 2].clip(*_LID_CREST_DISTANCE_RANGE_MM)
     return points_mm, fields
 
 

@@ -155,7 +155,7 @@ def _octave_rows() -> Iterator[tuple[NDArray[np.float64], float, float, int, int
             seed += 1
 
 
-def dot_table() -> NDArray[np.float32]:
+def dot_layer_table() -> NDArray[np.float32]:
     """Return the layers of dots as rows (d, 4): spacing [mm], minimum radius, maximum radius, edge warp [mm].
 
     The radii are fractions of the spacing.

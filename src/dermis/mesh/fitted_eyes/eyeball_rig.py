@@ -13,7 +13,7 @@ from dermis.mesh.rig import BONES_PER_POINT, BoneRotation, MorphTargets, Rig, Ri
 from dermis.mesh.rotations import matrix_angles, rigid_motion
 
 _ROOT_BONE_NAME, _EYE_BONE_NAMES = "scene", ("eye.L", "eye.R")
-_MAX_OTHER_FOLLOWER_FRACTION = 0.05
+_MAX_NON_EYE_FOLLOWER_RATIO = 0.05
 """Largest fraction of points outside the eye among the followers of an eye bone; a head bone has more."""
 _MIN_ROTATION_DEGREES, _MIN_SHIFT_MM = 0.5, 0.02  # smaller motions of a target are ignored
 
@@ -108,7 +108,7 @@ def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[FittedEyeball]) -> list[in
         own = _skin_weight_sums(skeleton, eyeball)
         bone = int(np.argmax(own))
         others = total[bone] - own[bone]
-        bones.append(bone if others <= _MAX_OTHER_FOLLOWER_FRACTION * own[bone] else -1)
+        bones.append(bone if others <= _MAX_NON_EYE_FOLLOWER_RATIO * own[bone] else -1)
     return bones
 
 

@@ -65,7 +65,7 @@ def with_fitted_eyes(head: Head, coarse_mesh: Mesh | None = None, eye_look: EyeL
         None if the head is not subdivided
     eye_look : appearance of the eyes
     """
-    mesh, control = head.mesh, head.control
+    mesh, control = head.mesh, head.control_rig
     balls, reason = find_eyeballs(coarse_mesh or mesh)
     if balls is None:
         return replace(head, note=reason)

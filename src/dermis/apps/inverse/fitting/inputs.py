@@ -165,7 +165,7 @@ def _person_of_head(head: Head) -> Human | None:
     if not isinstance(maps, PaintedMaps) or maps.colour is not None or not is_person_name(head.name):
         return None
     person = replace(load_person(head.name), skin=maps.look)
-    a, b = person.positions_mm, head.control.positions_mm
+    a, b = person.positions_mm, head.control_rig.positions_mm
     same = a.shape == b.shape and np.allclose(a, b, atol=_POSITION_TOLERANCE_MM)
     return person if same else None
 

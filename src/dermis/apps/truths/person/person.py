@@ -103,9 +103,9 @@ def posed_person(scene: Scene, textures: SkinTextures) -> Person:
     head, mesh = scene.head, scene.head.mesh
     if head.eyes is None:
         refuse(head.name, "a head with eyes of true shape", "it has none", "Load human")
-    rig = head.control
-    motion = scene.motion or rig.rest
-    points = rig.points_mm(motion) - np.array(head.centre_mm)
+    rig = head.control_rig
+    pose_arrays = scene.pose_arrays or rig.rest
+    points = rig.posed_points_mm(pose_arrays) - np.array(head.centre_mm)
     posed_mesh = build_mesh(
         points[mesh.point].astype(np.float32),
         mesh.uv,
@@ -122,5 +122,5 @@ def posed_person(scene: Scene, textures: SkinTextures) -> Person:
     )
     centred = np.eye(4)
     centred[:3, 3] = head.centre_mm
-    eyes = head.eyes.eye_matrices(rig, motion) @ centred
+    eyes = head.eyes.eye_matrices(rig, pose_arrays) @ centred
     return Person(head.name, posed_mesh, eyes, tuple(head.eyes.material.tolist()), hairs, textures)

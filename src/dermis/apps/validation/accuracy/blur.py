@@ -164,7 +164,7 @@ def sphere_blur_row(renderer: Renderer, radius_mm: float) -> str:
     light = np.nan_to_num(shown(atlas, mesh, own=True))[..., :1] / radius_mm
     remaining = widest_gaussian_level(renderer, *blur_light(renderer.device, mesh, atlas, light))
     density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
-    area = atlas.lit[..., None] / density
+    area = atlas.lit_mask[..., None] / density
     map_fraction = (area * remaining * light).sum() / (area * light**2).sum()
     v = BLUR_PROFILE.variance_mm2[-1] / radius_mm**2
     decay = np.exp(-2 / v)
@@ -299,7 +299,7 @@ def seam_side_points(head: Head, point_filter: PointFilter) -> tuple[Points, Poi
     )
     for size in (BALL_ATLAS_SIDE, HEAD_ATLAS_SIDE):
         for layout in ("mesh", "stitched"):
-            mapped = cached_atlas(head.topology.mesh, size, layout).mapped
+            mapped = cached_atlas(head.topology_head.mesh, size, layout).mapped
             selected &= mapped[first.triangle] & mapped[second.triangle]
     first, second = (Points(one.triangle[selected], one.weights[selected]) for one in (first, second))
     return first, second
@@ -342,6 +342,6 @@ def seam_discontinuities(
     renderer.draw(scene, settings)
     scattered = renderer.prepare(scene, settings).resources.scattered
     light = download(renderer.device, scattered).astype(float)[..., :3]
-    atlas = cached_atlas(scene.head.topology.mesh, atlas_side, SEAM_METHODS[seam_method].layouts[0])
+    atlas = cached_atlas(scene.head.topology_head.mesh, atlas_side, SEAM_METHODS[seam_method].layouts[0])
     a, b = (lit_at(light, atlas, points)[:, 0] for points in (first_side, second_side))
     return np.abs(a - b) / np.maximum((a + b) / 2, 1e-9)

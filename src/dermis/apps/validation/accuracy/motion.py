@@ -104,8 +104,8 @@ def posed_points(head: Head, person_points: Points, target_weights: Mapping[str,
     person_points : (p, 3) positions in the rest pose [mm]
     target_weights : morph target weights of the expression
     """
-    motion = Pose(target_weights, positions_mm=person_points).motion(head.control)
-    return head.control.points_mm(motion).astype(np.float32)
+    pose_arrays = Pose(target_weights, positions_mm=person_points).to_arrays(head.control_rig)
+    return head.control_rig.posed_points_mm(pose_arrays).astype(np.float32)
 
 
 def picture_error(
@@ -132,7 +132,7 @@ def _with_centre_of(head: Head, shaped_head: Head) -> Head:
 
     Lights and cameras are relative to the centre.
     """
-    for one in (head, head.bare):
+    for one in (head, head.without_maps):
         vars(one)["centre_mm"] = shaped_head.centre_mm
     return head
 
@@ -217,7 +217,12 @@ def occlusion_table(renderer: Renderer, head: Head) -> Iterator[str]:
     poses = {name: Pose(EXPRESSIONS[name]) for name in ("open jaw", "smile", "blink", "pucker", "surprise")}
     poses["head turned by 60 degrees"] = Pose(bones=neck)
     shapes = {
-        name: (pose, rebuilt_head(head, head.control.points_mm(pose.motion(head.control)).astype(np.float32)))
+        name: (
+            pose,
+            rebuilt_head(
+                head, head.control_rig.posed_points_mm(pose.to_arrays(head.control_rig)).astype(np.float32)
+            ),
+        )
         for name, pose in poses.items()
     }
     yield from occlusion_rows(renderer, head, shapes)

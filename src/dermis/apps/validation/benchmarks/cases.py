@@ -199,7 +199,7 @@ def with_test_rig(head: Head, target_count: int) -> Head:
     """
     points = head.positions_mm.astype(np.float64)
     rig = replace(
-        head.control, targets=_synthetic_targets(points, target_count), skeleton=_bone_chain(points)
+        head.control_rig, targets=_synthetic_targets(points, target_count), skeleton=_bone_chain(points)
     )
     return replace(head, rig=rig)
 

@@ -25,7 +25,7 @@ from dermis.mesh.head import Head
 from dermis.optics.media import published_media
 from dermis.scene.settings import Settings
 from dermis.scene.skin import DiffuseDirectionName, Skin
-from dermis.scene.sources import scattering_sources
+from dermis.scene.sources import scattering_citation_keys
 
 Floats = NDArray[np.float64]
 _EXPOSURE_PERCENTILE = 99.0
@@ -209,5 +209,5 @@ def comparison_sources(against: str, techniques: Iterable[str]) -> tuple[str, ..
     """
     keys = [*_REFERENCE_SOURCES[against], _FLIP_SOURCE]
     for technique in techniques:
-        keys += scattering_sources(Settings.model_validate({"technique": technique}))
+        keys += scattering_citation_keys(Settings.model_validate({"technique": technique}))
     return tuple(dict.fromkeys(keys))

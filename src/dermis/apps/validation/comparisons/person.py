@@ -154,7 +154,7 @@ def without_feature(subject: PersonSubject, omitted_feature: OmittedFeature) -> 
     elif omitted_feature == "relief":
         rough = flat * np.float32(DEFAULT_ROUGHNESS)
         maps = replace(maps, height=0.0 * flat, specular=flat, roughness=rough)
-        strength = flat * np.float32(scene.skin.strength)
+        strength = flat * np.float32(scene.skin.specular_strength)
         textures = replace(textures, height_mm=0.0 * flat, strength=strength, roughness=rough)
     elif omitted_feature == "reflection":
         textures = replace(textures, strength=0.0 * flat)
@@ -263,8 +263,8 @@ def path_trace_subject(
     """
     medium = None if subject.omitted_feature in ("scattering", "bounces") else skin.medium
     textures, scene = subject.textures, subject.scene
-    if skin.medium.eta != 1.0 and scene.skin.strength > 0.0:
-        textures = replace(textures, strength=textures.strength / np.float32(scene.skin.strength))
+    if skin.medium.eta != 1.0 and scene.skin.specular_strength > 0.0:
+        textures = replace(textures, strength=textures.strength / np.float32(scene.skin.specular_strength))
     return path_trace_person(
         scene,
         textures,

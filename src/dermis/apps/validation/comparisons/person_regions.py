@@ -69,7 +69,7 @@ def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regi
     )
     corners = mesh.triangles[visible.triangle]
     on_skin = np.array([one.kind == "skin" for one in mesh.materials])[mesh.material[visible.triangle]]
-    attributes = painted_surface(mesh, head.control.stencils).vertices.astype(np.float64)
+    attributes = painted_surface(mesh, head.control_rig.stencils).vertices.astype(np.float64)
     placed, normals, positions = (
         np.einsum("nk,nkc->nc", visible.barycentric, values[corners])
         for values in (attributes, mesh.normals.astype(np.float64), mesh.positions.astype(np.float64))

@@ -49,11 +49,11 @@ def person_textures(renderer: Renderer, scene: Scene, texture_side: int = 2048) 
 
 def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, texture_side: int) -> SkinTextures:
     head = scene.head
-    surface, device = painted_surface(head.mesh, head.control.stencils), renderer.device
+    surface, device = painted_surface(head.mesh, head.control_rig.stencils), renderer.device
     colour, gloss, rough, height = paint.paint_raw_arrays(device, surface, look, texture_side)
     height = height + _detail_heights_mm(gloss[..., 1], rough[..., 1], gloss[..., 2])
-    roughness = np.maximum(scene.skin.smoothing * rough[..., 0], _MIN_ROUGHNESS)
-    strength = np.ascontiguousarray(scene.skin.strength * gloss[..., 0])
+    roughness = np.maximum(scene.skin.roughness_factor * rough[..., 0], _MIN_ROUGHNESS)
+    strength = np.ascontiguousarray(scene.skin.specular_strength * gloss[..., 0])
     radius = float(np.sqrt(SCLERA_MM**2 - iris_plane_mm() ** 2))
     iris, white, *teeth = (
         _part_texture(renderer, scene, part, radius) for part in range(len(_TEXTURED_PARTS))

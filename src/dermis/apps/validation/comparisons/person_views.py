@@ -52,7 +52,7 @@ def eye_side_camera(head: Head) -> Camera:
 
 def lips_camera(head: Head) -> Camera:
     """Return a camera in front of the mouth, a little to its left."""
-    x, y, z = head.frontmost(0.0, _mouth_height_mm(head))
+    x, y, z = head.frontmost_point_mm(0.0, _mouth_height_mm(head))
     return Camera(position=(x + 120.0, y, z + 500.0), target=(x, y - 4.0, z), frame_mm=_LIPS_FRAME_MM)
 
 
@@ -66,8 +66,8 @@ def behind_ear_camera(head: Head) -> Camera:
 def _eye_position_mm(head: Head) -> tuple[float, float, float]:
     """Return the frontmost point of the left cornea, relative to the head's centre [mm]."""
     if head.eyes is None:
-        return head.frontmost(30.0, 0.0)
-    x, y, z = head.control.positions_mm[head.eyes.apex[0]] - np.array(head.centre_mm)
+        return head.frontmost_point_mm(30.0, 0.0)
+    x, y, z = head.control_rig.positions_mm[head.eyes.apex[0]] - np.array(head.centre_mm)
     return float(x), float(y), float(z)
 
 

@@ -68,7 +68,7 @@ def _ear_camera(head: Head) -> Camera:
 
 
 def _cheek_camera(head: Head) -> Camera:
-    spot = head.frontmost(40.0, -35.0)
+    spot = head.frontmost_point_mm(40.0, -35.0)
     return Camera(position=(spot[0] + 250.0, spot[1], spot[2] + 300.0), target=spot, frame_mm=90.0)
 
 

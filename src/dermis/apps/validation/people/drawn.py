@@ -1,6 +1,6 @@
 """Skin colours of people sampled at random, compared with those of the people in a spectral archive.
 
-People are sampled by `Human.drawn`.
+People are sampled by `Human.sampled`.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def site_skin_variables(look: SkinLook) -> Doubles:
 @logged_step("drawing people")
 def sample_people(group: str, seeds: Sequence[int]) -> RandomPeople:
     """Sample random people of an ancestry group, and compute their skin colours with the spectral model."""
-    drawn = [Human.drawn(seed, skin_ancestry=group) for seed in seeds]
+    drawn = [Human.sampled(seed, skin_ancestry=group) for seed in seeds]
     variables = np.concatenate([site_skin_variables(one.look) for one in drawn])
     colours = model_lab(variables).reshape(len(drawn), len(HEAD_SITES), 3)
     return RandomPeople(colours, np.array([one.age for one in drawn]), np.array([one.sex for one in drawn]))

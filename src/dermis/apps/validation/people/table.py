@@ -237,7 +237,7 @@ def _winsorise(samples: Doubles) -> Doubles:
 
 
 def _random_ages_and_sexes() -> tuple[Doubles, Doubles]:
-    """Return ages and sexes (n,) of adults, distributed as in `Human.drawn`."""
+    """Return ages and sexes (n,) of adults, distributed as in `Human.sampled`."""
     rng = np.random.default_rng(0)
     return 25.0 + 65.0 * rng.beta(1.2, 2.2, _POPULATION_SIZE), rng.integers(0, 2, _POPULATION_SIZE).astype(
         np.float64

@@ -44,7 +44,7 @@ from dermis.scene.environment import Environment
 from dermis.scene.frozen_model import SliderRange, field_choices, fields_under
 from dermis.scene.heads import HUMAN
 from dermis.scene.lights import LIGHTS, Light, SpotLight, light_presets
-from dermis.scene.talk import COMPARISONS_HEADING
+from dermis.scene.talk_comparisons import COMPARISONS_HEADING
 
 _CUSTOM_CHOICE = "custom"
 _NO_ENVIRONMENT = "none"

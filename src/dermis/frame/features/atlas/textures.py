@@ -96,7 +96,7 @@ def upload_atlas(
         feathered
     """
     texels = pack_surface_points(atlas.triangle, atlas.barycentric)
-    own = atlas.lit
+    own = atlas.lit_mask
     texels[~own] = 0
     resources = {"atlas": texture_from_array(device, texels, "rg32uint", _ATLAS_TEXTURE_NAME)}
     if seam_method.feathered or len(seam_method.layouts) > 1:
@@ -145,7 +145,7 @@ def _upload_mip(
     device: Device, mip: AtlasMip, resources: dict[str, Texture], **further_fields: Any
 ) -> AtlasTextures:
     reach = mip.reach.copy()
-    reach[..., 0] |= np.where(mip.covered & ~mip.lit, _GUTTER_BIT, 0).astype(np.uint16)
+    reach[..., 0] |= np.where(mip.covered & ~mip.lit_mask, _GUTTER_BIT, 0).astype(np.uint16)
     resources = resources | {
         "reach_map": texture_from_array(device, reach, "rgba16uint", _ATLAS_TEXTURE_NAME),
         "stretch_map": make_texture(
@@ -213,7 +213,7 @@ def edge_distances(atlas: Atlas) -> NDArray[np.float32]:
     from scipy.ndimage import distance_transform_edt
 
     # charts can be adjacent without an empty texel
-    inner = atlas.lit & (atlas.edge_distance > 0).all(axis=-1)
+    inner = atlas.lit_mask & (atlas.edge_distance > 0).all(axis=-1)
     texels = distance_transform_edt(np.pad(inner, 1))[1:-1, 1:-1] - GUTTER_TEXELS
     return np.asarray(np.maximum(texels, 0.0), np.float32)
 
@@ -223,14 +223,14 @@ class AtlasMip:
     """Masks and gutters of an n x n atlas at one resolution.
 
     covered : (n, n) mask of the texels that hold light, gutters included
-    lit : (n, n) mask of the texels where lighting is computed, gutters excluded
+    lit_mask : (n, n) mask of the texels where lighting is computed, gutters excluded
     reach : (n, n, 4) number of connected texels of the same chart to the left, right, up and down
     gutter : (a, 2) coordinates x and y of the gutter texels
     source : (a, 2) positions from which the gutter texels copy light [texels]
     """
 
     covered: NDArray[np.bool_]
-    lit: NDArray[np.bool_]
+    lit_mask: NDArray[np.bool_]
     reach: NDArray[np.uint16]
     gutter: NDArray[np.uint16]
     source: NDArray[np.float32]
@@ -244,7 +244,7 @@ def halve_mip(atlas_mip: AtlasMip) -> AtlasMip:
     """
     from scipy.ndimage import binary_dilation
 
-    own = _split_squares(atlas_mip.lit)
+    own = _split_squares(atlas_mip.lit_mask)
     any_own = own[0] | own[1] | own[2] | own[3]
     measured = np.where(any_own, own, _split_squares(atlas_mip.covered))
     covered = measured[0] | measured[1] | measured[2] | measured[3]

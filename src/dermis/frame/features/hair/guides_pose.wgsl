@@ -1,7 +1,7 @@
 // Poses the guides: each knot follows the quads of the skin to which it is bound.
 //#include "each.wgsl"
 
-//#fill const ANCHORS: u32 = {guide_anchors}; // quads that a knot follows
+//#fill const ANCHORS: u32 = {anchors_per_guide_knot}; // quads that a knot follows
 
 struct Anchor {
     corner: vec4u, // points of a quad, in order around it

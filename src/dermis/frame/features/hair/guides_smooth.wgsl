@@ -2,7 +2,7 @@
 // may change abruptly along the guide, such as from the jaw to the shoulder. Knots near the skin are not moved.
 //#include "each.wgsl"
 
-//#fill const GUIDE_KNOTS: u32 = {guide_knots}; // of each guide
+//#fill const KNOTS_PER_GUIDE: u32 = {knots_per_guide}; // of each guide
 const REACH: i32 = 8; // knots on either side that a knot is averaged with
 const NEAR_MM: f32 = 2.0; // height above the skin up to which knots keep their place
 const FAR_MM: f32 = 18.0; // height from which they are smoothed fully
@@ -17,12 +17,12 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     if (index >= arrayLength(&guide_rest)) {
         return;
     }
-    let first = index - index % GUIDE_KNOTS;
+    let first = index - index % KNOTS_PER_GUIDE;
     let rest = guide_rest[index];
     var sum = vec3f(0.0);
     var total = 0.0;
     for (var step = -REACH; step <= REACH; step += 1) {
-        let at = first + u32(clamp(i32(index - first) + step, 0, i32(GUIDE_KNOTS) - 1));
+        let at = first + u32(clamp(i32(index - first) + step, 0, i32(KNOTS_PER_GUIDE) - 1));
         let weight = 1.0 - f32(abs(step)) / f32(REACH + 1);
         sum += weight * (bound_guides[2u * at].xyz - guide_rest[at].xyz);
         total += weight;

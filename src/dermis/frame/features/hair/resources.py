@@ -12,7 +12,7 @@ from dermis.base.errors import refuse
 from dermis.frame.features.surface.record import DEFAULT_COLOUR
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Buffer, Constants, Device, Memo, Texture, UniformRecord, make_texture
-from dermis.mesh.groom import GUIDE_ANCHORS, GUIDE_KNOTS, Groom, Guides, StrandRoots
+from dermis.mesh.groom import ANCHORS_PER_GUIDE_KNOT, KNOTS_PER_GUIDE, Groom, Guides, StrandRoots
 from dermis.mesh.grown_strands import mean_hair_absorptance
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -355,7 +355,7 @@ def shader_constants() -> dict[str, float]:
     }
     sky: dict[str, float] = {f"sky_cells_{axis}": n for axis, n in zip("xyz", SKY_CELLS, strict=True)}
     sky |= {"sky_head_words": _SKY_HEADER_WORDS, "sky_cell_words": _SKY_CELL_WORDS}
-    guides = {"guide_anchors": GUIDE_ANCHORS, "guide_knots": GUIDE_KNOTS}
+    guides = {"anchors_per_guide_knot": ANCHORS_PER_GUIDE_KNOT, "knots_per_guide": KNOTS_PER_GUIDE}
     return {"strand_tile": TILE_SIDE_PIXELS, **opacity, **words, **sky, **guides, **hair_constants()}
 
 
@@ -496,10 +496,12 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resourc
     if head.hair is not None:
         kept = _KEPT_STYLE_COUNT
         style = cached(make_guide_tables, device, head.hair.guides, min_cache_size=kept)
-        roots = cached(make_strand_roots, device, head.hair.roots, head.topology.mesh, min_cache_size=kept)
+        roots = cached(
+            make_strand_roots, device, head.hair.roots, head.topology_head.mesh, min_cache_size=kept
+        )
         groom = cached(make_groom_tables, device, head.hair, style, roots)
     buffers = cached(make_strand_buffers, device, capacity, casters)
-    tables = cached(make_strand_tables, device, head.bare, coarse, buffers, groom)
+    tables = cached(make_strand_tables, device, head.without_maps, coarse, buffers, groom)
     picture = cached(make_strand_picture, device, capacity, request.settings.size)
     shadows = cached(make_deep_opacity_maps, device, layers, caller_name=f"{layers} {request.view_name}")
     return Resources(tables, picture, shadows, cached(mean_skin_albedo, head))

@@ -3,7 +3,7 @@
 //#include "each.wgsl"
 //#include "strand_knots.wgsl"
 
-//#fill const GUIDE_KNOTS: u32 = {guide_knots}; // of each guide
+//#fill const KNOTS_PER_GUIDE: u32 = {knots_per_guide}; // of each guide
 const MIN_HEIGHT_MM: f32 = 0.35; // least height of strands above the skin, away from their roots
 const RISE_MM: f32 = 4.0; // length from the root along which this height is reached
 const HAIRLINE_FADE_MM: vec2f = vec2f(-3.0, 11.0); // heights above the hairline between which density rises from 0 to 1
@@ -107,15 +107,15 @@ struct CurvePoint {
 
 // u: position along the guides, 0 to 1; root: position of the root, through which the curve passes
 fn curve_at(strand: StrandRoot, u: f32, root: vec3f) -> CurvePoint {
-    let at = clamp(u, 0.0, 1.0) * f32(GUIDE_KNOTS - 1u);
-    let first = min(u32(at), GUIDE_KNOTS - 2u);
+    let at = clamp(u, 0.0, 1.0) * f32(KNOTS_PER_GUIDE - 1u);
+    let first = min(u32(at), KNOTS_PER_GUIDE - 2u);
     let part = at - f32(first);
     var sum = CurvePoint(root, 0.0, vec3f(0.0), vec3f(0.0));
     var middle = vec3f(0.0);
     var square = 0.0;
     for (var k = 0u; k < 4u; k += 1u) {
         let weight = strand.guide_weight[k];
-        let begin = 2u * strand.guide[k] * GUIDE_KNOTS;
+        let begin = 2u * strand.guide[k] * KNOTS_PER_GUIDE;
         let row = begin + 2u * first;
         let a = guides[row];
         let b = guides[row + 2u];

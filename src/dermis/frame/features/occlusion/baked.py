@@ -63,7 +63,7 @@ def bake_occlusion(
     depth_map_side : side of a depth map [texels]
     """
     mesh, commands = head.mesh, CommandList(device)
-    shape = evaluate_rest_shape(device, shape_tables(device, head), head.control.positions_mm)
+    shape = evaluate_rest_shape(device, shape_tables(device, head), head.control_rig.positions_mm)
     geometry = upload_geometry(device, mesh, atlas, shape)
     shader, to_sky = program(device, "occlusion/occlusion.wgsl"), fibonacci_sphere(direction_count)
     rows = result_side - (-len(mesh.positions) // result_side)

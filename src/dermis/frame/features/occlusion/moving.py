@@ -20,7 +20,7 @@ from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.head import Head
 from dermis.mesh.morph_targets import no_targets
 from dermis.mesh.outline import Outline, RigOutline, rig_outline
-from dermis.mesh.rig import Motion
+from dermis.mesh.rig import PoseArrays
 from dermis.mesh.subdivide import coarse_triangles
 
 Floats = NDArray[np.float64]
@@ -114,7 +114,7 @@ def make_head_rotation_points(head: Head) -> HeadRotationPoints:
     Their weights decrease with the distance from the centre of the head, so that moving shoulders have little
     effect.
     """
-    rig = head.control
+    rig = head.control_rig
     points = np.unique(np.linspace(0, len(rig.positions_mm) - 1, _MAX_ROTATION_POINT_COUNT).astype(np.intp))
     positions = rig.positions_mm[points].astype(np.float64)
     distance2 = ((positions - head.centre_mm) ** 2).sum(axis=1)
@@ -125,14 +125,14 @@ def make_head_rotation_points(head: Head) -> HeadRotationPoints:
     )
 
 
-def head_rotation(rotation_points: HeadRotationPoints, motion: Motion) -> Floats:
+def head_rotation(rotation_points: HeadRotationPoints, pose_arrays: PoseArrays) -> Floats:
     """Return the (3, 3) rotation that best fits the motion of the `rotation_points` [Kabsch1976].
 
     Morph targets do not rotate a head and are ignored.
     """
     rest = rotation_points.outline.rest_mm.copy()
-    rest[:3] = motion.positions_mm[rotation_points.points].T
-    posed = replace(rotation_points.outline, rest_mm=rest).pose(np.zeros(0, np.float32), motion.matrices)
+    rest[:3] = pose_arrays.positions_mm[rotation_points.points].T
+    posed = replace(rotation_points.outline, rest_mm=rest).pose(np.zeros(0, np.float32), pose_arrays.matrices)
     left, _, right = np.linalg.svd(posed.T.astype(np.float64) @ rotation_points.offsets)
     left[:, 2] *= np.sign(np.linalg.det(left @ right))
     return np.asarray(left @ right)
@@ -176,7 +176,7 @@ def make_vertex_sky_visibility(
 
     rest_geometry : the triangles of the head at rest
     """
-    count, rig, commands = len(head.mesh.positions), head.control, CommandList(device, timed=False)
+    count, rig, commands = len(head.mesh.positions), head.control_rig, CommandList(device, timed=False)
     layers = make_layers(device, (DEPTH_MAP_SIDE, DEPTH_MAP_SIDE), SKY_VIEW_COUNT, store_triangles=False)
     occluders = upload_triangles(device, coarse_triangles(head, *_OCCLUDER_MIN_FACES_AND_MAX_ERROR))
     sky = VertexSkyVisibility(

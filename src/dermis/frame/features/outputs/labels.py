@@ -54,7 +54,7 @@ def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> Lab
     cached = memo.get
     if not any(name.startswith(LABEL_STAGE) for name in request.outputs):
         return None
-    head, settings = request.head.bare, request.settings
+    head, settings = request.head.without_maps, request.settings
     labels = cached(mesh_labels, head)
     tables = cached(_upload_label_tables, device, labels)
     if not has_strands(request.head, settings):

@@ -70,7 +70,7 @@ def make_resources(
     stages: dict[str, list[tuple[str, int]]] = {}
     for name, channels in request.output_channels.items():
         stages.setdefault(OUTPUTS[name].stage, []).append((name, channels))
-    sets, bare = request.landmarks, request.head.bare
+    sets, bare = request.landmarks, request.head.without_maps
     return Resources(
         names=request.outputs,
         images=tuple(

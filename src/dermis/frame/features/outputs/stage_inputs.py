@@ -27,11 +27,11 @@ from dermis.gpu import (
 class PreviousScene:
     """Pose and camera of the previous scene, from which motion vectors are computed.
 
-    motion : pose of the head in the previous scene, None if the pose has not changed since
+    pose_bytes : pose of the head in the previous scene, None if the pose has not changed since
     view : uniform record of the shading pass with the rays of the previous camera
     """
 
-    motion: PoseBytes | None
+    pose_bytes: PoseBytes | None
     view: UniformRecord
 
 

@@ -76,9 +76,9 @@ def _draw_motion(
 ) -> None:
     previous, vertices = inputs.previous, inputs.shape.vertices
     assert previous is not None
-    if previous.motion is not None:
+    if previous.pose_bytes is not None:
         assert resources.previous is not None
-        shape.draw(graph, resources.previous, previous.motion)
+        shape.draw(graph, resources.previous, previous.pose_bytes)
         vertices = resources.previous.vertices
     shader = stage_program(graph.device, output_images)
     bindings = inputs.bindings(shader) | {

@@ -26,7 +26,7 @@ from dermis.gpu import ComputeProgram, UniformRecord
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import MOUTH_PARTS
 from dermis.mesh.outline import Outline
-from dermis.scene.camera import Camera, Window
+from dermis.scene.camera import Camera, ImageRectangle
 from dermis.scene.settings import Settings
 from dermis.scene.skin import MAX_OTHER_PROFILES
 
@@ -42,12 +42,12 @@ class Pinhole(NamedTuple):
 
     eye : position of the pinhole [mm]
     axes : unit vectors to the right, up and forward
-    window : half extents and centre of the picture on the image plane at distance 1
+    image_rectangle : half extents and centre of the picture on the image plane at distance 1
     """
 
     eye: Triple
     axes: Axes
-    window: Window
+    image_rectangle: ImageRectangle
 
 
 class EyePoses(NamedTuple):
@@ -67,7 +67,7 @@ def world_space_pinhole(camera: Camera, head: Head, settings: Settings) -> Pinho
     eye = world_position(camera.position, head.centre_mm)
     forward = vector_between(camera.position, camera.target)
     width, height = settings.size
-    return Pinhole(eye, view_axes(forward, camera.up), camera.window(width / height))
+    return Pinhole(eye, view_axes(forward, camera.up), camera.image_rectangle(width / height))
 
 
 def camera_views(pinhole: Pinhole, outline: Outline, sample_count: int) -> Views:
@@ -76,7 +76,7 @@ def camera_views(pinhole: Pinhole, outline: Outline, sample_count: int) -> Views
     sample_count : number of samples per pixel
     """
     rows = view_rows(pinhole.eye, pinhole.axes)
-    clip = perspective_rows(rows, pinhole.window, *depth_range(outline, rows))
+    clip = perspective_rows(rows, pinhole.image_rectangle, *depth_range(outline, rows))
     return Views(np.array([clip]), pixel_sample_positions(sample_count))
 
 

@@ -135,6 +135,6 @@ def rest_geometry(
     """
     positions, owner = rest_positions_mm, "person"
     if positions is None:
-        positions, owner = head.control.positions_mm, "head"
+        positions, owner = head.control_rig.positions_mm, "head"
     shape = memo.get(evaluate_rest_shape, device, shape_tables, positions, caller_name=owner)
     return memo.get(HeadGeometry.with_shape, geometry, shape, caller_name=f"{owner} {layout_index}")

@@ -29,9 +29,9 @@ class Resources:
 
 def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resources:
     """Return the buffers from which the shape of the requested head is computed."""
-    cached, mesh = memo.get, request.atlas_head.mesh
+    cached, mesh = memo.get, request.topology_head.mesh
     tables = cached(
-        shape_tables, device, request.atlas_head, caller_name="shared" if request.has_shared_mesh else ""
+        shape_tables, device, request.topology_head, caller_name="shared" if request.has_shared_mesh else ""
     )
     return Resources(
         shape=cached(make_shape, device, tables),

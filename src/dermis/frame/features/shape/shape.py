@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.frame.programs import program, workgroup_grid
 from dermis.gpu import Bindings, Buffer, CommandList, Constants, Device, Recorder, Texture, make_texture
 from dermis.mesh.eyeball import LidContact
-from dermis.mesh.geometry import MIN_UV_CROSS, vertex_normals
+from dermis.mesh.geometry import MIN_DOUBLE_UV_AREA, vertex_normals
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton, Stencils
@@ -85,7 +85,7 @@ class Shape:
 
 def shape_tables(device: Device, head: Head) -> ShapeTables:
     """Upload the mesh and the rig of a head to the buffers from which its shape is computed."""
-    rig, mesh = head.control, head.mesh
+    rig, mesh = head.control_rig, head.mesh
     moves, bones = bool(rig.targets.names or rig.skeleton), len(rig.skeleton.names) if rig.skeleton else 0
     return ShapeTables(
         morphs=_upload_tables(device, _morph_tables(rig)) if moves else {},
@@ -307,15 +307,15 @@ class PoseBytes(NamedTuple):
         return PoseBytes(self.positions)
 
 
-def draw(graph: Recorder, shape: Shape, motion: PoseBytes) -> None:
+def draw(graph: Recorder, shape: Shape, pose_bytes: PoseBytes) -> None:
     """Write the pose to buffers, and declare the passes that compute the vertices of the posed surface."""
-    graph.write("shape", shape.rest, motion.positions)
-    if motion.weights:
-        graph.write("shape", shape.weights, motion.weights)
-    if motion.matrices:
-        graph.write("shape", shape.matrices, motion.matrices)
-    if motion.displacements:
-        graph.write("shape", shape.morphs["displacements"], motion.displacements)
+    graph.write("shape", shape.rest, pose_bytes.positions)
+    if pose_bytes.weights:
+        graph.write("shape", shape.weights, pose_bytes.weights)
+    if pose_bytes.matrices:
+        graph.write("shape", shape.matrices, pose_bytes.matrices)
+    if pose_bytes.displacements:
+        graph.write("shape", shape.morphs["displacements"], pose_bytes.displacements)
     graph.add_replayable(_evaluate_surface, shape)
 
 
@@ -353,7 +353,7 @@ def _evaluate_surface(graph: Recorder, shape: Shape) -> None:
         _dispatch_shape(graph, "shape/shape_pose.wgsl", shape.morphs, tables.control, constants)
     if shape.stencils:
         _dispatch_shape(graph, "shape/shape_refine.wgsl", shape.stencils, tables.points)
-    limits = (("MIN_UV_CROSS", MIN_UV_CROSS), ("MIN_TANGENT", MIN_RELATIVE_TANGENT))
+    limits = (("MIN_DOUBLE_UV_AREA", MIN_DOUBLE_UV_AREA), ("MIN_TANGENT", MIN_RELATIVE_TANGENT))
     _dispatch_shape(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, limits)
 
 

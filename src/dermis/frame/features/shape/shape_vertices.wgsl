@@ -2,7 +2,7 @@
 //#include "each.wgsl"
 
 override MESH_IN_BUFFERS: bool = false; // whether vertices are stored to the buffer, see geometry.wgsl
-override MIN_UV_CROSS: f32; // least cross product of the uv sides of a triangle with defined tangents
+override MIN_DOUBLE_UV_AREA: f32; // least cross product of the uv sides of a triangle with defined tangents
 override MIN_TANGENT: f32; // least length of dpdu without its part along the normal, relative to dpdu; shorter ones are replaced
 
 const MIN_MM: f32 = 1e-6; // of dpdu and dpdv, per unit of uv
@@ -72,7 +72,7 @@ fn tangents_of(index: u32, p: vec3f, n: vec3f, span: vec2u) -> Tangents {
         let t = vertices[corner.y].uv - uv;
         let in_uv = s.x * t.y - s.y * t.x;
         let area = length(cross(a, b));
-        if (abs(in_uv) > MIN_UV_CROSS && area > 0.0) {
+        if (abs(in_uv) > MIN_DOUBLE_UV_AREA && area > 0.0) {
             sum.u += area / in_uv * (t.y * a - s.y * b);
             sum.v += area / in_uv * (s.x * b - t.x * a);
             total += area;

@@ -108,7 +108,7 @@ def _painted_surface(head: Head) -> PaintedSurface:
 
     For people who are made from a template, it is the mesh of the template, without their own shape.
     """
-    return painted_surface(head.topology.mesh, head.topology.control.stencils)
+    return painted_surface(head.topology_head.mesh, head.topology_head.control_rig.stencils)
 
 
 def _upload_file_maps(device: Device, head: Head, use_colour: bool, decode_srgb: bool) -> MutableBindings:

@@ -97,7 +97,7 @@ def _derived_skin_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[
     """Return the members of the struct `Skin` that are not fields or properties of the Python class."""
     energy, usual = ENERGY_SCHEMES[skin.energy], DEFAULT_ROUGHNESS if maps.has_roughness else 1.0
     return {
-        "m": skin.smoothing * skin.roughness / usual,
+        "m": skin.roughness_factor * skin.roughness / usual,
         "f0": SKIN_F0,
         "eta": SKIN_ETA,
         "loss": energy.loss,

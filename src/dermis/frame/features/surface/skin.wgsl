@@ -58,7 +58,7 @@ fn surface_at(point: Point, footprint: f32) -> Surface {
     out.normal = bend(point, gradient + finest.xy * vec2f(length_u, length_v));
     out.colour = textureSampleLevel(colour_map, map_sampler, point.uv, mip_for(colour_map, footprint)).rgb;
     out.roughness = clamp(sqrt(m * m + spread.x + spread.y + finest.z), 0.05, 1.0);
-    out.rho_s = skin.strength * gloss.x;
+    out.rho_s = skin.specular_strength * gloss.x;
     return out;
 }
 

@@ -6,7 +6,7 @@ const PI: f32 = 3.14159265358979;
 // Members with the name of a field or property of scene/skin.py have its value; frame/features/surface/record.py derives the others.
 struct Skin {
     m: f32, // Beckmann roughness, oil included, where the roughness map is 1
-    strength: f32, // rho_s, oil included, where the specular map is 1
+    specular_strength: f32, // rho_s, oil included, where the specular map is 1
     f0: f32, // Schlick's reflectance at normal incidence
     eta: f32, // index of refraction
     loss: f32, // factor of the specular albedo by which transmission is reduced: 0 for none, 1, or the published pi

@@ -24,7 +24,7 @@ class StrainGauge:
     def __init__(self, head: Head) -> None:
         from scipy.spatial import cKDTree
 
-        self._rest_mm = head.control.positions_mm
+        self._rest_mm = head.control_rig.positions_mm
         count = len(self._rest_mm)
         sample = np.random.default_rng(_SAMPLING_SEED).permutation(count)[:_SAMPLED_LENGTH_COUNT]
         nearest = np.asarray(cKDTree(self._rest_mm[sample]).query(self._rest_mm[sample], 2)[1])
@@ -58,5 +58,5 @@ def pair_positions_mm(memo: Memo, request: FrameRequest) -> Floats | None:
     positions = request.rest_positions_mm
     if positions is None or request.has_shared_mesh:
         return None
-    gauge = memo.get(StrainGauge, request.atlas_head)
+    gauge = memo.get(StrainGauge, request.topology_head)
     return positions if gauge.strain(positions) > MAX_SHARED_PAIR_STRAIN else None

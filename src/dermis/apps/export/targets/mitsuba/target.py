@@ -242,7 +242,7 @@ def skin_colours(subject: Subject) -> SkinColours:
 
 def mean_roughness(subject: Subject) -> float:
     """Return the Beckmann roughness m of the skin, used where no roughness map sets the roughness."""
-    return float(subject.skin.smoothing * subject.skin.roughness)
+    return float(subject.skin.roughness_factor * subject.skin.roughness)
 
 
 def skin_textures(subject: Subject, colours: SkinColours) -> tuple[float | Map, Map | None, Map | None]:

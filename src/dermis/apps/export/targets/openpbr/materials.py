@@ -138,9 +138,9 @@ def skin_material(
         "subsurface_radius": longest,
         "subsurface_radius_scale": tuple(one / longest for one in radius_m),
         "subsurface_scatter_anisotropy": 0.0,
-        "specular_weight": skin.strength,
+        "specular_weight": skin.specular_strength,
         "specular_ior": SKIN_ETA,
-        "specular_roughness": float(np.sqrt(skin.roughness * skin.smoothing)),
+        "specular_roughness": float(np.sqrt(skin.roughness * skin.roughness_factor)),
     }
     mapped = {MAP_INPUTS[role]: role for role in map_roles}
     return OpenPbrMaterial(
@@ -208,10 +208,12 @@ def open_pbr_maps(head_maps: Maps, skin: Skin, slopes: Floats | None = None) -> 
     if head_maps.colour is not None and skin.albedo == "map":
         arrays["colour"] = head_maps.colour
     if head_maps.roughness is not None:
-        roughness = head_maps.roughness * np.float32(skin.roughness / DEFAULT_ROUGHNESS * skin.smoothing)
+        roughness = head_maps.roughness * np.float32(
+            skin.roughness / DEFAULT_ROUGHNESS * skin.roughness_factor
+        )
         arrays["roughness"] = np.sqrt(np.clip(roughness, 0.0, 1.0))
     if head_maps.specular is not None and (mean := float(head_maps.specular.mean())) > 0:
-        arrays["specular"] = np.clip(head_maps.specular * np.float32(skin.strength / mean), 0.0, 1.0)
+        arrays["specular"] = np.clip(head_maps.specular * np.float32(skin.specular_strength / mean), 0.0, 1.0)
     gradient = slopes if head_maps.normal is None else head_maps.normal
     if gradient is not None:
         normal = np.concatenate([-gradient, np.ones_like(gradient[..., :1])], axis=-1)

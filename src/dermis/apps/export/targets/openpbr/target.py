@@ -132,7 +132,7 @@ def surface_parameters(
     radius_meaning : explanation of subsurface_radius for the report
     """
     longest, skin, colour = float(radius_mm.max()), subject.skin, flat_tuple(subject.clipped_albedo())
-    roughness = float(np.sqrt(skin.roughness * skin.smoothing))
+    roughness = float(np.sqrt(skin.roughness * skin.roughness_factor))
     inputs = (
         ("subsurface_weight", 1.0, "-", "all light that is not reflected enters the skin"),
         ("subsurface_color", colour, "-", "diffuse reflectance; the mean of a colour map"),
@@ -140,7 +140,12 @@ def surface_parameters(
         ("subsurface_radius_scale", flat_tuple(radius_mm / longest), "-", "each channel's relative to that"),
         ("subsurface_scatter_anisotropy", 0.0, "-", "the lengths are reduced ones"),
         ("specular_ior", SKIN_ETA, "-", "of the surface; reflectance 0.028 at normal incidence"),
-        ("specular_weight", skin.strength, "-", "factor of the specular reflection; the mean of a map"),
+        (
+            "specular_weight",
+            skin.specular_strength,
+            "-",
+            "factor of the specular reflection; the mean of a map",
+        ),
         ("specular_roughness", roughness, "-", "square root of Beckmann's m, or its map"),
     )
     return tuple(Parameter(input_name(shader_category, name), *values) for name, *values in inputs)

@@ -61,7 +61,7 @@ def camera_directives(camera: Camera, picture_name: str) -> Lines:
     picture_name : name of the picture file that pbrt writes
     """
     vectors = np.concatenate([camera.position, camera.target, camera.up])
-    half, shift = camera.window(1.0)
+    half, shift = camera.image_rectangle(1.0)
     screen = [(end + shift[axis]) * half[axis] for axis in (0, 1) for end in (-1.0, 1.0)]
     film: DirectiveParameters = {
         "string filename": picture_name,

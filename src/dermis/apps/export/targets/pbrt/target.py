@@ -234,7 +234,9 @@ def _material_parameters(subject: Subject, mean_free_path_mm: Floats, mfp_meanin
         Parameter("scale", 1.0, "-", "factor of mfp; must not be changed"),
         Parameter("g", 0.0, "-", "the mean free paths are reduced ones"),
         Parameter("eta", SKIN_ETA, "-", "index of refraction of the skin"),
-        Parameter("roughness", skin.roughness * skin.smoothing, "-", "GGX's alpha: Beckmann's m, or its map"),
+        Parameter(
+            "roughness", skin.roughness * skin.roughness_factor, "-", "GGX's alpha: Beckmann's m, or its map"
+        ),
         Parameter("remaproughness", False, "-", "the roughness is alpha itself"),
     )
 

@@ -88,7 +88,7 @@ def texture_coordinates(head: Head) -> Floats:
     """
     mesh, uv = head.mesh, head.mesh.uv.copy()
     if head.eyes is not None:
-        frames = head.eyes.eye_matrices(head.control, head.control.rest)
+        frames = head.eyes.eye_matrices(head.control_rig, head.control_rig.rest)
         for material, frame in zip(head.eyes.material, frames, strict=True):
             eye = np.unique(mesh.triangles[mesh.material == material])
             uv[eye] = eye_uv(mesh.positions[eye] @ frame[:3, :3].T + frame[:3, 3])

@@ -58,7 +58,7 @@ def slider_frame_inputs(
             yield None
         elif slider.changes_pose_only:
             posed = prepare_frame_inputs(scene)
-            yield replace(default_frame_inputs, motion=posed.motion, view=posed.view)
+            yield replace(default_frame_inputs, pose_bytes=posed.pose_bytes, view=posed.view)
         else:
             yield prepare_frame_inputs(scene)
 

@@ -144,13 +144,13 @@ def _face_tables(hairline_recession: float, site_differences: SiteDifferences) -
     hairline_recession : recession of the hairline [-]
     site_differences : differences of pigments between measured sites of the face, such as forehead and cheek
     """
-    folds, edge = face.fold_curves(), face.hairline_heights(hairline_recession)
+    folds, edge = face.skin_folds(), face.hairline_heights(hairline_recession)
     ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)
     curves = np.pad(np.hstack([folds.curves, ends]), _TRIANGLE_ROW_PADDING)
     hairline = np.pad(np.column_stack([edge, np.append(edge[1:], edge[-1])]), _TRIANGLE_ROW_PADDING)
     tables = (
         textures.noise_table(),
-        textures.dot_table(),
+        textures.dot_layer_table(),
         face.zone_table(hairline_recession, site_differences),
         curves,
         folds.knots,

@@ -14,7 +14,7 @@ from dermis.gpu import CommandList, Device, download, make_texture
 from dermis.human.skin.painted import MAX_SIDE, MIN_SIDE, PaintedMaps
 from dermis.human.skin.surface import painted_surface
 from dermis.mesh.eye_look import EyeLook
-from dermis.mesh.eyeball import UV_DECAY_ANGLE_RADIANS, UV_RADIUS_OF_BACK, EyeTextures
+from dermis.mesh.eyeball import UV_RADIUS_FALLOFF_RADIANS, UV_RADIUS_OF_BACK, EyeTextures
 from dermis.mesh.head import Head
 
 EYE_PICTURE_SIDE = 1024
@@ -27,7 +27,7 @@ def paint_eye(device: Device, look: EyeLook, picture_side: int = EYE_PICTURE_SID
     picture_side : side of the pictures [pixels]
     """
     shader = program(device, "surface/painting/eye_pictures.wgsl")
-    picture = shader.make_record("EyePicture", rim=UV_RADIUS_OF_BACK, falling=UV_DECAY_ANGLE_RADIANS)
+    picture = shader.make_record("EyePicture", rim=UV_RADIUS_OF_BACK, falling=UV_RADIUS_FALLOFF_RADIANS)
     fill_eye_records(picture["eye"], look)
     textures = {
         name: make_texture(device, (picture_side, picture_side), "rgba32float")
@@ -65,7 +65,7 @@ def with_painted_maps(device: Device, head: Head, map_side: int) -> Head:
     if not isinstance(maps, PaintedMaps):
         return head
     painted = paint.paint_arrays(
-        device, painted_surface(head.mesh, head.control.stencils), maps.look, map_side
+        device, painted_surface(head.mesh, head.control_rig.stencils), maps.look, map_side
     )
     given_maps = {field.name: getattr(maps, field.name) for field in fields(painted)}
     if given_maps["normal"] is not None:

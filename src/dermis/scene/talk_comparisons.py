@@ -12,10 +12,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from dermis.scene.frozen_model import Colour, Heading
+from dermis.scene.frozen_model import Colour, HelpHeading
 from dermis.specular.models import EnergyConservationName
 
-COMPARISONS_HEADING = Heading("Comparisons of the 2007 talk")
+COMPARISONS_HEADING = HelpHeading("Comparisons of the 2007 talk")
 
 _SPECULAR_COLOUR_HELP = 'Colour of reflections; "wrong" multiplies them by the colour map.'
 SpecularColour = Annotated[

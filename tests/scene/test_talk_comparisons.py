@@ -9,7 +9,7 @@ from small_head import write_head
 
 import dermis
 from dermis.scene.frozen_model import FrozenModel, field_heading, field_help, fields_under
-from dermis.scene.talk import COMPARISONS_HEADING
+from dermis.scene.talk_comparisons import COMPARISONS_HEADING
 
 FIELDS: dict[type[FrozenModel], list[str]] = {
     dermis.Skin: ["specular_colour", "energy"],
