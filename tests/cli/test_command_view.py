@@ -24,7 +24,7 @@ Run = Callable[..., Any]
 
 
 @pytest.mark.parametrize(
-    ("words", "culprit"),
+    ("words", "error_subject"),
     [
         (("--port", "80"), "--port"),
         (("--host", "0.0.0.0"), "--host"),
@@ -39,10 +39,12 @@ Run = Callable[..., Any]
         (("--motion-fps", "25"), "--motion-fps"),
     ],
 )
-def test_impossible_options_are_refused(run: Run, folder: Path, words: tuple[str, ...], culprit: str) -> None:
+def test_impossible_options_are_refused(
+    run: Run, folder: Path, words: tuple[str, ...], error_subject: str
+) -> None:
     ended = run("view", "head.obj", *words, "--adapter", "cpu")
     assert (ended.code, ended.stdout) == (2, "")
-    assert ended.stderr.startswith(f"dermis: {culprit}")
+    assert ended.stderr.startswith(f"dermis: {error_subject}")
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ def _sound(rng: Random) -> Input:
     pictures = {f"frames/{k:03}{suffix}": data for k in range(_COUNT)}
     pattern = f"frames/%03d{suffix}"
     record = {f"frames/.%03d{suffix}.made-of": _MADE_OF.encode()}
-    return Input({**record, **pictures}, {"file": pattern, "culprits": []})
+    return Input({**record, **pictures}, {"file": pattern, "error_subjects": []})
 
 
 def _take(plan: Plan) -> None:

@@ -67,16 +67,20 @@ class DaskCluster:
         if self.file is not None and not self.file.is_file():
             refuse(self.file, "the file that dask's scheduler wrote", "it does not exist", "Start it first")
         scheduler = {"address": self.address} if self.file is None else {"scheduler_file": str(self.file)}
-        culprit = self.address or self.file
+        error_subject = self.address or self.file
         try:
             client = Client(**scheduler, timeout=_CONNECTION_TIMEOUT_S, set_as_default=False)
         except (OSError, ValueError) as fault:
-            refuse(culprit, "a scheduler of dask.distributed", f"none answers ({fault})", "Start it first")
+            refuse(
+                error_subject, "a scheduler of dask.distributed", f"none answers ({fault})", "Start it first"
+            )
         with client:
             try:
                 client.wait_for_workers(1, timeout=_CONNECTION_TIMEOUT_S)
             except TimeoutError:
-                refuse(culprit, "a scheduler with workers", "it has none", "Start them with dask worker")
+                refuse(
+                    error_subject, "a scheduler with workers", "it has none", "Start them with dask worker"
+                )
             yield client
 
 

@@ -27,6 +27,7 @@ from dermis.base.reading import (
     parsing,
     read_file,
 )
+from dermis.base.renamed import renamed_keywords
 from dermis.images.sizes import MAX_FILE_BYTES
 from dermis.scene.opencv import OpenCvCamera
 
@@ -106,15 +107,16 @@ def read_dataset(
     return _iterate_images(_select_shards(checked_path(path, "a data set"), shards), random)
 
 
-def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
+@renamed_keywords(culprit="error_subject")
+def decode_image(files: Mapping[str, object], error_subject: object = "") -> Image:
     """Return an image of a data set from the files of the image, with the keys that `read_dataset` lists.
 
     files : content of each file as bytes, by suffix, as the library webdataset provides them
-    culprit : name of the image in error messages; by default the image's key
+    error_subject : name of the image in error messages; by default the image's key
 
     Raises DermisError for damaged files.
     """
-    source = culprit or files.get("__key__", "an image")
+    source = error_subject or files.get("__key__", "an image")
     data = {suffix: content for suffix, content in files.items() if not suffix.startswith("__")}
     encoded, record = (_pop_file(data, suffix, source) for suffix in (PICTURE_SUFFIX, RECORD_SUFFIX))
     image = _decode_record(record, f"{source}.{RECORD_SUFFIX}")
@@ -133,19 +135,22 @@ def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
     return image
 
 
-def read_record(json_bytes: bytes, culprit: object) -> Record:
+def read_record(json_bytes: bytes, error_subject: object) -> Record:
     """Return the record of an image from the bytes of its JSON file, without checking the landmarks.
 
-    culprit : name of the file in error messages
+    error_subject : name of the file in error messages
 
     Raises DermisError if the record is damaged.
     """
     if len(json_bytes) > MAX_TEXT_BYTES:
         refuse(
-            culprit, "a record of an image", f"it has {len(json_bytes):,} bytes", "Copy or download it again"
+            error_subject,
+            "a record of an image",
+            f"it has {len(json_bytes):,} bytes",
+            "Copy or download it again",
         )
-    record: Record = parse_json(json_bytes, culprit, "a record of an image")
-    with _refuse_malformed_record(culprit):
+    record: Record = parse_json(json_bytes, error_subject, "a record of an image")
+    with _refuse_malformed_record(error_subject):
         if type(record["number"]) is not int:
             raise ValueError("its number is not an integer")
         for name, value in record["parameters"].items():
@@ -247,16 +252,18 @@ def _iterate_images(shards: list[Path], shuffle_rng: Random | None) -> Iterator[
                 yield image
 
 
-def _pop_file(files: dict[str, object], suffix: str, culprit: object) -> bytes:
+def _pop_file(files: dict[str, object], suffix: str, error_subject: object) -> bytes:
     content = files.pop(suffix, None)
     if not isinstance(content, bytes):
-        refuse(culprit, "an image of a data set", f"its .{suffix} is missing", "Copy or download it again")
+        refuse(
+            error_subject, "an image of a data set", f"its .{suffix} is missing", "Copy or download it again"
+        )
     return content
 
 
-def _decode_record(json_bytes: bytes, culprit: object) -> Image:
-    record = read_record(json_bytes, culprit)
-    with _refuse_malformed_record(culprit):
+def _decode_record(json_bytes: bytes, error_subject: object) -> Image:
+    record = read_record(json_bytes, error_subject)
+    with _refuse_malformed_record(error_subject):
         landmarks = {name: _decode_landmarks(one) for name, one in record["landmarks"].items()}
     image = {"number": record["number"], "parameters": record["parameters"]}
     image["skin_tone"] = record.get("skin_tone")
@@ -295,15 +302,17 @@ def _to_array(nested_numbers: NestedNumbers, shape: tuple[int, ...]) -> NDArray[
     return array.reshape(shape)
 
 
-def _refuse_malformed_record(culprit: object) -> AbstractContextManager[None]:
+def _refuse_malformed_record(error_subject: object) -> AbstractContextManager[None]:
     """Return a context manager that turns errors of a malformed record into a DermisError.
 
-    culprit : name of the file in error messages
+    error_subject : name of the file in error messages
     """
-    return parsing(culprit, "a record of an image", KeyError, TypeError, AttributeError)
+    return parsing(error_subject, "a record of an image", KeyError, TypeError, AttributeError)
 
 
-def _decode_picture(culprit: object, output_name: str, picture_format: str, file_content: object) -> Array:
+def _decode_picture(
+    error_subject: object, output_name: str, picture_format: str, file_content: object
+) -> Array:
     try:
         if not isinstance(file_content, bytes):
             raise TypeError("its content is not of type bytes")
@@ -313,7 +322,7 @@ def _decode_picture(culprit: object, output_name: str, picture_format: str, file
             else decode_png(file_content)
         )
     except DermisError as fault:  # a package is missing
-        raise DermisError(f"{culprit}: {fault}") from fault
+        raise DermisError(f"{error_subject}: {fault}") from fault
     except Exception as fault:  # decoders raise anything for damaged data
         actual = f"it cannot be decoded ({error_text(fault)})"
-        refuse(culprit, f"a picture as {picture_format}", actual, _RESTORE_ADVICE)
+        refuse(error_subject, f"a picture as {picture_format}", actual, _RESTORE_ADVICE)
