@@ -22,7 +22,7 @@ from typing import Any, BinaryIO, NoReturn
 from dermis.base.errors import DermisError, error_text, refuse
 
 MALFORMED_DATA_ERRORS = (LookupError, TypeError, AttributeError, ArithmeticError, struct.error)
-"""Exceptions raised by code that assumes well-formed data; pass them to `parsing`."""
+"""Exceptions raised by code that assumes well-formed data; pass them to refuse_parse_errors."""
 MAX_TEXT_BYTES = 1 << 20  # largest file with settings: scenes, lights, tables
 _MIN_READ_BYTES = 1 << 16
 _MAX_INTEGER_BITS = 64  # largest size of integers, as in TOML; all can be converted to float
@@ -103,7 +103,7 @@ def read_text(path: str | Path, expected: str, max_bytes: int = MAX_TEXT_BYTES) 
 
     Raises DermisError as `read_file` does, and for files that are not text.
     """
-    with parsing(path, expected):
+    with refuse_parse_errors(path, expected):
         data = read_file(path, expected, max_bytes)
         return data.decode("utf-16" if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig")
 
@@ -114,7 +114,7 @@ def read_toml(path: str | Path, expected: str = "a TOML file") -> dict[str, Any]
     Raises DermisError as `read_text` does, and for invalid TOML.
     """
     text = read_text(path, expected)
-    with parsing(path, expected):
+    with refuse_parse_errors(path, expected):
         if _LONG_KEY_PATTERN.search(text):
             raise ValueError(f"a key has more than {_MAX_KEY_PARTS} parts with dots between them")
         tables = tomllib.loads(text)
@@ -127,7 +127,7 @@ def parse_json(json_text: str | bytes, error_subject: object, expected: str) -> 
 
     Raises DermisError for invalid JSON, deep nesting, and numbers that are too large.
     """
-    with parsing(error_subject, expected):
+    with refuse_parse_errors(error_subject, expected):
         return json.loads(
             json_text,
             parse_constant=_refuse_json_constant,
@@ -149,7 +149,7 @@ def checked_path(file_name: object, expected: str) -> Path:
 
 
 @contextmanager
-def parsing(error_subject: object, expected: str, *errors: type[Exception]) -> Iterator[None]:
+def refuse_parse_errors(error_subject: object, expected: str, *errors: type[Exception]) -> Iterator[None]:
     """Convert exceptions that a parser raises in a with block into a DermisError that names the file.
 
     error_subject : name of the file

@@ -34,7 +34,7 @@ _COMMON_WRONG_UNITS_MM = (1.0, 10.0)  # units that programs write although the f
 _USUAL_SIZE_RANGE_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}
 
 
-def with_settled_unit(
+def with_positions_in_mm(
     rigged: RiggedMesh, path: Path, unit_mm: float | None, error_subject: object
 ) -> RiggedMesh:
     """Return the mesh of a file in millimetres, with a note if its unit was guessed or its size is unusual.

@@ -36,7 +36,7 @@ def _take(plan: Plan) -> None:
     from dermis.images.writer import FrameFiles
 
     files = FrameFiles(Path(plan["file"]))
-    files.prepare()
+    files.prepare_folder()
     files.start_sequence(_MADE_OF)
     missing = files.missing_frames(range(_COUNT), _SIZE)
     for number in set(range(_COUNT)) - set(missing):

@@ -51,7 +51,7 @@ class DaskCluster:
 
         name = f"dermis-{secrets.token_hex(6)}"
         with self._client() as client:
-            client.register_plugin(PartPlugin.for_run(options, self.adapter), name=name)
+            client.register_plugin(PartPlugin.from_run_options(options, self.adapter), name=name)
             try:
                 with _create_marker_file(options.out) as marker:
                     _check_shared_disk(client, marker)
@@ -116,7 +116,7 @@ def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> I
     """
     from distributed import Future, as_completed
 
-    from dermis.apps.batch.dask_worker import process_task
+    from dermis.apps.batch.dask_worker import run_task
 
     queue, submitted = deque(tasks), dict[Future, Shard]()
     keys, completed = itertools.count(), as_completed(loop=client.loop)
@@ -125,7 +125,7 @@ def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> I
         while queue and len(submitted) < _MAX_TASKS_IN_FLIGHT:
             task = queue.popleft()
             future = client.submit(
-                process_task, plugin_name, task, key=f"{plugin_name}-{next(keys)}", retries=_MAX_TASK_RETRIES
+                run_task, plugin_name, task, key=f"{plugin_name}-{next(keys)}", retries=_MAX_TASK_RETRIES
             )
             submitted[future] = task
             completed.add(future)

@@ -24,14 +24,14 @@ from dermis.base.reading import (
     checked_path,
     open_regular_file,
     parse_json,
-    parsing,
     read_file,
+    refuse_parse_errors,
 )
 from dermis.base.renamed import renamed_keywords
 from dermis.images.sizes import MAX_FILE_BYTES
 from dermis.scene.opencv import OpenCvCamera
 
-Image = dict[str, Any]
+ImageFields = dict[str, Any]
 """Ground truth of an image by name, see `read_dataset`."""
 FileReaders = dict[str, Callable[[], bytes]]
 """Functions that read the files of an image, by name or suffix."""
@@ -59,7 +59,7 @@ class LandmarkPoints(NamedTuple):
 
 def read_dataset(
     path: str | Path, *, shards: Iterable[int] | None = None, shuffle: int | None = None
-) -> Iterator[Image]:
+) -> Iterator[ImageFields]:
     """Return the images of a data set rendered by `dermis batch`, with their ground truth.
 
     Parameters
@@ -108,7 +108,7 @@ def read_dataset(
 
 
 @renamed_keywords(culprit="error_subject")
-def decode_image(files: Mapping[str, object], error_subject: object = "") -> Image:
+def decode_image(files: Mapping[str, object], error_subject: object = "") -> ImageFields:
     """Return an image of a data set from the files of the image, with the keys that `read_dataset` lists.
 
     files : content of each file as bytes, by suffix, as the library webdataset provides them
@@ -175,7 +175,7 @@ def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
         yield _group_by_image(path, {name: partial(_read_folder_file, path / name) for name in names})
         return
     with open_regular_file(path, SHARD_DESCRIPTION) as file:
-        with parsing(path, SHARD_DESCRIPTION):
+        with refuse_parse_errors(path, SHARD_DESCRIPTION):
             members = list(tar_members(file))
             if len({one.name for one in members}) != len(members):
                 raise ValueError("two of its files have the same name")
@@ -236,7 +236,7 @@ def _select_shards(path: Path, shards: Iterable[int] | None) -> list[Path]:
     return [by_number[number] for number in numbers]
 
 
-def _iterate_images(shards: list[Path], shuffle_rng: Random | None) -> Iterator[Image]:
+def _iterate_images(shards: list[Path], shuffle_rng: Random | None) -> Iterator[ImageFields]:
     if shuffle_rng:
         shuffle_rng.shuffle(shards)
     for path in shards:
@@ -261,7 +261,7 @@ def _pop_file(files: dict[str, object], suffix: str, error_subject: object) -> b
     return content
 
 
-def _decode_record(json_bytes: bytes, error_subject: object) -> Image:
+def _decode_record(json_bytes: bytes, error_subject: object) -> ImageFields:
     record = read_record(json_bytes, error_subject)
     with _refuse_malformed_record(error_subject):
         landmarks = {name: _decode_landmarks(one) for name, one in record["landmarks"].items()}
@@ -270,7 +270,7 @@ def _decode_record(json_bytes: bytes, error_subject: object) -> Image:
     return image | _decode_pose(record) | {"landmarks": landmarks}
 
 
-def _decode_pose(record: Record) -> Image:
+def _decode_pose(record: Record) -> ImageFields:
     """Return the arrays of camera, head pose and gaze in a record."""
     camera, gaze = record["camera"], record["gaze"]
     K, R, t = _to_array(camera["K"], (3, 3)), _to_array(camera["R"], (3, 3)), _to_array(camera["t"], (3,))
@@ -307,7 +307,7 @@ def _refuse_malformed_record(error_subject: object) -> AbstractContextManager[No
 
     error_subject : name of the file in error messages
     """
-    return parsing(error_subject, "a record of an image", KeyError, TypeError, AttributeError)
+    return refuse_parse_errors(error_subject, "a record of an image", KeyError, TypeError, AttributeError)
 
 
 def _decode_picture(

@@ -10,7 +10,7 @@ import numpy as np
 
 from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
-from dermis.base.reading import MALFORMED_DATA_ERRORS, parsing
+from dermis.base.reading import MALFORMED_DATA_ERRORS, refuse_parse_errors
 from dermis.formats.gltf.document import Document, Tree, checked_index, read_document
 from dermis.formats.gltf.nodes import Nodes, read_nodes
 from dermis.formats.gltf.rigs import target_names
@@ -70,7 +70,9 @@ def read_clip(path: Path, clip_name: str | None) -> Animation:
     if clip_name is not None and clip_name not in names:
         refuse(path, f"one of its clips ({', '.join(names)})", f"got {clip_name!r}", "Correct the name")
     index = 0 if clip_name is None else names.index(clip_name)
-    with parsing(f"{path}: clip {names[index][:80]!r}", "a valid animation", *MALFORMED_DATA_ERRORS):
+    with refuse_parse_errors(
+        f"{path}: clip {names[index][:80]!r}", "a valid animation", *MALFORMED_DATA_ERRORS
+    ):
         return Animation(names[index], tuple(_read_tracks(document, index, names[index])))
 
 

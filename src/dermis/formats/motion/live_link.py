@@ -15,7 +15,7 @@ import numpy as np
 from dermis.base.arrays import Doubles, Mask
 from dermis.base.errors import notify, refuse
 from dermis.base.quantities import checked_number
-from dermis.base.reading import parsing, read_text
+from dermis.base.reading import read_text, refuse_parse_errors
 from dermis.base.tables import column_separator, plain_key
 from dermis.formats.motion.captures import (
     FRAME_NUMBER_KEYS,
@@ -105,7 +105,7 @@ def _read_table(path: Path, fps: float | None) -> _CaptureTable:
     text = read_text(path, expected, MAX_CLIP_BYTES)
     separator = column_separator(next(filter(str.strip, io.StringIO(text)), ""))
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
-    with parsing(path, expected, csv.Error):
+    with refuse_parse_errors(path, expected, csv.Error):
         header = [cell.strip() for cell in next(filter(_has_text, reader), [])]
         if not header:
             refuse(path, f"{expected} with a header and rows", "it is empty", "Export it again")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dermis.atlas.atlas import Atlas
 from dermis.base.errors import refuse
 from dermis.base.quantities import checked_array
-from dermis.base.reading import parsing, read_text
+from dermis.base.reading import read_text, refuse_parse_errors
 from dermis.base.tables import parse_rows
 from dermis.formats.maps import load_labels
 from dermis.human.regions.average import (
@@ -88,7 +88,7 @@ def warp_to_average(head: Head, landmarks: Landmarks, points: Doubles) -> Double
 
 def _parse_landmarks(csv_text: str, file_name: str) -> Landmarks:
     expected = "rows of landmark,x,y,z"
-    with parsing(file_name, expected, KeyError, TypeError, csv.Error):
+    with refuse_parse_errors(file_name, expected, KeyError, TypeError, csv.Error):
         landmarks = {
             row["landmark"]: tuple(float(row[axis]) for axis in "xyz") for row in parse_rows(csv_text)
         }

@@ -20,7 +20,7 @@ from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, fill_page, w
 from dermis.apps.validation.peers.figures import scene_results
 from dermis.apps.validation.peers.rendering import PeerPlan, PeerRenders, render_peers
 from dermis.base.atomic_write import check_output
-from dermis.base.console import note, print_lines, progress_bar
+from dermis.base.console import print_lines, print_note, progress_bar
 from dermis.base.errors import DermisError, refuse
 
 RESULTS_FILE, PAGE = RESULTS / "peers.json", DOCS / "peers.md"
@@ -87,7 +87,7 @@ def compare_peers(head: str, lights: list[str], comparison_plan: PeerPlan, adapt
     try:
         blender_python()
     except DermisError as fault:
-        note(f"Cycles is skipped. {fault}")
+        print_note(f"Cycles is skipped. {fault}")
     loaded, renderer = dermis.load_head(head, subdivide=0), dermis.Renderer(adapter)
     scenes: list[PeerRenders] = []
     with progress_bar("measuring") as bar:
