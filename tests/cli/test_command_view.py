@@ -114,7 +114,7 @@ def test_options_determine_the_viewer_state(run: Run, folder: Path, monkeypatch:
     words = ("--lights", "window", "--camera", "ear", "--samples", "2", "--size", "300x200")
     assert run("view", "head.obj", *words, "--adapter", "cpu").code == 0
     state, adapter, size = seen[0]
-    assert (adapter, size, state.rig) == ("cpu", (300, 200), "window")
+    assert (adapter, size, state.light_preset) == ("cpu", (300, 200), "window")
     assert (state.settings.atlas, state.settings.samples) == (1024, 2)  # less on a software adapter
     assert state.head == {"name": str(folder / "head.obj")}
     assert state.scene.camera.frame_mm == 120.0
