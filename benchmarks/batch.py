@@ -36,7 +36,7 @@ from dermis.apps.batch.worker_pool import ProcessPool, SlotRequest, available_co
 from dermis.apps.validation.pages import JsonObject, write_results
 from dermis.base.atomic_write import check_output
 from dermis.base.command_line import run_script
-from dermis.base.console import note, print_lines
+from dermis.base.console import print_lines, print_note
 from dermis.base.errors import DermisError
 from dermis.base.extras import import_extra
 from dermis.cli.options import parse_size
@@ -304,7 +304,7 @@ def measure(
     for part in parts:
         if part not in jobs:
             raise DermisError(f"--parts: expected some of {', '.join(PARTS)}, but got {part!r}. Correct it.")
-        note(part)
+        print_note(part)
         figures[part] = jobs[part]()
         keep(figures)
     return figures

@@ -84,7 +84,7 @@ def compare_variants(
     """Return device times with and without intermediate levels [ms], and the relative RMSE of pictures."""
     row: JsonObject = {"gaussians": case.gaussians}
     pictures = []
-    with tempfile.TemporaryDirectory() as folder, TECHNIQUES.including(_AT_ONCE, AtOnce()):
+    with tempfile.TemporaryDirectory() as folder, TECHNIQUES.temporary_entry(_AT_ONCE, AtOnce()):
         scenes = case_scenes(case, head, Path(folder), 8)
         for name, technique in (("in steps", case.technique), ("at once", _AT_ONCE)):
             settings = case_settings(replace(case, technique=technique))

@@ -44,7 +44,7 @@ from dermis.apps.validation.benchmarks.run import run_benchmark as run_benchmark
 from dermis.apps.validation.pages import JsonObject, write_results
 from dermis.base.atomic_write import check_output
 from dermis.base.command_line import run_script
-from dermis.base.console import note
+from dermis.base.console import print_note
 from dermis.base.errors import DermisError
 from dermis.formats.samples import is_available
 from dermis.frame.renderer import Renderer
@@ -89,7 +89,7 @@ def _forward_output(stream: IO[str], last: deque[str]) -> None:
     for line in stream:
         if line.strip():
             last.append(line.strip())
-            note(line.rstrip())
+            print_note(line.rstrip())
 
 
 ENVIRONMENTS: dict[str, tuple[bool, str | None]] = {
@@ -245,7 +245,7 @@ def viewer(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
         except DermisError as fault:
             if not file.exists():
                 raise
-            note(str(fault))
+            print_note(str(fault))
             reason = {"ended": str(fault)}
         figures: JsonObject = json.loads(file.read_text(encoding="utf-8"))
         return figures | reason
@@ -333,7 +333,7 @@ def measure(plan: Plan, parts: list[str], minutes: float, keep: Callable[[JsonOb
     head, renderer = dermis.load_head(plan.head, subdivide=0), dermis.Renderer(plan.adapter)
     figures = _about(plan, renderer)
     for part in parts:
-        note(part)
+        print_note(part)
         started = time.perf_counter()
         left = 60.0 * minutes - (started - began)
         figures[part] = _measured(part, plan, head, renderer, left)
@@ -350,7 +350,7 @@ def _measured(part: str, plan: Plan, head: Head, renderer: Renderer, left: float
         figures: JsonObject = globals()[part](plan, head, renderer)
         return figures
     except DermisError as fault:
-        note(f"left out: {fault}")
+        print_note(f"left out: {fault}")
         return {"left_out": str(fault)}
     finally:
         renderer.clear_cache()  # the next part may need all of the memory

@@ -26,7 +26,7 @@ from viewer_page import page_figures
 from dermis.apps.validation.pages import JsonObject
 from dermis.base.atomic_write import atomic_file, check_output
 from dermis.base.command_line import run_script
-from dermis.base.console import note, print_lines
+from dermis.base.console import print_lines, print_note
 from dermis.cli.options import parse_size
 from dermis.gpu import Device, open_device
 
@@ -219,7 +219,7 @@ class Results:
             whole.write_text(json.dumps(self.all_figures, indent=1) + "\n", encoding="utf-8")
 
     def _log(self, what: str) -> None:
-        note(f"{self._clock.elapsed_s:6.1f} s  {what}")
+        print_note(f"{self._clock.elapsed_s:6.1f} s  {what}")
 
 
 def _halved(plan: Plan) -> Plan:

@@ -100,7 +100,7 @@ KINDS: dict[str, Kind] = {
     "pan": lambda s, r: s.with_camera(pan(s.scene.camera, r.uniform(-0.1, 0.1), r.uniform(-0.1, 0.1))),
     "dolly": lambda s, r: s.with_camera(dolly(s.scene.camera, r.uniform(0.8, 1.25))),
     "light": lambda s, r: drag_light(s, 0, r.uniform(-0.5, 0.5), r.uniform(-0.2, 0.2)),
-    "rig": lambda s, r: s.with_rig(_choice(r, *light_presets())),
+    "rig": lambda s, r: s.with_light_preset(_choice(r, *light_presets())),
     "environment": lambda s, r: s.with_environment(
         _choice(r, None, Environment(name="uniform", exposure=0.5))
     ),

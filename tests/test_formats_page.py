@@ -31,7 +31,7 @@ def test_formats_are_identified_by_suffix() -> None:
 def test_plugin_format_is_read(tmp_path: Path) -> None:
     path = tmp_path / "a.egg"
     path.write_text(obj_text())
-    with MESH_FORMATS.including("egg", MeshFormat((".egg",), read_obj, ())):
+    with MESH_FORMATS.temporary_entry("egg", MeshFormat((".egg",), read_obj, ())):
         assert len(load_rigged(path).mesh.triangles) > 0
     with pytest.raises(DermisError, match=r"the suffix is '\.egg'"):
         load_rigged(path)

@@ -29,9 +29,9 @@ class Input:
     """Files, and what is done with them.
 
     files : bytes by name
-    plan : JSON for the `take` function of the kind; "culprits": names of which messages must contain one,
-        instead of those of the files; "outputs": prefixes of files that may be written; "kept": those that
-        may remain after a refusal
+    plan : JSON for the `take` function of the kind; "error_subjects": names of which messages must contain
+        one, instead of those of the files; "outputs": prefixes of files that may be written; "kept": those
+        that may remain after a refusal
     changed : files to damage; all if empty
     """
 
@@ -44,7 +44,7 @@ class Input:
         for name, data in self.files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_bytes(data)
-        return {"culprits": list(self.files)} | dict(self.plan)
+        return {"error_subjects": list(self.files)} | dict(self.plan)
 
 
 @dataclass(frozen=True)

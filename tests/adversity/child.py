@@ -109,21 +109,25 @@ def _told(kind: Kind, plan: Plan) -> tuple[str, str, str]:
 def _of_refusal(refusal: DermisError, plan: Plan) -> tuple[str, str, str]:
     """Check that a refusal has the package's form and begins with a file of the input or a name in it."""
     message = str(refusal)
-    culprit = message.partition(": expected ")[0]
-    names = any(one in culprit for one in plan["culprits"]) or _is_held(culprit.strip("'\""))
-    names |= bool(_LIGHT.match(culprit))
-    if FORM.fullmatch(message) and (names or not plan["culprits"]):
+    error_subject = message.partition(": expected ")[0]
+    names = any(one in error_subject for one in plan["error_subjects"]) or _is_held(
+        error_subject.strip("'\"")
+    )
+    names |= bool(_LIGHT.match(error_subject))
+    if FORM.fullmatch(message) and (names or not plan["error_subjects"]):
         return case.REFUSED, "", message[:300]
     what = "names no file" if FORM.fullmatch(message) else "has another form"
     return case.UNCLEAR, f"{what}: {_place(refusal)}", message[:3000]
 
 
-def _is_held(culprit: str) -> bool:
+def _is_held(error_subject: str) -> bool:
     """Return whether a damaged file may contain the name, complete or shortened."""
-    begin, shortened, _ = culprit.partition(" ... ")
+    begin, shortened, _ = error_subject.partition(" ... ")
     if shortened:
         return any(begin in one for one in _HELD)
-    return not culprit.strip() or culprit.endswith((*_HELD, *(one.replace("//", "/") for one in _HELD)))
+    return not error_subject.strip() or error_subject.endswith(
+        (*_HELD, *(one.replace("//", "/") for one in _HELD))
+    )
 
 
 def _place(fault: BaseException) -> str:

@@ -47,7 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_two_thousand_draws_agree_with_their_spec(folder: Path) -> None:
     found = {one.parameter: one for one in fit_tests(folder, load_spec(folder / "spec.toml"))}
-    assert len(found) > 30 and all(one.passes for one in found.values())
+    assert len(found) > 30 and all(one.is_accepted for one in found.values())
     chances = np.array([one.p_value for one in found.values()])
     assert chances.min() > 1e-3 and 0.3 < np.median(chances) < 0.8, "p-values are uniform"
     assert found["person.age"].sample_count == COUNT // 2, "people count once"
@@ -77,7 +77,7 @@ def test_samples_of_another_distribution_fail_the_test(
     assert changed_line in lines
     (folder / "other.toml").write_text("\n".join(lines))
     spec = load_spec(folder / "other.toml")
-    assert [one.parameter for one in fit_tests(folder, spec) if not one.passes] == [parameter]
+    assert [one.parameter for one in fit_tests(folder, spec) if not one.is_accepted] == [parameter]
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -106,18 +106,18 @@ def test_expected_distance_is_the_mean_distance() -> None:
 def test_values_outside_the_distribution_have_a_p_value_of_0() -> None:
     law = parse_distribution({"choice": ["a", "b"], "weights": [1, 0]})
     assert fit_test("x", law, ["a"] * 9).p_value == 1.0
-    assert not fit_test("x", law, ["a"] * 9 + ["b"]).passes
+    assert not fit_test("x", law, ["a"] * 9 + ["b"]).is_accepted
     steps = parse_distribution({"choice": [0, 1 / 3, {"uniform": [5, 6]}]})
     even = list(np.linspace(5, 6, 50))
     assert fit_test("x", steps, [0.0, 0.333333] * 50 + even).p_value > 0.5, "numbers are rounded"
-    assert not fit_test("x", steps, [0.0, 0.34, 5.5] * 50).passes
+    assert not fit_test("x", steps, [0.0, 0.34, 5.5] * 50).is_accepted
 
 
 def test_backgrounds_without_an_environment_count_as_gradients(tmp_path: Path) -> None:
     kinds = {"kind": {"choice": ["environment", "gradient", "none"]}}
     around = {"name": {"choice": ["none", "uniform"]}}
     spec = parse_spec({"count": 500, "background": kinds, "environment": around})
-    assert all(one.passes for one in fit_tests(index(tmp_path, spec), spec))
+    assert all(one.is_accepted for one in fit_tests(index(tmp_path, spec), spec))
 
 
 def test_an_index_is_needed(tmp_path: Path) -> None:

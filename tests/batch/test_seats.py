@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from dermis.apps.batch import worker_pool
-from dermis.apps.batch.dask_worker import hold_local_rank
+from dermis.apps.batch.dask_worker import reserve_local_rank
 from dermis.apps.batch.worker_pool import SlotRequest
 
 
@@ -49,7 +49,7 @@ def test_a_software_adapter_shares_the_cores(
 
 
 def test_ranks_of_a_host_are_its_own_and_free_again() -> None:
-    with hold_local_rank() as first, hold_local_rank() as second:
+    with reserve_local_rank() as first, reserve_local_rank() as second:
         assert (first, second) == (0, 1)
-    with hold_local_rank() as again:
+    with reserve_local_rank() as again:
         assert again == 0

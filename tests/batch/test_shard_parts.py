@@ -192,7 +192,7 @@ def test_the_next_part_is_requested_while_frames_are_in_flight(small_spec: Spec,
             log.append(f"done {event.done.first}")
 
     with closing(Worker(HERE.adapter, RunOptions(small_spec, tmp_path))) as worker:
-        worker.process(tasks(), record)
+        worker.run_tasks(tasks(), record)
     assert log == ["requested 0", "requested 16", "done 0", "done 16"]
     assert [path.name for path in tmp_path.iterdir()] == ["shard-00000.tar"]
 

@@ -24,7 +24,7 @@ class Outcome(NamedTuple):
 
 
 Run = Callable[..., Outcome]
-FORM = re.compile(r"dermis: (?P<culprit>.+?): expected .+, but .+\. \S.+[.?]\n")
+FORM = re.compile(r"dermis: (?P<error_subject>.+?): expected .+, but .+\. \S.+[.?]\n")
 
 
 @pytest.fixture

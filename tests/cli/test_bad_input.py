@@ -1,4 +1,4 @@
-"""Invalid meshes, maps, numbers and names: the message begins with the culprit, as `refused` checks."""
+"""Invalid meshes, maps, numbers and names: the message begins with its subject, as `refused` checks."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ Run = Callable[..., Any]
 
 
 class Bad(NamedTuple):
-    """Arguments of a command, the culprit at the beginning of its message, and a part of the message."""
+    """Arguments of a command, the subject of its message, and a part of the message."""
 
     words: str
-    culprit: str
+    error_subject: str
     actual: str
 
 
@@ -100,18 +100,18 @@ def test_input_is_refused(refused: Run, opened: None, bad: Bad, request: pytest.
     if "lee_perry_smith" in bad.words:
         request.getfixturevalue("sample_folder")
     message = refused(*(word.strip("'") for word in bad.words.split()))
-    assert message["culprit"].endswith(bad.culprit) and bad.actual in message[0]
+    assert message["error_subject"].endswith(bad.error_subject) and bad.actual in message[0]
 
 
 def test_unknown_adapter(refused: Run) -> None:
     message = refused("head.obj", "--adapter", "voodoo")
-    assert message["culprit"] == "adapter 'voodoo'" and "auto, cpu" in message[0]
+    assert message["error_subject"] == "adapter 'voodoo'" and "auto, cpu" in message[0]
 
 
 def test_no_adapter(refused: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dermis.gpu.adapters.list_adapters", list)
     message = refused("head.obj")
-    assert message["culprit"] == "adapter" and "mesa-vulkan-drivers" in message[0]
+    assert message["error_subject"] == "adapter" and "mesa-vulkan-drivers" in message[0]
 
 
 def test_unknown_command(run: Run) -> None:

@@ -23,7 +23,7 @@ OUTPUTS = {
 def test_output_is_refused_before_anything_is_loaded(refused: Run, bad: tuple[str, str]) -> None:
     output, actual = bad
     message = refused("nobody.obj", output=output)
-    assert message["culprit"] == output and actual in message[0]
+    assert message["error_subject"] == output and actual in message[0]
 
 
 def test_folder_that_may_not_be_written(refused: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -46,7 +46,7 @@ def test_disk_that_fills_up(
 
     monkeypatch.setattr(Path, "write_bytes", full)
     message = refused("head.obj")
-    assert message["culprit"].endswith("out.png") and "No space left" in message[0]
+    assert message["error_subject"].endswith("out.png") and "No space left" in message[0]
     assert (tmp_path / "out.png").read_bytes() == b"the picture of yesterday"
 
 
@@ -59,7 +59,7 @@ def test_disk_that_fills_up_under_an_exr(
 
     monkeypatch.setattr("OpenEXR.File.write", full)
     message = refused("head.obj", output=tmp_path / "out.exr")
-    assert message["culprit"].endswith("out.exr") and "cannot write" in message[0]
+    assert message["error_subject"].endswith("out.exr") and "cannot write" in message[0]
 
 
 def test_interruption_leaves_nothing(

@@ -70,9 +70,9 @@ SCENES = {
 
 @pytest.mark.parametrize("bad", SCENES.values(), ids=SCENES)
 def test_scene_is_refused(refused: Run, opened: None, inputs: Path, bad: tuple[str | None, str, str]) -> None:
-    text, culprit, actual = bad
+    text, error_subject, actual = bad
     (inputs / "scene.toml").unlink(missing_ok=True)
     if text is not None:
         (inputs / "scene.toml").write_bytes(text.encode("utf-8", "surrogateescape"))
     message = refused("scene.toml")
-    assert message["culprit"].startswith(culprit) and actual in message[0]
+    assert message["error_subject"].startswith(error_subject) and actual in message[0]

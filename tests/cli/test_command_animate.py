@@ -193,7 +193,7 @@ def test_invalid_options_are_refused_before_rendering(
 ) -> None:
     from small_head import obj_text
 
-    words, culprit, actual = bad
+    words, error_subject, actual = bad
     monkeypatch.setattr("dermis.frame.renderer.Renderer.__init__", lambda *_: pytest.fail("opened"))
     Path("other.csv").write_text("Timecode,BlendShapeCount,browDown\n10:00:00:00,1,0\n", encoding="utf-8")
     Path("head.obj").write_text(obj_text())
@@ -201,7 +201,7 @@ def test_invalid_options_are_refused_before_rendering(
     ended = animate(*words.split(), *(() if "-o" in words else ("-o", "out.mp4")))
     assert (ended.code, ended.stdout) == (2, "")
     assert (
-        ended.stderr.startswith(f"dermis: {culprit}")
+        ended.stderr.startswith(f"dermis: {error_subject}")
         and actual in ended.stderr
         and "expected" in ended.stderr
     )

@@ -78,7 +78,7 @@ def test_curves_stay_inside_their_panel(m: float) -> None:
 
 
 def test_lobes_of_other_packages_have_panels_of_their_own() -> None:
-    with MODELS.including("other", MODELS["phong"]), MODELS.including("another", MODELS["phong"]):
+    with MODELS.temporary_entry("other", MODELS["phong"]), MODELS.temporary_entry("another", MODELS["phong"]):
         assert [axes.get_title() for axes in _lobe_figure(0.3).axes][-2:] == ["other", "another"]
 
 

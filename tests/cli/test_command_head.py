@@ -99,7 +99,7 @@ def test_targets_are_listed(run: Run, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "culprit"),
+    ("words", "error_subject"),
     [
         (("--age", "9"), "age"),
         (("--sex", "nan"), "sex"),
@@ -119,9 +119,15 @@ def test_targets_are_listed(run: Run, folder: Path) -> None:
         (("-o", "nowhere/own.glb"), "nowhere"),
     ],
 )
-def test_invalid_options_are_refused(run: Run, folder: Path, words: tuple[str, ...], culprit: str) -> None:
+def test_invalid_options_are_refused(
+    run: Run, folder: Path, words: tuple[str, ...], error_subject: str
+) -> None:
     before = sorted(folder.iterdir())
     ended = run("head", *words)
     assert (ended.code, ended.stdout) == (2, "")
-    assert ended.stderr.startswith("dermis: ") and culprit in ended.stderr and "Traceback" not in ended.stderr
+    assert (
+        ended.stderr.startswith("dermis: ")
+        and error_subject in ended.stderr
+        and "Traceback" not in ended.stderr
+    )
     assert sorted(folder.iterdir()) == before

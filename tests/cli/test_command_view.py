@@ -24,7 +24,7 @@ Run = Callable[..., Any]
 
 
 @pytest.mark.parametrize(
-    ("words", "culprit"),
+    ("words", "error_subject"),
     [
         (("--port", "80"), "--port"),
         (("--host", "0.0.0.0"), "--host"),
@@ -39,10 +39,12 @@ Run = Callable[..., Any]
         (("--motion-fps", "25"), "--motion-fps"),
     ],
 )
-def test_impossible_options_are_refused(run: Run, folder: Path, words: tuple[str, ...], culprit: str) -> None:
+def test_impossible_options_are_refused(
+    run: Run, folder: Path, words: tuple[str, ...], error_subject: str
+) -> None:
     ended = run("view", "head.obj", *words, "--adapter", "cpu")
     assert (ended.code, ended.stdout) == (2, "")
-    assert ended.stderr.startswith(f"dermis: {culprit}")
+    assert ended.stderr.startswith(f"dermis: {error_subject}")
 
 
 @pytest.mark.parametrize(
@@ -112,7 +114,7 @@ def test_options_determine_the_viewer_state(run: Run, folder: Path, monkeypatch:
     words = ("--lights", "window", "--camera", "ear", "--samples", "2", "--size", "300x200")
     assert run("view", "head.obj", *words, "--adapter", "cpu").code == 0
     state, adapter, size = seen[0]
-    assert (adapter, size, state.rig) == ("cpu", (300, 200), "window")
+    assert (adapter, size, state.light_preset) == ("cpu", (300, 200), "window")
     assert (state.settings.atlas, state.settings.samples) == (1024, 2)  # less on a software adapter
     assert state.head == {"name": str(folder / "head.obj")}
     assert state.scene.camera.frame_mm == 120.0

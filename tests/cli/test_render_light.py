@@ -97,7 +97,7 @@ def test_bloom_and_tone_reach_the_picture(render: Run) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "culprit", "actual"),
+    ("words", "error_subject", "actual"),
     [
         ("--env nowhere.hdr", "environment 'nowhere.hdr'", "neither"),
         ("--env lee_perry_smith", "lee_perry_smith", "a head"),
@@ -112,7 +112,7 @@ def test_bloom_and_tone_reach_the_picture(render: Run) -> None:
         ("--occlusion some", "--occlusion", "got 'some'"),
     ],
 )
-def test_bad_light_is_refused(render: Run, words: str, culprit: str, actual: str) -> None:
+def test_bad_light_is_refused(render: Run, words: str, error_subject: str, actual: str) -> None:
     ended = render("head.obj", *words.split(), "-o", "a.png")
     assert ended.code == 2 and ended.stdout == ""
-    assert ended.stderr.startswith(f"dermis: {culprit}: expected ") and actual in ended.stderr
+    assert ended.stderr.startswith(f"dermis: {error_subject}: expected ") and actual in ended.stderr

@@ -73,7 +73,7 @@ def test_lobes_of_a_registered_model_are_fitted_on_demand(
     shipped = isotropic_lobe_table("kelemen")
     monkeypatch.setattr(isotropic_fits, "ROUGHNESS_COUNT", 3)
     monkeypatch.setattr(isotropic_fits, "LOBE_TABLE_ROUGHNESSES", LOBE_TABLE_ROUGHNESSES[-3:])
-    with MODELS.including("theirs", MODELS["kelemen"]):
+    with MODELS.temporary_entry("theirs", MODELS["kelemen"]):
         made = isotropic_lobe_table("theirs")
     assert made.shape == (3, *shipped.shape[1:])
     assert np.allclose(made[-2:], shipped[-2:], atol=2e-3)

@@ -177,7 +177,7 @@ def test_registered_target_is_exported(tmp_path: Path) -> None:
         name = "toy"
         title = "Toy"
 
-    with TARGETS.including("toy", Toy()):
+    with TARGETS.temporary_entry("toy", Toy()):
         report = export_skin("skin1", "toy", tmp_path / "skin.asset")
     assert report.files[0].name == "skin.asset" and report.files[0].exists()
     with pytest.raises(DermisError, match=r"target: expected one of arnold, .*got 'toy'"):

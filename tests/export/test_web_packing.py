@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.apps.export.targets.web.maps import encode_picture
+from dermis.apps.export.targets.web.maps import encode_map_layer
 from dermis.apps.export.targets.web.packing import ByteRunCollector, byte_planes, encode_seven_bits, quantise
 
 
@@ -36,7 +36,7 @@ def test_maps_stored_as_pictures_stay_close() -> None:
     x = np.linspace(0.0, 1.0, 64)
     texels = np.stack([np.outer(x, x), np.outer(x, 1 - x), -np.outer(x, x)], axis=-1).astype(np.float16)
     for colours in (False, True):
-        found = encode_picture(np.abs(texels) if colours else texels, colours).texels.astype(np.float64)
+        found = encode_map_layer(np.abs(texels) if colours else texels, colours).texels.astype(np.float64)
         assert np.sqrt(((np.abs(found) - np.abs(texels.astype(np.float64))) ** 2).mean()) < (
             0.1 if colours else 0.02
         )

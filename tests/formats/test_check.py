@@ -1,4 +1,4 @@
-"""Error messages of mesh checks: culprit, fault and advice."""
+"""Error messages of mesh checks: subject, fault and advice."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ import pytest
 from egg import BUMPY, CLOTH, SKIN, Egg, Tree
 from property_rows import load_quietly, loaded, names_of, row_named, treatment
 
-from dermis.formats.gltf.read_materials import GLTF_MATERIALS
+from dermis.formats.gltf.read_materials import GLTF_MATERIAL_PROPERTIES
 from dermis.formats.mesh_formats import MESH_FORMATS
 
 PROPERTIES = MESH_FORMATS["gltf"].properties
@@ -258,7 +258,7 @@ def material_changes(which: str) -> list[Changed]:
     scan = both(in_surface(which, {"baseColorFactor": [0, 0, 0, 1]}), popped_colour(which))
     mask, cutoff = ({"alphaMode": "MASK"} | more for more in ({}, {"alphaCutoff": 0.9}))
     gloss = {"diffuseFactor": [0.5, 0.4, 0.3, 1.0]}
-    listed = {row.name: row.keys for row in GLTF_MATERIALS if row.keys and row.treatment == "noted"}
+    listed = {row.name: row.keys for row in GLTF_MATERIAL_PROPERTIES if row.keys and row.treatment == "noted"}
     del listed["`KHR_materials_emissive_strength`"]
     return [
         Changed("`baseColorFactor`", in_surface(which, {"baseColorFactor": [0.5, 0.6, 0.7, 1.0]})),
@@ -352,7 +352,7 @@ MATERIAL_CHANGES = [(which, case) for which in ("skin", "cloth") for case in mat
     ("which", "case"), MATERIAL_CHANGES, ids=[f"{which} {case.row}" for which, case in MATERIAL_CHANGES]
 )
 def test_a_property_of_a_material_is_treated_as_declared(which: str, case: Changed, tmp_path: Path) -> None:
-    row = row_named(GLTF_MATERIALS, case.row)
+    row = row_named(GLTF_MATERIAL_PROPERTIES, case.row)
     expected = row.treatment if which == "skin" else row.other_parts or row.treatment
     assert_treatment(case, expected, tmp_path)
 
@@ -360,8 +360,8 @@ def test_a_property_of_a_material_is_treated_as_declared(which: str, case: Chang
 def test_all_table_rows_are_exercised() -> None:
     rows = {row_named(PROPERTIES, one.row).name for one in CHANGES}
     assert rows | EXERCISED_ELSEWHERE.keys() == names_of(PROPERTIES)
-    assert {row_named(GLTF_MATERIALS, one.row).name for _, one in MATERIAL_CHANGES} == names_of(
-        GLTF_MATERIALS
+    assert {row_named(GLTF_MATERIAL_PROPERTIES, one.row).name for _, one in MATERIAL_CHANGES} == names_of(
+        GLTF_MATERIAL_PROPERTIES
     )
 
 

@@ -18,7 +18,7 @@ from dermis.base.file_properties import FileProperty
 from dermis.formats.stl import STL_PROPERTIES
 from dermis.formats.usd import read
 from dermis.formats.usd.read import USD_PROPERTIES
-from dermis.formats.usd.shading import USD_MATERIALS
+from dermis.formats.usd.shading import USD_MATERIAL_PROPERTIES
 from dermis.images.io import write_png
 
 NORMALS = np.tile([0.0, 0.0, 1.0], (len(BALL.positions), 1))
@@ -206,13 +206,15 @@ MATERIAL_CHANGES = [(which, change) for which in ("face", "shirt") for change in
 def test_each_property_of_a_usd_material_is_treated_as_declared(
     which: str, change: Change, folder: Path
 ) -> None:
-    row = row_named(USD_MATERIALS, change.row)
+    row = row_named(USD_MATERIAL_PROPERTIES, change.row)
     assert_treatment(folder, change, row.treatment if which == "face" else row.other_parts or row.treatment)
 
 
 def test_all_table_rows_are_exercised() -> None:
     assert {row_named(USD_PROPERTIES, one.row).name for one in CHANGES} == names_of(USD_PROPERTIES)
-    assert {row_named(USD_MATERIALS, one.row).name for _, one in MATERIAL_CHANGES} == names_of(USD_MATERIALS)
+    assert {row_named(USD_MATERIAL_PROPERTIES, one.row).name for _, one in MATERIAL_CHANGES} == names_of(
+        USD_MATERIAL_PROPERTIES
+    )
 
 
 def turned(data: bytes) -> bytes:

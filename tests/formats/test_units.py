@@ -10,7 +10,7 @@ from small_figure import arm, ellipsoids, figure, patch
 
 from dermis.base.errors import DermisError
 from dermis.formats.load import RiggedMesh
-from dermis.formats.units import guess_unit_mm, with_settled_unit
+from dermis.formats.units import guess_unit_mm, with_positions_in_mm
 from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import uv_sphere
 
@@ -24,7 +24,7 @@ def scaled(mesh: Mesh, factor: float) -> Mesh:
 
 
 def settled(mesh: Mesh, name: str, unit_mm: float | None = None) -> RiggedMesh:
-    return with_settled_unit(RiggedMesh(mesh, None), Path(name), unit_mm, name)
+    return with_positions_in_mm(RiggedMesh(mesh, None), Path(name), unit_mm, name)
 
 
 def refusal(mesh: Mesh, name: str, unit_mm: float | None = None) -> str:

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import os
 
-import numpy as np
-
 from dermis.apps.validation.comparisons.person_views import VIEWS, view_scene
 from dermis.frame.renderer import Renderer
-from dermis.gpu import download
 from dermis.human.person import Human
-from dermis.mesh.strands import Roots, hair_cover_of_points
 from dermis.scene.environment import Environment
 from dermis.scene.settings import Settings
 

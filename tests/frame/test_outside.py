@@ -46,13 +46,13 @@ power = 6
 
 @pytest.fixture
 def glow() -> Iterator[None]:
-    with LIGHTS.including("after-glow", GlowLight), KINDS.including("after-glow", GLOW):
+    with LIGHTS.temporary_entry("after-glow", GlowLight), KINDS.temporary_entry("after-glow", GLOW):
         yield
 
 
 @pytest.fixture
 def chalk() -> Iterator[None]:
-    with MODELS.including("blue-chalk", CHALK):
+    with MODELS.temporary_entry("blue-chalk", CHALK):
         yield
 
 
@@ -140,7 +140,7 @@ def test_plugin_technique_is_drawn(renderer: Renderer) -> None:
         settings = settings_of(size=(SIZE, SIZE), technique=technique, transmission="none")
         return renderer.draw(scene, settings).linear().astype(float)
 
-    with TECHNIQUES.including("dim", TECHNIQUE):
+    with TECHNIQUES.temporary_entry("dim", TECHNIQUE):
         assert "dim" in field_choices(Settings, "technique")
         assert "Borshukov2003" in picture_citation_keys(Skin(), Settings(technique="dim"))
         dimmed = below("dim")

@@ -33,7 +33,7 @@ def test_name_without_a_side_means_both_sides() -> None:
 
 
 def test_plugin_expression_is_usable_in_data_sets() -> None:
-    with EXPRESSIONS.including("sly", {"mouthSmileLeft": 0.3}):
+    with EXPRESSIONS.temporary_entry("sly", {"mouthSmileLeft": 0.3}):
         assert dermis.Pose(expression("sly")).weights == {"mouthSmileLeft": 0.3}
         parse_spec({"count": 10, "expression": {"name": "sly"}})
     with pytest.raises(DermisError, match="got 'sly'"):

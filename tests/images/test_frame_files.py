@@ -19,7 +19,7 @@ PICTURE = np.random.default_rng(0).integers(0, 256, (4, 6, 3), dtype=np.uint8)
 
 def _files(folder: Path, name: str = "%03d.png") -> FrameFiles:
     files = FrameFiles(folder / "frames" / name)
-    files.prepare()
+    files.prepare_folder()
     return files
 
 
@@ -31,7 +31,7 @@ def test_frame_names_are_numbered() -> None:
 @pytest.mark.parametrize("name", ["%s.png", "%02d-%02d.png", "%5d.png", "100%-%d.png", "%d.jpg", "%d"])
 def test_invalid_patterns_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(DermisError):
-        FrameFiles(tmp_path / "new" / name).prepare()
+        FrameFiles(tmp_path / "new" / name).prepare_folder()
     assert list(tmp_path.iterdir()) == []
 
 

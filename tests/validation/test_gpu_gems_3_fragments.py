@@ -84,7 +84,7 @@ def drawn(renderer: Renderer, scene: Scene, technique: str, seams: str) -> Drawn
 @pytest.fixture(scope="module", params=["clear-colour", "alpha"])
 def both(renderer: Renderer, leaf: Scene, request: pytest.FixtureRequest) -> tuple[Drawn, Drawn]:
     compute = drawn(renderer, leaf, GPU_GEMS_3, request.param)
-    with TECHNIQUES.including(FRAGMENT_TECHNIQUE, AS_FRAGMENTS):
+    with TECHNIQUES.temporary_entry(FRAGMENT_TECHNIQUE, AS_FRAGMENTS):
         fragments = drawn(renderer, leaf, FRAGMENT_TECHNIQUE, request.param)
     return compute, fragments
 
@@ -112,7 +112,7 @@ def test_sum_transmitted_light_and_image_match(both: tuple[Drawn, Drawn]) -> Non
 
 
 def test_compute_passes_are_restored_afterwards(renderer: Renderer, leaf: Scene) -> None:
-    with pytest.raises(KeyError), TECHNIQUES.including(FRAGMENT_TECHNIQUE, AS_FRAGMENTS):
+    with pytest.raises(KeyError), TECHNIQUES.temporary_entry(FRAGMENT_TECHNIQUE, AS_FRAGMENTS):
         assert drawn(renderer, leaf, FRAGMENT_TECHNIQUE, "alpha").filled > 0
         raise KeyError
     assert FRAGMENT_TECHNIQUE not in TECHNIQUES

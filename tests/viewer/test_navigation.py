@@ -155,6 +155,8 @@ def test_parallel_light_turns_its_direction() -> None:
 
 
 def test_without_lights_the_environment_turns(state: ViewerState) -> None:
-    around = state.with_rig("none").with_environment(Environment(name="uniform", rotation_degrees=170.0))
+    around = state.with_light_preset("none").with_environment(
+        Environment(name="uniform", rotation_degrees=170.0)
+    )
     turned = drag_light(around, 0, math.radians(20.0), 0.0).scene.environment
     assert turned is not None and turned.rotation_degrees == pytest.approx(-170.0)

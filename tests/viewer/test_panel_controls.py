@@ -31,7 +31,7 @@ STARTS: dict[str, Callable[[ViewerState], ViewerState]] = {
     ),
     "pigments": lambda state: state.with_skin(profile="light").with_pigments(structure="donner2008"),
     "layers": lambda state: state.with_skin(profile="dj3").with_settings(seams="clear-colour"),
-    "window": lambda state: state.with_rig("window"),
+    "window": lambda state: state.with_light_preset("window"),
 }
 EXPECTED = {
     "table": "show, profile, colour from, mix, roughness, rho_s, oiliness, BRDF, Fresnel, energy, "

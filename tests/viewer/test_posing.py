@@ -113,7 +113,7 @@ def test_saved_pose_is_restored(rigged: ViewerState, tmp_path: Path) -> None:
     skeleton = rigged.scene.head.control_rig.skeleton
     assert skeleton is not None
     pose = Pose({"jawOpen": 1 / 3}, {"neck": (1.0, -2.0, 0.1), "head": skeleton.local[1]})
-    moved = replace(rigged.with_pose(pose), rig="")
+    moved = replace(rigged.with_pose(pose), light_preset="")
     save_state(tmp_path / "scene.toml", moved)
     assert states_equal(load_state(tmp_path / "scene.toml", moved), moved)
     assert not states_equal(load_state(tmp_path / "scene.toml", moved), rigged)

@@ -55,7 +55,9 @@ def with_surface(state: ViewerState, folder: Path) -> ViewerState:
 
 def with_light(state: ViewerState, folder: Path) -> ViewerState:
     del folder
-    state = state.with_rig("window").with_light(1, irradiance=(0.5, 1.0, 2.0), shadows=True, softness_mm=9.0)
+    state = state.with_light_preset("window").with_light(
+        1, irradiance=(0.5, 1.0, 2.0), shadows=True, softness_mm=9.0
+    )
     around = Environment(name="uniform", rotation_degrees=40.0, exposure=0.3)
     return state.with_environment(around).with_camera(orbit(state.scene.camera, 0.6, -0.2))
 

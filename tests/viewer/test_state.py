@@ -27,7 +27,7 @@ def test_saved_state_is_restored_completely(state: ViewerState, tmp_path: Path) 
     before = full_state(state)
     save_state(tmp_path / "scene.toml", before)
     after = load_state(tmp_path / "scene.toml", before)
-    assert states_equal(replace(before, rig=""), after)
+    assert states_equal(replace(before, light_preset=""), after)
 
 
 def test_render_command_accepts_the_saved_file(state: ViewerState, tmp_path: Path) -> None:
@@ -41,7 +41,9 @@ def test_render_command_accepts_the_saved_file(state: ViewerState, tmp_path: Pat
 
 
 def test_a_scene_without_lights_stays_without(state: ViewerState, tmp_path: Path) -> None:
-    save_state(tmp_path / "dark.toml", state.with_rig("none").with_environment(Environment(name="uniform")))
+    save_state(
+        tmp_path / "dark.toml", state.with_light_preset("none").with_environment(Environment(name="uniform"))
+    )
     assert load_scene(tmp_path / "dark.toml")[0].lights == ()
 
 

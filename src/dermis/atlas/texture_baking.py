@@ -10,7 +10,7 @@ import numpy as np
 from dermis.atlas.raster import covered_texels
 from dermis.atlas.texture_tiles import TILE_PADDING_TEXELS, Tile, base_texture, file_uv, lay_out_tiles
 from dermis.base.arrays import Doubles, Floats, Mask, Numbers
-from dermis.formats.load import FileSurface
+from dermis.formats.load import FileSurfaceData
 from dermis.formats.maps import colour_map, slope_map
 from dermis.formats.materials import FileMaterial, Role, Texture, Wrap
 from dermis.formats.parts import DEFAULT_COLOUR
@@ -48,7 +48,7 @@ class PackedTextures:
 
 def pack_textures(
     mesh: Mesh,
-    surface: FileSurface,
+    surface: FileSurfaceData,
     materials: Sequence[FileMaterial],
     material_mask: Mask,
     required_roles: Sequence[Role] = ("colour",),
@@ -76,7 +76,7 @@ class _Baker:
     """Baker of the shared texture maps of several materials, with one tile of the maps per material."""
 
     mesh: Mesh
-    surface: FileSurface
+    surface: FileSurfaceData
     materials: Sequence[FileMaterial]
     tiles: list[Tile]
     side: int

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Mask
-from dermis.formats.load import FileSurface
+from dermis.formats.load import FileSurfaceData
 from dermis.formats.maps import MAX_MAP_SIDE
 from dermis.formats.materials import FileMaterial, Texture
 from dermis.images.io import read_size
@@ -64,7 +64,7 @@ def base_texture(material: FileMaterial) -> Texture | None:
     return material.textures.get("colour") or next(iter(material.textures.values()), None)
 
 
-def file_uv(mesh: Mesh, surface: FileSurface, uv_set: int, vertices: NDArray[np.integer]) -> Doubles:
+def file_uv(mesh: Mesh, surface: FileSurfaceData, uv_set: int, vertices: NDArray[np.integer]) -> Doubles:
     """Return the uv coordinates (n, 2) of vertices in one of the file's uv sets, with v down.
 
     uv_set : index of the uv set; set 0 is the mesh's own uv
@@ -74,7 +74,7 @@ def file_uv(mesh: Mesh, surface: FileSurface, uv_set: int, vertices: NDArray[np.
 
 
 def lay_out_tiles(
-    mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial], material_mask: Mask
+    mesh: Mesh, surface: FileSurfaceData, materials: Sequence[FileMaterial], material_mask: Mask
 ) -> tuple[list[Tile], int, float]:
     """Return tiles for selected materials, the side of the shared map [texel], and a scale factor.
 
@@ -99,7 +99,7 @@ def lay_out_tiles(
 
 def _unplaced_tile(
     mesh: Mesh,
-    surface: FileSurface,
+    surface: FileSurfaceData,
     material: FileMaterial,
     material_index: int,
     triangles: NDArray[np.integer],

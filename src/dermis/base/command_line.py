@@ -135,11 +135,13 @@ def usage_message(error: CycloptsError, program_name: str) -> str:
     program_name : name of the program
     """
     command = " ".join((program_name, *(error.command_chain or ())))
-    culprit, expected, actual = (shorten(part, _MAX_TEXT_LENGTH) for part in _describe_error(error, command))
+    error_subject, expected, actual = (
+        shorten(part, _MAX_TEXT_LENGTH) for part in _describe_error(error, command)
+    )
     error.verbose = False
     hint = str(error).partition("Did you mean ")[2]
     did_you_mean = f"Did you mean {hint} " if hint else ""
-    return f"{culprit}: expected {expected}, but {actual}. {did_you_mean}See {command} --help."
+    return f"{error_subject}: expected {expected}, but {actual}. {did_you_mean}See {command} --help."
 
 
 def _describe_error(error: CycloptsError, command: str) -> tuple[str, str, str]:

@@ -47,7 +47,7 @@ def print_report(as_json: bool, report: object, make_lines: Callable[[], Iterabl
         print_lines(*make_lines())
 
 
-def note(note_text: str) -> None:
+def print_note(note_text: str) -> None:
     """Print a line of text to stderr."""
     sys.stderr.write(note_text + "\n")
 

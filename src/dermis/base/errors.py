@@ -27,7 +27,7 @@ class DermisError(Exception):
 
 
 @contextmanager
-def error_context(culprit: object) -> Iterator[None]:
+def error_context(error_subject: object) -> Iterator[None]:
     """Put the name of a file, option or object before the messages of errors raised in a with block.
 
     Messages that already contain the name are unchanged.
@@ -35,9 +35,9 @@ def error_context(culprit: object) -> Iterator[None]:
     try:
         yield
     except DermisError as error:
-        if str(culprit) in str(error):
+        if str(error_subject) in str(error):
             raise
-        raise DermisError(f"{culprit}: {error}") from error
+        raise DermisError(f"{error_subject}: {error}") from error
 
 
 class DermisWarning(UserWarning):
@@ -49,17 +49,17 @@ def notify(message: str) -> None:
     warnings.warn(message, DermisWarning, stacklevel=3)
 
 
-def refuse(culprit: object, expected: str, actual: str, advice: str) -> NoReturn:
+def refuse(error_subject: object, expected: str, actual: str, advice: str) -> NoReturn:
     """Raise a `DermisError` that says what was expected, what was received and what to do.
 
-    The message is "culprit: expected EXPECTED, but ACTUAL. ADVICE."
+    The message is "ERROR_SUBJECT: expected EXPECTED, but ACTUAL. ADVICE."
 
-    culprit : file, option or object at fault
+    error_subject : file, option or object at fault
     expected : phrase after "expected"
     actual : clause after "but", such as "got 3" or "it has none"
     advice : what to do, without a full stop
     """
-    name, actual = shorten(str(culprit), _MAX_NAME_LENGTH), shorten(actual, _MAX_TEXT_LENGTH)
+    name, actual = shorten(str(error_subject), _MAX_NAME_LENGTH), shorten(actual, _MAX_TEXT_LENGTH)
     end = "" if advice.endswith("?") else "."
     raise DermisError(f"{name}: expected {expected}, but {actual}. {advice}{end}")
 

@@ -47,7 +47,7 @@ def _file_property(
     *keys: str,
     other_parts: Treatment | None = None,
 ) -> FileProperty:
-    """Return a `FileProperty`; callers use `drawn`, `noted` ..., which pass their treatment to this function.
+    """Return a `FileProperty`; callers use `drawn_property` and others, which pass their treatment to it.
 
     keys : words by which the reader recognises the property
     other_parts : treatment in the materials of parts that are not skin; None if it is the same
@@ -55,11 +55,11 @@ def _file_property(
     return FileProperty(treatment, property_name, detail_text, keys, other_parts)
 
 
-drawn = partial(_file_property, "drawn")
-drawn_with_note = partial(_file_property, "drawn with a note")
-noted = partial(_file_property, "noted")
-refused = partial(_file_property, "refused")
-no_effect = partial(_file_property, "no effect")
+drawn_property = partial(_file_property, "drawn")
+drawn_property_with_note = partial(_file_property, "drawn with a note")
+noted_property = partial(_file_property, "noted")
+refused_property = partial(_file_property, "refused")
+property_without_effect = partial(_file_property, "no effect")
 
 
 def keys_of(properties: Iterable[FileProperty], *treatments: Treatment) -> tuple[str, ...]:

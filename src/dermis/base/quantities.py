@@ -12,10 +12,10 @@ if TYPE_CHECKING:  # importing NumPy takes longer than printing --help
     from numpy.typing import NDArray
 
 
-def checked_number(culprit: object, value: object, low: float, high: float, reason: str = "") -> float:
+def checked_number(error_subject: object, value: object, low: float, high: float, reason: str = "") -> float:
     """Return a value as a float after checking that it lies in a range.
 
-    culprit : option or field with the value, for errors
+    error_subject : option or field with the value, for errors
     low, high : limits of the range, both included
     reason : reason for the limits, or unit of the value, to be added to errors
 
@@ -23,27 +23,27 @@ def checked_number(culprit: object, value: object, low: float, high: float, reas
     """
     found = _number_in_range(value, low, high)
     if found is None:
-        _refuse_number(culprit, "a number", value, low, high, reason)
+        _refuse_number(error_subject, "a number", value, low, high, reason)
     return float(found)
 
 
-def checked_integer(culprit: object, value: object, low: float, high: float, reason: str = "") -> int:
+def checked_integer(error_subject: object, value: object, low: float, high: float, reason: str = "") -> int:
     """Return a value as an int after checking that it is a whole number in a range; 4.0 becomes 4.
 
     For parameters and errors see `checked_number`.
     """
     found = _number_in_range(value, low, high)
     if found is None or found != int(found):
-        _refuse_number(culprit, "a whole number", value, low, high, reason)
+        _refuse_number(error_subject, "a whole number", value, low, high, reason)
     return int(found)
 
 
 def checked_array(
-    culprit: object, values: object, shape: tuple[int, ...], low: float, high: float, reason: str = ""
+    error_subject: object, values: object, shape: tuple[int, ...], low: float, high: float, reason: str = ""
 ) -> NDArray[np.float64]:
     """Return values as a float64 array after checking the shape and the range of all elements.
 
-    culprit : option or field with the values, for errors
+    error_subject : option or field with the values, for errors
     shape : expected shape, with 0 for an axis of any length
     low, high : limits of the range, both included
     reason : reason for the limits, or unit of the value, to be added to errors
@@ -63,7 +63,7 @@ def checked_array(
     if not fits:
         form = " x ".join(str(side or "n") for side in shape)
         expected = f"{form} numbers from {low:.10g} to {high:.10g}{f' ({reason})' if reason else ''}"
-        refuse(culprit, expected, f"got {format_value(values)}", "Correct it")
+        refuse(error_subject, expected, f"got {format_value(values)}", "Correct it")
     return found
 
 
@@ -111,8 +111,8 @@ def _has_text(values: Any, dimension_count: int) -> bool:
 
 
 def _refuse_number(
-    culprit: object, number_noun: str, value: object, low: float, high: float, reason: str
+    error_subject: object, number_noun: str, value: object, low: float, high: float, reason: str
 ) -> NoReturn:
     suffix = f" ({reason})" if reason else ""
     expected = f"{number_noun} from {low:.10g} to {high:.10g}{suffix}"
-    refuse(culprit, expected, f"got {format_value(value)}", "Choose one in this range")
+    refuse(error_subject, expected, f"got {format_value(value)}", "Choose one in this range")

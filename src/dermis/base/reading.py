@@ -22,7 +22,7 @@ from typing import Any, BinaryIO, NoReturn
 from dermis.base.errors import DermisError, error_text, refuse
 
 MALFORMED_DATA_ERRORS = (LookupError, TypeError, AttributeError, ArithmeticError, struct.error)
-"""Exceptions raised by code that assumes well-formed data; pass them to `parsing`."""
+"""Exceptions raised by code that assumes well-formed data; pass them to refuse_parse_errors."""
 MAX_TEXT_BYTES = 1 << 20  # largest file with settings: scenes, lights, tables
 _MIN_READ_BYTES = 1 << 16
 _MAX_INTEGER_BITS = 64  # largest size of integers, as in TOML; all can be converted to float
@@ -43,22 +43,22 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
 
     Raises DermisError when the file is missing, not regular, too large or unreadable.
     """
-    culprit = path if name is None else name
+    error_subject = path if name is None else name
     try:
-        with os.fdopen(_open_regular_descriptor(path, culprit, expected), "rb") as file:
+        with os.fdopen(_open_regular_descriptor(path, error_subject, expected), "rb") as file:
             size = os.fstat(file.fileno()).st_size
             limit = min(
                 max_bytes, max(size, _MIN_READ_BYTES)
             )  # system files such as /proc report a size of 0
             data = file.read(limit + 1) if size <= max_bytes else b""
     except (OSError, ValueError, TypeError) as fault:  # ValueError: a NUL in the name; TypeError: no name
-        refuse(culprit, expected, f"it cannot be read ({error_text(fault)})", "Check its name")
+        refuse(error_subject, expected, f"it cannot be read ({error_text(fault)})", "Check its name")
     if data is None:
-        refuse(culprit, expected, "nothing can be read from it", "Copy its contents to a file first")
+        refuse(error_subject, expected, "nothing can be read from it", "Copy its contents to a file first")
     if size > max_bytes or len(data) > limit:
         actual = f"it has {_format_megabytes(size)}" if size > max_bytes else "it grows while it is read"
         refuse(
-            culprit,
+            error_subject,
             f"{expected} of at most {_format_megabytes(max_bytes)}",
             actual,
             "Check its name and size",
@@ -103,7 +103,7 @@ def read_text(path: str | Path, expected: str, max_bytes: int = MAX_TEXT_BYTES) 
 
     Raises DermisError as `read_file` does, and for files that are not text.
     """
-    with parsing(path, expected):
+    with refuse_parse_errors(path, expected):
         data = read_file(path, expected, max_bytes)
         return data.decode("utf-16" if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig")
 
@@ -114,7 +114,7 @@ def read_toml(path: str | Path, expected: str = "a TOML file") -> dict[str, Any]
     Raises DermisError as `read_text` does, and for invalid TOML.
     """
     text = read_text(path, expected)
-    with parsing(path, expected):
+    with refuse_parse_errors(path, expected):
         if _LONG_KEY_PATTERN.search(text):
             raise ValueError(f"a key has more than {_MAX_KEY_PARTS} parts with dots between them")
         tables = tomllib.loads(text)
@@ -122,12 +122,12 @@ def read_toml(path: str | Path, expected: str = "a TOML file") -> dict[str, Any]
     return tables
 
 
-def parse_json(json_text: str | bytes, culprit: object, expected: str) -> Any:
+def parse_json(json_text: str | bytes, error_subject: object, expected: str) -> Any:
     """Return the value of a JSON text; all numbers in the text must be finite.
 
     Raises DermisError for invalid JSON, deep nesting, and numbers that are too large.
     """
-    with parsing(culprit, expected):
+    with refuse_parse_errors(error_subject, expected):
         return json.loads(
             json_text,
             parse_constant=_refuse_json_constant,
@@ -149,10 +149,10 @@ def checked_path(file_name: object, expected: str) -> Path:
 
 
 @contextmanager
-def parsing(culprit: object, expected: str, *errors: type[Exception]) -> Iterator[None]:
+def refuse_parse_errors(error_subject: object, expected: str, *errors: type[Exception]) -> Iterator[None]:
     """Convert exceptions that a parser raises in a with block into a DermisError that names the file.
 
-    culprit : name of the file
+    error_subject : name of the file
     expected : what the file should be
     errors : exception types that the parser raises besides ValueError and OverflowError
     """
@@ -161,25 +161,27 @@ def parsing(culprit: object, expected: str, *errors: type[Exception]) -> Iterato
     except DermisError:
         raise
     except RecursionError:
-        refuse(culprit, expected, "it is nested too deeply", "Export it again, or correct it")
+        refuse(error_subject, expected, "it is nested too deeply", "Export it again, or correct it")
     except MemoryError:
-        refuse(culprit, expected, "it needs more memory than there is", "Make it smaller")
+        refuse(error_subject, expected, "it needs more memory than there is", "Make it smaller")
     except Exception as fault:
         if not isinstance(fault, (ValueError, OverflowError, *errors)):
             raise
-        refuse(culprit, expected, f"it cannot be understood ({_short_error(fault)})", "Check its contents")
+        refuse(
+            error_subject, expected, f"it cannot be understood ({_short_error(fault)})", "Check its contents"
+        )
 
 
-def _open_regular_descriptor(path: str | Path, culprit: object, expected: str) -> int:
+def _open_regular_descriptor(path: str | Path, error_subject: object, expected: str) -> int:
     """Open a regular file and return its descriptor; pipes and devices are refused without blocking.
 
-    culprit : name of the file, for the error
+    error_subject : name of the file, for the error
     expected : what the file should be, for the error
     """
     descriptor = os.open(path, os.O_RDONLY | _OPEN_FLAGS)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        refuse(culprit, expected, "it is not a regular file", "Copy its contents to a file first")
+        refuse(error_subject, expected, "it is not a regular file", "Copy its contents to a file first")
     return descriptor
 
 

@@ -72,7 +72,7 @@ class Registry(Mapping[str, T], Generic[T]):
             self._summaries[name] = summary
 
     @contextmanager
-    def including(self, name: str, entry: T | str) -> Iterator[None]:
+    def temporary_entry(self, name: str, entry: T | str) -> Iterator[None]:
         """Add an entry for the duration of a with block, such as in tests."""
         self.register(name, entry)
         try:

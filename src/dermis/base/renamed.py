@@ -90,12 +90,12 @@ def renamed_keywords(**new_names: str) -> Callable[[Callable[P, R]], Callable[P,
 def renamed_attribute(old_name: str, new_name: str) -> property:
     """Return a property for the old name of an attribute; it warns and returns the renamed attribute."""
 
-    def get(instance: Any) -> Any:
+    def get_renamed_attribute(instance: Any) -> Any:
         text = f"{type(instance).__name__}.{old_name} is now {new_name}"
         warnings.warn(f"{text}; {_REMOVAL_NOTICE}", DeprecationWarning, stacklevel=2)
         return getattr(instance, new_name)
 
-    return property(get)
+    return property(get_renamed_attribute)
 
 
 def renamed_classmethod(old_name: str, new_name: str) -> classmethod[Any, ..., Any]:

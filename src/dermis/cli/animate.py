@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from dermis.base.console import note, print_report, progress_bar, spinner
+from dermis.base.console import print_note, print_report, progress_bar, spinner
 from dermis.base.errors import refuse
 from dermis.base.quantities import checked_number
 from dermis.cli.options import AdapterOption, FlagOption, IntegerOption, JsonOption, Options, OutputPath
@@ -132,15 +132,15 @@ def animate(
 
     started = time.perf_counter()
     span, target = parse_time_span(begin, end, fps, motion_fps), AnimationOutput(output, crf, overwrite)
-    target.check(scene.settings.get("size", (2, 2)))
+    target.check_writable(scene.settings.get("size", (2, 2)))
     motion_path = motion_file(head, motion)
     with spinner("loading"):
         animated, settings = assemble_scene(head, scene)
-        target.check(settings.size)
+        target.check_writable(settings.size)
         motion_clip = load_clip(head, animated.head, motion_path, clip, scene.head, span)
         numbers, rate = span.frames(motion_clip)
     if motion_clip.note:
-        note(f"note: {motion_clip.note}")
+        print_note(f"note: {motion_clip.note}")
     note_subdivision(head, scene, animated.head)
     settings = shrink_atlas_on_cpu(animated, settings, select_adapters(adapter)[0][0].kind)
     animation = _AnimatedScene(animated, settings, motion_clip, rate, numbers[0])
@@ -193,7 +193,7 @@ def _common_exposure(animated_scene: _AnimatedScene, renderer: Renderer) -> floa
         return animated_scene.settings.exposure
     (scene,) = animated_scene.scenes([animated_scene.first])
     exposure = renderer.draw(scene, animated_scene.settings, timed=False).exposure
-    note(f"note: --exposure {exposure:.3g}, metered at the first frame")
+    print_note(f"note: --exposure {exposure:.3g}, metered at the first frame")
     return exposure
 
 

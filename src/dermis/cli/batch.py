@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from dermis.base.console import note, print_json, print_lines, print_report, spinner
+from dermis.base.console import print_json, print_lines, print_note, print_report, spinner
 from dermis.base.errors import refuse
 from dermis.cli.options import (
     AdapterOption,
@@ -255,7 +255,7 @@ def image_progress() -> Iterator[Callable[[Progress], None]]:
     The function updates a progress bar in a terminal, and logs lines if stderr is not a terminal.
     """
     if not sys.stderr.isatty():
-        yield ProgressLog(note).report
+        yield ProgressLog(print_note).report
         return
     from rich import progress as rich
     from rich.console import Console

@@ -15,7 +15,7 @@ from dermis.base.atomic_write import atomic_file, refuse_output
 from dermis.base.console import print_report, spinner
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
-from dermis.cli.head_options import ShapeOptions, check_head_options, note_kept_eyeballs
+from dermis.cli.head_options import MeshOptions, check_head_options, note_kept_eyeballs
 from dermis.cli.options import (
     NO_OPTIONS,
     AdapterOption,
@@ -67,7 +67,7 @@ def compare(
     model: ModelName | None = None,
     sizes: SizeOptions = NO_OPTIONS,
     skin: SkinOptions = NO_OPTIONS,
-    shape: ShapeOptions = NO_OPTIONS,
+    shape: MeshOptions = NO_OPTIONS,
     samples: IntegerOption = None,
     output: OptionalOutputPath = None,
     adapter: AdapterOption = "auto",
@@ -230,7 +230,7 @@ _COLOUR_OF_INCIDENCE_DEGREES = {
     45: "#2e8b57",
     75: "#c0392b",
 }  # angles of incidence [degrees] and plot colours
-_DUPLICATE_MODEL = "kelemen-direct"  # the same lobe as kelemen
+_OMITTED_DUPLICATE_MODEL = "kelemen-direct"  # the same lobe as kelemen
 _PLOT_COLUMN_COUNT = 4
 # smallest radius of the plots: square root of the intensity relative to kelemen's peak
 _MIN_PLOT_RADIUS = 1.8
@@ -317,7 +317,7 @@ def _draw_lobes_and_albedo(folder: Path, roughness: float) -> None:
 
 def _distinct_model_names() -> list[str]:
     """Return the names of the specular models, except "kelemen-direct", whose lobe is that of "kelemen"."""
-    return [name for name in MODELS if name != _DUPLICATE_MODEL]
+    return [name for name in MODELS if name != _OMITTED_DUPLICATE_MODEL]
 
 
 def _lobe_figure(roughness: float) -> Figure:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from dermis.base.console import note, print_report, progress_bar
+from dermis.base.console import print_note, print_report, progress_bar
 from dermis.cli.options import AdapterOption, IntegerOption, JsonOption, OutputPath
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def gallery(
             pictures.append(picture)
             report_progress(len(pictures), len(scripts))
             if picture.fault:
-                note(f"dermis: {picture.script.name}: {picture.fault}")
+                print_note(f"dermis: {picture.script.name}: {picture.fault}")
     page = output / "index.html"
     write_page(page, pictures, studio.name, studio.renderer.device.adapter.name)
     count = f"{len(pictures)} picture{'s' * (len(pictures) != 1)}"

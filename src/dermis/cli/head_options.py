@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from dermis.base.console import note
+from dermis.base.console import print_note
 from dermis.base.errors import DermisError, refuse
 from dermis.cli.options import Options, check_fields, model_options
 from dermis.mesh.eye_look import EYE_LOOK_RANGES
@@ -15,7 +15,7 @@ from dermis.scene.head_table import HeadTable
 
 HEAD_OPTION_NAMES = {"specular": "specular_map", "roughness": "roughness_map"}
 """Option names by field of the [head] table, where they differ from the name of the field."""
-_SHAPE_FIELDS = "unit_mm", "v_origin", "up", "front", "skin_groups", "opaque", "eyes", "eye_groups"
+_MESH_FIELDS = "unit_mm", "v_origin", "up", "front", "skin_groups", "opaque", "eyes", "eye_groups"
 _MAP_FIELDS = "colour", "normal", "normal_y", "height", "height_mm", "specular", "roughness"
 
 if TYPE_CHECKING:
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from dermis.scene.model import Scene
 
     HeadOptions = Options
-    ShapeOptions = Options
+    MeshOptions = Options
     FileOptions = Options
 else:
     HeadOptions = model_options(HeadTable, excluded_fields=("name",), option_names=HEAD_OPTION_NAMES)
-    ShapeOptions = model_options(HeadTable, only_fields=_SHAPE_FIELDS)
+    MeshOptions = model_options(HeadTable, only_fields=_MESH_FIELDS)
     FileOptions = model_options(
-        HeadTable, only_fields=(*_SHAPE_FIELDS, *_MAP_FIELDS), option_names=HEAD_OPTION_NAMES
+        HeadTable, only_fields=(*_MESH_FIELDS, *_MAP_FIELDS), option_names=HEAD_OPTION_NAMES
     )
 
 
@@ -65,9 +65,9 @@ def note_kept_eyeballs(head: Head, eyes_option: str | None) -> None:
     eyes_option : value of the option --eyes
     """
     if head.note:
-        note(f"note: {head.note}")
+        print_note(f"note: {head.note}")
     elif eyes_option == "fitted" and head.eyes is None:
-        note("note: eyes: no group has a name of an eye; name the groups with --eye-groups")
+        print_note("note: eyes: no group has a name of an eye; name the groups with --eye-groups")
 
 
 _MAX_OPTION_NUMBER = 1e10

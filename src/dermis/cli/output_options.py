@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, cast
 from cyclopts import Parameter
 
 from dermis.base.atomic_write import atomic_file, check_output
-from dermis.base.console import note
+from dermis.base.console import print_note
 from dermis.base.errors import refuse
 from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.scene.outputs import OUTPUTS, check_outputs
@@ -67,7 +67,7 @@ class FrameOutputs:
         for path in self.paths.values():
             check_output(path, (path.suffix,))
         if "motion" in self.names:
-            note("note: motion is 0 in a single picture; Renderer.observe measures it between pictures")
+            print_note("note: motion is 0 in a single picture; Renderer.observe measures it between pictures")
 
     def write(self, picture: Floats | None, output_values: Mapping[str, OutputArray]) -> None:
         """Write the outputs to their files.
@@ -119,7 +119,7 @@ class FrameLandmarks:
             self.names = checked_landmark_sets(_split_names(option_value))
             check_output(self.path, (self.path.suffix,))
 
-    def check(self, head: Head) -> None:
+    def check_landmark_sets(self, head: Head) -> None:
         """Raise DermisError if the head lacks a requested landmark set; to be called before rendering."""
         if self.names:
             from dermis.human.landmarks.points import landmark_points
@@ -181,7 +181,7 @@ class AnimationOutput:
         """Return whether the images store linear light as floats (EXR)."""
         return self.path.suffix.lower() == ".exr"
 
-    def check(self, frame_size: tuple[int, int]) -> None:
+    def check_writable(self, frame_size: tuple[int, int]) -> None:
         """Raise DermisError if frames of this size cannot be written; to be called before rendering."""
         from dermis.images.movie import DEFAULT_CRF, MOVIE_SUFFIX, check_movie
         from dermis.images.writer import FrameFiles
@@ -189,7 +189,7 @@ class AnimationOutput:
         if self.is_numbered:
             if self.crf is not None:
                 refuse("--crf", f"a movie ({MOVIE_SUFFIX}) as output", f"got {self.path}", "Leave it out")
-            FrameFiles(self.path).prepare()
+            FrameFiles(self.path).prepare_folder()
             return
         if self.overwrite:
             refuse("--anew", "numbered pictures with it", f"got {self.path}", "Leave it out")

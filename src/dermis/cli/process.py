@@ -138,7 +138,8 @@ _HANDLED_SIGNALS = [
 # earlier repetitions are ignored: intermediate programs may send a signal twice
 _MIN_SECOND_SIGNAL_DELAY_S = 0.5
 _SIGNAL_RETRY_S = 0.02
-_UNSAFE_PACKAGES = {"importlib", "pydantic"}  # exceptions leave half-imported modules, or are lost in Rust
+# exceptions leave half-imported modules, or are lost in Rust
+_UNINTERRUPTIBLE_PACKAGES = {"importlib", "pydantic"}
 _DRIVER_PACKAGES = {"wgpu", "glfw"}
 _RETRY_BYTE, _END_BYTE = b"\0", b"\xff"  # bytes that are not signal numbers
 _SIGNAL_EXIT_BASE = 128  # exit status after a signal, minus the number of the signal
@@ -278,7 +279,7 @@ def _caller_swallows_exceptions(stack_frame: FrameType | None) -> bool:
             str(stack_frame.f_globals.get("__name__")).partition(".")[0],
             stack_frame.f_code.co_name,
         )
-        if package in _UNSAFE_PACKAGES or (package in _DRIVER_PACKAGES and "callback" in name):
+        if package in _UNINTERRUPTIBLE_PACKAGES or (package in _DRIVER_PACKAGES and "callback" in name):
             return True
         stack_frame = stack_frame.f_back
     return False

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from dermis.base.console import note, print_json, print_lines, progress_bar
+from cyclopts import Parameter
+
+from dermis.base.console import print_json, print_lines, print_note, progress_bar
 from dermis.base.errors import refuse
 from dermis.base.quantities import checked_integer, checked_number
 from dermis.cli.options import (
@@ -52,7 +54,7 @@ else:
         Pigments, option_names=_PIGMENT_OPTION_NAMES, shown_defaults=_pigment_default_texts()
     )
 
-Clamp = Literal["layer", "none"]
+SourceDepthClamp = Literal["layer", "none"]
 ProfileModelName = Literal[
     "counted", "dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"
 ]
@@ -65,7 +67,7 @@ def profile(
     /,
     *,
     model: ProfileModelName | None = None,
-    clamp: Clamp = "layer",
+    clamp: SourceDepthClamp = "layer",
     eta: float | None = None,
     photons: IntegerOption = None,
     seed: IntegerOption = None,
@@ -76,7 +78,7 @@ def profile(
     fit_kind: Literal["gaussian", "burley", "separable"] = "gaussian",
     variances: Literal["shared", "per-channel"] = "shared",
     keep_energy: FlagOption = False,
-    through: str | None = None,
+    transmission_thicknesses: Annotated[str | None, Parameter(name="--through")] = None,
     output: OptionalOutputPath = None,
     plot: Path | None = None,
     check: FlagOption = False,
@@ -128,7 +130,7 @@ def profile(
         Variances of the Gaussians: shared by all colour channels, as the renderer requires, or per-channel.
     keep_energy:
         Make the weights of the Gaussians sum to the total reflectance; always on for the model counted.
-    through:
+    transmission_thicknesses:
         Thicknesses at which to report the transmitted colour, such as 0.5,1,2 [mm].
     output:
         Profile to write (.toml), for `dermis render --profile`.
@@ -148,7 +150,9 @@ def profile(
     tissue_options = pigments | drop_none(oiliness=oiliness)
     changed = tissue_options or eta is not None
     _check_outputs(output, plot, check)
-    thicknesses = () if through is None else parse_lengths("--through", through)
+    thicknesses = (
+        () if transmission_thicknesses is None else parse_lengths("--through", transmission_thicknesses)
+    )
     tracing = _tracing_options(photons, seed, anisotropy, check or model == "montecarlo")
     table = find_gaussians(name)
     if table is not None:
@@ -180,7 +184,7 @@ def profile(
     else:
         print_lines(*report.lines())
         for warning in radial.warnings:
-            note(f"warning: {warning}")
+            print_note(f"warning: {warning}")
     return 0
 
 
@@ -203,7 +207,9 @@ def _tracing_options(photons: int | None, seed: int | None, anisotropy: float, i
     is_traced : whether the simulation will run
     """
     if not is_traced and (photons, seed, anisotropy) != (None, None, 0.0):
-        note("note: --photons, --seed and --anisotropy have no effect without --model montecarlo or --check")
+        print_note(
+            "note: --photons, --seed and --anisotropy have no effect without --model montecarlo or --check"
+        )
     return {
         "photons": checked_integer(
             "--photons", _DEFAULT_PHOTON_COUNT if photons is None else photons, 1, _MAX_PHOTON_COUNT
@@ -232,7 +238,7 @@ def _load_tissue(medium_name: str, options: Options, eta: float | None) -> Tissu
 
 
 def _reflectance_spectrum(
-    tissue: Tissue, model_name: ProfileModelName | None, source_clamp: Clamp
+    tissue: Tissue, model_name: ProfileModelName | None, source_clamp: SourceDepthClamp
 ) -> Floats | None:
     if model_name is None or model_name == "counted" or model_name == "montecarlo":
         return tissue.spectrum(clamp=source_clamp)
@@ -240,7 +246,10 @@ def _reflectance_spectrum(
 
 
 def _compute_profile(
-    tissue: Tissue, model_name: ProfileModelName | None, source_clamp: Clamp, tracing_options: Options
+    tissue: Tissue,
+    model_name: ProfileModelName | None,
+    source_clamp: SourceDepthClamp,
+    tracing_options: Options,
 ) -> RadialProfile:
     if model_name != "montecarlo":
         return tissue.profile(model_name, source_clamp)

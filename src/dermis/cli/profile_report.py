@@ -91,8 +91,8 @@ class ProfileReport:
     radial : diffusion profile
     tissue : tissue that the profile describes; None for a table of Gaussians
     fit : fitted Gaussians and their error
-    other_fit : Burley or separable fit; None if not requested
-    through_mm : thicknesses at which the transmitted colour is reported [mm]
+    additional_fit : Burley or separable fit; None if not requested
+    transmission_thicknesses_mm : thicknesses at which the transmitted colour is reported [mm]
     model_error : error of the diffusion model relative to Monte Carlo; None if this error is unknown
     spectrum : (31,) total reflectance at each wavelength; None for tissue given by RGB coefficients [-]
     """
@@ -100,8 +100,8 @@ class ProfileReport:
     radial: RadialProfile
     tissue: Tissue | None
     fit: GaussianFit
-    other_fit: BurleyFit | SeparableFit | None
-    through_mm: tuple[float, ...]
+    additional_fit: BurleyFit | SeparableFit | None
+    transmission_thicknesses_mm: tuple[float, ...]
     model_error: ModelDeviation | None = None
     spectrum: Floats | None = None
 
@@ -145,8 +145,10 @@ class ProfileReport:
                 },
                 "model_error": error
                 and {"least": error.smallest, "most": error.largest, "tissues": error.tissues},
-                **self._other_fit_json(),
-                "transmission": {"thickness_mm": self.through_mm, **transmitted} if transmitted else None,
+                **self._additional_fit_json(),
+                "transmission": {"thickness_mm": self.transmission_thicknesses_mm, **transmitted}
+                if transmitted
+                else None,
                 "warnings": radial.warnings,
                 "notes": self.tissue.medium.notes if self.tissue else (),
                 "sources": radial.sources,
@@ -170,9 +172,9 @@ class ProfileReport:
         kind = "R(r)" if fit.kind == "pointwise" else "rings"
         lines.append(f"error      {_format_row(fit.error)}  of {kind}, relative")
         lines.append(f"energy     {_format_row(fit.energy_error)}  relative error of the total")
-        lines += self._model_error_lines() + self._other_fit_lines()
+        lines += self._model_error_lines() + self._additional_fit_lines()
         for method, colours in self._transmitted_colours().items():
-            for thickness, colour in zip(self.through_mm, colours, strict=True):
+            for thickness, colour in zip(self.transmission_thicknesses_mm, colours, strict=True):
                 lines.append(f"through    {_format_row(colour)}  {thickness:g} mm, by {method}")
         lines += [f"note: {note}" for note in (self.tissue.medium.notes if self.tissue else ())]
         return lines
@@ -188,16 +190,18 @@ class ProfileReport:
         lines = [f"model      {_format_row(error.smallest)}  at least, {condition},"]
         return [*lines, f"           {_format_row(error.largest)}  at most, on {', '.join(error.tissues)}"]
 
-    def _other_fit_lines(self) -> list[str]:
-        if self.other_fit is None:
+    def _additional_fit_lines(self) -> list[str]:
+        if self.additional_fit is None:
             return []
-        if isinstance(self.other_fit, BurleyFit):
-            lines = [f"Burley     {_format_row(self.other_fit.profile.shape)}  s [1/mm]"]
+        if isinstance(self.additional_fit, BurleyFit):
+            lines = [f"Burley     {_format_row(self.additional_fit.profile.shape)}  s [1/mm]"]
         else:
-            kernel = self.other_fit.kernel
+            kernel = self.additional_fit.kernel
             pairs = zip(kernel.variance_mm2, kernel.weight, strict=True)
             lines = [f"separable  {_format_row(v)}  mm2, weights {_format_row(w)}" for v, w in pairs]
-        fit_error = f"rings      {_format_row(self.other_fit.error)}  its error in the light through rings"
+        fit_error = (
+            f"rings      {_format_row(self.additional_fit.error)}  its error in the light through rings"
+        )
         return [*lines, fit_error, f"rings      {_format_row(self.ring_error)}  error of the Gaussians"]
 
     def save(self, path: Path) -> None:
@@ -237,28 +241,31 @@ class ProfileReport:
             values["reflectance"] = self.spectrum
         return values
 
-    def _other_fit_json(self) -> dict[str, object]:
-        if self.other_fit is None:
+    def _additional_fit_json(self) -> dict[str, object]:
+        if self.additional_fit is None:
             return {}
-        values = asdict(self.other_fit)
-        if not isinstance(self.other_fit, BurleyFit):
+        values = asdict(self.additional_fit)
+        if not isinstance(self.additional_fit, BurleyFit):
             return {"separable": values}
         engines = {
-            f.__name__: asdict(f(self.other_fit.profile)) for f in (unity_parameters, unreal_parameters)
+            f.__name__: asdict(f(self.additional_fit.profile)) for f in (unity_parameters, unreal_parameters)
         }
         return {"burley": values | engines}
 
     def _transmitted_colours(self) -> dict[str, Floats]:
         """Return a dictionary from the name of a method to the transmittances (n, 3) of n slabs [-].
 
-        The slabs have the thicknesses `through_mm`. The methods are "gaussians" (computed from the fitted
-        Gaussians) and "slab" (computed from the tissue, and absent if the tissue is not known).
+        The slabs have the thicknesses `transmission_thicknesses_mm`. The methods are "gaussians" (computed
+        from the fitted Gaussians) and "slab" (computed from the tissue, and absent if the tissue is not
+        known).
         """
-        if not self.through_mm:
+        if not self.transmission_thicknesses_mm:
             return {}
-        gaussians = {"gaussians": gaussian_transmittance(self.fit.profile, self.through_mm)}
+        gaussians = {"gaussians": gaussian_transmittance(self.fit.profile, self.transmission_thicknesses_mm)}
         tissue = self.tissue
-        return gaussians | ({"slab": tissue.transmittance(self.through_mm)} if tissue else {})
+        return gaussians | (
+            {"slab": tissue.transmittance(self.transmission_thicknesses_mm)} if tissue else {}
+        )
 
 
 _CHANNEL_COLOURS = ("#c0392b", "#2e8b57", "#2a62b0")
@@ -341,9 +348,9 @@ def _plot_curves(axes: Axes, report: ProfileReport) -> float:
         axes.plot(
             r, r * fitted[:, channel], color=colour, linewidth=1.1, linestyle=_MODEL_DASH_PATTERN, label=label
         )
-        if isinstance(report.other_fit, BurleyFit):
-            other = r * report.other_fit.profile.radiant_exitance(r)[:, channel]
-            label = f"{name}, Burley, error {report.other_fit.error[channel]:.1%} of rings"
+        if isinstance(report.additional_fit, BurleyFit):
+            other = r * report.additional_fit.profile.radiant_exitance(r)[:, channel]
+            label = f"{name}, Burley, error {report.additional_fit.error[channel]:.1%} of rings"
             axes.plot(r, other, color=colour, linewidth=1.0, linestyle=":", label=label)
     return peak
 

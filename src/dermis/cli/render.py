@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dermis.base.console import note, print_report, spinner
+from dermis.base.console import print_note, print_report, spinner
 from dermis.cli.options import AdapterOption, JsonOption, OutputPath
 from dermis.cli.output_options import (
     FrameLandmarks,
@@ -98,7 +98,7 @@ def render(
         future = pool.submit(Renderer, adapter)  # the driver starts and compiles while the head is loaded
         with spinner("loading"):
             loaded_scene, settings = assemble_scene(head, scene)
-            landmark_output.check(loaded_scene.head)
+            landmark_output.check_landmark_sets(loaded_scene.head)
         note_subdivision(head, scene, loaded_scene.head)
         with spinner("rendering"):
             renderer = future.result()
@@ -181,16 +181,16 @@ def _note_lighting_problems(scene: Scene, settings: Settings, rendered_frame: Re
     ):
         fraction = f"{rendered_frame.unscattered_fraction:.0%} of the skin's triangles"
         reason = "their uv is collapsed, mirrored onto other skin, or thinner than a texel of the atlas"
-        note(f"note: {fraction} are lit without scattering: {reason}")
+        print_note(f"note: {fraction} are lit without scattering: {reason}")
     if suns and scene.environment:
         peaks = "a sun-like peak" if suns == 1 else f"{suns} sun-like peaks"
         effect = "is rendered as a light" if suns == 1 else "are rendered as lights"
-        note(f"note: {peaks} of {scene.environment.name} {effect} with shadows")
+        print_note(f"note: {peaks} of {scene.environment.name} {effect} with shadows")
     if settings.gamma == "wrong":
-        note("note: --gamma wrong computes light with encoded colours, an error, for comparison only")
+        print_note("note: --gamma wrong computes light with encoded colours, an error, for comparison only")
 
 
 def _note_overexposure(rendered_frame: RenderedFrame) -> None:
     if (fraction := rendered_frame.clipped_fraction()) > _MAX_CLIPPED_FRACTION:
         advice = f"use less than --exposure {rendered_frame.exposure:.3g}, or --tone neutral"
-        note(f"note: {fraction:.0%} of the head is overexposed: {advice}")
+        print_note(f"note: {fraction:.0%} of the head is overexposed: {advice}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from dermis.base.console import note
+from dermis.base.console import print_note
 from dermis.base.errors import refuse
 from dermis.cli.head_options import (
     EYE_OPTION,
@@ -154,7 +154,7 @@ def shrink_atlas_on_cpu(scene: Scene, settings: Settings, adapter_kind: str) -> 
         return settings
     side = atlas_side_for_picture(scene, settings)
     if side < settings.atlas and TECHNIQUES[settings.technique].uses_atlas:
-        note(f"note: --atlas {side} without a GPU, as the picture resolves no more texels")
+        print_note(f"note: --atlas {side} without a GPU, as the picture resolves no more texels")
     return settings.model_copy(update={"atlas": side})
 
 
@@ -172,7 +172,7 @@ def note_subdivision(head_or_scene: str, options: SceneOptions, head: Head) -> N
     min_levels = MIN_HUMAN_SUBDIVISION_LEVELS if is_person_name(head.name) else 0
     if head_options.get("subdivide", AUTO) == AUTO and head.levels > min_levels:
         count = f"{len(head.mesh.triangles):,} triangles"
-        note(f"note: --subdivide {head.levels} for a smooth outline in this picture: {count}")
+        print_note(f"note: --subdivide {head.levels} for a smooth outline in this picture: {count}")
 
 
 def _check_values(head_or_scene: str, options: SceneOptions) -> None:
@@ -197,7 +197,9 @@ def _check_values(head_or_scene: str, options: SceneOptions) -> None:
 def _note_profile_map(skin: Skin, settings: Settings) -> None:
     """Print a note on stderr if the skin has a profile map that the technique ignores."""
     if skin.profile_map and not TECHNIQUES[settings.technique].mixes_profiles:
-        note(f"note: {settings.technique} uses only the first profile; texture-space mixes them by the map")
+        print_note(
+            f"note: {settings.technique} uses only the first profile; texture-space mixes them by the map"
+        )
 
 
 def _base_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Settings]:
@@ -230,23 +232,26 @@ def _merge_environment(scene_environment: Environment | None, options: Options) 
 
 
 def _select_lights(
-    scene: Scene, rig_or_file: str | None, environment: Environment | None, *, replaces_environment: bool
+    scene: Scene, preset_or_file: str | None, environment: Environment | None, *, replaces_environment: bool
 ) -> tuple[Light, ...]:
     """Return the lights that the options --lights and --env select.
 
     Without --lights, these are the lights of the scene, or no lights if --env is given.
 
-    rig_or_file : value of --lights (name of a lighting rig, or path of a file); None without this option
+    preset_or_file : value of --lights (name of a lighting rig, or path of a file); None without this option
     environment : environment of the final scene; if it is None, a rig without lights raises DermisError
     replaces_environment : whether --env is given
     """
     from dermis.scene import load_lights
 
-    if rig_or_file is None:
+    if preset_or_file is None:
         return () if replaces_environment else tuple(scene.lights)
-    lights = load_lights(rig_or_file, scene.head)
+    lights = load_lights(preset_or_file, scene.head)
     if not lights and environment is None:
         refuse(
-            "--lights", "at least one light", f"{rig_or_file!r} has none", "Add --env, or choose another rig"
+            "--lights",
+            "at least one light",
+            f"{preset_or_file!r} has none",
+            "Add --env, or choose another rig",
         )
     return lights

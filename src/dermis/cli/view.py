@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dermis.base.console import note, print_lines, spinner
+from dermis.base.console import print_lines, print_note, spinner
 from dermis.base.errors import refuse
 from dermis.cli.options import AdapterOption, FlagOption, IntegerOption
 from dermis.cli.scene_options import DEFAULT_SCENE_OPTIONS, SceneOptions, assemble_scene
@@ -108,8 +108,8 @@ def _initial_state(head_or_scene: str, options: SceneOptions, adapter: str) -> V
         if is_scene
         else with_absolute_paths({"name": head_or_scene} | options.head, Path())
     )
-    rig = "" if is_scene else "none" if "name" in options.environment else "studio"
-    return initial_state(scene, settings, table, rig if options.lights is None else options.lights)
+    preset = "" if is_scene else "none" if "name" in options.environment else "studio"
+    return initial_state(scene, settings, table, preset if options.lights is None else options.lights)
 
 
 def _load_motion(motion_path: str | None, fps: float | None, viewer_state: ViewerState) -> MotionFile | None:
@@ -120,12 +120,12 @@ def _load_motion(motion_path: str | None, fps: float | None, viewer_state: Viewe
 
     motion = MotionFile(motion_path, fps)
     if text := motion.load_clip(viewer_state.scene.head).note:
-        note(text)
+        print_note(text)
     return motion
 
 
 def _print_url(url: str, is_reachable_by_others: bool) -> None:
     if is_reachable_by_others:
-        note("warning: other machines can reach this page; whoever knows its URL controls the viewer")
-        note("warning: the connection is not encrypted: use a trusted network or a tunnel")
+        print_note("warning: other machines can reach this page; whoever knows its URL controls the viewer")
+        print_note("warning: the connection is not encrypted: use a trusted network or a tunnel")
     print_lines(f"{url}  (Ctrl+C to stop)")

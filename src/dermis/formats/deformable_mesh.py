@@ -32,7 +32,7 @@ _MAX_CANDIDATE_BONES = 8  # bones among which four are selected
 _INTERPOLATED_WEIGHTS_PENALTY_MM2 = 1.0  # penalty for the squared deviation from the interpolated weights
 
 
-class VertexTarget(NamedTuple):
+class VertexMorphTarget(NamedTuple):
     """Morph target of a mesh: the vertices that it changes, and their changes at weight 1.
 
     vertex : (n,) indices of the changed vertices
@@ -88,7 +88,7 @@ class DeformableMesh:
         mesh = self.head.mesh
         return vertex_normals(self.positions_mm, mesh.point, mesh.triangles)
 
-    def targets(self) -> Iterator[VertexTarget]:
+    def targets(self) -> Iterator[VertexMorphTarget]:
         """Yield the morph targets in the order in which the rig lists them."""
         mesh = self.head.mesh
         for number in range(len(self.rig.targets.names)):
@@ -97,7 +97,7 @@ class DeformableMesh:
             delta_mm = delta[mesh.point].astype(np.float32)
             normal = self._normal_changes(delta_mm)
             vertex = np.flatnonzero(delta_mm.any(axis=1) | normal.any(axis=1))
-            yield VertexTarget(vertex, delta_mm[vertex], normal[vertex])
+            yield VertexMorphTarget(vertex, delta_mm[vertex], normal[vertex])
 
     def _normal_changes(self, delta_mm: Floats) -> Floats:
         """Return the changes (v, 3) of the unit normals that result from displacements of the vertices.

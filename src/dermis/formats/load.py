@@ -18,17 +18,17 @@ from dermis.base.arrays import Doubles, Floats, Mask, Numbers
 from dermis.base.disk import Arrays, load_or_make
 from dermis.base.errors import refuse
 from dermis.base.progress import logged_step
-from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, parsing, read_file
+from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, read_file, refuse_parse_errors
 from dermis.formats.axes import Axes, Axis, Front, head_axis_in_file, to_y_up
 from dermis.formats.materials import FileMaterial
 from dermis.formats.mesh_checks import UV_TOLERANCE, check_arrays, check_mesh, check_rig
 from dermis.formats.mesh_repair import RawMesh, repair_mesh
 from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart, default_unit_mm, is_binary_gltf, is_gltf
-from dermis.formats.read import Origin, join_parts, read_mesh_file, select_vertices
+from dermis.formats.read import UvOrigin, join_parts, read_mesh_file, select_vertices
 from dermis.formats.rig_from_file import build_rig, split_points
 from dermis.formats.size_limits import MAX_FILE_BYTES
 from dermis.formats.skin_groups import choose_skin, describe_skin_groups
-from dermis.formats.text_files import list_names
+from dermis.formats.text_files import join_names
 from dermis.mesh.face_direction import face_direction
 from dermis.mesh.file_vertices import FileVertices
 from dermis.mesh.geometry import compact_vertices, weld
@@ -67,7 +67,7 @@ def load_rigged(
     path: str | Path,
     *,
     unit_mm: float | None = None,
-    v_origin: Origin = "auto",
+    v_origin: UvOrigin = "auto",
     up: Axis | None = None,
     front: Front = "auto",
     skin_groups: tuple[str, ...] = (),
@@ -108,12 +108,12 @@ def load_rigged(
 def _load_uncached(
     mesh_path: Path,
     unit_mm: float | None,
-    v_origin: Origin,
+    v_origin: UvOrigin,
     axes: Axes,
     groups: GroupNames,
 ) -> RiggedMesh:
     """Load mesh and rig without the disk cache; for the parameters see `load_rigged`."""
-    with np.errstate(all="ignore"), parsing(mesh_path, "a mesh", *MALFORMED_DATA_ERRORS):
+    with np.errstate(all="ignore"), refuse_parse_errors(mesh_path, "a mesh", *MALFORMED_DATA_ERRORS):
         mesh_file = read_mesh_file(mesh_path)
         stated_mm = mesh_file.unit_mm or default_unit_mm(mesh_path)
         unit = stated_mm if unit_mm is None else unit_mm
@@ -150,7 +150,7 @@ def _load_uncached(
     notes = (*filter(None, (note, turned)), *mesh_file.notes, *repairs, *emptied)
     colours = None if vertices.colours is None else vertices.colours.astype(np.float32)
     other_uv = {index: own.astype(np.float32) for index, own in vertices.other_uv.items()}
-    surface = FileSurface(assigned.in_file, assigned.has_uv, colours, other_uv)
+    surface = FileSurfaceData(assigned.in_file, assigned.has_uv, colours, other_uv)
     file_vertices = FileVertices(
         len(used), raw.file_vertex.astype(np.int32), mesh.point, mesh.triangles, to_y_up(np.eye(3), axes).T
     )
@@ -206,7 +206,7 @@ def _weld_groups(mesh_parts: list[MeshPart]) -> Floats:
     return np.repeat(np.array(numbers, np.float32), [len(part.positions) for part in mesh_parts])
 
 
-def _uv_from_top(uv: Doubles, mesh_path: Path, v_origin: Origin) -> Doubles:
+def _uv_from_top(uv: Doubles, mesh_path: Path, v_origin: UvOrigin) -> Doubles:
     """Return uv (n, 2) with v = 0 at the top edge; rounding errors beyond [0, 1] are clamped.
 
     v_origin : edge of textures at which v is 0 in the file, see `load_rigged`
@@ -221,7 +221,7 @@ class _AssignedMaterials(NamedTuple):
     """Materials of the mesh, and the material of each part of the file.
 
     of_part : material index of each part
-    in_file, has_uv : see `FileSurface`
+    in_file, has_uv : see `FileSurfaceData`
     """
 
     materials: tuple[Material, ...]
@@ -283,7 +283,7 @@ def _without_empty_materials(
     kept = np.bincount(mesh.material, minlength=len(assigned_materials.materials)) > 0
     if kept.all() or not kept[assigned_materials.is_skin].any():
         return mesh, assigned_materials, ()
-    names = list_names([one.name for one in compress(assigned_materials.materials, ~kept)])
+    names = join_names([one.name for one in compress(assigned_materials.materials, ~kept)])
     assigned_materials = assigned_materials._replace(
         materials=tuple(compress(assigned_materials.materials, kept)),
         in_file=tuple(compress(assigned_materials.in_file, kept)),
@@ -317,7 +317,7 @@ class GroupNames(NamedTuple):
     eyes: tuple[str, ...] = ()
 
 
-class FileSurface(NamedTuple):
+class FileSurfaceData(NamedTuple):
     """Data with which the materials and pictures of a mesh file are applied to the mesh read from it.
 
     in_file : (m,) index in the file of each material of the mesh, -1 for a material that is not in the file
@@ -345,7 +345,7 @@ class RiggedMesh(NamedTuple):
     mesh: Mesh
     rig: Rig | None
     notes: tuple[str, ...] = ()
-    surface: FileSurface = FileSurface()
+    surface: FileSurfaceData = FileSurfaceData()
     materials: tuple[FileMaterial, ...] = ()
     unit_mm: float | None = None
     file_vertices: FileVertices | None = None
@@ -408,7 +408,7 @@ def _rigged_from_arrays(arrays: Arrays) -> RiggedMesh:
     vars(mesh)["outline"] = Outline(arrays["outline"])  # computing it would import scipy
     notes, colours = tuple(metadata["notes"]), arrays["colours"] if len(arrays["colours"]) else None
     other_uv = dict(zip(metadata["uv_sets"], arrays["other uv"], strict=True))
-    surface = FileSurface(tuple(metadata["in_file"]), tuple(metadata["has_uv"]), colours, other_uv)
+    surface = FileSurfaceData(tuple(metadata["in_file"]), tuple(metadata["has_uv"]), colours, other_uv)
     count, to_head = metadata["file"]
     file_vertices = FileVertices(count, arrays["file vertex"], mesh.point, mesh.triangles, np.array(to_head))
     rigged = RiggedMesh(mesh, None, notes, surface, file_vertices=file_vertices)

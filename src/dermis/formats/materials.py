@@ -30,25 +30,25 @@ class Texture:
     """Picture of a material, with its mapping to the surface.
 
     uv_set : index of the uv set of the mesh
-    transform : (a, b, c, d, e, f) with u' = a u + b v + c and v' = d u + e v + f, where v points down
+    uv_transform : (a, b, c, d, e, f) with u' = a u + b v + c and v' = d u + e v + f, where v points down
     wrap : how the texture continues beyond the edges of the picture, along u and along v
     channel : index of the picture's channel that is used; None for colours, normals and grey pictures
     """
 
     picture: PathLike
     uv_set: int = 0
-    transform: UvTransform = IDENTITY_UV_TRANSFORM
+    uv_transform: UvTransform = IDENTITY_UV_TRANSFORM
     wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
     channel: int | None = None
 
     @property
     def uv_mapping(self) -> tuple[int, UvTransform]:
         """Return the uv set and the transform, which determine the texture coordinates."""
-        return self.uv_set, self.transform
+        return self.uv_set, self.uv_transform
 
     def map_uv(self, uv: Doubles) -> Doubles:
         """Convert uv coordinates (n, 2), with v down, to positions (n, 2) in the picture, from 0 to 1."""
-        a, b, c, d, e, f = self.transform
+        a, b, c, d, e, f = self.uv_transform
         return np.asarray(uv @ np.array([[a, d], [b, e]]) + [c, f])
 
 

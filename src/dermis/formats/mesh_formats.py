@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dermis.base.file_properties import FileProperty
 from dermis.base.registry import Registry
-from dermis.formats.gltf.read_materials import GLTF_MATERIALS
+from dermis.formats.gltf.read_materials import GLTF_MATERIAL_PROPERTIES
 from dermis.formats.gltf.triangles import GLTF_PROPERTIES, read_gltf
 from dermis.formats.gltf.vrm import VRM_PROPERTIES
 from dermis.formats.obj import read_obj
@@ -18,7 +18,7 @@ from dermis.formats.parts import MeshFile
 from dermis.formats.ply import PLY_PROPERTIES, read_ply
 from dermis.formats.stl import STL_PROPERTIES, read_stl
 from dermis.formats.usd.read import USD_PROPERTIES, USD_SUFFIXES, read_usd
-from dermis.formats.usd.shading import USD_MATERIALS
+from dermis.formats.usd.shading import USD_MATERIAL_PROPERTIES
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,13 @@ _GLTF_FILE_PROPERTIES = (*GLTF_PROPERTIES, *VRM_PROPERTIES)
 MESH_FORMATS = Registry[MeshFormat](
     "mesh format",
     {
-        "gltf": MeshFormat((".glb", ".gltf", ".vrm"), read_gltf, _GLTF_FILE_PROPERTIES, GLTF_MATERIALS),
+        "gltf": MeshFormat(
+            (".glb", ".gltf", ".vrm"), read_gltf, _GLTF_FILE_PROPERTIES, GLTF_MATERIAL_PROPERTIES
+        ),
         "obj": MeshFormat((".obj",), read_obj, OBJ_PROPERTIES, MTL_PROPERTIES),
         "ply": MeshFormat((".ply",), read_ply, PLY_PROPERTIES),
         "stl": MeshFormat((".stl",), read_stl, STL_PROPERTIES),
-        "usd": MeshFormat(USD_SUFFIXES, read_usd, USD_PROPERTIES, USD_MATERIALS),
+        "usd": MeshFormat(USD_SUFFIXES, read_usd, USD_PROPERTIES, USD_MATERIAL_PROPERTIES),
     },
 )
 

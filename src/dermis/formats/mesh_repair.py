@@ -123,7 +123,7 @@ class RawMesh:
         point = np.concatenate((self.point, copies % stride)).astype(np.int32)
         return replace(self._select_vertices(source), point=point, triangles=triangles)
 
-    def without_unused(self) -> RawMesh:
+    def without_unused_points(self) -> RawMesh:
         """Return the mesh without unused vertices and points.
 
         Pairs of triangles that no longer share two vertices are removed from `quads`.
@@ -166,7 +166,7 @@ def repair_mesh(
         return mesh, ()
     repaired = _turn_outwards(_separate_sheets(_drop_triangles(mesh, flat, is_skin, notes), notes), notes)
     return _move_uv_charts(
-        repaired if repaired is mesh else repaired.without_unused(), materials, notes
+        repaired if repaired is mesh else repaired.without_unused_points(), materials, notes
     ), tuple(notes)
 
 
@@ -490,7 +490,7 @@ class _ComponentSurface:
         """
         component_area = np.bincount(self.component, self.double_area)
         more = _DOUBTFUL_SAMPLE_FRACTION * doubtful_components / (component_area * doubtful_components.sum())
-        triangle, sample = self._draw_samples(
+        triangle, sample = self._sample_triangles(
             self.double_area * ((1 - _DOUBTFUL_SAMPLE_FRACTION) / component_area.sum() + more[self.component])
         )
         normal, component = (
@@ -523,14 +523,14 @@ class _ComponentSurface:
         balance = np.where(is_seen, (front - back) / np.maximum(front + back, 1), 0)
         return balance, bool(back.sum() > 2 * front.sum())
 
-    def _draw_samples(self, triangle_weight: Doubles) -> tuple[Index, Doubles]:
+    def _sample_triangles(self, triangle_weights: Doubles) -> tuple[Index, Doubles]:
         """Return random points on the triangles: index of the triangle (n,), and position (3, n) [mm].
 
         Positions are relative to the centre of the mesh.
 
-        triangle_weight : (f,) relative probability of each triangle
+        triangle_weights : (f,) relative probability of each triangle
         """
-        total = np.cumsum(triangle_weight)
+        total = np.cumsum(triangle_weights)
         triangle = np.searchsorted(
             total, (np.arange(_VISIBILITY_SAMPLE_COUNT) + 0.5) / _VISIBILITY_SAMPLE_COUNT * total[-1]
         )

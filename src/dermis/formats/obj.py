@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from dermis.base.errors import DermisError, refuse
-from dermis.base.reading import parsing, read_file
+from dermis.base.reading import read_file, refuse_parse_errors
 from dermis.formats import size_limits as limits
 from dermis.formats.maps import check_finite, load_maps
 from dermis.formats.obj_geometry import parse_geometry
@@ -32,7 +32,7 @@ def read_obj_text(path: Path) -> str:
     Raises DermisError when the file cannot be read or is too large.
     """
     data = read_file(path, "an OBJ file", limits.MAX_FILE_BYTES)
-    with parsing(path, "an OBJ file"):
+    with refuse_parse_errors(path, "an OBJ file"):
         return decode_text(data)
 
 

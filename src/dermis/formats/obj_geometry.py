@@ -16,13 +16,13 @@ import numpy as np
 from dermis.base.arrays import Bytes, Doubles, Index, Mask
 from dermis.base.errors import refuse
 from dermis.base.file_properties import (
-    drawn,
-    drawn_with_note,
+    drawn_property,
+    drawn_property_with_note,
     keys_of,
     markdown_code,
-    no_effect,
-    noted,
-    refused,
+    noted_property,
+    property_without_effect,
+    refused_property,
 )
 from dermis.formats import size_limits as limits
 from dermis.formats.polygons import (
@@ -32,7 +32,7 @@ from dermis.formats.polygons import (
     refuse_without_faces,
     without_small_polygons,
 )
-from dermis.formats.text_files import list_names, parse_numbers, run_starts
+from dermis.formats.text_files import join_names, parse_numbers, run_starts
 from dermis.formats.vertex_colours import linear_colours
 
 _MAX_LINES = 12_000_000
@@ -49,33 +49,40 @@ _POLYPAINT_MARK = "#MRGB"
 _CURVE_STATEMENTS = "cstype deg bmat step curv curv2 surf con vp parm trim hole scrv sp end"
 _LEFT_OUT_STATEMENTS = {"lines": ("l",), "points": ("p",), "curves": tuple(_CURVE_STATEMENTS.split())}
 OBJ_PROPERTIES = (
-    drawn("`v x y z`", "position", "v"),
-    drawn_with_note("`v x y z w`", "position divided by w (no note if w is 1)"),
-    drawn("`v x y z r g b`", "sRGB colour from 0 to 1; vertices without one are white"),
-    drawn_with_note("`v x y z r g b` above 1", "sRGB colour from 0 to 255"),
-    noted("further numbers in `v`"),
-    drawn(f"`{_POLYPAINT_MARK}` (polypaint of ZBrush)", "sRGB colours of the vertices", _POLYPAINT_MARK),
-    noted(f"`{_POLYPAINT_MARK}` beside colours in `v`, or for another number of vertices"),
-    drawn("`vt u v`", "uv", "vt"),
-    noted("`vt u v w`", "u and v are drawn, w is left out (no note if it is 0)"),
-    drawn("`vn`", "normals; missing ones are computed", "vn"),
-    drawn(
+    drawn_property("`v x y z`", "position", "v"),
+    drawn_property_with_note("`v x y z w`", "position divided by w (no note if w is 1)"),
+    drawn_property("`v x y z r g b`", "sRGB colour from 0 to 1; vertices without one are white"),
+    drawn_property_with_note("`v x y z r g b` above 1", "sRGB colour from 0 to 255"),
+    noted_property("further numbers in `v`"),
+    drawn_property(
+        f"`{_POLYPAINT_MARK}` (polypaint of ZBrush)", "sRGB colours of the vertices", _POLYPAINT_MARK
+    ),
+    noted_property(f"`{_POLYPAINT_MARK}` beside colours in `v`, or for another number of vertices"),
+    drawn_property("`vt u v`", "uv", "vt"),
+    noted_property("`vt u v w`", "u and v are drawn, w is left out (no note if it is 0)"),
+    drawn_property("`vn`", "normals; missing ones are computed", "vn"),
+    drawn_property(
         "`f` with `v`, `v/vt`, `v//vn`, `v/vt/vn`",
         "polygons, divided into fans; indices count from 1, or backwards from the last vertex",
         "f",
     ),
-    drawn_with_note("`f` without `vt` beside others with it", "as skin without uv"),
-    noted("`f` of one or two corners"),
-    refused("`f` with an index of 0 or beyond the file", "the error names the line"),
-    drawn_with_note("`usemtl`, `g`", "groups; the note lists those of skin", "usemtl", "g"),
-    drawn("`o`", "groups where neither `usemtl` nor `g` has a name", "o"),
-    drawn("`mtllib`", "[materials](#materials-and-parts)", "mtllib"),
-    noted("`mtllib` of a missing file"),
-    noted("`s` in a file without normals", "the surface is smooth everywhere (no note for one group)"),
-    no_effect("`s` in a file with normals", "the normals decide"),
-    no_effect("`mg`", "for curves only", "mg"),
-    *(noted(f"{kind}: {markdown_code(keys)}", "", *keys) for kind, keys in _LEFT_OUT_STATEMENTS.items()),
-    noted("other statements"),
+    drawn_property_with_note("`f` without `vt` beside others with it", "as skin without uv"),
+    noted_property("`f` of one or two corners"),
+    refused_property("`f` with an index of 0 or beyond the file", "the error names the line"),
+    drawn_property_with_note("`usemtl`, `g`", "groups; the note lists those of skin", "usemtl", "g"),
+    drawn_property("`o`", "groups where neither `usemtl` nor `g` has a name", "o"),
+    drawn_property("`mtllib`", "[materials](#materials-and-parts)", "mtllib"),
+    noted_property("`mtllib` of a missing file"),
+    noted_property(
+        "`s` in a file without normals", "the surface is smooth everywhere (no note for one group)"
+    ),
+    property_without_effect("`s` in a file with normals", "the normals decide"),
+    property_without_effect("`mg`", "for curves only", "mg"),
+    *(
+        noted_property(f"{kind}: {markdown_code(keys)}", "", *keys)
+        for kind, keys in _LEFT_OUT_STATEMENTS.items()
+    ),
+    noted_property("other statements"),
 )
 """Statements of OBJ files; `parse_geometry` reads those that are drawn, and `s`."""
 _USED_STATEMENTS = {*keys_of(OBJ_PROPERTIES, "drawn", "drawn with a note"), "s"}
@@ -148,7 +155,7 @@ def parse_geometry(path: Path, obj_text: str) -> ObjGeometry:
     notes += [
         *faults,
         *missing_uv_notes(polygons),
-        *_unread_notes(unread, others, has_normals=len(normals) > 0),
+        *_notes_on_unread_statements(unread, others, has_normals=len(normals) > 0),
     ]
     statements = "\n".join(f"{key} {value}" for _, key, value in others)
     return ObjGeometry(polygons, pairs, pair[kept], statements, notes)
@@ -380,7 +387,7 @@ def _face_groups(
     return list(numbers), np.array(states)[np.searchsorted(lines, face_line) - 1]
 
 
-def _unread_notes(
+def _notes_on_unread_statements(
     statement_keys: Collection[str], statements: Sequence[_Statement], has_normals: bool
 ) -> list[str]:
     """Return notes on statements that have no effect.
@@ -395,7 +402,7 @@ def _unread_notes(
         if key not in _STATEMENTS_WITHOUT_EFFECT
     }
     names = [f"{key} ({kind})" if kind else key for key, kind in kinds.items()]
-    notes = [f"statements are left out: {list_names(names)}"] if names else []
+    notes = [f"statements are left out: {join_names(names)}"] if names else []
     smoothing = {value for _, key, value in statements if key == "s"}
     if not has_normals and (len(smoothing) > 1 or smoothing & {"0", "off"}):
         notes.append("smoothing groups (s) are left out: the surface is smooth everywhere")

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.base.file_properties import drawn, keys_of, no_effect, noted
-from dermis.base.reading import parsing, read_file
+from dermis.base.file_properties import drawn_property, keys_of, noted_property, property_without_effect
+from dermis.base.reading import read_file, refuse_parse_errors
 from dermis.formats import size_limits as limits
 from dermis.formats.materials import IDENTITY_UV_TRANSFORM, FileMaterial, Role, Texture, UvTransform, Wrap
 from dermis.formats.parts import DEFAULT_COLOUR, Colour, MeshPart, parse_colour
@@ -32,43 +32,45 @@ TEXTURE_ROLES = {
 NUMERIC_STATEMENTS = {"kd": 3, "ke": 3, "d": 1, "tr": 1, "pr": 1, "pm": 1, "ns": 1}
 """Number of values that each numeric statement of a material needs, by the statement in lower case."""
 MTL_PROPERTIES = (
-    drawn("`newmtl`", "begins a material", "newmtl"),
-    drawn("`Kd`", "linear colour; a grey of 0.8 counts as none", "Kd"),
-    noted("`Kd` beside `map_Kd`", "no note for greys that programs usually write there"),
-    drawn("`map_Kd`", "colour", "map_Kd"),
-    drawn("UDIM tiles: `face.<UDIM>.png`", "a picture for each tile"),
-    noted("`Ke`, `map_Ke`", "emission", "Ke", "map_Ke", other_parts="drawn"),
-    noted("`d`, `Tr`, `map_d`", "opacity, cut at one half", "d", "Tr", "map_d", other_parts="drawn"),
-    noted("`Pr`, `Ns`", "roughness; skin has a measured one", "Pr", "Ns", other_parts="drawn"),
-    drawn("`map_Pr`", "roughness, squared for skin", "map_Pr"),
-    noted("`Pm`, `map_Pm`", "metalness", "Pm", "map_Pm", other_parts="drawn"),
-    drawn("`map_Ks`", "specular strength, of a single skin material", "map_Ks", other_parts="noted"),
-    drawn("`norm`", "normal map", "norm"),
-    drawn(
+    drawn_property("`newmtl`", "begins a material", "newmtl"),
+    drawn_property("`Kd`", "linear colour; a grey of 0.8 counts as none", "Kd"),
+    noted_property("`Kd` beside `map_Kd`", "no note for greys that programs usually write there"),
+    drawn_property("`map_Kd`", "colour", "map_Kd"),
+    drawn_property("UDIM tiles: `face.<UDIM>.png`", "a picture for each tile"),
+    noted_property("`Ke`, `map_Ke`", "emission", "Ke", "map_Ke", other_parts="drawn"),
+    noted_property("`d`, `Tr`, `map_d`", "opacity, cut at one half", "d", "Tr", "map_d", other_parts="drawn"),
+    noted_property("`Pr`, `Ns`", "roughness; skin has a measured one", "Pr", "Ns", other_parts="drawn"),
+    drawn_property("`map_Pr`", "roughness, squared for skin", "map_Pr"),
+    noted_property("`Pm`, `map_Pm`", "metalness", "Pm", "map_Pm", other_parts="drawn"),
+    drawn_property("`map_Ks`", "specular strength, of a single skin material", "map_Ks", other_parts="noted"),
+    drawn_property("`norm`", "normal map", "norm"),
+    drawn_property(
         "`bump`, `map_Bump` with normals",
         "of a single skin material",
         "bump",
         "map_Bump",
         other_parts="noted",
     ),
-    noted("`bump`, `map_Bump` with heights", "drawn for skin with `--height-mm`"),
-    drawn("options `-s`, `-o`, `-clamp`", "placement of a picture"),
-    drawn("option `-bm`", "factor of normals and heights"),
-    noted(
+    noted_property("`bump`, `map_Bump` with heights", "drawn for skin with `--height-mm`"),
+    drawn_property("options `-s`, `-o`, `-clamp`", "placement of a picture"),
+    drawn_property("option `-bm`", "factor of normals and heights"),
+    noted_property(
         "options `-mm`, `-cc`, `-boost`, `-imfchan`, `-blendu`, `-blendv`, `-t`",
         "no note for values that change nothing, such as `-mm 0 1`",
     ),
-    no_effect("options `-texres`, `-type`", "pictures keep their size; `-type` is for reflections"),
-    noted("a picture that is missing"),
-    no_effect("`Ka`, `map_Ka`", "ambient light follows from the lights", "Ka", "map_Ka"),
-    no_effect(
+    property_without_effect(
+        "options `-texres`, `-type`", "pictures keep their size; `-type` is for reflections"
+    ),
+    noted_property("a picture that is missing"),
+    property_without_effect("`Ka`, `map_Ka`", "ambient light follows from the lights", "Ka", "map_Ka"),
+    property_without_effect(
         "`illum`, `sharpness`, `map_aat`", "settings of old renderers", "illum", "sharpness", "map_aat"
     ),
-    noted("other statements, such as `Ks`, `Ni`, `disp`"),
+    noted_property("other statements, such as `Ks`, `Ni`, `disp`"),
 )
 """Statements of .mtl files."""
 _STATEMENTS_WITHOUT_EFFECT = tuple(key.lower() for key in keys_of(MTL_PROPERTIES, "no effect"))
-_ROLE_BY_MTL_ROLE: Mapping[str, Role] = {
+_TEXTURE_ROLE_BY_MTL_ROLE: Mapping[str, Role] = {
     "colour": "colour",
     "roughness": "roughness",
     "metalness": "metalness",
@@ -117,7 +119,7 @@ class MtlTexture:
     unused: tuple[str, ...] = ()
 
     @property
-    def transform(self) -> UvTransform:
+    def uv_transform(self) -> UvTransform:
         """Return the transform that the options -s and -o state, for uv coordinates with v down."""
         (scale_u, scale_v), (u, v) = self.scale, self.offset
         if (self.scale, self.offset) == ((1.0, 1.0), (0.0, 0.0)):
@@ -168,7 +170,7 @@ def read_library(path: Path, obj_text: str) -> MaterialLibrary:
             else:
                 data = read_file(file, "material libraries", remaining)
                 remaining -= len(data)
-                with parsing(file, "material libraries"):
+                with refuse_parse_errors(file, "material libraries"):
                     library.materials |= _parse_mtl(decode_text(data))
     return library
 
@@ -308,13 +310,13 @@ def _file_material(path: Path, material_name: str, material: MtlMaterial, udim_t
         file = find_referenced_file(path, written)
         if file is None:
             missing[role] = f"{texture.key}: {written} is not in its folder. {_MISSING_FILE_ADVICE}"
-        elif role not in _ROLE_BY_MTL_ROLE:
+        elif role not in _TEXTURE_ROLE_BY_MTL_ROLE:
             skin_only.append(f"picture of {texture.key}")
         else:
-            a, b, c, d, e, f = texture.transform
+            a, b, c, d, e, f = texture.uv_transform
             if written != texture.name:
                 c, f = c - column, f + row
-            textures[_ROLE_BY_MTL_ROLE[role]] = Texture(
+            textures[_TEXTURE_ROLE_BY_MTL_ROLE[role]] = Texture(
                 file, 0, (a, b, c, d, e, f), (texture.wrap, texture.wrap)
             )
         unused += [f"option {option} of {written}" for option in texture.unused]

@@ -95,7 +95,7 @@ def _encode_colours8(maps: PartMaps) -> Bytes:
     return encode_srgb8(maps.colour[..., :3])
 
 
-def _encode_surface8(maps: PartMaps) -> Bytes:
+def _encode_roughness_metalness8(maps: PartMaps) -> Bytes:
     return np.pad(encode_linear8(maps.surface[..., 2:]), ((0, 0), (0, 0), (1, 0)))
 
 
@@ -113,7 +113,7 @@ _ENCODER_OF_ROLE: Mapping[PartRole, Callable[[PartMaps], Bytes]] = {
     "roughness": lambda maps: encode_linear8(maps.surface[..., 2:3]),
     "alpha": lambda maps: encode_linear8(maps.surface[..., 2:3] ** 2),
     "metalness": lambda maps: encode_linear8(maps.surface[..., 3:]),
-    "surface": _encode_surface8,
+    "surface": _encode_roughness_metalness8,
     "normal": lambda maps: encode_normals8(maps.surface[..., :2]),
     "emission": _encode_emission8,
 }

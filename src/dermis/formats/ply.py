@@ -14,13 +14,13 @@ import numpy as np
 from dermis.base.arrays import Bytes, Doubles, Index, Numbers
 from dermis.base.errors import refuse
 from dermis.base.file_properties import (
-    drawn,
-    drawn_with_note,
+    drawn_property,
+    drawn_property_with_note,
     keys_of,
     markdown_code,
-    no_effect,
-    noted,
-    refused,
+    noted_property,
+    property_without_effect,
+    refused_property,
 )
 from dermis.base.reading import read_file
 from dermis.formats import size_limits as limits
@@ -34,7 +34,7 @@ from dermis.formats.polygons import (
     without_small_polygons,
 )
 from dermis.formats.referenced_files import find_referenced_file
-from dermis.formats.text_files import decode_text, list_names, parse_numbers, run_starts
+from dermis.formats.text_files import decode_text, join_names, parse_numbers, run_starts
 from dermis.formats.vertex_colours import linear_colours
 from dermis.mesh.geometry import expand_runs, weld
 
@@ -67,31 +67,33 @@ _SCANNER_PROPERTIES = (
     *("label", "class", "classification", "segment"),
 )
 PLY_PROPERTIES = (
-    drawn("vertex: `x`, `y`, `z`", "positions"),
-    drawn("vertex: `nx`, `ny`, `nz`", "normals; missing ones are computed"),
-    drawn(f"vertex: {'; '.join(map(markdown_code, UV_NAMES))}", "uv"),
-    drawn(
+    drawn_property("vertex: `x`, `y`, `z`", "positions"),
+    drawn_property("vertex: `nx`, `ny`, `nz`", "normals; missing ones are computed"),
+    drawn_property(f"vertex: {'; '.join(map(markdown_code, UV_NAMES))}", "uv"),
+    drawn_property(
         f"vertex: {'; '.join(map(markdown_code, COLOUR_NAMES))}",
         "sRGB colours; integers of any size, or floats from 0 to 1",
     ),
-    drawn_with_note("the same as floats above 1", "sRGB colours from 0 to 255"),
-    noted(f"vertex: {markdown_code(name for (name,) in _ALPHA_NAMES)}", "no note if all are the same"),
-    drawn(f"face: {' or '.join(f'`{name}`' for name in _FACE_LIST_NAMES)}", "polygons"),
-    noted("faces of one or two corners"),
-    drawn("face: `texcoord`", "uv of the corners of a face"),
-    drawn_with_note("face: an empty `texcoord`", "as skin without uv"),
-    drawn_with_note("face: `texnumber`", "the picture of most faces is used for all"),
-    drawn("tristrips: `vertex_indices`", "strips of triangles, with -1 between them"),
-    drawn("`comment TextureFile NAME`", "colour picture in the folder of the file"),
-    noted("`comment TextureFile NAME` of a missing file"),
-    no_effect(
+    drawn_property_with_note("the same as floats above 1", "sRGB colours from 0 to 255"),
+    noted_property(
+        f"vertex: {markdown_code(name for (name,) in _ALPHA_NAMES)}", "no note if all are the same"
+    ),
+    drawn_property(f"face: {' or '.join(f'`{name}`' for name in _FACE_LIST_NAMES)}", "polygons"),
+    noted_property("faces of one or two corners"),
+    drawn_property("face: `texcoord`", "uv of the corners of a face"),
+    drawn_property_with_note("face: an empty `texcoord`", "as skin without uv"),
+    drawn_property_with_note("face: `texnumber`", "the picture of most faces is used for all"),
+    drawn_property("tristrips: `vertex_indices`", "strips of triangles, with -1 between them"),
+    drawn_property("`comment TextureFile NAME`", "colour picture in the folder of the file"),
+    noted_property("`comment TextureFile NAME` of a missing file"),
+    property_without_effect(
         f"values of scanners: {markdown_code(_SCANNER_PROPERTIES)}, `{_CLOUDCOMPARE_PREFIX}...`",
         "they do not describe the look of a surface",
         *_SCANNER_PROPERTIES,
     ),
-    no_effect("other comments"),
-    noted("other elements and properties"),
-    refused("a file without faces", "a cloud of points"),
+    property_without_effect("other comments"),
+    noted_property("other elements and properties"),
+    refused_property("a file without faces", "a cloud of points"),
 )
 """Elements and properties of PLY files."""
 _PROPERTIES_WITHOUT_EFFECT = keys_of(PLY_PROPERTIES, "no effect")
@@ -179,7 +181,7 @@ def read_ply(path: Path) -> MeshFile:
     vertices, faces, strips = (tables.get(name, _Columns()) for name in ("vertex", "face", "tristrips"))
     positions = vertices.take_properties("xyz")
     if positions is None:
-        refuse(path, "vertices with x, y and z", f"they have {list_names(vertices)}", limits.DAMAGED_ADVICE)
+        refuse(path, "vertices with x, y and z", f"they have {join_names(vertices)}", limits.DAMAGED_ADVICE)
     counts, index = _polygon_corners(path, faces, strips, len(positions))
     uv, uv_index = _corner_uv(path, vertices, faces, counts, index)
     normals = vertices.take_properties(("nx", "ny", "nz"))
@@ -191,7 +193,7 @@ def read_ply(path: Path) -> MeshFile:
     directions = np.empty((0, 3)) if normals is None else to_floats(normals)
     polygons = Polygons(counts, corners, np.asarray(positions, np.float64), uv, directions, colours)
     picture, unused = _main_picture(header.pictures, faces.take_properties(("texnumber",)))
-    notes += [*faults, *missing_uv_notes(polygons), *unused, *_unread_notes(tables)]
+    notes += [*faults, *missing_uv_notes(polygons), *unused, *_notes_on_unread_properties(tables)]
     materials: tuple[FileMaterial, ...] = ()
     if picture is not None and (file := find_referenced_file(path, picture)) is not None:
         materials = (FileMaterial(textures={"colour": Texture(file)}),)
@@ -459,7 +461,7 @@ def _polygon_corners(
         refuse(
             path,
             f"faces with {_FACE_LIST_NAMES[0]}",
-            f"they have {list_names(face_columns)}",
+            f"they have {join_names(face_columns)}",
             limits.DAMAGED_ADVICE,
         )
     if own is not None:
@@ -542,10 +544,10 @@ def _main_picture(
     )
     chosen = picture_names[int(used[counts.argmax()])]
     others = [name for name in dict.fromkeys(picture_names) if name != chosen]
-    return chosen, [f"of several pictures {chosen} is used; left out: {list_names(others)}"] if others else []
+    return chosen, [f"of several pictures {chosen} is used; left out: {join_names(others)}"] if others else []
 
 
-def _unread_notes(element_columns: Mapping[str, _Columns]) -> list[str]:
+def _notes_on_unread_properties(element_columns: Mapping[str, _Columns]) -> list[str]:
     """Return a list with a note on the elements and properties without effect; empty if there are none."""
     ignored = [name for name, columns in element_columns.items() if not columns.used]
     ignored += [
@@ -556,4 +558,4 @@ def _unread_notes(element_columns: Mapping[str, _Columns]) -> list[str]:
         and name not in (*columns.used, *_PROPERTIES_WITHOUT_EFFECT)
         and not name.startswith(_CLOUDCOMPARE_PREFIX)
     ]
-    return [f"these are left out: {list_names(ignored)}"] if ignored else []
+    return [f"these are left out: {join_names(ignored)}"] if ignored else []

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
-from dermis.base.reading import is_file, parsing
+from dermis.base.reading import is_file, refuse_parse_errors
 from dermis.formats import size_limits as limits
 from dermis.formats.mesh_checks import check_arrays, check_mesh_counts
 from dermis.formats.mesh_formats import find_format, mesh_suffixes
@@ -25,7 +25,7 @@ from dermis.mesh.geometry import compact_vertices, expand_runs
 MAX_ABSOLUTE_UV = 1e4
 """Largest valid absolute uv coordinate; larger ones are a sign of a damaged file, not of many tiles."""
 NumberType = TypeVar("NumberType", np.int64, np.float64)
-Origin = Literal["auto", "top", "bottom"]
+UvOrigin = Literal["auto", "top", "bottom"]
 _BLENDER_ADVICE = "Convert it in Blender: {}File > Export > glTF 2.0"
 _UNSUPPORTED_SUFFIXES = (".3ds", ".c4d", ".dae", ".lwo", ".ma", ".max", ".mb", ".wrl", ".x3d", ".zpr", ".ztl")
 _SUFFIX_ADVICE = {
@@ -158,7 +158,7 @@ def read_mesh_file(mesh_path: Path) -> MeshFile:
     if not is_file(mesh_path):
         refuse(mesh_path, "a mesh file", "there is no such file", "Check the path")
     # readers may raise any exception for damaged files
-    with parsing(mesh_path, f"a valid {mesh_path.suffix} mesh", Exception):
+    with refuse_parse_errors(mesh_path, f"a valid {mesh_path.suffix} mesh", Exception):
         mesh_file = mesh_format.read(mesh_path)
         parts = [_without_unused_vertices(part) for part in mesh_file.parts if len(part.triangles)]
     if not parts:

@@ -21,14 +21,14 @@ _MIN_DISPLACEMENT_MM = 1e-4  # smaller displacements are rounding errors and cou
 
 
 def split_points(
-    point_of_vertex: Ints, mesh_part: MeshPart, linear_to_head: Doubles, culprit: object
+    point_of_vertex: Ints, mesh_part: MeshPart, linear_to_head: Doubles, error_subject: object
 ) -> Ints:
     """Return point indices (v,) in which coincident vertices that move differently have different points.
 
     point_of_vertex : (v,) index of the point of each vertex, as found by welding vertices by position
     mesh_part : vertices with their morph targets and bone weights
     linear_to_head : (3, 3) matrix from the space of the file to that of the head [mm]
-    culprit : file, for errors
+    error_subject : file, for errors
 
     Raises DermisError if too many vertices at one position move differently.
     """
@@ -37,7 +37,7 @@ def split_points(
     while len(remaining):
         if number > _MAX_COINCIDENT_VERTICES:
             actual = f"{number} of them move differently"
-            refuse(culprit, "a few coincident vertices", actual, DAMAGED_ADVICE)
+            refuse(error_subject, "a few coincident vertices", actual, DAMAGED_ADVICE)
         groups, first = np.unique(point_of_vertex[remaining], return_index=True)
         other = remaining[first[np.searchsorted(groups, point_of_vertex[remaining])]]
         apart = _targets_differ(mesh_part, remaining, other, linear_to_head) | _weights_differ(
@@ -85,7 +85,7 @@ def build_rig(
     bones: Bones | None,
     weights: Mapping[str, float],
     to_head: Doubles,
-    culprit: object,
+    error_subject: object,
 ) -> Rig | None:
     """Return the rig that moves a mesh's points; None for a file with neither morph targets nor bones.
 
@@ -95,7 +95,7 @@ def build_rig(
     bones : bones of the file; None if it has none
     weights : default weights of morph targets by name
     to_head : (4, 4) matrix from the space of the file to that of the head [mm]
-    culprit : file, for errors
+    error_subject : file, for errors
 
     Raises DermisError for bones with a scale of 0.
     """
@@ -103,7 +103,7 @@ def build_rig(
         return None
     _, first = np.unique(point_of_vertex, return_index=True)
     point_positions = np.ascontiguousarray(positions_mm[first])
-    skeleton = None if bones is None else _point_skeleton(mesh_part, bones, first, to_head, culprit)
+    skeleton = None if bones is None else _point_skeleton(mesh_part, bones, first, to_head, error_subject)
     return Rig(point_positions, _point_targets(mesh_part, point_of_vertex, first, weights, to_head), skeleton)
 
 
@@ -144,12 +144,12 @@ def _point_targets(
 
 
 def _point_skeleton(
-    mesh_part: MeshPart, bones: Bones, first_vertex: Index, to_head: Doubles, culprit: object
+    mesh_part: MeshPart, bones: Bones, first_vertex: Index, to_head: Doubles, error_subject: object
 ) -> Skeleton:
     """Return the skeleton of the p points of a mesh.
 
     first_vertex : (p,) first vertex of each point, whose bone weights the point gets
-    mesh_part, bones, to_head, culprit : see `build_rig`
+    mesh_part, bones, to_head, error_subject : see `build_rig`
     """
     assert mesh_part.bone is not None and mesh_part.weight is not None
     bone = np.zeros((len(first_vertex), BONES_PER_POINT), np.int32)
@@ -163,7 +163,7 @@ def _point_skeleton(
     unusable = np.flatnonzero(flat & np.isin(np.arange(len(flat)), bone[weight > 0]))
     if len(unusable):
         actual = f"{bones.names[unusable[0]]!r} has a scale of 0 at rest"
-        refuse(culprit, "bones with a scale above 0", actual, "Export it with another scale")
+        refuse(error_subject, "bones with a scale above 0", actual, "Export it with another scale")
     inverse = np.linalg.inv(np.where(flat[:, None, None], np.eye(4), bones.world))
     inverse_bind = np.asarray(inverse, np.float64)
     return Skeleton(bones.names, bones.parent, bones.local, inverse_bind, to_head, bone, weight)

@@ -162,9 +162,9 @@ class _DownloadProgress:
         self._task = self._bars.add_task(name, total=None)
         self.total = 0
 
-    def update(self, count: int) -> None:
+    def update(self, byte_count: int) -> None:
         self._bars.start()
-        self._bars.update(self._task, total=self.total or None, advance=count)
+        self._bars.update(self._task, total=self.total or None, advance=byte_count)
 
     def reset(self) -> None:
         self._bars.reset(self._task)

@@ -40,13 +40,15 @@ MAX_MTL_FILES = 64
 """Largest number of .mtl files of an OBJ file."""
 
 
-def check_limit(culprit: object, actual_count: int, max_count: int, items_noun: str, advice: str) -> None:
+def check_limit(
+    error_subject: object, actual_count: int, max_count: int, items_noun: str, advice: str
+) -> None:
     """Raise an error for a file with more than `max_count` objects of one kind.
 
-    culprit : file, for the error
+    error_subject : file, for the error
     actual_count : number of the objects
     items_noun : plural noun for the objects
     advice : sentence for the error on how the user can correct the file
     """
     if actual_count > max_count:
-        refuse(culprit, f"at most {max_count:,} {items_noun}", f"it has {actual_count:,}", advice)
+        refuse(error_subject, f"at most {max_count:,} {items_noun}", f"it has {actual_count:,}", advice)

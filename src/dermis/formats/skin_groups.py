@@ -120,10 +120,10 @@ def describe_skin_groups(groups: Sequence[MaterialGroup], is_skin: Sequence[bool
     if not other:
         return ""
     return (
-        f"skin is {_list_names(skin)}; not skin: {_list_names(other)}. --skin-groups NAME,... chooses others"
+        f"skin is {_join_names(skin)}; not skin: {_join_names(other)}. --skin-groups NAME,... chooses others"
     )
 
 
-def _list_names(group_names: Sequence[str], max_count: int = 6) -> str:
+def _join_names(group_names: Sequence[str], max_count: int = 6) -> str:
     shown = ", ".join(repr(name) for name in group_names[:max_count])
     return f"{shown} and {len(group_names) - max_count} more" if len(group_names) > max_count else shown

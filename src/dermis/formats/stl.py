@@ -9,7 +9,7 @@ import numpy as np
 
 from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
-from dermis.base.file_properties import drawn, no_effect, noted
+from dermis.base.file_properties import drawn_property, noted_property, property_without_effect
 from dermis.base.reading import read_file
 from dermis.formats import size_limits as limits
 from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart
@@ -20,10 +20,10 @@ _TRIANGLE_DTYPE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("
 _CORNER_LINE = re.compile(rb"^[ \t]*vertex[ \t]+([^\r\n]*)", re.MULTILINE | re.IGNORECASE)
 
 STL_PROPERTIES = (
-    drawn("corners of triangles", "coincident ones become one vertex"),
-    no_effect("normals of triangles", "they are computed from the corners"),
-    noted("attribute bytes", "colours of triangles in some programs"),
-    no_effect("name or header", "names the part or the program"),
+    drawn_property("corners of triangles", "coincident ones become one vertex"),
+    property_without_effect("normals of triangles", "they are computed from the corners"),
+    noted_property("attribute bytes", "colours of triangles in some programs"),
+    property_without_effect("name or header", "names the part or the program"),
 )
 """Properties of STL files."""
 

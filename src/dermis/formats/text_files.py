@@ -45,7 +45,7 @@ def _decode_line(line: bytes) -> str:
         return line.decode("latin-1")
 
 
-def list_names(names: Collection[str]) -> str:
+def join_names(names: Collection[str]) -> str:
     """Return the first eight names as text for a message, with the number of further names."""
     first, more = islice(names, _MAX_LISTED_NAMES), len(names) - _MAX_LISTED_NAMES
     shown = [

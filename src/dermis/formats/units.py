@@ -34,7 +34,9 @@ _COMMON_WRONG_UNITS_MM = (1.0, 10.0)  # units that programs write although the f
 _USUAL_SIZE_RANGE_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}
 
 
-def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, culprit: object) -> RiggedMesh:
+def with_positions_in_mm(
+    rigged: RiggedMesh, path: Path, unit_mm: float | None, error_subject: object
+) -> RiggedMesh:
     """Return the mesh of a file in millimetres, with a note if its unit was guessed or its size is unusual.
 
     The unit is guessed for OBJ, PLY and STL if the user states none. A guessed unit scales only the mesh,
@@ -44,7 +46,7 @@ def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, cul
         otherwise from the unit that the file states, or else from the default unit of its format
     path : path of the file, whose suffix tells the format
     unit_mm : unit of the file as the user states it [mm]; None if the user states none
-    culprit : source of the mesh, for errors
+    error_subject : source of the mesh, for errors
 
     Raises DermisError for a mesh that is smaller than a millimetre or larger than three metres.
     """
@@ -56,7 +58,7 @@ def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, cul
         mesh = replace(mesh, positions=(mesh.positions * (unit / read_unit)).astype(np.float32))
     size = float(mesh.size_mm.max())
     if not _ACCEPTED_SIZE_RANGE_MM[0] <= size <= _ACCEPTED_SIZE_RANGE_MM[1]:
-        _refuse_size(mesh, unit, culprit)
+        _refuse_size(mesh, unit, error_subject)
     if guessed and not (unit == 1.0 and _is_in_mm(mesh.positions)):
         made = f"1 unit = {unit:g} mm makes it {_size_text(mesh.size_mm)}"
         note = f"its unit is not stated; {made}; --unit-mm sets another"
@@ -111,7 +113,7 @@ def _size_text(sizes_mm: Floats) -> str:
     return f"{length} {'high' if sizes_mm[1] == longest else 'long'}"
 
 
-def _refuse_size(mesh: Mesh, unit_mm: float, culprit: object) -> None:
+def _refuse_size(mesh: Mesh, unit_mm: float, error_subject: object) -> None:
     """Refuse a mesh of impossible size; the error suggests units with which the size would be usual.
 
     unit_mm : unit with which the file was read [mm]
@@ -125,7 +127,7 @@ def _refuse_size(mesh: Mesh, unit_mm: float, culprit: object) -> None:
             advice += f": {other:g}, for a program that writes {program}, makes it {_size_text(sizes)}"
     actual = f"it is {_size_text(mesh.size_mm)} at {unit_mm:g} mm per unit (a forgotten unit?)"
     refuse(
-        culprit,
+        error_subject,
         f"skin {_ACCEPTED_SIZE_RANGE_MM[0]:g} to {_ACCEPTED_SIZE_RANGE_MM[1]:g} mm large",
         actual,
         advice,

@@ -217,9 +217,9 @@ def point_shadow_views(
 
 def _check_lights_outside(lights: Sequence[tuple[str, PointLight]], outside_flags: Sequence[bool]) -> None:
     if not all(outside_flags):
-        culprit, light = lights[outside_flags.index(False)]
+        light_label, light = lights[outside_flags.index(False)]
         actual = f"it is at {[round(c) for c in light.position]} mm"
-        refuse(culprit, "a position outside the head", actual, "Move it away or set shadows = false")
+        refuse(light_label, "a position outside the head", actual, "Move it away or set shadows = false")
 
 
 def _largest_tangents(side_coordinates: NDArray[np.floating], depth: NDArray[np.floating]) -> list[float]:

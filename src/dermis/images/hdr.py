@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Bytes, Doubles, Floats, Index
 from dermis.base.errors import shorten
-from dermis.base.file_properties import drawn, drawn_with_note, markdown_code, no_effect, noted, refused
+from dermis.base.file_properties import (
+    drawn_property,
+    drawn_property_with_note,
+    markdown_code,
+    noted_property,
+    property_without_effect,
+    refused_property,
+)
 from dermis.images.colour_spaces import SRGB, ColourSpace, gamma_colour_space
 from dermis.images.exr_layers import ExrLayer, choose_layer
 from dermis.images.header import PictureHeader, UnsupportedError
@@ -40,34 +47,38 @@ _RADIANCE_HEADER_DEFAULTS = {
 """Names of numbers in a header, with their defaults; primaries of 0 are unknown."""
 _UNUSED_RADIANCE_HEADER_NAMES = ("GAMMA", "PIXASPECT")  # named in a note if they are not 1
 EXR_PROPERTIES = (
-    drawn("half, float, 32-bit integers; all kinds of compression; scan lines, tiles"),
-    refused("deep pixels"),
-    drawn("layer or part with R, G and B, in any case or in words, and perhaps A; or with Y"),
-    noted(
+    drawn_property("half, float, 32-bit integers; all kinds of compression; scan lines, tiles"),
+    refused_property("deep pixels"),
+    drawn_property("layer or part with R, G and B, in any case or in words, and perhaps A; or with Y"),
+    noted_property(
         "several layers, such as `ViewLayer.Combined.R`, or parts",
         "the one without a name is read, else one called beauty, combined, rgba and the like, else the first",
     ),
-    drawn("a single channel of any name", "as grey"),
-    refused("luminance with chroma (Y, RY, BY), subsampled channels, channels without a layer of colours"),
-    drawn_with_note("`dataWindow` inside `displayWindow`", "placed there, the rest is black"),
-    drawn_with_note("`dataWindow` beyond `displayWindow`", "cut off"),
-    drawn_with_note("`chromaticities`, else `colorInteropID`", "converted to Rec. 709"),
-    noted("unknown `colorInteropID`"),
-    noted("`pixelAspectRatio`", "no note if it is 1"),
-    no_effect("`envmap`", "a cube is refused as a panorama by its shape"),
-    no_effect("`screenWindow...`, `whiteLuminance`, cameras, dates, comments"),
+    drawn_property("a single channel of any name", "as grey"),
+    refused_property(
+        "luminance with chroma (Y, RY, BY), subsampled channels, channels without a layer of colours"
+    ),
+    drawn_property_with_note("`dataWindow` inside `displayWindow`", "placed there, the rest is black"),
+    drawn_property_with_note("`dataWindow` beyond `displayWindow`", "cut off"),
+    drawn_property_with_note("`chromaticities`, else `colorInteropID`", "converted to Rec. 709"),
+    noted_property("unknown `colorInteropID`"),
+    noted_property("`pixelAspectRatio`", "no note if it is 1"),
+    property_without_effect("`envmap`", "a cube is refused as a panorama by its shape"),
+    property_without_effect("`screenWindow...`, `whiteLuminance`, cameras, dates, comments"),
 )
 """Properties of OpenEXR files."""
 RADIANCE_PROPERTIES = (
-    drawn("`FORMAT` 32-bit_rle_rgbe"),
-    drawn_with_note("`FORMAT` 32-bit_rle_xyze", "converted to Rec. 709"),
-    refused("other `FORMAT`"),
-    drawn("size: `-Y`, `+Y`, `-X`, `+X`, rows or columns first", "upright"),
-    drawn("`EXPOSURE`, `COLORCORR`, also several", "pixels are divided by them"),
-    drawn_with_note("`PRIMARIES`", "converted to Rec. 709; zeros, as Photoshop writes them, are not used"),
-    noted(markdown_code(_UNUSED_RADIANCE_HEADER_NAMES), "no note if they are 1"),
-    refused("run-length coding of before 1991"),
-    no_effect("`VIEW`, `SOFTWARE`, comments"),
+    drawn_property("`FORMAT` 32-bit_rle_rgbe"),
+    drawn_property_with_note("`FORMAT` 32-bit_rle_xyze", "converted to Rec. 709"),
+    refused_property("other `FORMAT`"),
+    drawn_property("size: `-Y`, `+Y`, `-X`, `+X`, rows or columns first", "upright"),
+    drawn_property("`EXPOSURE`, `COLORCORR`, also several", "pixels are divided by them"),
+    drawn_property_with_note(
+        "`PRIMARIES`", "converted to Rec. 709; zeros, as Photoshop writes them, are not used"
+    ),
+    noted_property(markdown_code(_UNUSED_RADIANCE_HEADER_NAMES), "no note if they are 1"),
+    refused_property("run-length coding of before 1991"),
+    property_without_effect("`VIEW`, `SOFTWARE`, comments"),
 )
 """Properties of Radiance files (.hdr)."""
 _MAX_RADIANCE_HEADER_BYTES = 1 << 16

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dermis.base import atomic_write
 from dermis.base.arrays import Floats, Numbers
 from dermis.base.errors import DermisError, error_text, notify, refuse
-from dermis.base.file_properties import drawn_with_note, refused
+from dermis.base.file_properties import drawn_property_with_note, refused_property
 from dermis.base.reading import read_file
 from dermis.images.codecs import Pixels, decode_with_pillow, encode_png
 from dermis.images.colour import encode_srgb8
@@ -51,15 +51,15 @@ _UNSUPPORTED_FORMATS_BY_SIGNATURE = {
 }
 """Formats that are not read, by their first bytes."""
 UNSUPPORTED_PICTURE_PROPERTIES = (
-    refused(", ".join(dict.fromkeys(_UNSUPPORTED_FORMATS_BY_SIGNATURE.values())), "by name"),
+    refused_property(", ".join(dict.fromkeys(_UNSUPPORTED_FORMATS_BY_SIGNATURE.values())), "by name"),
 )
 """Picture formats that are not read."""
 INVALID_PIXEL_PROPERTIES = (
-    drawn_with_note("infinite", "the largest finite value"),
-    drawn_with_note("NaN, negative", "0"),
-    refused("more than half of the pixels not finite, or none above 0"),
-    refused("radiance above 10¹² in panoramas"),
-    refused("odd pixels in maps of heads"),
+    drawn_property_with_note("infinite", "the largest finite value"),
+    drawn_property_with_note("NaN, negative", "0"),
+    refused_property("more than half of the pixels not finite, or none above 0"),
+    refused_property("radiance above 10¹² in panoramas"),
+    refused_property("odd pixels in maps of heads"),
 )
 """Invalid pixels of panoramas and linear photographs, and their replacements."""
 

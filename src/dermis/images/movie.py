@@ -34,12 +34,12 @@ _FRAME_RATE_PATTERN = re.compile(
 _MAX_FRAME_RATE, _MAX_FRAME_RATE_DENOMINATOR = 1000, 1001
 
 
-def parse_frame_rate(frame_rate: str | float | Fraction, culprit: object = "rate") -> Fraction:
+def parse_frame_rate(frame_rate: str | float | Fraction, error_subject: object = "rate") -> Fraction:
     """Return a frame rate as an exact fraction, because rounded frame times would drift.
 
     frame_rate : frame rate such as 30, 12.5 or "24000/1001" [1/s]; 23.976 means 24000/1001, and likewise
         29.97 and 59.94 mean the exact NTSC rates
-    culprit : name of the option or argument, for error messages
+    error_subject : name of the option or argument, for error messages
 
     Raises DermisError for values that are not a frame rate above 0 and up to 1000.
     """
@@ -54,7 +54,7 @@ def parse_frame_rate(frame_rate: str | float | Fraction, culprit: object = "rate
         rate = Fraction(0)
     if not 0 < rate <= _MAX_FRAME_RATE:
         expected = f"frames a second up to {_MAX_FRAME_RATE}, such as 30, 23.976 or 24000/1001"
-        refuse(culprit, expected, f"got {format_value(text)}", "Correct it")
+        refuse(error_subject, expected, f"got {format_value(text)}", "Correct it")
     nearest = min(_NTSC_RATES, key=lambda ntsc: abs(ntsc - rate))
     rate = (
         nearest

@@ -14,7 +14,13 @@ import numpy as np
 from dermis.base.disk import Arrays
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
-from dermis.base.file_properties import drawn, drawn_with_note, no_effect, noted, refused
+from dermis.base.file_properties import (
+    drawn_property,
+    drawn_property_with_note,
+    noted_property,
+    property_without_effect,
+    refused_property,
+)
 from dermis.base.native_decoding import run_decoder
 from dermis.base.reading import MALFORMED_DATA_ERRORS
 from dermis.images.colour_spaces import (
@@ -42,39 +48,39 @@ _FORMATS_BY_BRAND = {b"avif": "AVIF", b"avis": "AVIF"} | dict.fromkeys(
 )
 """Formats by brand of the container that AVIF and HEIC share."""
 PICTURE_PROPERTIES = (
-    drawn(
+    drawn_property(
         ", ".join(dict.fromkeys((*_FORMATS_BY_SIGNATURE.values(), "WebP", *_FORMATS_BY_BRAND.values()))),
         "AVIF and WebP need a Pillow that has them, as its wheels do; HEIC needs "
         '`pip install "dermis[formats]"`, 16-bit colour `"dermis[video]"`',
     ),
-    drawn("8 and 16 bits, palettes"),
-    drawn_with_note("grey, with or without alpha", "repeated in all channels of colours"),
-    drawn_with_note("10 and 12 bits (AVIF, HEIC), CMYK of 16 bits", "reduced to 8"),
-    drawn("float TIFF", "linear; only grey"),
-    drawn_with_note(
+    drawn_property("8 and 16 bits, palettes"),
+    drawn_property_with_note("grey, with or without alpha", "repeated in all channels of colours"),
+    drawn_property_with_note("10 and 12 bits (AVIF, HEIC), CMYK of 16 bits", "reduced to 8"),
+    drawn_property("float TIFF", "linear; only grey"),
+    drawn_property_with_note(
         "ICC profile of curves: Display P3, Adobe RGB, ProPhoto, linear, grey and others",
         "colours are converted to linear Rec. 709 at full depth; no note for sRGB",
     ),
-    drawn_with_note(
+    drawn_property_with_note(
         "ICC profile of tables, in RGB",
         "colours are converted by LittleCMS at 8 bits, relative to white, with compensation of black",
     ),
-    noted("ICC profile that is damaged or for other pixels"),
-    drawn_with_note("CMYK", "converted by its profile likewise, or by subtraction of the inks"),
-    drawn_with_note("code points (`cICP` of PNG, `nclx` of AVIF and HEIC)", "converted"),
-    noted("unknown code points"),
-    refused("code points of PQ and HLG", "levels for HDR displays"),
-    drawn_with_note("`gAMA`, `cHRM`, `sRGB` of PNG", "converted; no note for sRGB"),
-    drawn_with_note("Adobe RGB stated in EXIF", "converted"),
-    no_effect("colour profiles of maps of numbers", "numbers are read as stored"),
-    noted("colour profiles of pictures in .glb files", "not used, as glTF demands"),
-    drawn_with_note("EXIF orientation of photographs and of HEIC", "turned upright"),
-    noted("EXIF orientation of maps"),
-    drawn_with_note("alpha of photographs", "transparent pixels are not fitted"),
-    drawn("alpha of maps", "as the material states"),
-    noted("several pictures in a file: pages, frames, gain maps of phones", "the first is read"),
-    refused("raw files of cameras, CIELAB, 32-bit integers"),
-    no_effect("resolution, dates, texts and other metadata"),
+    noted_property("ICC profile that is damaged or for other pixels"),
+    drawn_property_with_note("CMYK", "converted by its profile likewise, or by subtraction of the inks"),
+    drawn_property_with_note("code points (`cICP` of PNG, `nclx` of AVIF and HEIC)", "converted"),
+    noted_property("unknown code points"),
+    refused_property("code points of PQ and HLG", "levels for HDR displays"),
+    drawn_property_with_note("`gAMA`, `cHRM`, `sRGB` of PNG", "converted; no note for sRGB"),
+    drawn_property_with_note("Adobe RGB stated in EXIF", "converted"),
+    property_without_effect("colour profiles of maps of numbers", "numbers are read as stored"),
+    noted_property("colour profiles of pictures in .glb files", "not used, as glTF demands"),
+    drawn_property_with_note("EXIF orientation of photographs and of HEIC", "turned upright"),
+    noted_property("EXIF orientation of maps"),
+    drawn_property_with_note("alpha of photographs", "transparent pixels are not fitted"),
+    drawn_property("alpha of maps", "as the material states"),
+    noted_property("several pictures in a file: pages, frames, gain maps of phones", "the first is read"),
+    refused_property("raw files of cameras, CIELAB, 32-bit integers"),
+    property_without_effect("resolution, dates, texts and other metadata"),
 )
 """Properties of picture files that Pillow opens."""
 _MAX_BRAND_BYTES = 64

@@ -123,7 +123,7 @@ class FrameFiles:
         name = _NUMBER_PLACEHOLDER.sub(lambda found: f"{frame_number:0{found[1] or 1}d}", self.pattern.name)
         return self.pattern.with_name(name)
 
-    def prepare(self) -> None:
+    def prepare_folder(self) -> None:
         """Create the folder and check that it is writable.
 
         Raises DermisError for an invalid pattern, and for a folder that is not writable.

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from dermis.base.arrays import Doubles, Floats
 from dermis.base.errors import DermisError, format_value, refuse
 from dermis.base.quantities import checked_array, checked_number
+from dermis.base.renamed import renamed_keywords
 from dermis.base.summary import ShortRepr
 from dermis.mesh.rig import PoseArrays, Rig
 from dermis.mesh.skeleton import Skeleton
@@ -75,14 +76,15 @@ class Pose(ShortRepr):
             refuse("pose", expected, f"got {format_value(value)}", "Correct it")
         return cls(weights=value)
 
-    def to_arrays(self, rig: Rig, culprit: object = "pose") -> PoseArrays:
+    @renamed_keywords(error_subject="error_subject")
+    def to_arrays(self, rig: Rig, error_subject: object = "pose") -> PoseArrays:
         """Return the pose as arrays for a rig: target weights, bone matrices and rest positions of points.
 
         Parameters
         ----------
         rig : Rig
             Rig of the head.
-        culprit : object, optional
+        error_subject : object, optional
             Name of the pose in error messages.
 
         Returns
@@ -96,38 +98,38 @@ class Pose(ShortRepr):
             For names that the rig does not have, and for invalid numbers and shapes.
         """
         return PoseArrays(
-            self._target_weights(rig, culprit),
-            self._bone_matrices(rig, culprit),
-            self._rest_positions(rig, culprit),
+            self._target_weights(rig, error_subject),
+            self._bone_matrices(rig, error_subject),
+            self._rest_positions(rig, error_subject),
         )
 
-    def _target_weights(self, rig: Rig, culprit: object) -> Floats:
+    def _target_weights(self, rig: Rig, error_subject: object) -> Floats:
         weights = np.zeros(len(rig.targets.names), np.float32)
         if not self.weights:
             return weights
         try:
             index = rig.target_index
             targets = [index[name] for name in self.weights]
-            values = checked_array(culprit, list(self.weights.values()), (0,), -MAX_WEIGHT, MAX_WEIGHT)
+            values = checked_array(error_subject, list(self.weights.values()), (0,), -MAX_WEIGHT, MAX_WEIGHT)
         except (KeyError, TypeError, DermisError):
-            _refuse_weights(self.weights, rig.targets.names, culprit)
+            _refuse_weights(self.weights, rig.targets.names, error_subject)
         weights[targets] = values if rig.targets.rest is None else values - rig.targets.rest[targets]
         return weights
 
-    def _bone_matrices(self, rig: Rig, culprit: object) -> Floats:
+    def _bone_matrices(self, rig: Rig, error_subject: object) -> Floats:
         bone_values = self._bones_with_target_rotations(rig)
         if not bone_values:
             return rig.rest.matrices
         if rig.skeleton is None:
-            _refuse_name(f"{culprit}: bones", next(iter(bone_values)), (), "bone")
+            _refuse_name(f"{error_subject}: bones", next(iter(bone_values)), (), "bone")
         index = rig.skeleton.index_by_name
         for name in bone_values:
             if name not in index:
-                _refuse_name(f"{culprit}: bones", name, index, "bone")
+                _refuse_name(f"{error_subject}: bones", name, index, "bone")
         ordered = sorted((index[name], name) for name in bone_values)
         bones = [bone for bone, _ in ordered]
         return rig.skeleton.pose_matrices(
-            bones, _bone_transforms(rig.skeleton, ordered, bone_values, culprit)
+            bones, _bone_transforms(rig.skeleton, ordered, bone_values, error_subject)
         )
 
     def _bones_with_target_rotations(self, rig: Rig) -> Mapping[str, ArrayLike]:
@@ -145,7 +147,7 @@ class Pose(ShortRepr):
                 bones[bone] = [a + self.weights[target] * b for a, b in zip(before, degrees, strict=True)]
         return bones
 
-    def _rest_positions(self, rig: Rig, culprit: object) -> Floats:
+    def _rest_positions(self, rig: Rig, error_subject: object) -> Floats:
         if self.positions_mm is None:
             return rig.positions_mm
         try:
@@ -157,13 +159,13 @@ class Pose(ShortRepr):
         if positions.shape != expected:
             actual = f"got {positions.shape if positions.size else format_value(self.positions_mm)}"
             advice = "Give as many points as Head.positions_mm lists, in its order"
-            refuse(f"{culprit}: positions_mm", f"an array of {expected}", actual, advice)
+            refuse(f"{error_subject}: positions_mm", f"an array of {expected}", actual, advice)
         with np.errstate(invalid="ignore"):
             if not np.abs(positions).max(initial=0) <= MAX_DISTANCE_MM:
                 invalid = np.flatnonzero(~(np.abs(positions) <= MAX_DISTANCE_MM).all(axis=1))
                 actual = f"{len(invalid)} are NaN, infinite or farther, first {invalid[0]}"
                 expected_mm = f"points within {MAX_DISTANCE_MM:g} mm"
-                refuse(f"{culprit}: positions_mm", expected_mm, actual, "Correct them")
+                refuse(f"{error_subject}: positions_mm", expected_mm, actual, "Correct them")
         return rig.complete_positions(positions) if rig.rigid_followers else positions
 
 
@@ -177,13 +179,16 @@ def merge_poses(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
 
 
 def _bone_transforms(
-    skeleton: Skeleton, ordered_bones: list[tuple[int, str]], bone_values: Mapping[str, Any], culprit: object
+    skeleton: Skeleton,
+    ordered_bones: list[tuple[int, str]],
+    bone_values: Mapping[str, Any],
+    error_subject: object,
 ) -> Doubles:
     """Return the transforms (n, 4, 4) in head space that move bones from the rest pose to the pose [mm].
 
     ordered_bones : (n,) index and name of each bone, parents before children
     bone_values : mapping from bone name to angles or matrix, see `Pose`
-    culprit : name of the pose in error messages
+    error_subject : name of the pose in error messages
     """
     changes = np.empty((len(ordered_bones), 4, 4))
     rows: list[list[float]] = []
@@ -193,66 +198,68 @@ def _bone_transforms(
         try:
             if len(bone_values[name]) == 3:
                 angles = checked_array(
-                    culprit, bone_values[name], (3,), -MAX_ROTATION_DEGREES, MAX_ROTATION_DEGREES
+                    error_subject, bone_values[name], (3,), -MAX_ROTATION_DEGREES, MAX_ROTATION_DEGREES
                 )
                 rows.append(skeleton.joint_rotation_matrix(bone, angles.tolist()))
                 by_angles.append(k)
             else:
                 changes[k] = checked_array(
-                    culprit, bone_values[name], (4, 4), -MAX_DISTANCE_MM, MAX_DISTANCE_MM
+                    error_subject, bone_values[name], (4, 4), -MAX_DISTANCE_MM, MAX_DISTANCE_MM
                 )
                 by_matrix.append(k)
         except (TypeError, DermisError):
-            _refuse_bone_value(f"{culprit}: bones.{name}", bone_values[name])
+            _refuse_bone_value(f"{error_subject}: bones.{name}", bone_values[name])
     if by_angles:
         changes[by_angles] = np.array(rows).reshape(-1, 4, 4)
     if by_matrix:
-        _check_matrices(changes[by_matrix], [ordered_bones[k][1] for k in by_matrix], culprit)
+        _check_matrices(changes[by_matrix], [ordered_bones[k][1] for k in by_matrix], error_subject)
         bones = [ordered_bones[k][0] for k in by_matrix]
         changes[by_matrix] = skeleton.head_space_transforms(bones, changes[by_matrix])
     return changes
 
 
-def _check_matrices(bone_matrices: Doubles, bone_names: list[str], culprit: object) -> None:
+def _check_matrices(bone_matrices: Doubles, bone_names: list[str], error_subject: object) -> None:
     """Raise DermisError if one of the matrices (n, 4, 4) is singular.
 
     bone_names : (n,) names of the bones
-    culprit : name of the pose in error messages
+    error_subject : name of the pose in error messages
     """
     linear = bone_matrices[:, :3, :3]
     size = np.sqrt(np.einsum("nij,nij->n", linear, linear))
     singular = np.abs(np.linalg.det(linear)) <= _MIN_RELATIVE_DETERMINANT * size**3
     if singular.any():
-        name = f"{culprit}: bones.{bone_names[int(singular.argmax())]}"
+        name = f"{error_subject}: bones.{bone_names[int(singular.argmax())]}"
         refuse(name, "a matrix that can be inverted", "this one flattens what it moves", "Correct it")
 
 
-def _refuse_bone_value(culprit: str, bone_value: object) -> NoReturn:
+def _refuse_bone_value(error_subject: str, bone_value: object) -> NoReturn:
     limits = f"no angle beyond {MAX_ROTATION_DEGREES:g}, nothing beyond {MAX_DISTANCE_MM:g}"
     expected = f"{_EXPECTED_BONE_VALUE}, {limits}"
-    refuse(culprit, expected, f"got {format_value(bone_value, 80)}", "Correct it")
+    refuse(error_subject, expected, f"got {format_value(bone_value, 80)}", "Correct it")
 
 
 def _refuse_weights(
-    target_weights: Mapping[str, object], target_names: tuple[str, ...], culprit: object
+    target_weights: Mapping[str, object], target_names: tuple[str, ...], error_subject: object
 ) -> NoReturn:
     """Raise DermisError for the first invalid weight or unknown morph target.
 
     target_weights : mapping from names of morph targets to weights
     target_names : names of the morph targets of the rig
-    culprit : name of the pose in error messages
+    error_subject : name of the pose in error messages
     """
     for name, weight in target_weights.items():
         if name not in target_names:
-            _refuse_name(f"{culprit}: weights", name, target_names, "morph target")
-        checked_number(f"{culprit}: weights.{name}", weight, -MAX_WEIGHT, MAX_WEIGHT)
-    refuse(f"{culprit}: weights", "a number for each target", "got something else", "Correct it")
+            _refuse_name(f"{error_subject}: weights", name, target_names, "morph target")
+        checked_number(f"{error_subject}: weights.{name}", weight, -MAX_WEIGHT, MAX_WEIGHT)
+    refuse(f"{error_subject}: weights", "a number for each target", "got something else", "Correct it")
 
 
-def _refuse_name(culprit: str, unknown_name: object, known_names: Iterable[str], name_noun: str) -> NoReturn:
+def _refuse_name(
+    error_subject: str, unknown_name: object, known_names: Iterable[str], name_noun: str
+) -> NoReturn:
     """Raise DermisError for an unknown name; the message suggests similar known names.
 
-    culprit : name of the pose's field in the message
+    error_subject : name of the pose's field in the message
     known_names : names of all bones or morph targets of the head
     name_noun : "bone" or "morph target"
     """
@@ -260,7 +267,7 @@ def _refuse_name(culprit: str, unknown_name: object, known_names: Iterable[str],
     if not names:
         actual = f"got {format_value(unknown_name)} and it has none"
         refuse(
-            culprit,
+            error_subject,
             f"a {name_noun} of the head",
             actual,
             f"Load a glTF file with {name_noun}s, or leave it out",
@@ -274,7 +281,7 @@ def _refuse_name(culprit: str, unknown_name: object, known_names: Iterable[str],
         if similar
         else f"It has {_short_name_list(names)}"
     )
-    refuse(culprit, f"a {name_noun} of the head", f"there is no {format_value(unknown_name)}", advice)
+    refuse(error_subject, f"a {name_noun} of the head", f"there is no {format_value(unknown_name)}", advice)
 
 
 def _short_name_list(known_names: list[str]) -> str:

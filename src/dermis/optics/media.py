@@ -127,11 +127,16 @@ class Medium:
         return replace(self, layers=layers)
 
 
-def _check_layer(culprit: str, layer: Layer, is_last: bool) -> None:
+def _check_layer(error_subject: str, layer: Layer, is_last: bool) -> None:
     a, s = layer.sigma_a, layer.sigma_s_prime
     if a.ndim != 1 or a.shape != s.shape or len(a) == 0:
         actual = f"got shapes {a.shape} and {s.shape}"
-        refuse(culprit, "one absorption and scattering coefficient per channel", actual, "Correct the lists")
+        refuse(
+            error_subject,
+            "one absorption and scattering coefficient per channel",
+            actual,
+            "Correct the lists",
+        )
     if not (
         (a >= 0)
         & (a <= _MAX_COEFFICIENT_PER_MM)
@@ -141,12 +146,12 @@ def _check_layer(culprit: str, layer: Layer, is_last: bool) -> None:
         actual = f"got absorption {a.tolist()} and scattering {s.tolist()}"
         scattering_range = f"{_MIN_SCATTERING_PER_MM:g} to {_MAX_COEFFICIENT_PER_MM:g} /mm"
         expected = f"absorption from 0 and scattering from {scattering_range}"
-        refuse(culprit, expected, actual, "Correct them")
+        refuse(error_subject, expected, actual, "Correct them")
     semi_infinite = np.isinf(layer.thickness_mm) and layer.thickness_mm > 0 and is_last
     if not semi_infinite and not _MIN_THICKNESS_MM <= layer.thickness_mm <= _MAX_THICKNESS_MM:
         limits = f"{_MIN_THICKNESS_MM:g} to {_MAX_THICKNESS_MM:g} mm"
         expected = f"a thickness from {limits}, infinite in the last layer only"
-        refuse(culprit, expected, f"got {layer.thickness_mm} mm", "Correct it")
+        refuse(error_subject, expected, f"got {layer.thickness_mm} mm", "Correct it")
 
 
 @cache
@@ -185,25 +190,27 @@ def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
     return Medium(str(document.get("name", path.stem)), layers, eta)
 
 
-def _layer_from_table(culprit: str, layer_entries: Mapping[str, Any]) -> Layer:
-    check_reduced(culprit, layer_entries)
+def _layer_from_table(error_subject: str, layer_entries: Mapping[str, Any]) -> Layer:
+    check_reduced(error_subject, layer_entries)
     unknown = sorted(set(layer_entries) - {"name", "thickness_mm", *_COEFFICIENT_KEYS})
     if unknown:
         known = ", ".join(("name", "thickness_mm", *_COEFFICIENT_KEYS))
-        refuse(culprit, known, f"got {', '.join(unknown)}", "Take it out or correct its name")
-    absorption, scattering = (_rgb_coefficients(culprit, layer_entries, key) for key in _COEFFICIENT_KEYS)
+        refuse(error_subject, known, f"got {', '.join(unknown)}", "Take it out or correct its name")
+    absorption, scattering = (
+        _rgb_coefficients(error_subject, layer_entries, key) for key in _COEFFICIENT_KEYS
+    )
     thickness = layer_entries.get("thickness_mm", np.inf)
     if thickness != np.inf:
         thickness = checked_number(
-            f"{culprit}: thickness_mm", thickness, _MIN_THICKNESS_MM, _MAX_THICKNESS_MM
+            f"{error_subject}: thickness_mm", thickness, _MIN_THICKNESS_MM, _MAX_THICKNESS_MM
         )
     return Layer(absorption, scattering, thickness, str(layer_entries.get("name", "layer")))
 
 
-def _rgb_coefficients(culprit: str, layer_entries: Mapping[str, Any], coefficient_key: str) -> Floats:
+def _rgb_coefficients(error_subject: str, layer_entries: Mapping[str, Any], coefficient_key: str) -> Floats:
     unit = "1/mm in red, green and blue"
     return checked_array(
-        f"{culprit}: {coefficient_key}",
+        f"{error_subject}: {coefficient_key}",
         layer_entries.get(coefficient_key),
         (3,),
         0.0,

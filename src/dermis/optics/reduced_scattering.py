@@ -17,12 +17,12 @@ _MAX_LISTED_LAYERS = 6  # in a message
 _MAX_LISTED_THICKNESS_MM = 1e4  # thicker layers of MCML files stand for semi-infinite ones
 
 
-def check_reduced(culprit: str, layer_entries: Mapping[str, object]) -> None:
+def check_reduced(error_subject: str, layer_entries: Mapping[str, object]) -> None:
     """Raise DermisError if a layer in a file has an entry for the anisotropy g.
 
     The scattering coefficient of such a layer is probably not yet multiplied by 1 - g.
 
-    culprit : name of the file or layer, for the message
+    error_subject : name of the file or layer, for the message
     layer_entries : entries of the layer in the file, including "scattering_per_mm"
     """
     key = next((key for key in _ANISOTROPY_KEYS if key in layer_entries), None)
@@ -37,7 +37,7 @@ def check_reduced(culprit: str, layer_entries: Mapping[str, object]) -> None:
             reduced = f"[{', '.join(f'{_reduced_scattering(*pair):.4g}' for pair in pairs)}]"
     expected = f"reduced scattering, mu_s' = mu_s (1 - g), and no {key}"
     advice = f"If its scattering is mu_s, as in MCML, write scattering_per_mm = {reduced}"
-    refuse(culprit, expected, f"it has {key} = {format_value(g)}", f"{advice}; then take {key} out")
+    refuse(error_subject, expected, f"it has {key} = {format_value(g)}", f"{advice}; then take {key} out")
 
 
 def refuse_mcml(path: Path) -> NoReturn:

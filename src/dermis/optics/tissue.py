@@ -20,7 +20,7 @@ from dermis.optics.diffusion.models import (
     diffusion_rings,
     slab_transmittance,
 )
-from dermis.optics.diffusion.multipole import Clamp
+from dermis.optics.diffusion.multipole import SourceDepthClamp
 from dermis.optics.fits.targets import RingTarget
 from dermis.optics.half_space import (
     PHOTON_TABLE_MODEL,
@@ -83,7 +83,7 @@ class Tissue:
         heading = f"Tissue {self.medium.name}: {kind}, index of refraction {self.medium.eta:g}"
         return "\n".join([heading, f"  {thicknesses}", f"  {', '.join(ranges)}"])
 
-    def spectrum(self, model: DiffusionModel = "layered", clamp: Clamp = "layer") -> Floats | None:
+    def spectrum(self, model: DiffusionModel = "layered", clamp: SourceDepthClamp = "layer") -> Floats | None:
         """Return the total diffuse reflectance (31,) at `WAVELENGTHS_NM` [-].
 
         It is relative to the incident light and excludes surface reflection. The result is None for a medium
@@ -115,7 +115,7 @@ class Tissue:
         """
         return PHOTON_TABLE_MODEL if self.rgb is None and has_photon_table(self.medium) else "layered"
 
-    def profile(self, model: ProfileModel | None = None, clamp: Clamp = "layer") -> RadialProfile:
+    def profile(self, model: ProfileModel | None = None, clamp: SourceDepthClamp = "layer") -> RadialProfile:
         """Return the diffusion profile R(r) of the tissue in linear Rec. 709.
 
         R(r) is relative to the incident power for a skin that is defined by its pigments, and relative to the

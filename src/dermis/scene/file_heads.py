@@ -18,7 +18,7 @@ from dermis.formats.mesh_checks import check_uv_range
 from dermis.formats.obj import obj_maps
 from dermis.formats.parts import is_gltf
 from dermis.formats.samples import SAMPLES, Sample, fetch_sample
-from dermis.formats.units import with_settled_unit
+from dermis.formats.units import with_positions_in_mm
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -114,9 +114,9 @@ def load_file_head(
     return Head(sample_or_path, mesh, maps, "", rigged.rig, file_vertices=rigged.file_vertices), look
 
 
-def _load_mesh(path: Path, culprit: str, mesh_options: dict[str, Any]) -> RiggedMesh:
+def _load_mesh(path: Path, error_subject: str, mesh_options: dict[str, Any]) -> RiggedMesh:
     rigged = with_generated_uv(load_rigged(path, **mesh_options))
-    return with_settled_unit(rigged, path, mesh_options["unit_mm"], culprit)
+    return with_positions_in_mm(rigged, path, mesh_options["unit_mm"], error_subject)
 
 
 def _load_sample(sample: Sample, mesh_options: dict[str, Any], map_options: MapOptions) -> Head:

@@ -12,7 +12,7 @@ from dermis.atlas.texture_baking import PackedTextures, pack_textures, read_line
 from dermis.atlas.texture_tiles import UV_TOLERANCE
 from dermis.atlas.unwrap.missing_uv import unwrap_triangles
 from dermis.base.arrays import Floats, Mask
-from dermis.formats.load import FileSurface, RiggedMesh
+from dermis.formats.load import FileSurfaceData, RiggedMesh
 from dermis.formats.materials import IDENTITY_UV_TRANSFORM, FileMaterial, Role
 from dermis.mesh.maps import Maps, PartMaps
 from dermis.mesh.mesh import Material, Mesh
@@ -92,7 +92,7 @@ def _materials_of_kind(mesh: Mesh, material_kind: str) -> Mask:
     return np.array([material.kind == material_kind for material in mesh.materials])
 
 
-def _has_colours(mesh: Mesh, surface: FileSurface, material_mask: Mask) -> bool:
+def _has_colours(mesh: Mesh, surface: FileSurfaceData, material_mask: Mask) -> bool:
     """Return whether any vertex of selected materials has a colour other than white.
 
     surface : surface data of the file, with vertex colours from 0 to 1 if the file has them
@@ -150,7 +150,7 @@ def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) ->
     return coloured
 
 
-def _pictured_material_mask(mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial]) -> Mask:
+def _pictured_material_mask(mesh: Mesh, surface: FileSurfaceData, materials: Sequence[FileMaterial]) -> Mask:
     """Return the mask (m,) of opaque materials with pictures or vertex colours."""
     opaque = _materials_of_kind(mesh, "opaque")
     if any(one.maps is not None for one in materials):  # this package wrote the file; eyes are fitted again

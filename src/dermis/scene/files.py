@@ -286,18 +286,27 @@ def _resolve_file(scene_folder: Path, file_or_preset: str) -> str:
     return str(file) if is_file(file) else file_or_preset
 
 
-def _parse_lights(culprit: object, light_tables: Any) -> tuple[Light, ...]:
+def _parse_lights(error_subject: object, light_tables: Any) -> tuple[Light, ...]:
     if not isinstance(light_tables, list) or not light_tables:
         actual = "got none" if not light_tables else f"got {light_tables!r}"
-        refuse(culprit, "at least one [[lights]] table", actual, "Add one with kind, position and irradiance")
-    return tuple(_parse_light(culprit, f"light {k}", table) for k, table in enumerate(light_tables, start=1))
+        refuse(
+            error_subject,
+            "at least one [[lights]] table",
+            actual,
+            "Add one with kind, position and irradiance",
+        )
+    return tuple(
+        _parse_light(error_subject, f"light {k}", table) for k, table in enumerate(light_tables, start=1)
+    )
 
 
-def _parse_light(culprit: object, light_label: str, light_table: Any) -> Light:
+def _parse_light(error_subject: object, light_label: str, light_table: Any) -> Light:
     kind = light_table.get("kind", "point") if isinstance(light_table, dict) else "point"
     if not isinstance(kind, str) or kind not in LIGHTS:
-        refuse(f"{culprit}: {light_label}", f"a kind of {', '.join(LIGHTS)}", f"got {kind!r}", "Correct it")
-    return _build_settings(LIGHTS[kind], culprit, light_label, light_table)
+        refuse(
+            f"{error_subject}: {light_label}", f"a kind of {', '.join(LIGHTS)}", f"got {kind!r}", "Correct it"
+        )
+    return _build_settings(LIGHTS[kind], error_subject, light_label, light_table)
 
 
 def _build_settings(settings_class: type[P], file_name: object, table_name: str, table_values: Any) -> P:

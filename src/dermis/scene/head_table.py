@@ -163,12 +163,12 @@ def check_options(**options: Any) -> None:
         raise InvalidFieldsError("load_head", error.messages) from None
 
 
-def check_relief(height_mm: float | None, height_map: object, culprit: str = "height_mm") -> None:
+def check_relief(height_mm: float | None, height_map: object, error_subject: str = "height_mm") -> None:
     """Raise DermisError if height_mm is given without a height map.
 
     height_map : file of the height map
-    culprit : name of the option height_mm, for the error message
+    error_subject : name of the option height_mm, for the error message
     """
     if height_mm is not None and height_map is None:
         actual = f"got {height_mm} without a height map"
-        refuse(culprit, "a height map with it", actual, "Give the map too, or leave height_mm out")
+        refuse(error_subject, "a height map with it", actual, "Give the map too, or leave height_mm out")

@@ -56,7 +56,7 @@ def _head() -> Any:
 
 def _sound(rng: Random) -> Input:
     changed = tuple(name for name in _stored() if name.startswith(_FOLDER))
-    return Input(_stored(), {"culprits": []}, changed)
+    return Input(_stored(), {"error_subjects": []}, changed)
 
 
 def _take(plan: Plan) -> None:

@@ -58,7 +58,12 @@ class _BegunError(BaseException):
 def _sound_options(rng: Random) -> Input:
     command = rng.choice([name for name in _BEGINNINGS for _ in range(_DRAWN.get(name, 1))])
     files = {**scenes.files_of_scenes(), "scene.toml": scenes.scene_files()[0], "take.csv": CAPTURE.encode()}
-    plan = {"command": [command, *_BEGINNINGS[command]], "culprits": [], "outputs": _OUTPUTS, "kept": _KEPT}
+    plan = {
+        "command": [command, *_BEGINNINGS[command]],
+        "error_subjects": [],
+        "outputs": _OUTPUTS,
+        "kept": _KEPT,
+    }
     return Input(files, plan)
 
 
@@ -86,7 +91,7 @@ def _sound_drawn(rng: Random) -> Input:
     words, moves = found.plan["words"], "--motion" in found.plan["words"]
     command = ["animate", *words, *_MOVING[1:]] if moves else ["render", *words, *_BEGINNINGS["render"][1:]]
     files = {"head.obj": meshes.head_files()["head.obj"], **found.files}
-    plan = {"command": command, "outputs": _OUTPUTS, "kept": _KEPT, "culprits": list(files)}
+    plan = {"command": command, "outputs": _OUTPUTS, "kept": _KEPT, "error_subjects": list(files)}
     return Input(files, plan, found.changed or tuple(found.files))
 
 

@@ -35,7 +35,7 @@ def _sound_tar(rng: Random) -> Input:
 
 
 def _sound_folder(rng: Random) -> Input:
-    return Input(_shard("folder", rng.choice(_ENCODINGS)), {"file": _SHARD, "culprits": [_SHARD]})
+    return Input(_shard("folder", rng.choice(_ENCODINGS)), {"file": _SHARD, "error_subjects": [_SHARD]})
 
 
 def _damaged_inside(sound: Input, rng: Random) -> Input:
@@ -79,7 +79,7 @@ def _take_whole(plan: Plan) -> None:
 
 def _sound_whole(rng: Random) -> Input:
     form = rng.choice(("webdataset", "folder"))
-    return Input(_shard(form, "png"), {"form": form, "culprits": []})
+    return Input(_shard(form, "png"), {"form": form, "error_subjects": []})
 
 
 KINDS = (

@@ -26,7 +26,7 @@ def _sound(rng: Random) -> Input:
     pictures = {f"frames/{k:03}{suffix}": data for k in range(_COUNT)}
     pattern = f"frames/%03d{suffix}"
     record = {f"frames/.%03d{suffix}.made-of": _MADE_OF.encode()}
-    return Input({**record, **pictures}, {"file": pattern, "culprits": []})
+    return Input({**record, **pictures}, {"file": pattern, "error_subjects": []})
 
 
 def _take(plan: Plan) -> None:
@@ -36,7 +36,7 @@ def _take(plan: Plan) -> None:
     from dermis.images.writer import FrameFiles
 
     files = FrameFiles(Path(plan["file"]))
-    files.prepare()
+    files.prepare_folder()
     files.start_sequence(_MADE_OF)
     missing = files.missing_frames(range(_COUNT), _SIZE)
     for number in set(range(_COUNT)) - set(missing):

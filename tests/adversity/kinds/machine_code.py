@@ -41,7 +41,7 @@ def _stored() -> dict[str, bytes]:
 
 
 def _sound(rng: Random) -> Input:
-    return Input(_stored(), {"culprits": []})
+    return Input(_stored(), {"error_subjects": []})
 
 
 def _take(plan: Plan) -> None:

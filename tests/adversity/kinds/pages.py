@@ -43,7 +43,7 @@ def _texts(rng: Random, count: int) -> dict[str, bytes]:
 
 
 def _message(rng: Random) -> Input:
-    return Input(_texts(rng, 1), {"culprits": []})
+    return Input(_texts(rng, 1), {"error_subjects": []})
 
 
 def _take_message(plan: Plan) -> None:
@@ -78,7 +78,7 @@ def _passed(texts: list[str]) -> list[dict[str, Any]]:
 
 
 def _events(rng: Random) -> Input:
-    return Input(_texts(rng, _COUNT), {"culprits": [], "outputs": ["head.obj"]})
+    return Input(_texts(rng, _COUNT), {"error_subjects": [], "outputs": ["head.obj"]})
 
 
 def _take_events(plan: Plan) -> None:
@@ -128,7 +128,7 @@ def _upload(rng: Random) -> Input:
     if rng.random() < 0.5:
         request["path"] = f"/upload/{name(rng)}.obj"
         files["request.json"] = json.dumps(request).encode()
-    return Input(files, {"culprits": [], "outputs": ["files"]}, ("request.json",))
+    return Input(files, {"error_subjects": [], "outputs": ["files"]}, ("request.json",))
 
 
 def _take_upload(plan: Plan) -> None:

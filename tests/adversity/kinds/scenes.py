@@ -202,8 +202,8 @@ def _profile(rng: Random) -> Input:
     trees = {"medium.toml": _MEDIUM, "pigments.toml": _PIGMENTS, "gaussians.toml": _GAUSSIANS}
     files = {name: _toml(tree) for name, tree in trees.items()} | {"profile.csv": _PROFILE.encode()}
     name = rng.choice(tuple(files))
-    culprits = [name, str(_MEDIUM["name"])]  # a medium may be called as its file calls it
-    plan = {"file": name, "culprits": culprits, "words": ["head.obj", "--profile", name]}
+    error_subjects = [name, str(_MEDIUM["name"])]  # a medium may be called as its file calls it
+    plan = {"file": name, "error_subjects": error_subjects, "words": ["head.obj", "--profile", name]}
     return Input({name: files[name]}, plan)
 
 

@@ -18,7 +18,7 @@ from dermis.optics.radial import enclosed_energy, resample_profile
 A = boundary_mismatch(1.4, "exact")
 
 
-def of(medium: Medium, clamp: multipole.Clamp = "layer") -> Slab:
+def of(medium: Medium, clamp: multipole.SourceDepthClamp = "layer") -> Slab:
     return Slab(medium.layers[0], A, A, clamp)
 
 
@@ -51,7 +51,7 @@ def test_profiles_of_the_table(sample_folder: Path, name: str, layer: Layer) -> 
 @pytest.mark.parametrize(
     ("thickness", "clamp"), [(0.3, "none"), (1.2, "none"), (1.2, "layer"), (4.0, "layer")]
 )
-def test_series_is_the_inverse_of_the_closed_sum(thickness: float, clamp: multipole.Clamp) -> None:
+def test_series_is_the_inverse_of_the_closed_sum(thickness: float, clamp: multipole.SourceDepthClamp) -> None:
     one = of(slab(0.95, thickness), clamp)
     r = np.geomspace(0.02, 8.0, 30)
     for series, closed in (

@@ -51,7 +51,7 @@ class DaskCluster:
 
         name = f"dermis-{secrets.token_hex(6)}"
         with self._client() as client:
-            client.register_plugin(PartPlugin.for_run(options, self.adapter), name=name)
+            client.register_plugin(PartPlugin.from_run_options(options, self.adapter), name=name)
             try:
                 with _create_marker_file(options.out) as marker:
                     _check_shared_disk(client, marker)
@@ -67,16 +67,20 @@ class DaskCluster:
         if self.file is not None and not self.file.is_file():
             refuse(self.file, "the file that dask's scheduler wrote", "it does not exist", "Start it first")
         scheduler = {"address": self.address} if self.file is None else {"scheduler_file": str(self.file)}
-        culprit = self.address or self.file
+        error_subject = self.address or self.file
         try:
             client = Client(**scheduler, timeout=_CONNECTION_TIMEOUT_S, set_as_default=False)
         except (OSError, ValueError) as fault:
-            refuse(culprit, "a scheduler of dask.distributed", f"none answers ({fault})", "Start it first")
+            refuse(
+                error_subject, "a scheduler of dask.distributed", f"none answers ({fault})", "Start it first"
+            )
         with client:
             try:
                 client.wait_for_workers(1, timeout=_CONNECTION_TIMEOUT_S)
             except TimeoutError:
-                refuse(culprit, "a scheduler with workers", "it has none", "Start them with dask worker")
+                refuse(
+                    error_subject, "a scheduler with workers", "it has none", "Start them with dask worker"
+                )
             yield client
 
 
@@ -112,7 +116,7 @@ def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> I
     """
     from distributed import Future, as_completed
 
-    from dermis.apps.batch.dask_worker import process_task
+    from dermis.apps.batch.dask_worker import run_task
 
     queue, submitted = deque(tasks), dict[Future, Shard]()
     keys, completed = itertools.count(), as_completed(loop=client.loop)
@@ -121,7 +125,7 @@ def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> I
         while queue and len(submitted) < _MAX_TASKS_IN_FLIGHT:
             task = queue.popleft()
             future = client.submit(
-                process_task, plugin_name, task, key=f"{plugin_name}-{next(keys)}", retries=_MAX_TASK_RETRIES
+                run_task, plugin_name, task, key=f"{plugin_name}-{next(keys)}", retries=_MAX_TASK_RETRIES
             )
             submitted[future] = task
             completed.add(future)

@@ -71,7 +71,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
     adapter: str
 
     @classmethod
-    def for_run(cls, options: RunOptions, adapter: str) -> Self:
+    def from_run_options(cls, options: RunOptions, adapter: str) -> Self:
         """Return the plugin for the options of a run and the requested graphics adapters."""
         folder, out = options.spec.folder.resolve(), options.out.resolve()
         return cls(options.spec.to_toml(), folder, out, options.encoders, options.keep_going, adapter)
@@ -88,15 +88,15 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
             self._state.close()
             self._state.lock.release()
 
-    def process(self, task: Shard) -> WorkerEvent:
-        """Process a task as `Worker.process` does; return an event that reports its completion or an error.
+    def run_task(self, task: Shard) -> WorkerEvent:
+        """Process a task as `Worker.run_tasks` does; return an event that reports its completion or an error.
 
         Raises LostProcessError if the process or its device was lost; dask then retries the task.
         """
         state = self._state
         with state.lock:
             try:
-                return self._process_in_child(state.child or self._start_child(), task)
+                return self._run_in_child(state.child or self._start_child(), task)
             except LostProcessError:
                 state.close()
                 raise
@@ -106,7 +106,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
                 if state.stopped.is_set():
                     state.close()
 
-    def _process_in_child(self, child: ChildProcess, task: Shard) -> WorkerEvent:
+    def _run_in_child(self, child: ChildProcess, task: Shard) -> WorkerEvent:
         try:
             child.pipe.send(task)
             while not self._state.stopped.is_set():
@@ -127,7 +127,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
     def _start_child(self) -> ChildProcess:
         """Start the rendering process, on an adapter chosen by the rank of this dask worker on its host."""
         cleanup = self._state.cleanup
-        rank = cleanup.enter_context(hold_local_rank())
+        rank = cleanup.enter_context(reserve_local_rank())
         adapters = adapters_like_best_match(self.adapter)
         spec = parse_spec(tomllib.loads(self.spec_toml), self.folder)
         slot = WorkerSlot(f"#{adapters[rank % len(adapters)].number}")
@@ -137,13 +137,13 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
         return child
 
 
-def process_task(plugin_name: str, task: Shard) -> WorkerEvent:
+def run_task(plugin_name: str, task: Shard) -> WorkerEvent:
     """Process a task inside a dask worker, with the `PartPlugin` that is registered with this worker.
 
     plugin_name : name under which the plugin is registered
     task : part of a shard to render, or complete shard to verify
     """
-    event: WorkerEvent = get_worker().plugins[plugin_name].process(task)
+    event: WorkerEvent = get_worker().plugins[plugin_name].run_task(task)
     return event
 
 
@@ -153,7 +153,7 @@ def path_exists(file_path: str) -> bool:
 
 
 @contextmanager
-def hold_local_rank() -> Iterator[int]:
+def reserve_local_rank() -> Iterator[int]:
     """Yield the smallest rank, counted from 0, that no other process of this user holds on this host.
 
     Dask workers on one host choose different adapters by rank. A process holds a rank by locking a file; the

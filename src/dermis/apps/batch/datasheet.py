@@ -101,7 +101,11 @@ def _files_table(spec: Spec) -> str:
 
 def _fit_tests_table(fit_test_results: Iterable[FitTest]) -> str:
     rows = [
-        (*one[:4], *(f"{number:.2g}" for number in one[4:]), "" if one.passes else "differs from the spec")
+        (
+            *one[:4],
+            *(f"{number:.2g}" for number in one[4:]),
+            "" if one.is_accepted else "differs from the spec",
+        )
         for one in fit_test_results
     ]
     columns = "parameter", "samples", "spec", "sampled", "distance", "expected distance", "p-value", ""

@@ -140,14 +140,14 @@ class TruncatedNormal(Distribution):
         """Check the standard deviation and the limits."""
         require(self.sd > 0, "a standard deviation above 0")
         require(self.low < self.high, "a lower limit that is less than the upper limit")
-        below, above = self._limit_probabilities
+        below, above = self._probabilities_at_limits
         require(
             above - below >= _MIN_INTERVAL_PROBABILITY,
             f"limits that contain at least {_MIN_INTERVAL_PROBABILITY:g} of the normal distribution",
         )
 
     @property
-    def _limit_probabilities(self) -> tuple[float, float]:
+    def _probabilities_at_limits(self) -> tuple[float, float]:
         """Return the cumulative probabilities of the untruncated normal distribution at both limits.
 
         If both limits exceed the mean, they are mirrored about the mean and swapped, because the difference
@@ -163,7 +163,7 @@ class TruncatedNormal(Distribution):
 
     def quantile(self, probability: float) -> float:
         """Return the number below which a sample lies with a given probability between 0 and 1."""
-        below, above = self._limit_probabilities
+        below, above = self._probabilities_at_limits
         if self.low > self.mean:
             deviation = -float(ndtri(above - probability * (above - below)))
         else:

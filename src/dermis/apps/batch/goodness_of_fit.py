@@ -56,7 +56,7 @@ class FitTest(NamedTuple):
     p_value: float
 
     @property
-    def passes(self) -> bool:
+    def is_accepted(self) -> bool:
         """Return whether the p-value is at least `MIN_P_VALUE`."""
         return self.p_value >= MIN_P_VALUE
 

@@ -86,7 +86,7 @@ def estimate_size_and_duration(spec: Spec, adapter: str = "auto") -> Estimate:
     times = [time.monotonic()]
     with TemporaryDirectory() as name, closing(Worker(adapter, RunOptions(spec, Path(name)))) as worker:
         send = lambda event: times.extend([time.monotonic()] * event.images)  # noqa: E731
-        worker.process([Part(0, 0, count)], send)
+        worker.run_tasks([Part(0, 0, count)], send)
         size = sum(path.stat().st_size for path in Path(name).rglob("*") if path.is_file())
     untimed = _WARM_UP_IMAGE_COUNT if count > _WARM_UP_IMAGE_COUNT else 0
     seconds = (times[-1] - times[untimed]) / (count - untimed)

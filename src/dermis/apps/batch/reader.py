@@ -24,13 +24,14 @@ from dermis.base.reading import (
     checked_path,
     open_regular_file,
     parse_json,
-    parsing,
     read_file,
+    refuse_parse_errors,
 )
+from dermis.base.renamed import renamed_keywords
 from dermis.images.sizes import MAX_FILE_BYTES
 from dermis.scene.opencv import OpenCvCamera
 
-Image = dict[str, Any]
+ImageFields = dict[str, Any]
 """Ground truth of an image by name, see `read_dataset`."""
 FileReaders = dict[str, Callable[[], bytes]]
 """Functions that read the files of an image, by name or suffix."""
@@ -58,7 +59,7 @@ class LandmarkPoints(NamedTuple):
 
 def read_dataset(
     path: str | Path, *, shards: Iterable[int] | None = None, shuffle: int | None = None
-) -> Iterator[Image]:
+) -> Iterator[ImageFields]:
     """Return the images of a data set rendered by `dermis batch`, with their ground truth.
 
     Parameters
@@ -106,15 +107,16 @@ def read_dataset(
     return _iterate_images(_select_shards(checked_path(path, "a data set"), shards), random)
 
 
-def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
+@renamed_keywords(error_subject="error_subject")
+def decode_image(files: Mapping[str, object], error_subject: object = "") -> ImageFields:
     """Return an image of a data set from the files of the image, with the keys that `read_dataset` lists.
 
     files : content of each file as bytes, by suffix, as the library webdataset provides them
-    culprit : name of the image in error messages; by default the image's key
+    error_subject : name of the image in error messages; by default the image's key
 
     Raises DermisError for damaged files.
     """
-    source = culprit or files.get("__key__", "an image")
+    source = error_subject or files.get("__key__", "an image")
     data = {suffix: content for suffix, content in files.items() if not suffix.startswith("__")}
     encoded, record = (_pop_file(data, suffix, source) for suffix in (PICTURE_SUFFIX, RECORD_SUFFIX))
     image = _decode_record(record, f"{source}.{RECORD_SUFFIX}")
@@ -133,19 +135,22 @@ def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
     return image
 
 
-def read_record(json_bytes: bytes, culprit: object) -> Record:
+def read_record(json_bytes: bytes, error_subject: object) -> Record:
     """Return the record of an image from the bytes of its JSON file, without checking the landmarks.
 
-    culprit : name of the file in error messages
+    error_subject : name of the file in error messages
 
     Raises DermisError if the record is damaged.
     """
     if len(json_bytes) > MAX_TEXT_BYTES:
         refuse(
-            culprit, "a record of an image", f"it has {len(json_bytes):,} bytes", "Copy or download it again"
+            error_subject,
+            "a record of an image",
+            f"it has {len(json_bytes):,} bytes",
+            "Copy or download it again",
         )
-    record: Record = parse_json(json_bytes, culprit, "a record of an image")
-    with _refuse_malformed_record(culprit):
+    record: Record = parse_json(json_bytes, error_subject, "a record of an image")
+    with _refuse_malformed_record(error_subject):
         if type(record["number"]) is not int:
             raise ValueError("its number is not an integer")
         for name, value in record["parameters"].items():
@@ -170,7 +175,7 @@ def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
         yield _group_by_image(path, {name: partial(_read_folder_file, path / name) for name in names})
         return
     with open_regular_file(path, SHARD_DESCRIPTION) as file:
-        with parsing(path, SHARD_DESCRIPTION):
+        with refuse_parse_errors(path, SHARD_DESCRIPTION):
             members = list(tar_members(file))
             if len({one.name for one in members}) != len(members):
                 raise ValueError("two of its files have the same name")
@@ -231,7 +236,7 @@ def _select_shards(path: Path, shards: Iterable[int] | None) -> list[Path]:
     return [by_number[number] for number in numbers]
 
 
-def _iterate_images(shards: list[Path], shuffle_rng: Random | None) -> Iterator[Image]:
+def _iterate_images(shards: list[Path], shuffle_rng: Random | None) -> Iterator[ImageFields]:
     if shuffle_rng:
         shuffle_rng.shuffle(shards)
     for path in shards:
@@ -247,23 +252,25 @@ def _iterate_images(shards: list[Path], shuffle_rng: Random | None) -> Iterator[
                 yield image
 
 
-def _pop_file(files: dict[str, object], suffix: str, culprit: object) -> bytes:
+def _pop_file(files: dict[str, object], suffix: str, error_subject: object) -> bytes:
     content = files.pop(suffix, None)
     if not isinstance(content, bytes):
-        refuse(culprit, "an image of a data set", f"its .{suffix} is missing", "Copy or download it again")
+        refuse(
+            error_subject, "an image of a data set", f"its .{suffix} is missing", "Copy or download it again"
+        )
     return content
 
 
-def _decode_record(json_bytes: bytes, culprit: object) -> Image:
-    record = read_record(json_bytes, culprit)
-    with _refuse_malformed_record(culprit):
+def _decode_record(json_bytes: bytes, error_subject: object) -> ImageFields:
+    record = read_record(json_bytes, error_subject)
+    with _refuse_malformed_record(error_subject):
         landmarks = {name: _decode_landmarks(one) for name, one in record["landmarks"].items()}
     image = {"number": record["number"], "parameters": record["parameters"]}
     image["skin_tone"] = record.get("skin_tone")
     return image | _decode_pose(record) | {"landmarks": landmarks}
 
 
-def _decode_pose(record: Record) -> Image:
+def _decode_pose(record: Record) -> ImageFields:
     """Return the arrays of camera, head pose and gaze in a record."""
     camera, gaze = record["camera"], record["gaze"]
     K, R, t = _to_array(camera["K"], (3, 3)), _to_array(camera["R"], (3, 3)), _to_array(camera["t"], (3,))
@@ -295,15 +302,17 @@ def _to_array(nested_numbers: NestedNumbers, shape: tuple[int, ...]) -> NDArray[
     return array.reshape(shape)
 
 
-def _refuse_malformed_record(culprit: object) -> AbstractContextManager[None]:
+def _refuse_malformed_record(error_subject: object) -> AbstractContextManager[None]:
     """Return a context manager that turns errors of a malformed record into a DermisError.
 
-    culprit : name of the file in error messages
+    error_subject : name of the file in error messages
     """
-    return parsing(culprit, "a record of an image", KeyError, TypeError, AttributeError)
+    return refuse_parse_errors(error_subject, "a record of an image", KeyError, TypeError, AttributeError)
 
 
-def _decode_picture(culprit: object, output_name: str, picture_format: str, file_content: object) -> Array:
+def _decode_picture(
+    error_subject: object, output_name: str, picture_format: str, file_content: object
+) -> Array:
     try:
         if not isinstance(file_content, bytes):
             raise TypeError("its content is not of type bytes")
@@ -313,7 +322,7 @@ def _decode_picture(culprit: object, output_name: str, picture_format: str, file
             else decode_png(file_content)
         )
     except DermisError as fault:  # a package is missing
-        raise DermisError(f"{culprit}: {fault}") from fault
+        raise DermisError(f"{error_subject}: {fault}") from fault
     except Exception as fault:  # decoders raise anything for damaged data
         actual = f"it cannot be decoded ({error_text(fault)})"
-        refuse(culprit, f"a picture as {picture_format}", actual, _RESTORE_ADVICE)
+        refuse(error_subject, f"a picture as {picture_format}", actual, _RESTORE_ADVICE)

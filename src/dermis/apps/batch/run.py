@@ -22,7 +22,7 @@ from dermis.apps.batch.shards import (
     shard_exists,
     shard_path,
 )
-from dermis.apps.batch.spec import COUNT_LINE_PATTERN, GENERATOR_LINE_PATTERN, GENERATOR_NUMBER, Spec
+from dermis.apps.batch.spec import COUNT_LINE_PATTERN, GENERATOR_LINE_PATTERN, GENERATOR_VERSION, Spec
 from dermis.apps.batch.worker import Failure, RunOptions, WorkerEvent
 from dermis.base.atomic_write import refuse_output
 from dermis.base.errors import notify, refuse
@@ -117,7 +117,7 @@ def run(
     remove_unfinished_files(out, removable_names)
     _remove_joined_parts(out, spec, existing)
     try:
-        images, damaged, failed = _process_tasks(pool, options, [*missing, *verified], on_progress)
+        images, damaged, failed = _run_tasks(pool, options, [*missing, *verified], on_progress)
     finally:
         remove_unfinished_files(out, removable_names)
     complete_shards = {shard for shard in all_shards if shard_exists(out, shard, spec)}
@@ -161,11 +161,11 @@ def _is_smaller_version(existing_toml: str, spec: Spec, dataset_folder: Path) ->
     other_folder, count = "Choose another folder", COUNT_LINE_PATTERN.search(existing_toml)
     generator = GENERATOR_LINE_PATTERN.search(existing_toml)
     number = int(generator[1]) if generator else 1  # earlier versions wrote none
-    if number != GENERATOR_NUMBER:
+    if number != GENERATOR_VERSION:
         actual = f"it was made with number {number}, by another version of dermis"
         refuse(
             dataset_folder,
-            f"a data set of generator number {GENERATOR_NUMBER}",
+            f"a data set of generator number {GENERATOR_VERSION}",
             actual,
             f"{other_folder}, or that version",
         )
@@ -191,7 +191,7 @@ def _remove_joined_parts(dataset_folder: Path, spec: Spec, complete_shards: Iter
                 remove_path(path)
 
 
-def _process_tasks(
+def _run_tasks(
     pool: WorkerPool,
     options: RunOptions,
     tasks: Sequence[Shard],

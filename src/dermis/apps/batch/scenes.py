@@ -39,7 +39,7 @@ _GAZE_DISTANCE_MM = 1e4  # distance of the gaze target if the gaze is given by a
 _SEED_PARAMETER, _HEAD_PARAMETER = "person.seed", "person.head"
 _MAX_CACHED_SAMPLED_PEOPLE = 1  # a sampled person is not used again
 _MAX_CACHED_FILE_HEADS = 8
-_PARAMETERS_NOT_OF_HUMAN = "number", "seed", "head"  # parameters of people that are not fields of `Human`
+_IDENTITY_PARAMETERS = "number", "seed", "head"  # parameters of people that are not fields of `Human`
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ def sampled_person(parameters: Parameters) -> Human:
         part, _, field = name.partition(".")
         if field:
             appearance.setdefault(part, {})[field] = value
-        elif name not in _PARAMETERS_NOT_OF_HUMAN:
+        elif name not in _IDENTITY_PARAMETERS:
             fields[name] = value
     return Human.sampled(int(parameters[_SEED_PARAMETER]), **fields, **appearance)
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from dermis.apps.batch.atomic_files import flush_to_disk
-from dermis.base.reading import parse_json, parsing, read_file
+from dermis.base.reading import parse_json, read_file, refuse_parse_errors
 from dermis.base.version import version
 from dermis.images.sizes import MAX_FILE_BYTES
 
@@ -52,15 +52,15 @@ class ShardManifest:
         return (json.dumps({**values, "check": check}, indent=1) + "\n").encode()
 
 
-def parse_manifest(json_bytes: bytes, culprit: object) -> ShardManifest:
+def parse_manifest(json_bytes: bytes, error_subject: object) -> ShardManifest:
     """Return the manifest in the bytes of a manifest file.
 
-    culprit : name of the shard in error messages
+    error_subject : name of the shard in error messages
 
     Raises DermisError if the bytes are not a manifest, or do not match the hash in the manifest.
     """
-    values = parse_json(json_bytes, culprit, _MANIFEST_DESCRIPTION)
-    with parsing(culprit, _MANIFEST_DESCRIPTION, KeyError, TypeError, AttributeError):
+    values = parse_json(json_bytes, error_subject, _MANIFEST_DESCRIPTION)
+    with refuse_parse_errors(error_subject, _MANIFEST_DESCRIPTION, KeyError, TypeError, AttributeError):
         index, first, stop = (values[name] for name in ("index", "first", "stop"))
         left_out = tuple((number, reason) for number, reason in values["left_out"])
         spec, sha256, made = values["spec"], values["sha256"], values["made_with"]

@@ -15,7 +15,7 @@ from dermis.apps.batch.shard_formats import FolderWriter, ShardManifest, TarWrit
 from dermis.apps.batch.spec import Spec
 from dermis.base.atomic_write import refuse_output
 from dermis.base.errors import DermisError, refuse, shorten
-from dermis.base.reading import open_regular_file, parsing, read_file
+from dermis.base.reading import open_regular_file, read_file, refuse_parse_errors
 
 SHARD_DESCRIPTION = "a shard of a data set"
 _SHARD_NAME_PATTERN = re.compile(r"shard-(\d{5,9})(\.tar)?")
@@ -188,7 +188,7 @@ def read_manifest(path: Path) -> ShardManifest:
     if path.is_dir():
         data = read_file(path / formats.MANIFEST_NAME, SHARD_DESCRIPTION, formats.MAX_MANIFEST_BYTES)
         return formats.parse_manifest(data, path)
-    with open_regular_file(path, SHARD_DESCRIPTION) as file, parsing(path, SHARD_DESCRIPTION):
+    with open_regular_file(path, SHARD_DESCRIPTION) as file, refuse_parse_errors(path, SHARD_DESCRIPTION):
         return formats.parse_manifest(formats.read_tar_manifest(file)[1], path)
 
 
@@ -247,5 +247,5 @@ def shard_sha256(path: Path) -> str:
     if path.is_dir():
         names = {one.name for one in path.iterdir()} - {formats.MANIFEST_NAME}
         return formats.folder_sha256(path, sorted(names))
-    with open_regular_file(path, SHARD_DESCRIPTION) as file, parsing(path, SHARD_DESCRIPTION):
+    with open_regular_file(path, SHARD_DESCRIPTION) as file, refuse_parse_errors(path, SHARD_DESCRIPTION):
         return formats.tar_sha256(file, formats.read_tar_manifest(file)[0])

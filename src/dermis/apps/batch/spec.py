@@ -29,7 +29,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.toml_text import key_text, table_text
 
 MAX_IMAGES = 10**9
-GENERATOR_NUMBER = 3
+GENERATOR_VERSION = 3
 """Number of the rules by which seeds become people and pictures: other rules make other people of a seed.
 
 Number 1 stands for the people of version 0.1, number 2 for people with the skin of measured people.
@@ -65,9 +65,9 @@ class Spec(FrozenModel):
     """Seed of all random numbers."""
     generator: Annotated[
         int,
-        Field(ge=GENERATOR_NUMBER, le=GENERATOR_NUMBER),
+        Field(ge=GENERATOR_VERSION, le=GENERATOR_VERSION),
         BoundsReason("this version makes other images from a spec"),
-    ] = GENERATOR_NUMBER
+    ] = GENERATOR_VERSION
     """Number of the rules by which seeds become pictures; data sets of another number are not continued."""
     images_per_person: Annotated[int, Field(ge=1, le=10**6), BoundsReason("a million of each")] = 1
     """Number of consecutive images that show the same person."""
@@ -215,10 +215,10 @@ def parse_spec(toml_data: Mapping[str, object], folder: Path = Path()) -> Spec:
     """
     if "folder" in toml_data:
         refuse("folder", "no such key", "it is given", "Paths are relative to the folder of the spec")
-    if toml_data.get("generator", GENERATOR_NUMBER) != GENERATOR_NUMBER:
+    if toml_data.get("generator", GENERATOR_VERSION) != GENERATOR_VERSION:
         actual = f"got {format_value(toml_data['generator'])}"
         advice = "Remove it to start another data set, or use the version of dermis that wrote it"
-        refuse("generator", f"{GENERATOR_NUMBER}, the generator number of this version", actual, advice)
+        refuse("generator", f"{GENERATOR_VERSION}, the generator number of this version", actual, advice)
     fields = {k: v if k == "files" else _expand_patterns(v, folder, k) for k, v in toml_data.items()}
     fields["render"] = _parse_render_table(fields.pop("size", (512, 512)), fields.get("render", {}))
     if isinstance(groups := fields.get("correlated", ()), list | tuple):

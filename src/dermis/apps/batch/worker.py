@@ -139,7 +139,7 @@ class Worker:
         gc.freeze()  # excludes the objects created so far from collections, which would scan them each time
         return renderer
 
-    def process(self, tasks: Iterable[Shard], send_event: Callable[[WorkerEvent], None]) -> None:
+    def run_tasks(self, tasks: Iterable[Shard], send_event: Callable[[WorkerEvent], None]) -> None:
         """Process the tasks: render each part, join the parts of complete shards, and verify each shard.
 
         The next task is requested while frames of the previous task are still being rendered. Without the
@@ -304,7 +304,7 @@ def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
         try:
             with closing(Worker(slot.adapter, options)) as worker:
                 while True:
-                    worker.process(available_tasks(pipe), pipe.send)
+                    worker.run_tasks(available_tasks(pipe), pipe.send)
         except (DeviceError, LostProcessError) as fault:
             pipe.send(WorkerEvent(retry=str(fault).removesuffix(".")))  # the pool appends text
         except DermisError as fault:

@@ -139,7 +139,7 @@ class _PoolState:
             worker.tasks.remove(event.done)
             self._queue.extendleft(reversed(event.missing))
         if event.retry:
-            self._return_tasks(worker, event.retry)
+            self._requeue_tasks(worker, event.retry)
             self._stop_worker(worker)
         elif self._gets_another_task(worker):
             self._send_task(worker)
@@ -165,7 +165,7 @@ class _PoolState:
         worker.child.kill()
         self._free_slots.append(worker.slot)
 
-    def _return_tasks(self, worker: _WorkerProcess, reason: str) -> None:
+    def _requeue_tasks(self, worker: _WorkerProcess, reason: str) -> None:
         """Put the tasks of an exiting worker back into the queue.
 
         reason : reason why the worker exits, for the error

@@ -216,7 +216,7 @@ def export_skin(
     True
     """
     target = replace(TARGETS[to].with_variant(variant), side=side, adapter=adapter)
-    target = target if library is None else target.with_library(library)
+    target = target if library is None else target.with_embedded_library(library)
     resolved, path = target.resolve_version(version), _check_output_path(target, output)
     options = {"model": model, "profile": profile, **head}
     if not isinstance(subject, Subject):

@@ -148,7 +148,7 @@ class Target(ABC):
             refuse("variant", expected, f"got {format_value(variant)}", "Correct it")
         return replace(self, variant=variant)
 
-    def with_library(self, node_modules_folder: str | Path) -> Target:
+    def with_embedded_library(self, node_modules_folder: str | Path) -> Target:
         """Return a copy of the target that embeds an installed JavaScript library in the web page.
 
         Parameters

@@ -274,18 +274,18 @@ class ScatteringLayer:
 
     def __post_init__(self) -> None:
         """Raise DermisError for properties outside their range."""
-        culprit = "scattering layer"
+        error_subject = "scattering layer"
         if not (0.0 <= self.sigma_a < np.inf and 0.0 <= self.sigma_s < np.inf):
             actual = f"got absorption {self.sigma_a:g} and scattering {self.sigma_s:g}"
-            refuse(culprit, "coefficients of 0 or more [1/mm]", actual, "Correct them")
+            refuse(error_subject, "coefficients of 0 or more [1/mm]", actual, "Correct them")
         if not self.thickness_mm > 0.0:
-            refuse(culprit, "a thickness above 0 mm", f"got {self.thickness_mm:g}", "Correct it")
+            refuse(error_subject, "a thickness above 0 mm", f"got {self.thickness_mm:g}", "Correct it")
         if np.isinf(self.thickness_mm) and self.sigma_t == 0.0:
             actual = "it neither absorbs nor scatters"
-            refuse(culprit, "an infinite layer with extinction", actual, "Give it a thickness")
+            refuse(error_subject, "an infinite layer with extinction", actual, "Give it a thickness")
         check_anisotropy(self.g)
         if not 1.0 <= self.eta <= 2.5:
-            refuse(culprit, "an index of refraction from 1 to 2.5", f"got {self.eta:g}", "Correct it")
+            refuse(error_subject, "an index of refraction from 1 to 2.5", f"got {self.eta:g}", "Correct it")
 
     @property
     def sigma_t(self) -> float:

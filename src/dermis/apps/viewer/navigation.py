@@ -120,9 +120,9 @@ def interpolate_cameras(start_camera: Camera, end_camera: Camera, fraction: floa
     frame = start_camera.frame_mm * (end_camera.frame_mm / start_camera.frame_mm) ** fraction
     camera = validated_copy(
         end_camera,
-        position=_clamped_tuple(target + distance * _normalise(direction)),
-        target=_clamped_tuple(target),
-        up=_clamped_tuple(up) if np.linalg.norm(np.cross(up, direction)) > 1e-3 else end_camera.up,
+        position=_clamped_coordinates(target + distance * _normalise(direction)),
+        target=_clamped_coordinates(target),
+        up=_clamped_coordinates(up) if np.linalg.norm(np.cross(up, direction)) > 1e-3 else end_camera.up,
         frame_mm=frame,
         principal_point=tuple(
             _interpolate(start_camera.principal_point, end_camera.principal_point, fraction).tolist()
@@ -191,9 +191,9 @@ def orbit_light(light: Light, camera: Camera, right_rad: float, up_rad: float) -
     x, y, _ = camera_axes(camera)
     rotation = _rotation_matrix(y, right_rad) @ _rotation_matrix(x, -up_rad)
     if isinstance(light, DirectionalLight):
-        return validated_copy(light, direction=_clamped_tuple(rotation @ np.array(light.direction)))
+        return validated_copy(light, direction=_clamped_coordinates(rotation @ np.array(light.direction)))
     offset = rotation @ np.subtract(light.position, light.target)
-    return validated_copy(light, position=_clamped_tuple(np.array(light.target) + offset))
+    return validated_copy(light, position=_clamped_coordinates(np.array(light.target) + offset))
 
 
 def _cameras_nearly_equal(first_camera: Camera, second_camera: Camera) -> bool:
@@ -212,10 +212,12 @@ def _cameras_nearly_equal(first_camera: Camera, second_camera: Camera) -> bool:
 def _with_position_and_target(
     camera: Camera, position: ArrayLike, target: ArrayLike, **fields: float
 ) -> Camera:
-    return validated_copy(camera, position=_clamped_tuple(position), target=_clamped_tuple(target), **fields)
+    return validated_copy(
+        camera, position=_clamped_coordinates(position), target=_clamped_coordinates(target), **fields
+    )
 
 
-def _clamped_tuple(position_mm: ArrayLike) -> tuple[float, float, float]:
+def _clamped_coordinates(position_mm: ArrayLike) -> tuple[float, float, float]:
     x, y, z = (float(c) for c in np.clip(position_mm, -MAX_COORDINATE_MM, MAX_COORDINATE_MM))
     return x, y, z
 

@@ -85,7 +85,7 @@ class ViewerState:
     head : table from which the head was loaded, with the keys of the [head] table of a scene file; empty for
         a head created in memory
     view : picture or intermediate result to display, one of `views.VIEW_NAMES`
-    rig : name of the light preset; empty for custom lights
+    light_preset : name of the light preset; empty for custom lights
     atlas_view : part of the atlas that the view "atlas" shows
     seconds : time in the motion from which the pose was taken [s]
     """
@@ -94,7 +94,7 @@ class ViewerState:
     settings: Settings = field(default_factory=Settings)
     head: Table = field(default_factory=dict)
     view: str = PICTURE_VIEW_NAME
-    rig: str = "studio"
+    light_preset: str = "studio"
     atlas_view: AtlasView = field(default_factory=AtlasView)
     seconds: float = 0.0
 
@@ -123,16 +123,16 @@ class ViewerState:
         """Return a copy with another camera."""
         return self._with_scene(camera=camera)
 
-    def with_lights(self, lights: Sequence[Light], rig: str = "") -> ViewerState:
+    def with_lights(self, lights: Sequence[Light], light_preset: str = "") -> ViewerState:
         """Return a copy with other lights.
 
-        rig : name of the light preset; empty for custom lights
+        light_preset : name of the light preset; empty for custom lights
         """
-        return replace(self._with_scene(lights=tuple(lights)), rig=rig)
+        return replace(self._with_scene(lights=tuple(lights)), light_preset=light_preset)
 
-    def with_rig(self, rig_name: str) -> ViewerState:
+    def with_light_preset(self, preset_name: str) -> ViewerState:
         """Return a copy with the lights of a preset."""
-        return self.with_lights(load_lights(rig_name, self.scene.head), rig_name)
+        return self.with_lights(load_lights(preset_name, self.scene.head), preset_name)
 
     def with_light(self, light_index: int, **fields: object) -> ViewerState:
         """Return a copy with new values of some fields of one light."""
@@ -185,7 +185,7 @@ def states_equal(first_state: ViewerState, second_state: ViewerState) -> bool:
     def compared_values(state: ViewerState) -> tuple[object, ...]:
         scene = state.scene
         scene_values = tuple(scene.lights), scene.camera, scene.skin, scene.environment
-        view_values = state.view, state.rig, state.atlas_view, state.seconds
+        view_values = state.view, state.light_preset, state.atlas_view, state.seconds
         return *scene_values, state.settings, state.head_table, *view_values
 
     is_head_same = first_state.scene.head is second_state.scene.head and poses_equal(
@@ -235,7 +235,7 @@ def make_state(subject: Head | Human | Scene | ViewerState | str | os.PathLike[s
     if isinstance(subject, Head):
         return ViewerState(Scene(subject), settings)
     if isinstance(subject, Scene):
-        return ViewerState(subject, settings, rig="")
+        return ViewerState(subject, settings, light_preset="")
     if not isinstance(subject, str | os.PathLike):
         actual = f"got a {type(subject).__name__}"
         refuse("view", "a head, a person, a scene or a name", actual, "Try dermis.Human()")
@@ -256,20 +256,20 @@ def load_state(path: Path, current_state: ViewerState | None = None) -> ViewerSt
     )
     scene, scene_settings = load_scene(path, known_head)
     settings = Settings(**{**PHOTOGRAPHIC_SETTINGS, **scene_settings.model_dump(exclude_unset=True)})
-    return initial_state(scene, settings, table, rig_name="" if scene.lights else NO_LIGHTS)
+    return initial_state(scene, settings, table, preset_name="" if scene.lights else NO_LIGHTS)
 
 
-def initial_state(scene: Scene, settings: Settings, head_table: Table, rig_name: str) -> ViewerState:
+def initial_state(scene: Scene, settings: Settings, head_table: Table, preset_name: str) -> ViewerState:
     """Return the initial state of a scene.
 
     If `settings.parts` selects only the diffuse or only the specular light, the initial view shows only this
     light.
 
     head_table : table from which the head was loaded, with the keys of the [head] table of a scene file
-    rig_name : name of the light preset; empty for custom lights
+    preset_name : name of the light preset; empty for custom lights
     """
     view = settings.parts if settings.parts in LIGHT_COMPONENT_VIEWS else PICTURE_VIEW_NAME
-    return ViewerState(scene, validated_copy(settings, parts="all"), head_table, view, rig_name)
+    return ViewerState(scene, validated_copy(settings, parts="all"), head_table, view, preset_name)
 
 
 _MAX_UNDO_STEPS = 200

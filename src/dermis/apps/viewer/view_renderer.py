@@ -31,7 +31,8 @@ from dermis.mesh.mesh import Mesh
 from dermis.scene.camera import Camera
 from dermis.scene.settings import MAX_SAMPLE_COUNT, Settings
 
-_FRAME_BUDGET_MS = {True: 100.0, False: 33.0}  # time of a frame in motion on a software adapter and on a GPU
+# time of a frame in motion on a software adapter and on a GPU
+_FRAME_BUDGET_MS_BY_IS_SOFTWARE = {True: 100.0, False: 33.0}
 _SLOW_FRAME_RATIO, _FAST_FRAME_RATIO = (
     1.25,
     0.45,
@@ -75,7 +76,7 @@ class QualityController:
 
     def __init__(self, is_software_adapter: bool) -> None:
         self.software = is_software_adapter
-        self._budget_ms = _FRAME_BUDGET_MS[is_software_adapter]
+        self._budget_ms = _FRAME_BUDGET_MS_BY_IS_SOFTWARE[is_software_adapter]
         self._level = self._best_level = _BEST_QUALITY_LEVEL_ON_CPU if is_software_adapter else 0
         self._streak = 0
 
@@ -115,7 +116,7 @@ class QualityController:
         )
 
 
-Images = tuple[Texture, Texture | None]
+LiveAndFrozenImages = tuple[Texture, Texture | None]
 """Image of the live state, and image of the frozen state; None if no state is frozen."""
 _CACHED_RESOURCE_SETS = 2  # resources for frames in motion and for still frames
 _PREPARATION_FRAME_SIZE = (96, 64)  # size of small frames that use all shaders [pixel]
@@ -185,7 +186,7 @@ class ViewRenderer:
         camera: Camera,
         view_size: tuple[int, int],
         is_moving: bool,
-    ) -> Images:
+    ) -> LiveAndFrozenImages:
         """Return the images of the live state and of the frozen state (None if there is no frozen state).
 
         camera : camera to use instead of the cameras of both states

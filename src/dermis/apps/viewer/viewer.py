@@ -13,7 +13,7 @@ from dermis.apps.viewer.navigation import CameraEasing
 from dermis.apps.viewer.player import MotionFile
 from dermis.apps.viewer.session import Session
 from dermis.apps.viewer.state import ViewerState
-from dermis.apps.viewer.view_renderer import HeadPreparation, Images, ViewRenderer
+from dermis.apps.viewer.view_renderer import HeadPreparation, LiveAndFrozenImages, ViewRenderer
 from dermis.base.errors import DermisError
 from dermis.gpu import Device, Texture, TextureView
 from dermis.gpu.failures import DeviceLostError, converted_gpu_failures
@@ -26,7 +26,7 @@ PixelBox = tuple[int, int, int, int]
 """Left, top, width and height [pixel]."""
 
 
-class Patch(NamedTuple):
+class PlacedImage(NamedTuple):
     """Image that is scaled to a viewport of the target and clipped to a scissor rectangle.
 
     image : texture of sRGB bytes
@@ -59,7 +59,7 @@ class BlitProgram(Program):
             primitive={"topology": "triangle-list", "cull_mode": "none"},
         )
 
-    def draw(self, patches: Sequence[Patch], target_view: TextureView) -> None:
+    def draw(self, placed_images: Sequence[PlacedImage], target_view: TextureView) -> None:
         """Draw images over a black background.
 
         target_view : view of the target texture
@@ -73,10 +73,10 @@ class BlitProgram(Program):
         }
         render_pass = encoder.begin_render_pass(label="blit", color_attachments=[attachment])
         render_pass.set_pipeline(self._pipeline)
-        for patch in patches:
-            render_pass.set_viewport(*patch.viewport, 0.0, 1.0)
-            render_pass.set_scissor_rect(*patch.scissor)
-            entry = {"binding": 0, "resource": patch.image.create_view()}
+        for placed_image in placed_images:
+            render_pass.set_viewport(*placed_image.viewport, 0.0, 1.0)
+            render_pass.set_scissor_rect(*placed_image.scissor)
+            entry = {"binding": 0, "resource": placed_image.image.create_view()}
             group = self.device.handle.create_bind_group(layout=self._group_layout, entries=[entry])
             render_pass.set_bind_group(0, group)
             render_pass.draw(3)
@@ -176,7 +176,7 @@ class Viewer:
         images = self._render_images(state, camera, size, self._is_moving(now_s))
         session.status = self._status_text(size)
         target = self._context.get_current_texture().create_view()
-        self._blit.draw(self._image_patches(*images, size), target)
+        self._blit.draw(self._placed_images(*images, size), target)
         self.panel.draw(target, self.canvas.get_logical_size(), self.canvas.get_pixel_ratio())
 
     def _panel_width(self) -> int:
@@ -189,27 +189,27 @@ class Viewer:
         width, height = self.canvas.get_physical_size()
         return max(1, width - self._panel_width()), max(1, height)
 
-    def _image_patches(
+    def _placed_images(
         self, live_image: Texture, frozen_image: Texture | None, picture_size: tuple[int, int]
-    ) -> list[Patch]:
-        """Return patches that show the live image and, if there is one, the frozen image left of the divider.
+    ) -> list[PlacedImage]:
+        """Return the live image and, if there is one, the frozen image left of the divider, with places.
 
         picture_size : width and height of the picture [pixel]
         """
         left, (width, height) = self._panel_width(), picture_size
         viewport = left, 0, width, height
         if frozen_image is None:
-            return [Patch(live_image, viewport, viewport)]
+            return [PlacedImage(live_image, viewport, viewport)]
         divider = round(self.session.split.divider_position * width)
-        patches = (
-            Patch(frozen_image, viewport, (left, 0, divider, height)),
-            Patch(live_image, viewport, (left + divider, 0, width - divider, height)),
+        placed_images = (
+            PlacedImage(frozen_image, viewport, (left, 0, divider, height)),
+            PlacedImage(live_image, viewport, (left + divider, 0, width - divider, height)),
         )
-        return [patch for patch in patches if patch.scissor[2]]
+        return [placed_image for placed_image in placed_images if placed_image.scissor[2]]
 
     def _render_images(
         self, state: ViewerState, camera: Camera, picture_size: tuple[int, int], is_moving: bool
-    ) -> Images:
+    ) -> LiveAndFrozenImages:
         """Return the live and the frozen image; if `state` cannot be rendered, the last image and None."""
         import wgpu
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
-from dermis.base.reading import MALFORMED_DATA_ERRORS, parsing
+from dermis.base.reading import MALFORMED_DATA_ERRORS, refuse_parse_errors
 from dermis.formats.gltf.document import Document, Tree, checked_index, read_document
 from dermis.formats.gltf.nodes import Nodes, read_nodes
 from dermis.formats.gltf.rigs import target_names
@@ -70,7 +70,9 @@ def read_clip(path: Path, clip_name: str | None) -> Animation:
     if clip_name is not None and clip_name not in names:
         refuse(path, f"one of its clips ({', '.join(names)})", f"got {clip_name!r}", "Correct the name")
     index = 0 if clip_name is None else names.index(clip_name)
-    with parsing(f"{path}: clip {names[index][:80]!r}", "a valid animation", *MALFORMED_DATA_ERRORS):
+    with refuse_parse_errors(
+        f"{path}: clip {names[index][:80]!r}", "a valid animation", *MALFORMED_DATA_ERRORS
+    ):
         return Animation(names[index], tuple(_read_tracks(document, index, names[index])))
 
 
@@ -82,45 +84,53 @@ def _document_clip_names(document: Document) -> tuple[str, ...]:
 def _read_tracks(document: Document, clip_index: int, clip_name: str) -> list[AnimationTrack]:
     """Return the tracks of a clip; channels with equal path, interpolation and key times share one track."""
     clip, nodes = document.top_level_object("animations", clip_index), read_nodes(document)
-    culprit = f"{document.path}: clip {clip_name!r}"
-    check_limit(culprit, len(clip["channels"]), MAX_ANIMATION_CURVES, "channels", "Export it again")
+    error_subject = f"{document.path}: clip {clip_name!r}"
+    check_limit(error_subject, len(clip["channels"]), MAX_ANIMATION_CURVES, "channels", "Export it again")
     groups: dict[tuple[object, ...], list[tuple[str, _Keyframes]]] = {}
     tracks, names = [], dict[int, tuple[str, ...]]()
     for channel_index, channel in enumerate(clip["channels"]):
-        target, culprit = channel["target"], f"{document.path}: clip {clip_name!r}, channel {channel_index}"
+        target, error_subject = (
+            channel["target"],
+            f"{document.path}: clip {clip_name!r}, channel {channel_index}",
+        )
         if "node" not in target or target["path"] not in (*_PROPERTY_COMPONENT_COUNTS, "weights"):
             continue  # a target of an extension
-        _check_node_index(nodes, target["node"], culprit)
+        _check_node_index(nodes, target["node"], error_subject)
         sampler = clip["samplers"][checked_index(channel["sampler"], len(clip["samplers"]), "samplers")]
         if target["path"] == "weights":
-            tracks.append(_weight_track(document, target["node"], sampler, culprit, names))
+            tracks.append(_weight_track(document, target["node"], sampler, error_subject, names))
             continue
-        keys = _read_keyframes(document, sampler, _PROPERTY_COMPONENT_COUNTS[target["path"]], culprit)
+        keys = _read_keyframes(document, sampler, _PROPERTY_COMPONENT_COUNTS[target["path"]], error_subject)
         rotations = keys.values[:, _SPLINE_VALUE] if keys.kind == "CUBICSPLINE" else keys.values
         if target["path"] == "rotation" and not rotations.any(axis=-1).all():
-            refuse(culprit, "unit quaternions as rotations", "one is 0", DAMAGED_ADVICE)
+            refuse(error_subject, "unit quaternions as rotations", "one is 0", DAMAGED_ADVICE)
         group = (target["path"], keys.kind, keys.times_s.tobytes())
         groups.setdefault(group, []).append((nodes.names[target["node"]], keys))
     return tracks + [_merge_tracks(str(path), members) for (path, *_), members in groups.items()]
 
 
-def _check_node_index(nodes: Nodes, node_index: int, culprit: str) -> None:
+def _check_node_index(nodes: Nodes, node_index: int, error_subject: str) -> None:
     if not 0 <= node_index < len(nodes.names):
-        refuse(culprit, f"a node from 0 to {len(nodes.names) - 1}", f"got node {node_index}", DAMAGED_ADVICE)
+        refuse(
+            error_subject,
+            f"a node from 0 to {len(nodes.names) - 1}",
+            f"got node {node_index}",
+            DAMAGED_ADVICE,
+        )
 
 
 def _weight_track(
     document: Document,
     mesh_node_index: int,
     sampler: Tree,
-    culprit: str,
+    error_subject: str,
     mesh_targets: dict[int, tuple[str, ...]],
 ) -> AnimationTrack:
     """Return the track of the morph target weights of a node.
 
     mesh_node_index : index of the node that carries the mesh with the morph targets
     sampler : JSON tree of the animation sampler
-    culprit : file, clip and channel, for error messages
+    error_subject : file, clip and channel, for error messages
     mesh_targets : dictionary from mesh index to the names of the mesh's morph targets; used as a cache, to
         which this function adds the mesh of the node
     """
@@ -130,8 +140,8 @@ def _weight_track(
     names = () if mesh is None else mesh_targets[mesh]
     if not names:
         actual = f"node {mesh_node_index} has no morph targets"
-        refuse(culprit, "weights of a mesh with morph targets", actual, DAMAGED_ADVICE)
-    keys = _read_keyframes(document, sampler, len(names), culprit)
+        refuse(error_subject, "weights of a mesh with morph targets", actual, DAMAGED_ADVICE)
+    keys = _read_keyframes(document, sampler, len(names), error_subject)
     curve = AnimationCurve(keys.times_s, keys.values[..., None, :], keys.kind)
     return AnimationTrack("weights", names, curve)
 
@@ -148,30 +158,32 @@ def _merge_tracks(animated_property: str, keyframes_by_name: list[tuple[str, _Ke
     return AnimationTrack(animated_property, tuple(name for name, _ in keyframes_by_name), curve)
 
 
-def _read_keyframes(document: Document, sampler: Tree, component_count: int, culprit: str) -> _Keyframes:
+def _read_keyframes(
+    document: Document, sampler: Tree, component_count: int, error_subject: str
+) -> _Keyframes:
     """Read the times and values of the k keys of an animation sampler.
 
     The values have the shape (k, n). For cubic splines they include tangents and have the shape (k, 3, n).
 
     sampler : JSON tree of the animation sampler
     component_count : number n of components per key
-    culprit : file, clip and channel, for error messages
+    error_subject : file, clip and channel, for error messages
     """
     kind = sampler.get("interpolation", "LINEAR")
     if kind not in get_args(Interpolation):
         kinds = ", ".join(get_args(Interpolation))
-        refuse(culprit, f"an interpolation of {kinds}", f"got {kind!r}", DAMAGED_ADVICE)
+        refuse(error_subject, f"an interpolation of {kinds}", f"got {kind!r}", DAMAGED_ADVICE)
     times, values = document.read_floats(sampler["input"]).ravel(), document.read_floats(sampler["output"])
     shape = (len(times), 3, component_count) if kind == "CUBICSPLINE" else (len(times), component_count)
     if len(times) == 0 or values.size != np.prod(shape):
         actual = f"got {len(times)} and {values.size}"
-        refuse(culprit, f"a time and {np.prod(shape[1:])} numbers for each key", actual, DAMAGED_ADVICE)
+        refuse(error_subject, f"a time and {np.prod(shape[1:])} numbers for each key", actual, DAMAGED_ADVICE)
     if not (np.isfinite(times).all() and np.isfinite(values).all()):
-        refuse(culprit, "finite keys", "some are NaN or infinite", DAMAGED_ADVICE)
+        refuse(error_subject, "finite keys", "some are NaN or infinite", DAMAGED_ADVICE)
     if (np.diff(times) < 0).any():
         early = int(np.flatnonzero(np.diff(times) < 0)[0])
         actual = f"key {early + 1} at {times[early + 1]:g} s comes after {times[early]:g} s"
-        refuse(culprit, "keys in temporal order", actual, DAMAGED_ADVICE)
+        refuse(error_subject, "keys in temporal order", actual, DAMAGED_ADVICE)
     return _Keyframes(times, values.reshape(shape), kind)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from dermis.base.arrays import Doubles, Numbers
 from dermis.base.errors import refuse
-from dermis.base.reading import MALFORMED_DATA_ERRORS, parse_json, parsing, read_file
+from dermis.base.reading import MALFORMED_DATA_ERRORS, parse_json, read_file, refuse_parse_errors
 from dermis.formats.parts import is_binary_gltf, to_floats
 from dermis.formats.referenced_files import resolve_uri
 from dermis.formats.size_limits import MAX_ACCESSOR_COMPONENTS, MAX_FILE_BYTES, MAX_JSON_VALUES, check_limit
@@ -221,7 +221,7 @@ def read_document(path: Path) -> Document:
     Raises DermisError when the file is not a glTF file, is truncated, or is too large.
     """
     data = read_file(path, "a glTF file", MAX_FILE_BYTES)
-    with parsing(path, "a glTF file", *MALFORMED_DATA_ERRORS):
+    with refuse_parse_errors(path, "a glTF file", *MALFORMED_DATA_ERRORS):
         if not is_binary_gltf(path):
             return Document(path, _parse_json_tree(path, data))
         magic, version, length = struct.unpack_from("<III", data)

@@ -6,7 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from dermis.base.errors import error_context
-from dermis.base.reading import MALFORMED_DATA_ERRORS, parsing
+from dermis.base.reading import MALFORMED_DATA_ERRORS, refuse_parse_errors
 from dermis.formats.gltf.document import read_document
 from dermis.formats.gltf.read_materials import read_materials
 from dermis.formats.materials import FileMaterial, check_pictures
@@ -19,7 +19,7 @@ def embedded_materials(path: Path) -> tuple[FileMaterial, ...]:
     Raises DermisError when the file is damaged, or when its pictures are too large.
     """
     document = read_document(path)
-    with parsing(path, "valid textures", *MALFORMED_DATA_ERRORS):
+    with refuse_parse_errors(path, "valid textures", *MALFORMED_DATA_ERRORS):
         materials = read_materials(document)
     check_pictures(path, materials)
     return materials
@@ -37,5 +37,5 @@ def embedded_eye_look(path: Path) -> EyeLook:
     if not isinstance(eyes, dict):
         return EyeLook()
     values = {one.name: eyes[one.name] for one in fields(EyeLook) if one.name in eyes}
-    with error_context(path), parsing(path, "valid eye parameters", *MALFORMED_DATA_ERRORS):
+    with error_context(path), refuse_parse_errors(path, "valid eye parameters", *MALFORMED_DATA_ERRORS):
         return EyeLook(**values)

@@ -29,7 +29,7 @@ _DEFAULT_ROUGHNESS = 0.8
 
 
 @dataclass(frozen=True)
-class SkinAdditions:
+class SkinMaterialAdditions:
     """Properties that an export adds to the glTF material of skin.
 
     surface : members to add to the material's `pbrMetallicRoughness`, such as a `baseColorFactor`; if there
@@ -44,7 +44,7 @@ class SkinAdditions:
     extras: FrozenTree = field(default_factory=dict)
     pictures: Mapping[str, bytes] = field(default_factory=dict)
 
-    def add_to_material(self, material: FrozenTree) -> Tree:
+    def extend_material(self, material: FrozenTree) -> Tree:
         """Return a copy of a glTF material, extended by the properties of this object.
 
         If `surface` is not empty, the material's base colour texture moves to the entry "colour" of its

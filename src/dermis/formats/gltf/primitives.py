@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Index, Intp, Ints
-from dermis.formats.deformable_mesh import DeformableMesh, VertexTarget
+from dermis.formats.deformable_mesh import DeformableMesh, VertexMorphTarget
 from dermis.formats.gltf.binary import VERTEX_TARGET, BufferBuilder
 from dermis.formats.gltf.document import Tree
 from dermis.mesh.eyeball import eye_uv
@@ -39,7 +39,7 @@ class PrimitiveSource(Protocol):
         """
         ...
 
-    def add_target(self, buffer_builder: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
+    def add_target(self, buffer_builder: BufferBuilder, morph_target: VertexMorphTarget) -> dict[str, int]:
         """Append to the buffer how a morph target changes the vertices of this geometry.
 
         Returns a dictionary from attribute name to accessor index.
@@ -84,18 +84,18 @@ class SurfacePrimitive:
         )
         attributes |= _bone_attributes(buffer_builder, self.deformable, used)
         primitive: Tree = {"attributes": attributes, "indices": index}
-        flags = {"quads": self._has_quads(), "alone": self._is_separate()}
+        flags = {"quads": self._has_quads(), "alone": self._shares_no_points()}
         extras = {key: True for key, value in flags.items() if value}
         return primitive | ({"extras": {"dermis": extras}} if extras else {})
 
-    def add_target(self, buffer_builder: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
+    def add_target(self, buffer_builder: BufferBuilder, morph_target: VertexMorphTarget) -> dict[str, int]:
         """Append to the buffer how a morph target changes positions and normals of these vertices.
 
         Returns a dictionary from attribute name to accessor index.
         """
-        used = np.flatnonzero(np.isin(vertex_target.vertex, self.used_vertices, assume_unique=True))
-        row = np.searchsorted(self.used_vertices, vertex_target.vertex[used])
-        columns = [to_metres(vertex_target.delta_mm[used]), vertex_target.normal[used]]
+        used = np.flatnonzero(np.isin(morph_target.vertex, self.used_vertices, assume_unique=True))
+        row = np.searchsorted(self.used_vertices, morph_target.vertex[used])
+        columns = [to_metres(morph_target.delta_mm[used]), morph_target.normal[used]]
         accessors = buffer_builder.add_displacements(row, columns, len(self.used_vertices))
         return dict(zip(("POSITION", "NORMAL"), accessors, strict=True))
 
@@ -112,7 +112,7 @@ class SurfacePrimitive:
         other[mesh.quads[:, 0]] = mesh.quads[:, 1]
         return len(self.faces) % 2 == 0 and bool((other[self.faces[::2]] == self.faces[1::2]).all())
 
-    def _is_separate(self) -> bool:
+    def _shares_no_points(self) -> bool:
         """Return whether the triangles share no points with triangles of other materials."""
         mesh = self._head.mesh
         others = np.delete(np.arange(len(mesh.triangles)), self.faces)
@@ -152,13 +152,13 @@ class HairPrimitive:
         index = buffer_builder.add_triangles(self.fibres.triangles(), len(positions))
         return {"attributes": attributes, "indices": index, "extras": {"dermis": {"hair": True}}}
 
-    def add_target(self, buffer_builder: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
+    def add_target(self, buffer_builder: BufferBuilder, morph_target: VertexMorphTarget) -> dict[str, int]:
         """Append to the buffer how a morph target displaces the vertices of the hair tubes.
 
         Returns {"POSITION": index of the accessor of the displacements}.
         """
         delta, mesh = np.zeros_like(self._rest_points), self.deformable.head.mesh
-        delta[mesh.point[vertex_target.vertex]] = vertex_target.delta_mm
+        delta[mesh.point[morph_target.vertex]] = morph_target.delta_mm
         vertex, displacement = self.fibres.tube_displacements(self._rest_points, delta)
         (accessor,) = buffer_builder.add_displacements(
             vertex, [to_metres(displacement)], self.fibres.vertex_count

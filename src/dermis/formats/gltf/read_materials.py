@@ -9,13 +9,13 @@ from typing import Any
 
 from dermis.base.errors import refuse
 from dermis.base.file_properties import (
-    drawn,
-    drawn_with_note,
+    drawn_property,
+    drawn_property_with_note,
     keys_of,
     markdown_code,
-    no_effect,
-    noted,
-    refused,
+    noted_property,
+    property_without_effect,
+    refused_property,
 )
 from dermis.formats.gltf.document import Document, Tree
 from dermis.formats.materials import (
@@ -64,41 +64,47 @@ _UNDRAWN_EXTENSIONS = {
     "VRMC_materials_mtoon": "cartoon shading (shade colour, outline, rim light)",
 }
 _BASISU_EXTENSION = "KHR_texture_basisu"
-GLTF_MATERIALS = (
-    drawn("`baseColorFactor`, `baseColorTexture`"),
-    drawn("`normalTexture` with `scale`"),
-    drawn_with_note(
+GLTF_MATERIAL_PROPERTIES = (
+    drawn_property("`baseColorFactor`, `baseColorTexture`"),
+    drawn_property("`normalTexture` with `scale`"),
+    drawn_property_with_note(
         "`metallicRoughnessTexture`",
         "roughness, squared for skin, which has no metalness (note)",
         other_parts="drawn",
     ),
-    noted("`roughnessFactor`", "skin has a measured roughness", other_parts="drawn"),
-    noted("`metallicFactor`", other_parts="drawn"),
-    noted("`emissiveFactor`, `emissiveTexture`", other_parts="drawn"),
-    noted(
+    noted_property("`roughnessFactor`", "skin has a measured roughness", other_parts="drawn"),
+    noted_property("`metallicFactor`", other_parts="drawn"),
+    noted_property("`emissiveFactor`, `emissiveTexture`", other_parts="drawn"),
+    noted_property(
         f"`{_EMISSIVE_STRENGTH_EXTENSION}`",
         "factor of the emission",
         _EMISSIVE_STRENGTH_EXTENSION,
         other_parts="drawn",
     ),
-    drawn_with_note("emission without a base colour", "taken for the reflectance, as in scans"),
-    noted(f"`{_UNLIT_EXTENSION}`", "the colour is taken for the reflectance", _UNLIT_EXTENSION),
-    noted("`alphaMode`, `alphaCutoff`", "cut out, also in shadows; `BLEND` at 0.5", other_parts="drawn"),
-    noted("`occlusionTexture`", "computed from the shape"),
-    no_effect("`doubleSided`", "back faces are always drawn"),
-    drawn("`texCoord`, `KHR_texture_transform`", "", "KHR_texture_transform"),
-    drawn("`wrapS`, `wrapT`", "repeated, mirrored or clamped"),
-    noted("`magFilter`", "always interpolated (no note if it is linear)"),
-    no_effect("`minFilter`", "maps always have mip levels"),
-    drawn("pictures in PNG, JPEG, WebP, AVIF", markdown_code(_SOURCE_EXTENSIONS), *_SOURCE_EXTENSIONS),
-    refused(f"`{_BASISU_EXTENSION}` without another picture", "KTX2"),
-    drawn_with_note(markdown_code(_SCATTERING_EXTENSIONS), "the material is skin", *_SCATTERING_EXTENSIONS),
-    drawn_with_note(f"`{_GLOSS_EXTENSION}`", "without the specular colour", _GLOSS_EXTENSION),
-    *(noted(f"`{name}`", text, name) for name, text in _UNDRAWN_EXTENSIONS.items()),
-    noted("other extensions of materials"),
+    drawn_property_with_note("emission without a base colour", "taken for the reflectance, as in scans"),
+    noted_property(f"`{_UNLIT_EXTENSION}`", "the colour is taken for the reflectance", _UNLIT_EXTENSION),
+    noted_property(
+        "`alphaMode`, `alphaCutoff`", "cut out, also in shadows; `BLEND` at 0.5", other_parts="drawn"
+    ),
+    noted_property("`occlusionTexture`", "computed from the shape"),
+    property_without_effect("`doubleSided`", "back faces are always drawn"),
+    drawn_property("`texCoord`, `KHR_texture_transform`", "", "KHR_texture_transform"),
+    drawn_property("`wrapS`, `wrapT`", "repeated, mirrored or clamped"),
+    noted_property("`magFilter`", "always interpolated (no note if it is linear)"),
+    property_without_effect("`minFilter`", "maps always have mip levels"),
+    drawn_property(
+        "pictures in PNG, JPEG, WebP, AVIF", markdown_code(_SOURCE_EXTENSIONS), *_SOURCE_EXTENSIONS
+    ),
+    refused_property(f"`{_BASISU_EXTENSION}` without another picture", "KTX2"),
+    drawn_property_with_note(
+        markdown_code(_SCATTERING_EXTENSIONS), "the material is skin", *_SCATTERING_EXTENSIONS
+    ),
+    drawn_property_with_note(f"`{_GLOSS_EXTENSION}`", "without the specular colour", _GLOSS_EXTENSION),
+    *(noted_property(f"`{name}`", text, name) for name, text in _UNDRAWN_EXTENSIONS.items()),
+    noted_property("other extensions of materials"),
 )
 """Properties of glTF materials and textures."""
-MATERIAL_EXTENSIONS = keys_of(GLTF_MATERIALS)
+MATERIAL_EXTENSIONS = keys_of(GLTF_MATERIAL_PROPERTIES)
 """Extensions of materials and textures that are read or named in a note."""
 
 

@@ -136,8 +136,8 @@ def read_influences(
     """
     skin, attributes = _node_skin(document, mesh_node_index), primitive["attributes"]
     count = max(1, sum(name.startswith("WEIGHTS_") for name in attributes))
-    culprit = f"{document.path}: {nodes.names[mesh_node_index]!r}"
-    check_limit(culprit, 4 * count, MAX_BONES_PER_VERTEX, "joints of a vertex", "Export it with fewer")
+    error_subject = f"{document.path}: {nodes.names[mesh_node_index]!r}"
+    check_limit(error_subject, 4 * count, MAX_BONES_PER_VERTEX, "joints of a vertex", "Export it with fewer")
     sets = [k for k in range(count) if f"JOINTS_{k}" in attributes and f"WEIGHTS_{k}" in attributes]
     if not sets:
         actual = f"the mesh of {nodes.names[mesh_node_index]!r} has none"

@@ -11,13 +11,13 @@ import numpy as np
 from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
 from dermis.base.file_properties import (
-    drawn,
-    drawn_with_note,
+    drawn_property,
+    drawn_property_with_note,
     keys_of,
     markdown_code,
-    no_effect,
-    noted,
-    refused,
+    noted_property,
+    property_without_effect,
+    refused_property,
 )
 from dermis.formats import size_limits as limits
 from dermis.formats.gltf import draco, vrm
@@ -38,7 +38,7 @@ from dermis.formats.gltf.rigs import (
 from dermis.formats.gltf.unread import LIGHTS_EXTENSION, note_unread
 from dermis.formats.materials import FileMaterial
 from dermis.formats.parts import DEFAULT_COLOUR, MaterialGroup, MeshFile, MeshPart, find_quads
-from dermis.formats.text_files import list_names
+from dermis.formats.text_files import join_names
 
 _TRIANGLES_MODE, _STRIP_MODE, _FAN_MODE = 4, 5, 6
 _MAX_SCENE_COUNTS = {
@@ -50,37 +50,41 @@ _MAX_SCENE_COUNTS = {
 _MESHOPT_EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 _QUANTISATION_EXTENSION = "KHR_mesh_quantization"
 GLTF_PROPERTIES = (
-    drawn("triangles, strips, fans"),
-    noted("points and lines"),
-    drawn("`indices`, `NORMAL`, `TEXCOORD_0`, `TEXCOORD_1`, ...", "missing normals are computed"),
-    drawn("`COLOR_0`", "linear; multiplies the base colour"),
-    noted("alpha of `COLOR_0`", "no note if it is 1"),
-    drawn(f"sparse accessors, normalised integers, `{_QUANTISATION_EXTENSION}`", "", _QUANTISATION_EXTENSION),
-    drawn(
+    drawn_property("triangles, strips, fans"),
+    noted_property("points and lines"),
+    drawn_property("`indices`, `NORMAL`, `TEXCOORD_0`, `TEXCOORD_1`, ...", "missing normals are computed"),
+    drawn_property("`COLOR_0`", "linear; multiplies the base colour"),
+    noted_property("alpha of `COLOR_0`", "no note if it is 1"),
+    drawn_property(
+        f"sparse accessors, normalised integers, `{_QUANTISATION_EXTENSION}`", "", _QUANTISATION_EXTENSION
+    ),
+    drawn_property(
         f"`{draco.DRACO_EXTENSION}`",
         'with `pip install "dermis[formats]"` ([DracoPy](https://github.com/seung-lab/DracoPy)): positions, '
         "normals, uv, colours, joints and weights; refused if the data does not have the size that its "
         "accessors state",
         draco.DRACO_EXTENSION,
     ),
-    refused(
+    refused_property(
         f"{markdown_code(_MESHOPT_EXTENSIONS)}, if required",
         "its Python package has no wheels; write the file without it: `gltfpack` without `-c` and `-cc`, or "
         "`gltf-transform copy`",
     ),
-    refused("other extensions that are required", "the error names them"),
-    noted("other extensions that are used but not required"),
-    drawn("transforms of nodes"),
-    drawn("morph targets, default weights, skins", "they move the head, see [motion](motion.md)"),
-    drawn("animations", "by `--motion`, see [motion](motion.md)"),
-    noted(f"`{LIGHTS_EXTENSION}`, cameras", "`--lights` and `--camera` set others", LIGHTS_EXTENSION),
-    noted("several scenes", "the default scene is read"),
-    refused("buffers without data", "such as the fallback of a compressed one"),
-    drawn_with_note(
+    refused_property("other extensions that are required", "the error names them"),
+    noted_property("other extensions that are used but not required"),
+    drawn_property("transforms of nodes"),
+    drawn_property("morph targets, default weights, skins", "they move the head, see [motion](motion.md)"),
+    drawn_property("animations", "by `--motion`, see [motion](motion.md)"),
+    noted_property(
+        f"`{LIGHTS_EXTENSION}`, cameras", "`--lights` and `--camera` set others", LIGHTS_EXTENSION
+    ),
+    noted_property("several scenes", "the default scene is read"),
+    refused_property("buffers without data", "such as the fallback of a compressed one"),
+    drawn_property_with_note(
         "names of materials and meshes, such as `Face_00_SKIN`, `Hair_00_HAIR`, `Tops_01_CLOTH`",
         "used to find [which parts are skin](#materials-and-parts)",
     ),
-    no_effect("`asset`, `extras`, other names", "information for programs and people"),
+    property_without_effect("`asset`, `extras`, other names", "information for programs and people"),
 )
 """Properties of glTF files besides their materials."""
 _READ_EXTENSIONS = {*MATERIAL_EXTENSIONS, *keys_of((*GLTF_PROPERTIES, *vrm.VRM_PROPERTIES))}
@@ -118,7 +122,7 @@ def _refuse_extensions(document: Document) -> None:
             (_EXTENSION_ADVICE[name] for name in unsupported if name in _EXTENSION_ADVICE),
             _OTHER_EXTENSION_ADVICE,
         )
-        refuse(document.path, "plain glTF", f"the file requires {list_names(unsupported)}", advice)
+        refuse(document.path, "plain glTF", f"the file requires {join_names(unsupported)}", advice)
 
 
 @dataclass
@@ -193,7 +197,7 @@ class _SceneReader:
             influences, matrices = read_influences(
                 self.document, self.nodes, self.armature, node_index, primitive
             )
-            return _skin_part(part, targets, influences, matrices)
+            return _apply_skinning(part, targets, influences, matrices)
         transformed = _transform_part(part, targets, _nearest_rigid_transform(self.nodes.world[node_index]))
         bone = self.armature.bone_for_node(self.nodes, node_index) if self.armature else None
         if bone is None:
@@ -318,7 +322,7 @@ def _nearest_rigid_transform(matrix: Doubles) -> Doubles:
     return rigid
 
 
-def _skin_part(
+def _apply_skinning(
     mesh_part: MeshPart,
     targets: dict[str, VertexDisplacements],
     influences: SkinInfluences,

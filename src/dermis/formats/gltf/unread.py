@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 
 from dermis.formats.gltf.document import Document
 from dermis.formats.gltf.nodes import Nodes
-from dermis.formats.text_files import list_names
+from dermis.formats.text_files import join_names
 
 LIGHTS_EXTENSION = "KHR_lights_punctual"
 _POINT_AND_LINE_MODES = range(4)  # modes of primitives
@@ -36,4 +36,4 @@ def note_unread(document: Document, nodes: Nodes, read_extensions: Collection[st
         name for name in map(str, document.top_level_array("extensionsUsed")) if name not in read_extensions
     ]
     if unread:
-        yield f"these extensions are left out: {list_names(unread)}"
+        yield f"these extensions are left out: {join_names(unread)}"

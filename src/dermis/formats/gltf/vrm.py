@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dermis.base.file_properties import drawn, no_effect, noted
+from dermis.base.file_properties import drawn_property, noted_property, property_without_effect
 from dermis.formats.axes import DEFAULT_AXES, Axes
 from dermis.formats.gltf.document import Document, Tree
 from dermis.formats.gltf.rigs import VertexDisplacements
 from dermis.formats.size_limits import MAX_DISPLACEMENTS, MAX_TARGETS, check_limit
-from dermis.formats.text_files import list_names
+from dermis.formats.text_files import join_names
 
 VRM_0, VRM_1 = "VRM", "VRMC_vrm"
 """Extensions of VRM 0.x, whose avatars look along -Z, and of VRM 1.0, whose avatars look along +Z."""
@@ -24,22 +24,22 @@ _UNREAD_PROPERTIES = {
     "visibility in first person": ("firstPerson",),
 }
 VRM_PROPERTIES = (
-    drawn(
+    drawn_property(
         f"`{VRM_0}` (0.x)",
         "the face looks along -Z and is turned to the viewer, unless `--front` is given",
         VRM_0,
     ),
-    no_effect(f"`{VRM_1}` (1.0)", "the face looks along +Z, as in other files", VRM_1),
-    drawn(
+    property_without_effect(f"`{VRM_1}` (1.0)", "the face looks along +Z, as in other files", VRM_1),
+    drawn_property(
         "expressions: presets and custom ones",
         "morph targets beside those of the file (`happy`, `aa`, `blink`, in VRM 0 `joy`, `a`); "
         "a target of the file keeps its name",
     ),
-    noted("changes of materials by expressions"),
-    noted(
+    noted_property("changes of materials by expressions"),
+    noted_property(
         f"MToon (`{_TOON_EXTENSION}`, in VRM 0 `VRM/MToon`)", "only the base colour is drawn", _TOON_EXTENSION
     ),
-    *(noted(text, "", *keys) for text, keys in _UNREAD_PROPERTIES.items()),
+    *(noted_property(text, "", *keys) for text, keys in _UNREAD_PROPERTIES.items()),
 )
 """Properties of VRM files in addition to those of glTF."""
 _MATERIAL_BIND_KEYS = ("materialValues", "materialColorBinds", "textureTransformBinds")
@@ -173,7 +173,7 @@ def _avatar_notes(extensions: Tree, vrm_extension: Tree, is_vrm_0: bool) -> Iter
     materials = vrm_extension.get("materialProperties") or ()
     toon = [str(one.get("name")) for one in materials if "MToon" in str(one.get("shader"))]
     if toon:
-        yield f"cartoon shading (shade colour, outline, rim light) is not drawn: {list_names(toon)}"
+        yield f"cartoon shading (shade colour, outline, rim light) is not drawn: {join_names(toon)}"
 
 
 def _sum_displacements(

@@ -12,7 +12,7 @@ from dermis.formats.deformable_mesh import DeformableMesh
 from dermis.formats.gltf.binary import CLAMPED_SAMPLER, BufferBuilder, glb_bytes, resolve_textures
 from dermis.formats.gltf.document import FrozenTree, Tree
 from dermis.formats.gltf.materials import (
-    SkinAdditions,
+    SkinMaterialAdditions,
     encode_colours_png,
     encode_eye_pictures,
     encode_part_pictures,
@@ -44,7 +44,7 @@ def encode_head(
     slopes: Floats | None = None,
     asset_extras: FrozenTree | None = None,
     eyes: EyeTextures | None = None,
-    skin_additions: SkinAdditions | None = None,
+    skin_additions: SkinMaterialAdditions | None = None,
 ) -> bytes:
     """Encode a head as a .glb file in metres, with one primitive per material, morph targets and joints.
 
@@ -63,7 +63,7 @@ def encode_head(
     parts, materials = _primitive_sources(deformable, pictures, roles, roughness, eyes)
     if skin_additions is not None:
         materials = [
-            skin_additions.add_to_material(material) if "dermis" in material.get("extras", {}) else material
+            skin_additions.extend_material(material) if "dermis" in material.get("extras", {}) else material
             for material in materials
         ]
     images = [

@@ -72,10 +72,10 @@ class CaptureSamples:
     unused_names: tuple[str, ...] = ()
 
 
-def capture_clip(culprit: object, clip_name: str, samples: CaptureSamples, head: Head) -> Clip:
+def capture_clip(error_subject: object, clip_name: str, samples: CaptureSamples, head: Head) -> Clip:
     """Return a facial capture as a clip for a head, linearly interpolated between frames.
 
-    culprit : file of the capture, for errors
+    error_subject : file of the capture, for errors
     clip_name : name of the clip
     samples : blend shape weights and bone angles of the capture
 
@@ -83,7 +83,7 @@ def capture_clip(culprit: object, clip_name: str, samples: CaptureSamples, head:
     """
     target_of_name = match_targets(samples.names, head.targets)
     if not target_of_name and not samples.angles:
-        refuse_unmatched_motion(culprit, samples.names, head)
+        refuse_unmatched_motion(error_subject, samples.names, head)
     times = samples.times_s - samples.times_s[0]
     columns = [samples.names.index(name) for name in target_of_name]
     weights, targets = samples.weights[:, columns], tuple(target_of_name.values())
@@ -112,12 +112,12 @@ def capture_clip(culprit: object, clip_name: str, samples: CaptureSamples, head:
     )
 
 
-def refuse_unmatched_motion(culprit: object, capture_names: Sequence[str], head: Head) -> None:
+def refuse_unmatched_motion(error_subject: object, capture_names: Sequence[str], head: Head) -> None:
     """Raise an error for a motion in which no name matches a morph target or bone of the head."""
     targets = _abbreviated_list(head.targets) if head.targets else "none"
     actual = f"it has {_abbreviated_list(capture_names)} and the head {targets}"
     advice = "Use a head with targets of these names, such as those of ARKit"
-    refuse(culprit, "names of targets or bones of the head", actual, advice)
+    refuse(error_subject, "names of targets or bones of the head", actual, advice)
 
 
 def estimate_frame_rate(times: Doubles) -> float | None:
@@ -133,13 +133,13 @@ def estimate_frame_rate(times: Doubles) -> float | None:
     return nearest if abs(nearest / rate - 1) < _FRAME_RATE_TOLERANCE else rate
 
 
-def to_seconds(culprit: object, times: Doubles, unit_s: float | None) -> Doubles:
+def to_seconds(file_name: object, times: Doubles, unit_s: float | None) -> Doubles:
     """Return times (k,) in seconds.
 
     If the unit is unknown, it is guessed, and a note tells the user. The guess is the first of seconds,
     milliseconds, microseconds and nanoseconds for which the median interval between frames is at most 2 s.
 
-    culprit : source of the times, for the note
+    file_name : file of the capture, for the note
     unit_s : unit of the times [s]; None if it is unknown
     """
     if unit_s is None:
@@ -147,34 +147,33 @@ def to_seconds(culprit: object, times: Doubles, unit_s: float | None) -> Doubles
         step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
         unit_s = next((unit_s for unit_s in _TIME_UNIT_NAMES if unit_s * step <= _MAX_FRAME_INTERVAL_S), 1.0)
         notify(
-            f"{culprit}: the unit of its times is not stated; they are taken as {_TIME_UNIT_NAMES[unit_s]}"
+            f"{file_name}: the unit of its times is not stated; they are taken as {_TIME_UNIT_NAMES[unit_s]}"
         )
     return times * unit_s
 
 
-def frame_rate_or_default(culprit: object, fps: float | None, default_fps: float) -> float:
+def frame_rate_or_default(file_name: object, fps: float | None, default_fps: float) -> float:
     """Return the frame rate to use for a capture whose frames have no times.
 
     This is `fps`. If `fps` is None, it is `default_fps`, and a note tells the user.
 
-    culprit : source of the capture, for the note
+    file_name : file of the capture, for the note
     """
     if fps is None:
         assumed = f"{default_fps:g} frames per second are assumed"
-        notify(f"{culprit}: it has no times; {assumed}, which fps (--motion-fps) changes")
+        notify(f"{file_name}: it has no times; {assumed}, which fps (--motion-fps) changes")
     return fps or default_fps
 
 
-def note_lost_frames(culprit: object, lost_frame_count: int, frame_count: int) -> None:
+def note_lost_frames(file_name: object, lost_frame_count: int, frame_count: int) -> None:
     """Issue a note on the number of frames that show no face, unless all frames show a face.
 
     lost_frame_count : number of frames without a face
     frame_count : number of all frames
     """
     if lost_frame_count:
-        notify(
-            f"{culprit}: {lost_frame_count} of {frame_count} frames show no face; their pose is interpolated"
-        )
+        lost = f"{lost_frame_count} of {frame_count} frames"
+        notify(f"{file_name}: {lost} show no face; their pose is interpolated")
 
 
 def fill_gaps(times_s: Doubles, channels: Doubles) -> Doubles:
@@ -191,21 +190,23 @@ def fill_gaps(times_s: Doubles, channels: Doubles) -> Doubles:
     return filled
 
 
-def weights_as_fractions(culprit: object, weights: Doubles) -> Doubles:
+def weights_as_fractions(file_name: object, weights: Doubles) -> Doubles:
     """Return blend shape weights (k, n) as fractions; weights in percent are divided by 100, with a note."""
     largest = float(np.nanmax(np.abs(weights), initial=0.0))
     if _PERCENT_WEIGHT_RANGE[0] < largest <= _PERCENT_WEIGHT_RANGE[1]:
-        notify(f"{culprit}: weights of up to {largest:g} are taken as percent")
+        notify(f"{file_name}: weights of up to {largest:g} are taken as percent")
         return weights / 100
     if _MAX_PLAUSIBLE_WEIGHT < largest <= _PERCENT_WEIGHT_RANGE[0]:
-        notify(f"{culprit}: weights of up to {largest:g} are used as they are, where 1 is the full shape")
+        notify(f"{file_name}: weights of up to {largest:g} are used as they are, where 1 is the full shape")
     return weights
 
 
-def check_weights(culprits: Sequence[object], shape_names: Sequence[str], shape_weights: Doubles) -> None:
+def check_weights(
+    error_subjects: Sequence[object], shape_names: Sequence[str], shape_weights: Doubles
+) -> None:
     """Refuse implausibly large blend shape weights (k, n); NaN marks missing weights and is accepted.
 
-    culprits : (k,) names of the frames, for errors
+    error_subjects : (k,) names of the frames, for errors
     shape_names : (n,) names of the blend shapes, for errors
     """
     invalid = np.argwhere(np.abs(shape_weights) > MAX_WEIGHT)
@@ -213,10 +214,10 @@ def check_weights(culprits: Sequence[object], shape_names: Sequence[str], shape_
         row, column = invalid[0]
         expected = f"numbers from -{MAX_WEIGHT:g} to {MAX_WEIGHT:g}"
         actual = f"{shape_names[column]} is {shape_weights[row, column]:g}"
-        refuse(culprits[row], expected, actual, "Correct or remove the line")
+        refuse(error_subjects[row], expected, actual, "Correct or remove the line")
 
 
-def check_capture_size(culprit: object, frame_count: int, column_count: int) -> None:
+def check_capture_size(error_subject: object, frame_count: int, column_count: int) -> None:
     """Refuse a capture with too many frames or too many columns.
 
     frame_count : number of frames read so far
@@ -225,7 +226,7 @@ def check_capture_size(culprit: object, frame_count: int, column_count: int) -> 
     if frame_count > MAX_CAPTURE_FRAMES or column_count > MAX_CAPTURE_COLUMNS:
         expected = f"at most {MAX_CAPTURE_FRAMES:,} frames of {MAX_CAPTURE_COLUMNS} numbers"
         actual = f"it has more ({frame_count:,} of {column_count:,} so far)"
-        refuse(culprit, expected, actual, "Shorten it, or remove columns that heads do not have")
+        refuse(error_subject, expected, actual, "Shorten it, or remove columns that heads do not have")
 
 
 def _abbreviated_list(names: Sequence[str]) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from dermis.base.arrays import Doubles, Mask
 from dermis.base.errors import notify, refuse
 from dermis.base.quantities import checked_number
-from dermis.base.reading import parsing, read_text
+from dermis.base.reading import read_text, refuse_parse_errors
 from dermis.base.tables import column_separator, plain_key
 from dermis.formats.motion.captures import (
     FRAME_NUMBER_KEYS,
@@ -105,7 +105,7 @@ def _read_table(path: Path, fps: float | None) -> _CaptureTable:
     text = read_text(path, expected, MAX_CLIP_BYTES)
     separator = column_separator(next(filter(str.strip, io.StringIO(text)), ""))
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
-    with parsing(path, expected, csv.Error):
+    with refuse_parse_errors(path, expected, csv.Error):
         header = [cell.strip() for cell in next(filter(_has_text, reader), [])]
         if not header:
             refuse(path, f"{expected} with a header and rows", "it is empty", "Export it again")
@@ -116,12 +116,12 @@ def _read_table(path: Path, fps: float | None) -> _CaptureTable:
         count = keys.index(_SHAPE_COUNT_COLUMN) if _SHAPE_COUNT_COLUMN in keys else None
         lines, times, rows, states_shapes = [], [], [], []
         for row in filter(_has_text, reader):
-            culprit = f"{path}, line {reader.line_num}"
-            _check_row(culprit, header, row, count)
-            lines.append(culprit)
+            error_subject = f"{path}, line {reader.line_num}"
+            _check_row(error_subject, header, row, count)
+            lines.append(error_subject)
             times.append("" if time is None else row[time].strip().replace(",", "."))
             states_shapes.append(count is not None and row[count].strip() not in ("", "0"))
-            rows.append(_row_values(culprit, header, row, columns))
+            rows.append(_row_values(error_subject, header, row, columns))
             check_capture_size(path, len(rows), len(columns))
     if not rows:
         refuse(path, f"{expected} with a header and rows", "it has only its header", "Export it again")
@@ -135,7 +135,9 @@ def _has_text(table_row: Sequence[str]) -> bool:
     return any(map(str.strip, table_row))
 
 
-def _check_row(culprit: str, header: Sequence[str], table_row: list[str], count_column: int | None) -> None:
+def _check_row(
+    error_subject: str, header: Sequence[str], table_row: list[str], count_column: int | None
+) -> None:
     """Refuse a row with too many or too few cells.
 
     A row whose number of blend shapes is 0 may be too short; empty cells are appended to it.
@@ -149,21 +151,26 @@ def _check_row(culprit: str, header: Sequence[str], table_row: list[str], count_
     ):
         table_row += [""] * (len(header) - len(table_row))
     if len(table_row) < len(header) or any(cell.strip() for cell in table_row[len(header) :]):
-        refuse(culprit, f"{len(header)} cells", f"got {len(table_row)}", "Correct or remove the line")
+        refuse(error_subject, f"{len(header)} cells", f"got {len(table_row)}", "Correct or remove the line")
 
 
-def _check_header(culprit: str, header: Sequence[str]) -> None:
-    check_capture_size(culprit, 0, len(header))
+def _check_header(error_subject: str, header: Sequence[str]) -> None:
+    check_capture_size(error_subject, 0, len(header))
     folded = [name.casefold() for name in header if name]
     repeated = [name for name in header if name and folded.count(name.casefold()) > 1]
     if repeated:
-        refuse(culprit, "each column once", f"{repeated[0]} occurs twice", "Remove one of them")
+        refuse(error_subject, "each column once", f"{repeated[0]} occurs twice", "Remove one of them")
     if all(plain_key(name) in _COLUMNS_WITHOUT_MOTION for name in header):
-        refuse(culprit, "columns of blend shapes", "there are none", "Export it from Live Link Face as it is")
+        refuse(
+            error_subject,
+            "columns of blend shapes",
+            "there are none",
+            "Export it from Live Link Face as it is",
+        )
 
 
 def _row_values(
-    culprit: str, header: Sequence[str], table_row: Sequence[str], column_indices: Sequence[int]
+    error_subject: str, header: Sequence[str], table_row: Sequence[str], column_indices: Sequence[int]
 ) -> Doubles:
     """Return the values of the columns `column_indices` of a row; empty cells are NaN.
 
@@ -175,7 +182,7 @@ def _row_values(
         try:
             values[index] = float(cell.replace(",", ".") or "nan")
         except ValueError:
-            refuse(culprit, "numbers", f"{header[column]} is {cell!r}", "Correct or remove the line")
+            refuse(error_subject, "numbers", f"{header[column]} is {cell!r}", "Correct or remove the line")
     return values
 
 
@@ -265,22 +272,27 @@ def _row_times(
     return times
 
 
-def _parse_timecode(culprit: str, timecode_cell: str) -> _Timecode:
+def _parse_timecode(error_subject: str, timecode_cell: str) -> _Timecode:
     match = _TIMECODE_PATTERN.fullmatch(timecode_cell)
     if match is None:
         refuse(
-            culprit, "a Timecode as HH:MM:SS:FF.fff", f"got {timecode_cell!r}", "Correct or remove the line"
+            error_subject,
+            "a Timecode as HH:MM:SS:FF.fff",
+            f"got {timecode_cell!r}",
+            "Correct or remove the line",
         )
     hours, minutes, seconds, frames = match.groups(default="0")
     return _Timecode(3600 * int(hours) + 60 * int(minutes) + float(seconds), float(frames))
 
 
-def _parse_time(culprit: str, time_cell: str) -> float:
+def _parse_time(error_subject: str, time_cell: str) -> float:
     try:
-        return checked_number(culprit, float(time_cell), -MAX_STATED_TIME, MAX_STATED_TIME)
+        return checked_number(error_subject, float(time_cell), -MAX_STATED_TIME, MAX_STATED_TIME)
     except ValueError:
         actual = f"got {time_cell!r}"
-        refuse(culprit, "a Timecode as HH:MM:SS:FF.fff, or a number", actual, "Correct or remove the line")
+        refuse(
+            error_subject, "a Timecode as HH:MM:SS:FF.fff, or a number", actual, "Correct or remove the line"
+        )
 
 
 def _timecode_rate(timecodes: Sequence[_Timecode]) -> float:

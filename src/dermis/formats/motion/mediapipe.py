@@ -62,7 +62,7 @@ _RECORD_ADVICE = "Record with output_face_blendshapes (JavaScript: outputFaceBle
 class _CapturedFrame(NamedTuple):
     """Blend shape weights of one captured frame.
 
-    culprit : file with line or number of the frame, for errors
+    error_subject : file with line or number of the frame, for errors
     number : number of the frame
     time : time of the frame, in the unit `unit`; NaN if the frame has none
     unit : unit of the time [s]; None if it is not stated
@@ -72,7 +72,7 @@ class _CapturedFrame(NamedTuple):
     faces : number of faces in the frame
     """
 
-    culprit: str
+    error_subject: str
     number: float
     time: float
     unit: float | None
@@ -100,8 +100,8 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     columns: dict[str, int] = {}
     frames: list[_CapturedFrame] = []
     record: object = None
-    for index, (culprit, record) in enumerate(records):
-        frames.append(_parse_frame(culprit, index, record, columns))
+    for index, (error_subject, record) in enumerate(records):
+        frames.append(_parse_frame(error_subject, index, record, columns))
         check_capture_size(path, len(frames), len(columns))
     lost, several = sum(frame.faces == 0 for frame in frames), sum(frame.faces > 1 for frame in frames)
     if lost == len(frames):
@@ -118,7 +118,7 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
             row[:] = 0.0
             row[frame.columns] = frame.weights
     weights = weights_as_fractions(path, weights)
-    check_weights([frame.culprit for frame in frames], names, weights)
+    check_weights([frame.error_subject for frame in frames], names, weights)
     angles, unused = _head_angles(path, frames, times, find_rotation_bones(head.control_rig.skeleton))
     samples = CaptureSamples(times, names, fill_gaps(times, weights), angles, unused)
     return capture_clip(path, path.stem, samples, head)
@@ -178,7 +178,7 @@ def _frame_list(json_document: object) -> list[object]:
 
 
 def _parse_frame(
-    culprit: str, frame_index: int, json_record: object, shape_columns: dict[str, int]
+    error_subject: str, frame_index: int, json_record: object, shape_columns: dict[str, int]
 ) -> _CapturedFrame:
     """Parse the JSON record of a frame.
 
@@ -190,23 +190,23 @@ def _parse_frame(
     if isinstance(json_record, list):
         json_record = {"blendshapes": json_record}
     if not isinstance(json_record, dict | None):
-        refuse(culprit, "an object in JSON", f"got {format_value(json_record)}", _LINE_ADVICE)
+        refuse(error_subject, "an object in JSON", f"got {format_value(json_record)}", _LINE_ADVICE)
     fields = _fields_by_plain_key(json_record)
     for value in tuple(fields.values()):  # the record may contain the result as one of its values
         if not fields.keys() & {*_SHAPE_KEYS, *_MATRIX_KEYS}:
             fields = _fields_by_plain_key(value[0] if isinstance(value, list) and value else value) | fields
     shapes, faces = _first_face(next((fields[key] for key in _SHAPE_KEYS if key in fields), None))
     matrix = next((fields[key] for key in _MATRIX_KEYS if key in fields), None)
-    transformation = _facial_transformation(culprit, matrix)
-    scores = _shape_scores(culprit, shapes or {})
+    transformation = _facial_transformation(error_subject, matrix)
+    scores = _shape_scores(error_subject, shapes or {})
     key = next((key for key in SECONDS_PER_TIME_KEY if fields.get(key) is not None), "")
     number = next((fields[key] for key in FRAME_NUMBER_KEYS if key in fields), frame_index)
     listed = fields.get("faces")
     faces = max(faces, len(listed) if isinstance(listed, list) else 0)
     return _CapturedFrame(
-        culprit,
-        checked_number(f"{culprit}: frame", number, -MAX_STATED_TIME, MAX_STATED_TIME),
-        checked_number(f"{culprit}: {key}", fields[key], -MAX_STATED_TIME, MAX_STATED_TIME)
+        error_subject,
+        checked_number(f"{error_subject}: frame", number, -MAX_STATED_TIME, MAX_STATED_TIME),
+        checked_number(f"{error_subject}: {key}", fields[key], -MAX_STATED_TIME, MAX_STATED_TIME)
         if key
         else np.nan,
         SECONDS_PER_TIME_KEY.get(key, 1.0),
@@ -246,7 +246,7 @@ def _wraps_blend_shapes(json_value: object) -> bool:
     )
 
 
-def _shape_scores(culprit: str, json_shapes: object) -> dict[str, float]:
+def _shape_scores(error_subject: str, json_shapes: object) -> dict[str, float]:
     """Return the score of each blend shape by name.
 
     json_shapes : {name: score}, or MediaPipe's list of {"categoryName", "score"}
@@ -256,17 +256,24 @@ def _shape_scores(culprit: str, json_shapes: object) -> dict[str, float]:
         names = [next((item[key] for key in _NAME_KEYS if item.get(key)), None) for item in categories]
         scores = [next((item[key] for key in _SCORE_KEYS if key in item), None) for item in categories]
         if None in names or None in scores:
-            refuse(culprit, "a categoryName and a score for each blend shape", "one has none", _LINE_ADVICE)
+            refuse(
+                error_subject, "a categoryName and a score for each blend shape", "one has none", _LINE_ADVICE
+            )
         json_shapes = {str(name): score for name, score in zip(names, scores, strict=True)}
     if not isinstance(json_shapes, dict):
-        refuse(culprit, "blendshapes by name or as a list", f"got {format_value(json_shapes)}", _LINE_ADVICE)
+        refuse(
+            error_subject,
+            "blendshapes by name or as a list",
+            f"got {format_value(json_shapes)}",
+            _LINE_ADVICE,
+        )
     for name, score in json_shapes.items():
         if type(score) not in (int, float):
-            refuse(culprit, "scores as numbers", f"{name} is {format_value(score)}", _LINE_ADVICE)
+            refuse(error_subject, "scores as numbers", f"{name} is {format_value(score)}", _LINE_ADVICE)
     return {name: score for name, score in json_shapes.items() if name != NEUTRAL_SHAPE_NAME}
 
 
-def _facial_transformation(culprit: str, json_matrix: object) -> Doubles | None:
+def _facial_transformation(error_subject: str, json_matrix: object) -> Doubles | None:
     """Return the facial transformation (4, 4) of the first face; None if the frame has none.
 
     The translation is in the last column of the result, whether the file lists the matrix by rows or by
@@ -296,9 +303,9 @@ def _facial_transformation(culprit: str, json_matrix: object) -> Doubles | None:
     flat = isinstance(json_matrix, list) and not any(isinstance(row, list) for row in json_matrix)
     shape = (16,) if flat else (4, 4)
     limit = _MAX_MATRIX_VALUE
-    matrix = checked_array(f"{culprit}: matrix", json_matrix, shape, -limit, limit).reshape(4, 4)
+    matrix = checked_array(f"{error_subject}: matrix", json_matrix, shape, -limit, limit).reshape(4, 4)
     if not abs(np.linalg.det(matrix[:3, :3])) > 1e-12:
-        refuse(culprit, "an invertible matrix", "its determinant is 0", _LINE_ADVICE)
+        refuse(error_subject, "an invertible matrix", "its determinant is 0", _LINE_ADVICE)
     last_row, last_column = np.abs(matrix[3, :3]).max(), np.abs(matrix[:3, 3]).max()
     no_translation = last_row == last_column == 0
     return matrix.T if last_row > last_column or (no_translation and flat and by_columns) else matrix
@@ -329,7 +336,7 @@ def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None
     for (before, after), frame in zip(pairwise(times.tolist()), frames[1:], strict=True):
         if after < before:
             actual = f"{after:g} s comes after {before:g} s"
-            refuse(frame.culprit, "increasing times", actual, "Sort the lines")
+            refuse(frame.error_subject, "increasing times", actual, "Sort the lines")
     return times
 
 

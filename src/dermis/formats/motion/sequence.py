@@ -15,7 +15,7 @@ import numpy as np
 
 from dermis.base.arrays import Doubles, Floats, Index, Ints
 from dermis.base.errors import notify, refuse
-from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, parsing
+from dermis.base.reading import MALFORMED_DATA_ERRORS, is_file, refuse_parse_errors
 from dermis.formats.axes import DEFAULT_AXES, Axes, Axis, Front, to_y_up
 from dermis.formats.mesh_checks import check_arrays
 from dermis.formats.obj import parse_obj, read_obj_text
@@ -283,7 +283,7 @@ class FrameReader:
         return vertices
 
     def _parse_vertices(self, path: Path, unit_mm: float) -> FrameVertices:
-        with np.errstate(all="ignore"), parsing(path, "a mesh", *MALFORMED_DATA_ERRORS):
+        with np.errstate(all="ignore"), refuse_parse_errors(path, "a mesh", *MALFORMED_DATA_ERRORS):
             part = join_parts(read_mesh_file(path).parts, path)
             positions = self._to_head_axes(unit_mm * part.positions)
             assert part.uv is not None

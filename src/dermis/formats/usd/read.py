@@ -13,7 +13,13 @@ import numpy as np
 from dermis.base.arrays import Index, Mask
 from dermis.base.disk import Arrays
 from dermis.base.errors import refuse
-from dermis.base.file_properties import drawn, drawn_with_note, no_effect, noted, refused
+from dermis.base.file_properties import (
+    drawn_property,
+    drawn_property_with_note,
+    noted_property,
+    property_without_effect,
+    refused_property,
+)
 from dermis.base.native_decoding import array_from_text, run_decoder, text_from_array
 from dermis.base.reading import parse_json, read_file
 from dermis.formats.axes import Axes, Axis
@@ -31,30 +37,34 @@ _DECODER_MODULE = "dermis.formats.usd.decoder"
 _PACKAGE_SUFFIX = ".usdz"
 Tree = dict[str, Any]
 USD_PROPERTIES = (
-    drawn("`metersPerUnit`", "unless `--unit-mm` is given"),
-    drawn_with_note("a file without `metersPerUnit`", "its unit is USD's default, 10 mm"),
-    drawn("`upAxis`", "unless an `--up` other than `y` is given"),
-    drawn("meshes, with transforms, instances, `orientation`, holes"),
-    no_effect("meshes that are invisible or of purpose `guide` or `proxy`", "hidden in all programs"),
-    drawn("time samples", "the state at the first time"),
-    drawn("`subdivisionScheme`", "normals are used if it is `none`; `--subdivide` subdivides"),
-    drawn(
+    drawn_property("`metersPerUnit`", "unless `--unit-mm` is given"),
+    drawn_property_with_note("a file without `metersPerUnit`", "its unit is USD's default, 10 mm"),
+    drawn_property("`upAxis`", "unless an `--up` other than `y` is given"),
+    drawn_property("meshes, with transforms, instances, `orientation`, holes"),
+    property_without_effect(
+        "meshes that are invisible or of purpose `guide` or `proxy`", "hidden in all programs"
+    ),
+    drawn_property("time samples", "the state at the first time"),
+    drawn_property("`subdivisionScheme`", "normals are used if it is `none`; `--subdivide` subdivides"),
+    drawn_property(
         "primvars of each interpolation, with indices",
         "uv (`st`, `UVMap` or the name in the material), normals, colours",
     ),
-    drawn_with_note("several sets of uv in one mesh", "that of the first material is used"),
-    drawn(
+    drawn_property_with_note("several sets of uv in one mesh", "that of the first material is used"),
+    drawn_property(
         "`displayColor` of a mesh without material, or read by its material",
         "linear colours of vertices; those of faces are averaged at vertices",
     ),
-    drawn("materials of meshes and of subsets of faces"),
-    drawn(
+    drawn_property("materials of meshes and of subsets of faces"),
+    drawn_property(
         "pictures",
         "in the package, or in the folder of the file and below; of other paths only the last part is used",
     ),
-    drawn("sublayers, references, payloads", "from the folder of the file and below, or from the package"),
-    refused("layers in other places, value clips", "before any of them is opened"),
-    noted("cameras, lights, skeletons, blend shapes, points, curves, spheres, other prims"),
+    drawn_property(
+        "sublayers, references, payloads", "from the folder of the file and below, or from the package"
+    ),
+    refused_property("layers in other places, value clips", "before any of them is opened"),
+    noted_property("cameras, lights, skeletons, blend shapes, points, curves, spheres, other prims"),
 )
 """Properties of USD files, except those of materials."""
 

@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
-from dermis.base.file_properties import drawn, drawn_with_note, markdown_code, noted
+from dermis.base.file_properties import (
+    drawn_property,
+    drawn_property_with_note,
+    markdown_code,
+    noted_property,
+)
 
 if TYPE_CHECKING:
     from pxr import Usd, UsdShade
@@ -37,21 +42,21 @@ _INPUTS_WITHOUT_EFFECT = {
     "occlusion": ("picture of occlusion, which is computed from the shape", 1.0),
     "specularColor": ("specular colour", (0.0, 0.0, 0.0)),
 }
-USD_MATERIALS = (
-    drawn("`diffuseColor`, `normal`", "values and pictures"),
-    drawn("picture of the `roughness`", "squared for skin"),
-    noted("value of the `roughness`", "skin has a measured roughness", other_parts="drawn"),
-    noted("`metallic`, `emissiveColor`", "values and pictures", other_parts="drawn"),
-    noted(
+USD_MATERIAL_PROPERTIES = (
+    drawn_property("`diffuseColor`, `normal`", "values and pictures"),
+    drawn_property("picture of the `roughness`", "squared for skin"),
+    noted_property("value of the `roughness`", "skin has a measured roughness", other_parts="drawn"),
+    noted_property("`metallic`, `emissiveColor`", "values and pictures", other_parts="drawn"),
+    noted_property(
         "`opacity`, `opacityThreshold`", "values, or the alpha of the colour's picture", other_parts="drawn"
     ),
-    noted("another picture of the `opacity`"),
-    drawn("`scale`, `wrapS`, `wrapT`, `UsdTransform2d`"),
-    noted("`bias`, `wrap...` of `black`, `sourceColorSpace` of `raw`", "normals use their `bias`"),
-    noted(markdown_code(_INPUTS_WITHOUT_EFFECT), "no note for values that change nothing"),
-    drawn_with_note("emission without a `diffuseColor`", "taken for the reflectance, as in scans"),
-    noted("shaders other than `UsdPreviewSurface`", "drawn in the colour of the mesh"),
-    noted("a picture that is missing"),
+    noted_property("another picture of the `opacity`"),
+    drawn_property("`scale`, `wrapS`, `wrapT`, `UsdTransform2d`"),
+    noted_property("`bias`, `wrap...` of `black`, `sourceColorSpace` of `raw`", "normals use their `bias`"),
+    noted_property(markdown_code(_INPUTS_WITHOUT_EFFECT), "no note for values that change nothing"),
+    drawn_property_with_note("emission without a `diffuseColor`", "taken for the reflectance, as in scans"),
+    noted_property("shaders other than `UsdPreviewSurface`", "drawn in the colour of the mesh"),
+    noted_property("a picture that is missing"),
 )
 """Inputs of UsdPreviewSurface and of its textures."""
 _WRAP_OF_USD_MODE = {"repeat": "repeat", "mirror": "mirror"}

@@ -84,7 +84,7 @@ class LightKind(Generic[LightT]):
         """
         return [light]
 
-    def check(self, light: LightT, head: Head, culprit: str) -> None:
+    def check(self, light: LightT, head: Head, error_subject: str) -> None:
         """Check that the light has a valid position.
 
         Parameters
@@ -93,7 +93,7 @@ class LightKind(Generic[LightT]):
             Light of the scene.
         head : Head
             Head that is lit.
-        culprit : str
+        error_subject : str
             Name of the light in messages.
 
         Raises

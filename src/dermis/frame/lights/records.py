@@ -112,10 +112,12 @@ def light_shadow_views(scene: Scene, outline: Outline, map_side: int) -> list[Sh
         actual = f"there are {len(numbered)}, with the environment's suns and each part of a large rectangle"
         refuse("lights", f"at most {_MAX_LIGHTS}", actual, "Remove some")
     head = scene.head
-    for culprit, light in numbered:
-        KINDS[light.kind].check(light, head, culprit)
-    shadowed = [(culprit, light) for culprit, light in numbered if light.shadows]
-    points = [(culprit, light) for culprit, light in shadowed if not isinstance(light, DirectionalLight)]
+    for light_label, light in numbered:
+        KINDS[light.kind].check(light, head, light_label)
+    shadowed = [(light_label, light) for light_label, light in numbered if light.shadows]
+    points = [
+        (light_label, light) for light_label, light in shadowed if not isinstance(light, DirectionalLight)
+    ]
     point_views = iter(point_shadow_views(points, head.centre_mm, outline, map_side))
 
     def shadow_view(light: Light) -> ShadowView:

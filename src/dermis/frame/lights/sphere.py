@@ -16,12 +16,14 @@ from dermis.scene.lights import SphereLight
 class _SphereLightKind(LightKind[SphereLight]):
     punctual = False
 
-    def check(self, light: SphereLight, head: Head, culprit: str) -> None:
+    def check(self, light: SphereLight, head: Head, error_subject: str) -> None:
         middle = world_position(light.position, head.centre_mm)
         near = float(np.linalg.norm(head.mesh.positions - np.array(middle), axis=1).min())
         if near <= light.radius_mm:
             actual = f"the head is {near:.0f} mm from its middle"
-            refuse(culprit, f"a head outside the sphere of {light.radius_mm:g} mm", actual, "Move it away")
+            refuse(
+                error_subject, f"a head outside the sphere of {light.radius_mm:g} mm", actual, "Move it away"
+            )
 
     def shader_members(
         self, light: SphereLight, head_centre: Triple, target_distance: float

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_integer
-from dermis.base.reading import checked_path, parsing, read_text
+from dermis.base.reading import checked_path, read_text, refuse_parse_errors
 from dermis.base.tables import Rows, parse_rows, read_rows
 from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.human.regions.average import average_head, is_human
@@ -75,7 +75,7 @@ def read_landmark_table(table_path: str) -> list[tuple[str, int]]:
     Raises DermisError for tables that cannot be read.
     """
     text = read_text(check_landmarks(table_path), _EXPECTED_TABLE_FORMAT)
-    with parsing(table_path, _EXPECTED_TABLE_FORMAT, KeyError, TypeError, csv.Error):
+    with refuse_parse_errors(table_path, _EXPECTED_TABLE_FORMAT, KeyError, TypeError, csv.Error):
         found = [(str(row["name"]), int(row["vertex"])) for row in parse_rows(text)]
     if not 0 < len(found) <= _MAX_LANDMARKS:
         refuse(table_path, f"1 to {_MAX_LANDMARKS} landmarks", f"got {len(found)}", "Correct the table")

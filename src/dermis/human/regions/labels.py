@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dermis.atlas.atlas import Atlas
 from dermis.base.errors import refuse
 from dermis.base.quantities import checked_array
-from dermis.base.reading import parsing, read_text
+from dermis.base.reading import read_text, refuse_parse_errors
 from dermis.base.tables import parse_rows
 from dermis.formats.maps import load_labels
 from dermis.human.regions.average import (
@@ -88,7 +88,7 @@ def warp_to_average(head: Head, landmarks: Landmarks, points: Doubles) -> Double
 
 def _parse_landmarks(csv_text: str, file_name: str) -> Landmarks:
     expected = "rows of landmark,x,y,z"
-    with parsing(file_name, expected, KeyError, TypeError, csv.Error):
+    with refuse_parse_errors(file_name, expected, KeyError, TypeError, csv.Error):
         landmarks = {
             row["landmark"]: tuple(float(row[axis]) for axis in "xyz") for row in parse_rows(csv_text)
         }
@@ -102,23 +102,23 @@ def _parse_landmarks(csv_text: str, file_name: str) -> Landmarks:
 
 
 def _check_landmarks(head: Head, landmarks: Landmarks, reference_landmarks: Landmarks) -> None:
-    subject = f"landmarks of {head.name}"
+    error_subject = f"landmarks of {head.name}"
     for name in landmarks.keys() - reference_landmarks.keys():
-        refuse(subject, f"only {', '.join(reference_landmarks)}", f"got {name!r}", "Correct its name")
+        refuse(error_subject, f"only {', '.join(reference_landmarks)}", f"got {name!r}", "Correct its name")
     if len(landmarks) < _MIN_LANDMARKS:
         actual = f"got {len(landmarks)}"
-        refuse(subject, f"at least {_MIN_LANDMARKS}", actual, "Add some all around the head")
+        refuse(error_subject, f"at least {_MIN_LANDMARKS}", actual, "Add some all around the head")
     skin = head.mesh.positions - np.array(head.centre_mm)
     for name, position in landmarks.items():
         distance = float(np.linalg.norm(skin - position, axis=1).min())
         if not distance < _MAX_SKIN_DISTANCE_MM:
             actual = f"{name!r} is {distance:.0f} mm off the nearest corner of the mesh"
             expected = "points on the skin, in mm from the head's centre"
-            refuse(subject, expected, actual, "Correct its position")
+            refuse(error_subject, expected, actual, "Correct its position")
     points_mm = np.array(list(landmarks.values()))
     singular_values = np.linalg.svd(points_mm - points_mm.mean(axis=0), compute_uv=False)
     if singular_values[-1] / np.sqrt(len(points_mm)) < _MIN_LANDMARK_DEPTH_MM:
-        refuse(subject, "points all around the head", "they lie in one plane", "Add some outside of it")
+        refuse(error_subject, "points all around the head", "they lie in one plane", "Add some outside of it")
 
 
 def label_texels(head: Head, atlas: Atlas, region_table: RegionTable) -> NDArray[np.uint8]:

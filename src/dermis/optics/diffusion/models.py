@@ -14,7 +14,7 @@ from dermis.base.errors import refuse
 from dermis.base.tables import float_columns, read_rows
 from dermis.optics.diffusion import dipole, hankel, layered_diffusion, multipole
 from dermis.optics.diffusion.boundary import boundary_mismatch, normal_reflectance
-from dermis.optics.diffusion.multipole import Clamp
+from dermis.optics.diffusion.multipole import SourceDepthClamp
 from dermis.optics.fits.targets import RingTarget
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats, Medium
@@ -47,7 +47,7 @@ _MIN_REPORTED_NEGATIVE_LIGHT_RATIO = (
 def diffusion_profile(
     medium: Medium,
     model: DiffusionModel = "layered",
-    clamp: Clamp = "layer",
+    clamp: SourceDepthClamp = "layer",
     rgb_weights: Floats | None = None,
 ) -> RadialProfile:
     """Return the diffusion profile R(r) of a medium, computed by a diffusion model.
@@ -83,7 +83,7 @@ def diffusion_profile(
 def diffusion_rings(
     medium: Medium,
     model: DiffusionModel = "layered",
-    clamp: Clamp = "layer",
+    clamp: SourceDepthClamp = "layer",
     rgb_weights: Floats | None = None,
 ) -> RingTarget:
     """Return the light of a narrow beam that emerges through concentric rings around the beam.
@@ -97,7 +97,7 @@ def diffusion_rings(
 
 
 def _sampled_profile(
-    medium: Medium, model: DiffusionModel, clamp: Clamp, rgb_weights: Floats | None
+    medium: Medium, model: DiffusionModel, clamp: SourceDepthClamp, rgb_weights: Floats | None
 ) -> tuple[Floats, Floats, Floats]:
     """Return radii r (n,) [mm], the profile R(r) (n, c) [1/mm2] and the total reflectance (c,) [-].
 
@@ -125,7 +125,9 @@ def _sampled_profile(
     return grid[inside], values[inside], total
 
 
-def hankel_transform(medium: Medium, model: DiffusionModel, clamp: Clamp, frequency: Floats) -> Floats:
+def hankel_transform(
+    medium: Medium, model: DiffusionModel, clamp: SourceDepthClamp, frequency: Floats
+) -> Floats:
     """Return the Hankel transform (n, c) of a model's R(r) [-].
 
     clamp : whether the multipole's source is kept inside thin layers ("layer") or not ("none"), see `Slab`
@@ -145,7 +147,9 @@ def _check_half_space(medium: Medium, model: DiffusionModel) -> None:
         refuse(f"model {model}", "one semi-infinite layer", actual, "Use the model multipole or layered")
 
 
-def _closed_form_profile(medium: Medium, model: DiffusionModel, clamp: Clamp, radius_mm: Floats) -> Floats:
+def _closed_form_profile(
+    medium: Medium, model: DiffusionModel, clamp: SourceDepthClamp, radius_mm: Floats
+) -> Floats:
     layer = medium.layers[0]
     if model == "better-dipole":
         return dipole.better_dipole_reflectance(radius_mm, layer, medium.eta)
@@ -155,7 +159,7 @@ def _closed_form_profile(medium: Medium, model: DiffusionModel, clamp: Clamp, ra
     return multipole.reflectance(radius_mm, slab)
 
 
-def _medium_warnings(medium: Medium, model: DiffusionModel, clamp: Clamp) -> list[str]:
+def _medium_warnings(medium: Medium, model: DiffusionModel, clamp: SourceDepthClamp) -> list[str]:
     """Return warnings about properties of the medium for which the model is inaccurate."""
     warnings = []
     for number, layer in enumerate(medium.layers, 1):

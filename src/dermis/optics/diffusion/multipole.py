@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from dermis.optics.diffusion import dipole
 from dermis.optics.media import Floats, Layer, Medium
 
-Clamp = Literal["none", "layer"]
+SourceDepthClamp = Literal["none", "layer"]
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Slab:
     layer: Layer
     A_top: float
     A_bottom: float
-    clamp: Clamp = "layer"
+    clamp: SourceDepthClamp = "layer"
 
     @property
     def source_depth_mm(self) -> Floats:
@@ -174,7 +174,7 @@ class StackResponse:
 
 
 def stack_response(
-    frequency: ArrayLike, medium: Medium, boundary_mismatch: float, clamp: Clamp = "layer"
+    frequency: ArrayLike, medium: Medium, boundary_mismatch: float, clamp: SourceDepthClamp = "layer"
 ) -> StackResponse:
     """Return the response of the stack of all layers of a medium, at frequencies s [1/mm].
 
@@ -188,7 +188,7 @@ def stack_response(
     return stack
 
 
-def layer_slabs(medium: Medium, boundary_mismatch: float, clamp: Clamp = "layer") -> list[Slab]:
+def layer_slabs(medium: Medium, boundary_mismatch: float, clamp: SourceDepthClamp = "layer") -> list[Slab]:
     """Return one slab per layer of a medium.
 
     boundary_mismatch : boundary mismatch of the faces that touch air; all other faces are index-matched [-]

@@ -163,22 +163,22 @@ def _radii_at_fractions(
 def _check_target(
     target_kind: str, radius_mm: Floats, profile_values: Floats, total_reflectance: Floats
 ) -> None:
-    culprit = f"{target_kind} target"
+    error_subject = f"{target_kind} target"
     if (
         profile_values.ndim != 2
         or radius_mm.shape != profile_values.shape[:1]
         or total_reflectance.shape != profile_values.shape[1:]
     ):
         actual = f"got {radius_mm.shape}, {profile_values.shape} and {total_reflectance.shape}"
-        refuse(culprit, "arrays of n, n x c and c numbers", actual, "Correct the arrays")
+        refuse(error_subject, "arrays of n, n x c and c numbers", actual, "Correct the arrays")
     if not (
         np.isfinite(radius_mm).all()
         and np.isfinite(profile_values).all()
         and np.isfinite(total_reflectance).all()
     ):
-        refuse(culprit, "finite numbers", "got NaN or infinity", "Correct the arrays")
+        refuse(error_subject, "finite numbers", "got NaN or infinity", "Correct the arrays")
     if len(radius_mm) < 2 or not (np.diff(radius_mm) > 0.0).all():
-        refuse(culprit, "two or more increasing radii", "they do not increase", "Sort them")
+        refuse(error_subject, "two or more increasing radii", "they do not increase", "Sort them")
     dark = [
         i
         for i in range(profile_values.shape[1])
@@ -188,4 +188,4 @@ def _check_target(
         peak, sum_ = profile_values[:, dark[0]].max(), total_reflectance[dark[0]]
         actual = f"channel {dark[0]} has a maximum of {peak:.3g} and a sum of {sum_:.3g}"
         advice = "Leave it out, or use another model, another skin or more photons"
-        refuse(culprit, "light in every channel", actual, advice)
+        refuse(error_subject, "light in every channel", actual, advice)

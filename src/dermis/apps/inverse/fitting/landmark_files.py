@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dermis.base.errors import notify, refuse
-from dermis.base.reading import parse_json, parsing, read_text
+from dermis.base.reading import parse_json, read_text, refuse_parse_errors
 from dermis.base.tables import column_separator, plain_key
 from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.optics.media import Floats
@@ -69,7 +69,9 @@ def read_landmarks(path: str | Path, photo_size: tuple[int, int]) -> tuple[str, 
     """
     text = read_text(path, _EXPECTED_FILE_FORMATS)
     lines = [line.strip() for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    with parsing(path, _EXPECTED_FILE_FORMATS, KeyError, TypeError, IndexError, AttributeError, csv.Error):
+    with refuse_parse_errors(
+        path, _EXPECTED_FILE_FORMATS, KeyError, TypeError, IndexError, AttributeError, csv.Error
+    ):
         if re.match(r'\s*(\[|\{\s*["}])', text):
             points = _landmarks_from_json(path, parse_json(text, path, _EXPECTED_FILE_FORMATS), photo_size)
         elif any(_PTS_HEADER_LINE.fullmatch(line) for line in lines[:3]) or "{" in lines[:3]:

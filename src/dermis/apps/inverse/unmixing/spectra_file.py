@@ -24,7 +24,7 @@ from dermis.apps.inverse.unmixing.spectral_inversion import (
 )
 from dermis.base.errors import notify, refuse
 from dermis.base.quantities import checked_number
-from dermis.base.reading import open_regular_file, parsing
+from dermis.base.reading import open_regular_file, refuse_parse_errors
 from dermis.base.tables import column_separator
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
@@ -99,7 +99,7 @@ def _read_table_cells(path: str | Path) -> list[list[str]]:
     with open_regular_file(path, _EXPECTED_TABLE) as file:
         packed = file.read(2) == b"\x1f\x8b"
         file.seek(0)
-        with parsing(path, _EXPECTED_TABLE, OSError, EOFError, UnicodeDecodeError, zlib.error):
+        with refuse_parse_errors(path, _EXPECTED_TABLE, OSError, EOFError, UnicodeDecodeError, zlib.error):
             data = (gzip.GzipFile(fileobj=file) if packed else file).read(_MAX_FILE_BYTES + 1)
             if len(data) > _MAX_FILE_BYTES:
                 refuse(path, "at most 32 MB of text", "it has more", "Split the table")
@@ -108,7 +108,7 @@ def _read_table_cells(path: str | Path) -> list[list[str]]:
     if len(lines) < 2:
         refuse(path, _EXPECTED_TABLE, f"it has {len(lines)} rows", "Give headings and spectra")
     separator = column_separator(lines[0])
-    with parsing(path, _EXPECTED_TABLE, csv.Error):
+    with refuse_parse_errors(path, _EXPECTED_TABLE, csv.Error):
         rows = list(csv.reader(lines, delimiter=separator))
     width = len(rows[0])
     for number, row in enumerate(rows[1:], 2):

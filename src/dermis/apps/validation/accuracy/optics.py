@@ -15,7 +15,7 @@ from dermis.optics.diffusion.models import (
     slab_transmittance,
     truncated_medium,
 )
-from dermis.optics.diffusion.multipole import Clamp
+from dermis.optics.diffusion.multipole import SourceDepthClamp
 from dermis.optics.fits.burley import fit_burley
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.fits.separable import fit_separable
@@ -28,7 +28,7 @@ from dermis.optics.tissue import Tissue, load_tissue
 Floats = NDArray[np.float64]
 PHOTON_COUNT, SPECTRAL_PHOTON_COUNT = 4_000_000, 400_000
 COMPARED_TISSUES = ("skin1", "skin2", "dj3", "light", "medium", "dark")
-COMPARED_MODELS: tuple[tuple[DiffusionModel, Clamp], ...] = (
+COMPARED_MODELS: tuple[tuple[DiffusionModel, SourceDepthClamp], ...] = (
     ("dipole", "layer"),
     ("better-dipole", "layer"),
     ("multipole", "none"),
@@ -174,7 +174,7 @@ def error_against_published_sum(profile: RadialProfile) -> Floats:
 
 def published_profile_errors_text() -> str:
     """Return text with `error_against_published_sum` of three diffusion profiles of the tissue "dj3"."""
-    variants: tuple[tuple[str, DiffusionModel, Clamp], ...] = (
+    variants: tuple[tuple[str, DiffusionModel, SourceDepthClamp], ...] = (
         ("multipole as printed", "multipole", "none"),
         ("multipole", "multipole", "layer"),
         ("layered diffusion of a point source", "layered-point", "layer"),

@@ -26,7 +26,7 @@ FRAGMENT_TECHNIQUE = "published-fragments"
 """Technique with the passes of GPU Gems 3 in the graphics pipeline; `GPU_GEMS_3` has compute passes."""
 _MAX_MOVEMENT_MM = 2.0  # largest movement of camera and lights
 _MIN_GAUSSIAN_WEIGHT = 1e-3
-_RIG_ROTATION_DEGREES = 25.0  # between two copies of the studio's lights
+_LIGHT_ROTATION_DEGREES = 25.0  # between two copies of the studio's lights
 
 
 @dataclass(frozen=True)
@@ -149,9 +149,12 @@ def _spot_lights(light_count: int) -> list[PointLight]:
 
     light_count : number of lights to return
     """
-    rig = [light for light in studio() if isinstance(light, PointLight)]
+    studio_lights = [light for light in studio() if isinstance(light, PointLight)]
     return [
-        _rotate_light(rig[k % len(rig)], _RIG_ROTATION_DEGREES * (k // len(rig))) for k in range(light_count)
+        _rotate_light(
+            studio_lights[k % len(studio_lights)], _LIGHT_ROTATION_DEGREES * (k // len(studio_lights))
+        )
+        for k in range(light_count)
     ]
 
 

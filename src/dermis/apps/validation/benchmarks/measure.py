@@ -102,7 +102,10 @@ def measure_case(
 
     Raises DermisError if the device cannot draw the frames, for example for lack of memory.
     """
-    with converted_gpu_failures(renderer.device), TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES):
+    with (
+        converted_gpu_failures(renderer.device),
+        TECHNIQUES.temporary_entry(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES),
+    ):
         return _measure_case(renderer, case, head, folder, bytes_per_s, frame_counts)
 
 

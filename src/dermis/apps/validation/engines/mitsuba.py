@@ -17,9 +17,9 @@ from dermis.apps.export.fitting import fit_burley_width
 from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.target import get_numbers
 from dermis.apps.export.targets.mitsuba.scene import (
-    BOUNDARIES,
-    Boundary,
+    IOR_BY_SURFACE_MODEL,
     IsotropicMedium,
+    SurfaceModel,
     medium_description,
     surface_bsdf,
 )
@@ -31,7 +31,7 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 
 Floats = NDArray[np.float64]
 RESULTS_FILE = RESULTS / "engines_mitsuba.json"
-COMPARED_SKINS: dict[str, tuple[Boundary, ...]] = {
+COMPARED_SKINS: dict[str, tuple[SurfaceModel, ...]] = {
     "skin1": ("matched", "smooth"),
     "skin2": ("matched", "smooth", "rough"),
     "dj3": ("matched", "smooth"),
@@ -47,7 +47,7 @@ _BLACK_ALBEDO = 1e-9
 def half_lit_plane(
     mi: Mitsuba,
     medium: IsotropicMedium,
-    boundary: Boundary,
+    surface_model: SurfaceModel,
     burley_width_mm: float,
     *,
     is_black: bool = False,
@@ -59,7 +59,7 @@ def half_lit_plane(
 
     mi : module mitsuba
     medium : medium below the plane
-    boundary : surface of the medium: "matched" for none, "smooth" or "rough"
+    surface_model : surface of the medium: "matched" for none, "smooth" or "rough"
     burley_width_mm : Burley width d of the profile; the view spans 3 d on each side of the edge [mm]
     is_black : whether the medium absorbs all light, so that only the surface reflects
     """
@@ -70,7 +70,7 @@ def half_lit_plane(
     )
     albedo = (_BLACK_ALBEDO,) * 3 if is_black else medium.albedo
     inside = mi.load_dict(medium_description(IsotropicMedium(medium.sigma_t, albedo)))
-    camera_below = boundary != "rough"
+    camera_below = surface_model != "rough"
     eye = -1e-3 * height if camera_below else 0.5 * height
     lamp_to_world = transform().translate([size, 0.0, height]).rotate([1, 0, 0], 180).scale([size, size, 1.0])
     scale = [
@@ -96,14 +96,14 @@ def half_lit_plane(
             "type": "scene",
             "integrator": {"type": "volpath", "rr_depth": 400},
             "sensor": {**sensor, **({"medium": inside} if camera_below else {})},
-            "skin": {**skin, "bsdf": surface_bsdf(boundary)},
+            "skin": {**skin, "bsdf": surface_bsdf(surface_model)},
             "lamp": {**lamp, "emitter": {"type": "area", "radiance": mitsuba_rgb((1, 1, 1))}},
         }
     )
 
 
 def measured_edge_response(
-    mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, burley_width_mm: float, samples: int
+    mi: Mitsuba, medium: IsotropicMedium, surface_model: SurfaceModel, burley_width_mm: float, samples: int
 ) -> tuple[Floats, Floats, float]:
     """Measure the light scattered across the edge of a half-lit plane in Mitsuba.
 
@@ -112,15 +112,15 @@ def measured_edge_response(
 
     mi : module mitsuba
     medium : medium below the plane
-    boundary : surface of the medium: "matched" for none, "smooth" or "rough"
+    surface_model : surface of the medium: "matched" for none, "smooth" or "rough"
     burley_width_mm : Burley width of the profile [mm]
     samples : paths per pixel
     """
-    plane = half_lit_plane(mi, medium, boundary, burley_width_mm)
+    plane = half_lit_plane(mi, medium, surface_model, burley_width_mm)
     passes = [mi.render(plane, spp=samples // _PASS_COUNT, seed=k) for k in range(_PASS_COUNT)]
     images = np.array([np.array(image)[0].mean(axis=1) for image in passes])
-    if boundary == "rough":  # subtract what the surface reflects
-        black_scene = half_lit_plane(mi, medium, boundary, burley_width_mm, is_black=True)
+    if surface_model == "rough":  # subtract what the surface reflects
+        black_scene = half_lit_plane(mi, medium, surface_model, burley_width_mm, is_black=True)
         lit = np.array(mi.render(black_scene, spp=samples, seed=99))[0].mean(axis=1)
         images -= np.where(np.arange(_PIXEL_COUNT) >= _PIXEL_COUNT // 2, lit[_PIXEL_COUNT // 2 :].mean(), 0.0)
     # At every distance, the two sides of the edge add up to the same total.
@@ -150,16 +150,16 @@ def pixel_edge_response(
     return np.asarray(cumulative_profile.edge_response(centres)[..., channel].mean(axis=1))
 
 
-def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int) -> JsonObject:
+def measure_skin(mi: Mitsuba, subject: Subject, surface_model: SurfaceModel, samples: int) -> JsonObject:
     """Return the measured edge responses of an exported skin, and their errors, by channel.
 
     An edge response is the radiance of a half-lit plane by distance from the edge of the lit half.
 
     mi : module mitsuba
-    boundary : surface of the skin: "matched" for none, "smooth" or "rough"
+    surface_model : surface of the skin: "matched" for none, "smooth" or "rough"
     samples : paths per pixel
     """
-    target = TARGET.with_variant(boundary)
+    target = TARGET.with_variant(surface_model)
     version = target.resolve_version(None)
     rows = target.parameters(subject, version)
     predicted, d = target.predicted_profile(rows, subject, version), fit_burley_width(subject.curve)
@@ -168,7 +168,7 @@ def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int
     for c in range(3):
         sigma, albedo = (get_numbers(rows, name)[c] for name in ("sigma_t", "albedo"))
         medium = IsotropicMedium((sigma,) * 3, (albedo,) * 3)
-        edge, error, total = measured_edge_response(mi, medium, boundary, float(d[c]), samples)
+        edge, error, total = measured_edge_response(mi, medium, surface_model, float(d[c]), samples)
         difference = edge - pixel_edge_response(predicted, c, float(d[c]))
         results["predicted"].append(float(np.abs(difference).max()))
         results["exported"].append(
@@ -177,9 +177,11 @@ def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int
         results["noise"].append(float(error.mean()))
         results["rms"].append(float(np.sqrt((difference**2).mean())))
         # Radiance inside the medium is larger by the square of the index.
-        results["energy"].append(total / (BOUNDARIES[boundary] ** 2 if boundary != "rough" else 1.0))
+        results["energy"].append(
+            total / (IOR_BY_SURFACE_MODEL[surface_model] ** 2 if surface_model != "rough" else 1.0)
+        )
         results["edge"].append([float(value) for value in edge[_PIXEL_COUNT // 2 :]])
-    return {"skin": subject.name, "boundary": boundary, "d_mm": [float(x) for x in d], **results}
+    return {"skin": subject.name, "boundary": surface_model, "d_mm": [float(x) for x in d], **results}
 
 
 def measure_mitsuba(
@@ -199,9 +201,9 @@ def measure_mitsuba(
     mi = load_mitsuba()
     edge = []
     with mitsuba_variant(mi, variant):
-        for name, boundaries in COMPARED_SKINS.items():
+        for name, surface_models in COMPARED_SKINS.items():
             subject = load_subject(name)
-            edge += [measure_skin(mi, subject, boundary, samples) for boundary in boundaries]
+            edge += [measure_skin(mi, subject, surface_model, samples) for surface_model in surface_models]
     half = _PIXEL_COUNT // 2
     centres = [(k + 0.5) * _VIEW_HALF_WIDTH_PER_BURLEY_WIDTH / half for k in range(half)]
     settings = {"mitsuba": mi.__version__, "samples": samples, "pixels": _PIXEL_COUNT, "at_d": centres}

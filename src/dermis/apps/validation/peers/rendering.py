@@ -148,7 +148,7 @@ def render_with_all_renderers(
         on_progress(SAMPLES_PER_PASS * _PROGRESS_STEPS_BY_RENDERER["path-traced"])
 
     scene_context = medium_scene(head, light, default_region(light), medium)
-    with TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES), scene_context as (scene, _):
+    with TECHNIQUES.temporary_entry(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES), scene_context as (scene, _):
         for seed in FIRST_SEED_BY_TURN:
             for method in CYCLES_METHODS:
                 _time_frames(ours, renderer, scene, comparison_settings)

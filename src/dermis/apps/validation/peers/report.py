@@ -20,7 +20,7 @@ from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, fill_page, w
 from dermis.apps.validation.peers.figures import scene_results
 from dermis.apps.validation.peers.rendering import ComparisonSettings, SceneRenders, render_with_all_renderers
 from dermis.base.atomic_write import check_output
-from dermis.base.console import note, print_lines, progress_bar
+from dermis.base.console import print_lines, print_note, progress_bar
 from dermis.base.errors import DermisError, refuse
 
 RESULTS_FILE, PAGE = RESULTS / "peers.json", DOCS / "peers.md"
@@ -89,7 +89,7 @@ def compare_renderers(
     try:
         blender_python()
     except DermisError as fault:
-        note(f"Cycles is skipped. {fault}")
+        print_note(f"Cycles is skipped. {fault}")
     loaded, renderer = dermis.load_head(head, subdivide=0), dermis.Renderer(adapter)
     scenes: list[SceneRenders] = []
     with progress_bar("measuring") as bar:

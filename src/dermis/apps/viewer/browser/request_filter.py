@@ -138,7 +138,7 @@ def checked_message(message_text: object) -> str | None:
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
-App = Callable[[Message, Receive, Send], Awaitable[None]]
+AsgiApp = Callable[[Message, Receive, Send], Awaitable[None]]
 
 MAX_PAGES = 8
 """Maximum number of open pages."""
@@ -160,7 +160,7 @@ class RequestFilter:
     cookie : name of the cookie, different for each port because browsers share cookies between ports
     """
 
-    def __init__(self, asgi_app: App, token: str, cookie: str = "dermis") -> None:
+    def __init__(self, asgi_app: AsgiApp, token: str, cookie: str = "dermis") -> None:
         self._app, self._token, self._cookie = asgi_app, token, cookie
         self._pages = 0
 

@@ -75,7 +75,7 @@ class LimitedConnection(H11Protocol):  # type: ignore[misc]
             self._deadline = None
 
 
-LoadState = Callable[[], tuple[ViewerState, MotionFile | None]]
+StateLoader = Callable[[], tuple[ViewerState, MotionFile | None]]
 
 PREPARATION_STAGES = (
     "reading the head",
@@ -90,7 +90,7 @@ _FAILURE_DISPLAY_S = 0.7  # time for pages to receive the reason of a failure
 
 
 async def prepare_viewer(
-    http_server: uvicorn.Server, canvas: PageCanvas, load_state: LoadState, adapter: str
+    http_server: uvicorn.Server, canvas: PageCanvas, load_state: StateLoader, adapter: str
 ) -> Viewer:
     """Prepare the first frame in a thread and return the viewer; pages display the progress.
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from dermis.apps.viewer.browser.canvas import PageCanvas
-from dermis.apps.viewer.browser.request_filter import App, Message, Receive, Send
+from dermis.apps.viewer.browser.request_filter import AsgiApp, Message, Receive, Send
 from dermis.apps.viewer.session import HEAD_FILE_SUFFIXES
 from dermis.base.errors import DermisError, refuse
 
@@ -41,7 +41,7 @@ class Uploads:
         used in paths
     """
 
-    def __init__(self, asgi_app: App, canvas: PageCanvas, upload_folder: Path) -> None:
+    def __init__(self, asgi_app: AsgiApp, canvas: PageCanvas, upload_folder: Path) -> None:
         self._app, self._canvas, self._folder = asgi_app, canvas, upload_folder
         self._count = self._bytes = 0
         self._is_busy = False

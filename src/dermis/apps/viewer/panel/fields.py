@@ -23,7 +23,7 @@ from dermis.scene.frozen_model import (
 )
 
 StateWithFields = Callable[..., ViewerState]
-ToState = Callable[[Any], ViewerState]
+StateWithValue = Callable[[Any], ViewerState]
 _LOG_SLIDER_FLAG = int(imgui.SliderFlags_.logarithmic)
 _HDR_COLOUR_FLAGS = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
 _UNIT_FORMATS = {"_per_mm": "%.3g", "_mm": "%.4g mm", "_degrees": "%.4g°"}  # by unit suffix of the field name
@@ -156,7 +156,7 @@ def _draw_keywords(
     label: str,
     current_value: object,
     keywords: tuple[str, ...],
-    state_with_value: ToState,
+    state_with_value: StateWithValue,
     field_style: FieldStyle,
 ) -> None:
     """Draw a drop-down list of the keywords that a field accepts instead of a number or colour.
@@ -224,7 +224,7 @@ def draw_slider(
     session: Session,
     label: str,
     current_value: float,
-    state_with_value: ToState,
+    state_with_value: StateWithValue,
     value_range: SliderRange,
     number_format: str,
 ) -> None:
@@ -246,7 +246,7 @@ def clamp_to_range(unclamped_value: float, value_range: SliderRange) -> float:
 
 
 def apply_edited_value(
-    session: Session, label: str, change_and_value: tuple[bool, Any], state_with_value: ToState
+    session: Session, label: str, change_and_value: tuple[bool, Any], state_with_value: StateWithValue
 ) -> None:
     """Apply the new value of a control to the state; all changes of one drag are undone together.
 
@@ -267,7 +267,7 @@ def draw_combo(
     label: str,
     current_name: str,
     names: Iterable[str],
-    state_with_value: ToState,
+    state_with_value: StateWithValue,
     display_names: Mapping[str, str] = _EMPTY_DISPLAY_NAMES,
 ) -> None:
     """Draw a drop-down list, and change the state when a name is chosen.

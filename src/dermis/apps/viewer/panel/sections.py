@@ -75,7 +75,13 @@ _SETTINGS_SET_ELSEWHERE = ("size", "parts")  # determined by the window and by t
 
 def draw_lights(session: Session) -> None:
     """Draw the controls of the light preset, the selected light and the environment."""
-    draw_combo(session, "rig", session.state.rig or _CUSTOM_CHOICE, light_presets(), session.state.with_rig)
+    draw_combo(
+        session,
+        "rig",
+        session.state.light_preset or _CUSTOM_CHOICE,
+        light_presets(),
+        session.state.with_light_preset,
+    )
     _draw_light_selector(session)
     draw_combo(
         session, "add", "a light", LIGHTS, lambda kind: _with_new_light(session, kind), LIGHT_KIND_NAMES

@@ -36,7 +36,7 @@ from dermis.scene.tissue import tissue_layers
 Layers = tuple[TissueLayer, ...]
 _PROFILE_FIELDS = ("profile", "profile_map", "other_profiles", "albedo", "pigments", "layers")
 _EPIDERMAL_BLOOD_STRUCTURE = "donner2008"  # the only structure with blood in the epidermis
-_DERMIS_PIGMENTS = ("blood", "oxygen")
+_DERMAL_PIGMENT_FIELDS = ("blood", "oxygen")
 _PERCENT_STYLES = {
     name: FieldStyle(unit=0.01, number_format="%.2f %%") for name in Pigments.model_fields if "_" not in name
 }
@@ -127,10 +127,10 @@ def _draw_pigments(session: Session, skin: Skin) -> None:
         values,
         state_with_fields,
         _PIGMENT_STYLES,
-        [name for name in numbers if name not in _DERMIS_PIGMENTS],
+        [name for name in numbers if name not in _DERMAL_PIGMENT_FIELDS],
     )
     imgui.separator_text("dermis")
-    draw_fields(session, values, state_with_fields, _PIGMENT_STYLES, _DERMIS_PIGMENTS)
+    draw_fields(session, values, state_with_fields, _PIGMENT_STYLES, _DERMAL_PIGMENT_FIELDS)
 
 
 def _plot_profile(session: Session) -> None:

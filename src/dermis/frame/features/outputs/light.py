@@ -191,15 +191,15 @@ def _translucent_pairs(
 
     Raises DermisError if an output needs them, but the frame is rendered without light through thin parts.
     """
-    culprit = next((name for name in request.outputs if name in _TRANSLUCENCY_OUTPUTS), None)
-    if culprit is None:
+    output_name = next((name for name in request.outputs if name in _TRANSLUCENCY_OUTPUTS), None)
+    if output_name is None:
         return None
     if translucency[0] is None:
         settings = request.settings
         able = ", ".join(name for name in TECHNIQUES.names if TECHNIQUES[name].supports_translucency)
         actual = f"got technique {settings.technique} with transmission {settings.transmission}"
         expected = f"light that passes thin parts: transmission thin with technique {able}"
-        refuse(f"output {culprit}", expected, actual, "Choose these, or leave the output out")
+        refuse(f"output {output_name}", expected, actual, "Choose these, or leave the output out")
     return translucency[0].pairs
 
 
@@ -218,11 +218,11 @@ def _uniform_pigments(request: FrameRequest) -> tuple[float, float] | None:
         return None
     parameters = _pigment_parameters(request.skin)
     if parameters is None:
-        culprit = next(name for name in request.outputs if name in _PIGMENT_OUTPUTS)
+        output_name = next(name for name in request.outputs if name in _PIGMENT_OUTPUTS)
         skins = ", ".join(SKINS)
         expected = f"a person's painted skin, or a profile made of pigments ({skins} or a file's)"
         actual = f"profile {request.skin.profile} on {request.head.name}"
-        refuse(f"output {culprit}", expected, actual, "Choose one of them, or leave the output out")
+        refuse(f"output {output_name}", expected, actual, "Choose one of them, or leave the output out")
     return parameters.melanin, parameters.blood
 
 

@@ -80,7 +80,7 @@ class Babylon(EnginePage):
         )
         return spiral_profile(profile, metres, subject.curve.energy)
 
-    def library_elements(self, version: str) -> tuple[str, list[str]]:
+    def library_script_tags(self, version: str) -> tuple[str, list[str]]:
         """Return the script elements of Babylon.js, and the values to add to script-src.
 
         script-src is the part of the page's Content-Security-Policy that lists the permitted scripts. The

@@ -37,7 +37,7 @@ _4_PI = 4.0 * np.pi
 JENSEN_DMFP_MM = 3.67, 1.37, 0.68
 """Diffuse mean free paths of skin1 in [Jensen2001], widely used as the radii of skin [mm]."""
 _FIRST_SUPPORTED_VERSION = 4, 5
-_FIRST_MFP_VERSION = 5, 2  # first version in which the radius of a random walk is a mean free path
+_FIRST_MFP_RADIUS_VERSION = 5, 2  # first version in which the radius of a random walk is a mean free path
 _EFFECTIVELY_INFINITE_RADIUS = 1e9
 
 
@@ -243,9 +243,9 @@ class Blender(Target):
         if self.variant != "random-walk":
             return list(_FIRST_SUPPORTED_VERSION), None
         return (
-            (list(_FIRST_MFP_VERSION), None)
+            (list(_FIRST_MFP_RADIUS_VERSION), None)
             if _radius_is_mfp(version)
-            else (list(_FIRST_SUPPORTED_VERSION), list(_FIRST_MFP_VERSION))
+            else (list(_FIRST_SUPPORTED_VERSION), list(_FIRST_MFP_RADIUS_VERSION))
         )
 
     def _material_parameters(self, subsurface_radius: tuple[float, ...], version: str) -> Parameters:
@@ -309,7 +309,7 @@ class Blender(Target):
 
 def _radius_is_mfp(version: str) -> bool:
     """Return whether a version of Blender interprets the radius of a random walk as a mean free path."""
-    return tuple(map(int, version.split("."))) >= _FIRST_MFP_VERSION
+    return tuple(map(int, version.split("."))) >= _FIRST_MFP_RADIUS_VERSION
 
 
 TARGET = Blender()

@@ -9,7 +9,7 @@ import numpy as np
 
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.targets.gltf.volume import multiscatter_for_reflectance
-from dermis.formats.gltf.materials import SkinAdditions, encode_colours_png
+from dermis.formats.gltf.materials import SkinMaterialAdditions, encode_colours_png
 from dermis.formats.gltf.write import encode_head
 from dermis.human.person_file import person_parameters, relief_slopes
 from dermis.mesh.head import Head
@@ -44,7 +44,7 @@ def encode_glb(subject: Subject, material_extensions: Extensions, draft_notice: 
 
 def _skin_additions(
     subject: Subject, head: Head, material_extensions: Extensions, draft_notice: str
-) -> SkinAdditions:
+) -> SkinMaterialAdditions:
     """Return the extensions and base colour of the skin material, and an additional map if needed.
 
     If the head has a colour map and the export uses the draft extension KHR_materials_scatter, the uniform
@@ -54,15 +54,15 @@ def _skin_additions(
     """
     if not draft_notice:
         colour = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}
-        return SkinAdditions({} if head.maps.colour is not None else colour, material_extensions)
+        return SkinMaterialAdditions({} if head.maps.colour is not None else colour, material_extensions)
     white, extras = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]}, {"draft": draft_notice}
     if head.maps.colour is None:
-        return SkinAdditions(white, material_extensions, extras)
+        return SkinMaterialAdditions(white, material_extensions, extras)
     steps = np.linspace(0.0, 1.0, _MULTISCATTER_TABLE_SIZE)
     scattered = np.interp(head.maps.colour, steps, multiscatter_for_reflectance(steps)).astype(np.float32)
     scatter = {**material_extensions["KHR_materials_scatter"], "multiscatterColorFactor": [1.0, 1.0, 1.0]}
     scatter["multiscatterColorTexture"] = {"index": _MULTISCATTER_ROLE}
     material_extensions = {**material_extensions, "KHR_materials_scatter": scatter}
-    return SkinAdditions(
+    return SkinMaterialAdditions(
         white, material_extensions, extras, {_MULTISCATTER_ROLE: encode_colours_png(scattered)}
     )

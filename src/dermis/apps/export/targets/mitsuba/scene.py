@@ -23,10 +23,10 @@ from dermis.scene.model import Scene
 from dermis.specular.fresnel import SKIN_ETA
 
 Floats = NDArray[np.float32]
-Boundary = Literal["matched", "smooth", "rough"]
-BOUNDARIES: Mapping[Boundary, float] = {"matched": 1.0, "smooth": SKIN_ETA, "rough": SKIN_ETA}
+SurfaceModel = Literal["matched", "smooth", "rough"]
+IOR_BY_SURFACE_MODEL: Mapping[SurfaceModel, float] = {"matched": 1.0, "smooth": SKIN_ETA, "rough": SKIN_ETA}
 """Surface models of the skin, with their index of refraction."""
-MATCHED_REFLECTANCE = 0.03
+INDEX_MATCHED_REFLECTANCE = 0.03
 """Reflectance of an index-matched surface in all directions: the mean reflectance of rough skin [-]."""
 _OPAQUE_PART_ROUGHNESS = 0.3  # square root of Beckmann's m
 _PART_IOR = 1.5  # of the metallic-roughness model
@@ -53,7 +53,7 @@ class IsotropicMedium(NamedTuple):
 class SkinAppearance(NamedTuple):
     """Media and textures of the skin, and the meshes of the head's other materials.
 
-    media : dictionary from each surface model in `BOUNDARIES` to the medium of the skin
+    media : dictionary from each surface model in `IOR_BY_SURFACE_MODEL` to the medium of the skin
     roughness : Beckmann m, a number or a map (n, n)
     transmittance : (n, n, 3) map by which a refracting surface scales light on entry and again on exit; None
         for uniform skin
@@ -65,7 +65,7 @@ class SkinAppearance(NamedTuple):
     pictures : dictionary from role to the PNG file of a texture image, which all materials share
     """
 
-    media: Mapping[Boundary, IsotropicMedium]
+    media: Mapping[SurfaceModel, IsotropicMedium]
     roughness: float | Floats
     transmittance: Floats | None = None
     dimming: Floats | None = None
@@ -77,7 +77,7 @@ class SkinAppearance(NamedTuple):
 def scene_files(
     scene: Scene,
     skin_appearance: SkinAppearance,
-    surface_model: Boundary,
+    surface_model: SurfaceModel,
     picture_size: tuple[int, int],
     samples_per_pixel: int,
 ) -> Iterator[tuple[str, bytes]]:
@@ -100,7 +100,7 @@ def scene_files(
             )
         ),
     )
-    for each in BOUNDARIES:
+    for each in IOR_BY_SURFACE_MODEL:
         yield (
             f"boundary_{each}.xml",
             xml.scene_document(_skin_elements(backend, each, skin_appearance, meshes)),
@@ -136,7 +136,7 @@ def medium_description(medium: IsotropicMedium) -> SceneDict:
 
 
 def surface_bsdf(
-    surface_model: Boundary, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
+    surface_model: SurfaceModel, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
 ) -> SceneDict:
     """Return Mitsuba's description of the skin's surface, or of the outer one of its two layers.
 
@@ -151,7 +151,7 @@ def surface_bsdf(
     facets = {"distribution": "beckmann", "alpha": roughness}
     if surface_model == "matched":
         mirror = {"type": "roughconductor", "material": "none", **facets}
-        return {"type": "mask", "opacity": MATCHED_REFLECTANCE, "bsdf": mirror, "id": "skin_surface"}
+        return {"type": "mask", "opacity": INDEX_MATCHED_REFLECTANCE, "bsdf": mirror, "id": "skin_surface"}
     refraction: SceneDict = {"int_ior": SKIN_ETA, "ext_ior": 1.0}
     if transmittance is not None:
         refraction["specular_transmittance"] = transmittance
@@ -177,7 +177,7 @@ def _scene_elements(
     xml_backend: XmlBackend,
     scene: Scene,
     skin_appearance: SkinAppearance,
-    surface_model: Boundary,
+    surface_model: SurfaceModel,
     picture_size_and_samples: tuple[int, int, int],
 ) -> list[ET.Element]:
     """Return the XML elements of the scene except the skin, which is included from its own XML file.
@@ -220,7 +220,7 @@ def _scene_elements(
 
 def _skin_elements(
     xml_backend: XmlBackend,
-    surface_model: Boundary,
+    surface_model: SurfaceModel,
     skin_appearance: SkinAppearance,
     meshes_by_shape_name: Mapping[str, bytes],
 ) -> list[ET.Element]:

@@ -27,12 +27,12 @@ from dermis.apps.export.target import (
     write_files,
 )
 from dermis.apps.export.targets.mitsuba.scene import (
-    BOUNDARIES,
-    MATCHED_REFLECTANCE,
+    INDEX_MATCHED_REFLECTANCE,
+    IOR_BY_SURFACE_MODEL,
     PART_ROLES,
-    Boundary,
     IsotropicMedium,
     SkinAppearance,
+    SurfaceModel,
     scene_files,
 )
 from dermis.formats.part_pictures import PartRole
@@ -77,9 +77,9 @@ class Mitsuba(Target):
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the parameters of the medium, fitted to the skin's profile and lightest colour."""
-        boundary, colours = self._boundary, skin_colours(subject)
-        medium = fit_medium(subject.curve, colours, boundary)
-        transmittance = colours.transmittance(boundary)
+        surface_model, colours = self._surface_model, skin_colours(subject)
+        medium = fit_medium(subject.curve, colours, surface_model)
+        transmittance = colours.transmittance(surface_model)
         return (
             Parameter(
                 _EXTINCTION_NAME, medium.sigma_t, "1/mm", "extinction; divided by its maximum in the file"
@@ -88,7 +88,7 @@ class Mitsuba(Target):
             Parameter(
                 _TRANSMITTANCE_NAME, transmittance, "-", "mean transmittance of the textures, both ways"
             ),
-            Parameter(_IOR_NAME, BOUNDARIES[boundary], "-", "of the surface; 1 for none"),
+            Parameter(_IOR_NAME, IOR_BY_SURFACE_MODEL[surface_model], "-", "of the surface; 1 for none"),
             Parameter(
                 _ALPHA_NAME, mean_roughness(subject), "-", "Beckmann roughness, without a texture of it"
             ),
@@ -105,35 +105,35 @@ class Mitsuba(Target):
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the profile of random walks through the medium, for light incident along the normal."""
-        boundary = self._boundary
+        surface_model = self._surface_model
         names = _EXTINCTION_NAME, _ALBEDO_NAME, _TRANSMITTANCE_NAME
         sigma, albedo, transmittance = (np.array(get_numbers(parameters, name)) for name in names)
-        curve = half_space(_half_space_kind(boundary), albedo, 1.0 / sigma)
-        matched = boundary == "matched"
+        curve = half_space(_half_space_kind(surface_model), albedo, 1.0 / sigma)
+        matched = surface_model == "matched"
         energy = half_space("walk", albedo, np.ones(3)).energy if matched else curve.energy
-        factor = subject.curve.energy * _boundary_transmittance(boundary)
+        factor = subject.curve.energy * _surface_transmittance(surface_model)
         mean = np.maximum(skin_colours(subject).mean, 1e-9)
         return curve.with_energy(factor * energy * transmittance / mean)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the scene with one XML file for each surface model, and with meshes and textures."""
         colours, scene = skin_colours(subject), subject.scene or Scene(subject.head_or_ball)
-        media = {each: fit_medium(subject.curve, colours, each) for each in BOUNDARIES}
+        media = {each: fit_medium(subject.curve, colours, each) for each in IOR_BY_SURFACE_MODEL}
         pictured = _image_roles_by_material(subject)
         opaque = _encode_opaque_meshes(scene, self.adapter, pictured)
         pictures = subject.part_pictures.encode(PART_ROLES) if subject.part_pictures else {}
         appearance = SkinAppearance(media, *skin_textures(subject, colours), opaque, pictured, pictures)
         return write_files(
-            output, scene_files(scene, appearance, self._boundary, _PICTURE_SIZE, _SAMPLES_PER_PIXEL)
+            output, scene_files(scene, appearance, self._surface_model, _PICTURE_SIZE, _SAMPLES_PER_PIXEL)
         )
 
     @property
-    def _boundary(self) -> Boundary:
-        return next(one for one in BOUNDARIES if one == (self.variant or self.variants[0]))
+    def _surface_model(self) -> SurfaceModel:
+        return next(one for one in IOR_BY_SURFACE_MODEL if one == (self.variant or self.variants[0]))
 
 
 def fit_medium(
-    reference_profile: CumulativeProfile, colours: SkinColours, surface_model: Boundary
+    reference_profile: CumulativeProfile, colours: SkinColours, surface_model: SurfaceModel
 ) -> IsotropicMedium:
     """Return the medium with the colour `SkinColours.medium_colour` and the profile closest to the reference.
 
@@ -143,24 +143,24 @@ def fit_medium(
     colours : mean and brightest colour of the skin
     surface_model : model of the surface above the medium
     """
-    energy = colours.medium_colour(surface_model) / _boundary_transmittance(surface_model)
+    energy = colours.medium_colour(surface_model) / _surface_transmittance(surface_model)
     if surface_model == "matched":
         energy = half_space("matched", tabulated_albedo("walk", energy), np.ones(3)).energy
     medium = fit_homogeneous_medium(reference_profile, energy, _half_space_kind(surface_model))
     return IsotropicMedium(flat_tuple(1.0 / medium.mfp_mm), flat_tuple(medium.albedo))
 
 
-def _half_space_kind(surface_model: Boundary) -> HalfSpaceKind:
+def _half_space_kind(surface_model: SurfaceModel) -> HalfSpaceKind:
     return "matched" if surface_model == "matched" else "skin"
 
 
-def _boundary_transmittance(surface_model: Boundary) -> float:
+def _surface_transmittance(surface_model: SurfaceModel) -> float:
     """Return the transmittance of the reflecting layer above the medium; 1 if there is no such layer.
 
     Only the surface model "matched" has this layer: its medium has the refractive index of air and does not
     reflect, so the layer adds the reflection of skin.
     """
-    return 1.0 - MATCHED_REFLECTANCE if surface_model == "matched" else 1.0
+    return 1.0 - INDEX_MATCHED_REFLECTANCE if surface_model == "matched" else 1.0
 
 
 def _image_roles_by_material(subject: Subject) -> dict[int, set[PartRole]]:
@@ -209,7 +209,7 @@ class SkinColours:
     brightest: Floats
     lightness_ratio: float
 
-    def medium_colour(self, surface_model: Boundary) -> Floats:
+    def medium_colour(self, surface_model: SurfaceModel) -> Floats:
         """Return the colour (3,) of the medium without textures.
 
         Under an index-matched surface, textures can only scale all channels equally, so the colour is the
@@ -219,7 +219,7 @@ class SkinColours:
             self.lightness_ratio * self.mean if surface_model == "matched" else self.brightest, 0.97
         )
 
-    def transmittance(self, surface_model: Boundary) -> tuple[float, ...]:
+    def transmittance(self, surface_model: SurfaceModel) -> tuple[float, ...]:
         """Return the mean factor (3,) by which textures scale light that enters and leaves the skin [-]."""
         return flat_tuple(self.mean / self.medium_colour(surface_model))
 

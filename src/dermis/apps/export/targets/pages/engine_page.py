@@ -101,13 +101,13 @@ class EnginePage(Target):
     library_files: ClassVar[Mapping[str, tuple[LibraryFile, ...]]]
     """Files of the library, by version."""
 
-    def with_library(self, node_modules_folder: str | Path) -> EnginePage:
+    def with_embedded_library(self, node_modules_folder: str | Path) -> EnginePage:
         """Return a copy of the target that embeds the library from an npm folder in the page."""
         return replace(self, library_folder=Path(node_modules_folder))
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the page with the head, its parameters, camera and lights."""
-        libraries, sources = self.library_elements(version)
+        libraries, sources = self.library_script_tags(version)
         script = (_PAGE_FOLDER / "panel.js").read_text("utf-8") + self.drawing_script.read_text("utf-8")
         text = render_page(
             _PAGE_FOLDER,
@@ -124,7 +124,7 @@ class EnginePage(Target):
         return [output]
 
     @abstractmethod
-    def library_elements(self, version: str) -> tuple[str, list[str]]:
+    def library_script_tags(self, version: str) -> tuple[str, list[str]]:
         """Return the HTML elements of the library, and the sources for script-src.
 
         A source is a URL, a scheme or a hash that the page's Content-Security-Policy allows.

@@ -31,7 +31,7 @@ _IMPORT_MAP_NAMES = {
 _DEFAULT_IOR = 1.5
 
 
-class Three(EnginePage):
+class ThreeJs(EnginePage):
     """Export to a web page that draws the head with three.js."""
 
     name = "three"
@@ -64,7 +64,7 @@ class Three(EnginePage):
         """Return the cumulative profile of light that leaves the skin where it enters: 1 at every radius."""
         return CumulativeProfile.from_function(lambda r: np.ones((len(r), 3)), subject.curve.energy)
 
-    def library_elements(self, version: str) -> tuple[str, list[str]]:
+    def library_script_tags(self, version: str) -> tuple[str, list[str]]:
         """Return the import map of three.js, and the values to add to script-src.
 
         script-src is the part of the page's Content-Security-Policy that lists the permitted scripts. The
@@ -84,4 +84,4 @@ def _import_map(import_map: dict[str, dict[str, str]], script_sources: list[str]
     return f'<script type="importmap">{text}</script>', [csp_hash(text), *script_sources]
 
 
-TARGET = Three()
+TARGET = ThreeJs()

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from dermis.apps.export.target import flat_tuple
 from dermis.apps.export.targets.web.frame_json import Json, NamedFrame, PictureMap, PictureMaps, frames_json
 from dermis.apps.export.targets.web.maps import (
+    MapLayerKey,
     MapPictures,
-    PictureKey,
-    encode_picture,
+    encode_map_layer,
     quantise_hairs,
     read_texels,
 )
@@ -54,10 +54,10 @@ class PageContent:
     byte_runs: ByteRunCollector = field(default_factory=ByteRunCollector)
     maps: MapPictures = field(default_factory=MapPictures)
     pictures: list[bytes] = field(default_factory=list)
-    picture_entries: dict[PictureKey, tuple[int, int, int]] = field(default_factory=dict)
+    picture_entries: dict[MapLayerKey, tuple[int, int, int]] = field(default_factory=dict)
     poster: NDArray[np.uint8] | None = None
 
-    def add_picture(self, picture_key: PictureKey) -> tuple[int, int, int]:
+    def add_picture(self, picture_key: MapLayerKey) -> tuple[int, int, int]:
         """Add the WebP file of one layer of a map, unless present; return its entry in `picture_entries`.
 
         picture_key : role, mip level and layer of the map
@@ -255,7 +255,7 @@ def _colour_map_entry(
         texels = read_texels(capture, capture.index_of_resource(texture), 0)[0]
         if page_content.maps.matches_picture("colour_map", texels):
             return None
-        page_content.maps.pictures[map_role, 0, 0] = encode_picture(texels, True)
+        page_content.maps.pictures[map_role, 0, 0] = encode_map_layer(texels, True)
     return *page_content.add_picture((map_role, 0, 0))[:2], 3
 
 

@@ -19,7 +19,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 
 Halves = NDArray[np.float16]
-PictureKey = tuple[str, int, int]
+MapLayerKey = tuple[str, int, int]
 """Role, mip level and layer of a picture."""
 MIN_PICTURE_SIDE = 64
 """Minimum side of a map that is stored as a picture [texel]."""
@@ -29,7 +29,7 @@ _COLOUR_CHANNEL_COUNT = 3
 
 
 @dataclass(frozen=True)
-class Picture:
+class EncodedMapLayer:
     """One layer of a map, encoded as a WebP image.
 
     data : WebP file: a colour image for a colour map, otherwise a grey image of the channels, stacked
@@ -43,7 +43,7 @@ class Picture:
     texels: Halves
 
 
-def encode_picture(texels: Halves, is_colour_map: bool) -> Picture:
+def encode_map_layer(texels: Halves, is_colour_map: bool) -> EncodedMapLayer:
     """Return one layer of a map encoded as a WebP image.
 
     texels : (h, w, c) texels
@@ -67,7 +67,7 @@ def encode_picture(texels: Halves, is_colour_map: bool) -> Picture:
     else:
         levels = levels[..., 0].reshape(len(curves), *texels.shape[:2]).transpose(1, 2, 0)
     decoded = np.stack([curves[k][levels[..., k]] for k in range(len(curves))], axis=-1)
-    return Picture(data, curves.astype(np.float16), decoded.astype(np.float16))
+    return EncodedMapLayer(data, curves.astype(np.float16), decoded.astype(np.float16))
 
 
 def _quantisation_curve(texels: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -120,7 +120,7 @@ class MapPictures:
     pictures : one image for each layer of a mip level of a map; the keys are role, mip level and layer
     """
 
-    pictures: dict[PictureKey, Picture] = field(default_factory=dict)
+    pictures: dict[MapLayerKey, EncodedMapLayer] = field(default_factory=dict)
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, map_role: str, texels: NDArray[np.float16]) -> bool:
@@ -165,7 +165,7 @@ class MapPictures:
         layers = read_texels(frame_capture, resource_index, mip_level)
         for layer, texels in enumerate(layers):
             if (map_role, mip_level, layer) not in self.pictures:
-                self.pictures[map_role, mip_level, layer] = encode_picture(texels, map_role == _COLOUR_ROLE)
+                self.pictures[map_role, mip_level, layer] = encode_map_layer(texels, map_role == _COLOUR_ROLE)
                 self._encoded_texels.setdefault(map_role, texels)
         return np.stack([self.pictures[map_role, mip_level, layer].texels for layer in range(len(layers))])
 

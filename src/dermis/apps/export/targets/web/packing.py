@@ -22,8 +22,8 @@ _ESCAPED_CHARACTERS = frozenset({0, 13, ord("<")})
 """Characters that HTML changes in a script element, or that end it."""
 _WORDS_PER_ROW_CHOICES = (1, 2, 3, 4, 6, 8, 12, 16, 24)
 _DIFFERENCE_ORDERS = (0, 1, 2)
-_LAYOUT_SAMPLE_BYTES, _LAYOUT_SAMPLE_COUNT = 3 << 15, 3  # parts of a run on which layouts are compared
-_LAYOUT_SAMPLE_ALIGNMENT = 192  # bytes; a multiple of the bytes of all rows
+_TRIAL_SAMPLE_BYTES, _TRIAL_SAMPLE_COUNT = 3 << 15, 3  # parts of a run on which layouts are compared
+_TRIAL_SAMPLE_ALIGNMENT_BYTES = 192  # bytes; a multiple of the bytes of all rows
 _TRIAL_ZLIB_LEVEL = 4  # zlib level for the comparison of layouts
 _UNSIGNED_TYPE_BY_WORD_BYTES = {1: np.uint8, 2: np.uint16, 4: np.uint32}
 
@@ -62,25 +62,28 @@ class ByteRunCollector:
         self.runs.append((0, sum(self.runs[k][1] for k in numbers), 0, 0, 0, numbers))
         return len(self.runs) - 1
 
-    def add_floats(self, floats: NDArray[np.float32], column_steps: tuple[float, ...]) -> int:
+    def add_floats(self, floats: NDArray[np.float32], quantisation_steps: tuple[float, ...]) -> int:
         """Add a byte run of floats, stored as integer multiples of the steps; return its index in `runs`.
 
         floats : (n, c) floats that are multiples of the steps
-        column_steps : (c,) step of each column, a power of two
+        quantisation_steps : (c,) step of each column, a power of two
         """
-        words = np.rint(floats / np.array(column_steps)).astype(np.int32)
-        layouts = [(4, len(column_steps), order) for order in _DIFFERENCE_ORDERS]
-        return self._add_run(words.view(np.uint8).reshape(-1), layouts, column_steps)
+        words = np.rint(floats / np.array(quantisation_steps)).astype(np.int32)
+        layouts = [(4, len(quantisation_steps), order) for order in _DIFFERENCE_ORDERS]
+        return self._add_run(words.view(np.uint8).reshape(-1), layouts, quantisation_steps)
 
     def _add_run(
-        self, raw_bytes: Bytes, candidate_layouts: list[tuple[int, int, int]], column_steps: tuple[float, ...]
+        self,
+        raw_bytes: Bytes,
+        candidate_layouts: list[tuple[int, int, int]],
+        quantisation_steps: tuple[float, ...],
     ) -> int:
-        key = hashlib.sha256(raw_bytes.tobytes()).digest() + repr(column_steps).encode()
+        key = hashlib.sha256(raw_bytes.tobytes()).digest() + repr(quantisation_steps).encode()
         if key not in self._run_indices:
             self._run_indices[key] = len(self.runs)
             layout = _best_layout(raw_bytes, candidate_layouts)
             planes = byte_planes(raw_bytes, *layout)
-            self.runs.append((self._end, len(planes), *layout, column_steps))
+            self.runs.append((self._end, len(planes), *layout, quantisation_steps))
             self._data.append(planes)
             self._end += len(planes)
         return self._run_indices[key]
@@ -90,12 +93,14 @@ class ByteRunCollector:
         return gzip.compress(b"".join(self._data), 9, mtime=0)
 
 
-def quantise(floats: NDArray[np.float32], column_steps: tuple[float, ...]) -> NDArray[np.float32]:
+def quantise(floats: NDArray[np.float32], quantisation_steps: tuple[float, ...]) -> NDArray[np.float32]:
     """Return floats (n, c) with each column rounded to multiples of a step.
 
-    column_steps : (c,) step of each column
+    quantisation_steps : (c,) step of each column
     """
-    return np.asarray(np.rint(floats / np.array(column_steps)) * np.array(column_steps), np.float32)
+    return np.asarray(
+        np.rint(floats / np.array(quantisation_steps)) * np.array(quantisation_steps), np.float32
+    )
 
 
 def encode_seven_bits(raw_bytes: bytes) -> str:
@@ -142,13 +147,13 @@ def _best_layout(raw_bytes: Bytes, candidate_layouts: list[tuple[int, int, int]]
         by its difference from the previous row
     """
     sample = raw_bytes
-    if len(raw_bytes) > _LAYOUT_SAMPLE_COUNT * _LAYOUT_SAMPLE_BYTES:
+    if len(raw_bytes) > _TRIAL_SAMPLE_COUNT * _TRIAL_SAMPLE_BYTES:
         starts = [
-            k * (len(raw_bytes) - _LAYOUT_SAMPLE_BYTES) // (_LAYOUT_SAMPLE_COUNT - 1)
-            for k in range(_LAYOUT_SAMPLE_COUNT)
+            k * (len(raw_bytes) - _TRIAL_SAMPLE_BYTES) // (_TRIAL_SAMPLE_COUNT - 1)
+            for k in range(_TRIAL_SAMPLE_COUNT)
         ]
-        aligned = [start // _LAYOUT_SAMPLE_ALIGNMENT * _LAYOUT_SAMPLE_ALIGNMENT for start in starts]
-        sample = np.concatenate([raw_bytes[start : start + _LAYOUT_SAMPLE_BYTES] for start in aligned])
+        aligned = [start // _TRIAL_SAMPLE_ALIGNMENT_BYTES * _TRIAL_SAMPLE_ALIGNMENT_BYTES for start in starts]
+        sample = np.concatenate([raw_bytes[start : start + _TRIAL_SAMPLE_BYTES] for start in aligned])
     return min(
         candidate_layouts,
         key=lambda layout: len(zlib.compress(byte_planes(sample, *layout), _TRIAL_ZLIB_LEVEL)),
