@@ -1,22 +1,54 @@
-"""Light of the sky on skin under hair."""
+"""Light of the sky on hair and on skin beside hair."""
 
 from __future__ import annotations
 
 import os
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
 
 from dermis.apps.validation.comparisons.person_views import VIEWS, view_scene
 from dermis.frame.renderer import Renderer
+from dermis.human.hair.look import HairLook
 from dermis.human.person import Human
 from dermis.scene.environment import Environment
 from dermis.scene.settings import Settings
 
+@pytest.fixture(scope="module")
+def renderer() -> Renderer:
+    return Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
 
-def test_hair_hides_the_sky_from_skin() -> None:
-    renderer, human = Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu")), Human()
-    settings = Settings(size=(48, 48), atlas=128, strands=False, occlusion="rest", subsamples=1)
-    pictures = {}
-    for style in ("none", "long"):
-        head = replace(human, hair=HairLook(style)).head(subdivide=0)
-        scene = view_scene(head, VIEWS["portrait"])
-        scene = scene.replace(lights=(), environment=Environment(name="uniform"))
-        pictures[style] = renderer.draw(scene, settings).linear()
+
+def _picture_and_labels(
+    renderer: Renderer, hair: HairLook
+) -> tuple[NDArray[np.float32], NDArray[np.integer[Any]]]:
+    head = replace(Human(), hair=hair).head(subdivide=0)
+    scene = view_scene(head, VIEWS["portrait"]).replace(lights=(), environment=Environment(name="uniform"))
+    frame = renderer.draw(scene, Settings(size=(96, 96), atlas=256, samples=1), outputs=("label",))
+    return frame.linear(), frame.output("label")
+
+
+def test_long_hair_hides_the_sky_from_the_neck_but_hardly_from_the_nose(renderer: Renderer) -> None:
+    (bald, before), (long, after) = (
+        _picture_and_labels(renderer, HairLook(style)) for style in ("none", "long")
+    )
+    ratio = {}
+    for name in ("neck", "nose"):
+        seen = (before == class_index(name)) & (after == class_index(name))
+        assert seen.sum() > 20
+        ratio[name] = float(long[seen].sum() / bald[seen].sum())
+    assert ratio["neck"] < 0.9
+    assert 0.94 < ratio["nose"] < 1.005
+
+
+def test_white_hair_returns_most_light_of_the_sky_and_black_hair_little(renderer: Renderer) -> None:
+    radiance = {}
+    for eumelanin in (0.0, 9.0):
+        look = HairLook("long", eumelanin=eumelanin, pheomelanin=0.0)
+        picture, labels = _picture_and_labels(renderer, look)
+        radiance[eumelanin] = float(picture[labels == class_index("hair")].mean())
+    assert 0.5 < radiance[0.0] < 1.05
+    assert 0.01 < radiance[9.0] < 0.15

@@ -53,6 +53,7 @@ from dermis.apps.validation.pages import (
 from dermis.base.console import print_lines
 from dermis.base.disk import load_arrays, try_save_arrays
 from dermis.frame.renderer import Renderer
+from dermis.human.hair.look import HairLook
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.optics.media import Medium, published_media
@@ -70,12 +71,15 @@ _PANEL_FOLDER, _PANEL_NAMES = "path-traced-panels", ("frame", "traced", "differe
 _ABLATED_VIEWS = "portrait", "profile", "ear from behind", "three-quarter, lebombo"
 _FULL_COVERAGE = 0.999
 ComparisonResult = dict[str, Any]
-PersonName = Literal["human", "dark", "old"]
+PersonName = Literal["human", "short hair", "dark", "old"]
 _PEOPLE: dict[PersonName, Callable[[], Head]] = {
     "human": lambda: load_head("human"),
+    "short hair": lambda: Human(hair=HairLook("short", length_mm=30.0)).head(),
     "dark": lambda: Human(african=1.0, asian=0.0, caucasian=0.0, sex=1.0).head(),
     "old": lambda: Human(caucasian=1.0, african=0.0, asian=0.0, age=80.0).head(),
 }
+_PERSON_OF_VIEW: Mapping[str, PersonName] = {"ear from behind": "short hair"}  # of all others: the human
+_OTHER_PEOPLE: tuple[PersonName, ...] = "dark", "old"
 _PEOPLE_VIEWS = "portrait", "three-quarter, lebombo", "moved"
 _MOVED_VIEW = {"moved": View(VIEWS["three-quarter"].camera, "window", "surprise")}
 ALL_VIEWS: Mapping[str, View] = VIEWS | _MOVED_VIEW
@@ -112,17 +116,23 @@ class ComparisonCase:
 
 def list_comparison_cases() -> list[ComparisonCase]:
     """Return all comparisons of people rendered by dermis against path tracing, most important first."""
-    found = [ComparisonCase("human", view, "matched") for view in ALL_VIEWS]
-    found += [ComparisonCase("human", view, "layered") for view in VIEWS]
-    people: tuple[PersonName, ...] = "dark", "old"
-    found += [ComparisonCase(one, view, "matched") for one in people for view in _PEOPLE_VIEWS]
+    found = [_view_case(view, "matched") for view in ALL_VIEWS]
+    found += [_view_case(view, "layered") for view in VIEWS]
+    found += [ComparisonCase(one, view, "matched") for one in _OTHER_PEOPLE for view in _PEOPLE_VIEWS]
     found += [
-        ComparisonCase("human", view, "matched", omitted_feature)
+        _view_case(view, "matched", omitted_feature)
         for view in _ABLATED_VIEWS
         for omitted_feature in OMITTED_FEATURES
     ]
-    found += [ComparisonCase("human", view, "refracting") for view in VIEWS]
+    found += [_view_case(view, "refracting") for view in VIEWS]
     return found
+
+
+def _view_case(
+    view: str, skin_kind: SharedSkinKind, omitted_feature: OmittedFeature | None = None
+) -> ComparisonCase:
+    """Return the comparison of a view, with the person that the view shows."""
+    return ComparisonCase(_PERSON_OF_VIEW.get(view, "human"), view, skin_kind, omitted_feature)
 
 
 class ComparisonRunner:
@@ -168,7 +178,7 @@ class ComparisonRunner:
             if comparison_case.view == "eye":
                 iris = iris_errors(pair, EYE_FRAME_MM)._asdict()
                 result["iris"] = {name: list(value) for name, value in iris.items()}
-            if comparison_case.person == "human":
+            if comparison_case.person == _PERSON_OF_VIEW.get(comparison_case.view, "human"):
                 save_panels(comparison_case.view, pair)
         return result
 
@@ -414,7 +424,7 @@ def view_rows(people_results: ComparisonResult) -> str:
     lines = []
     for view, where in ALL_VIEWS.items():
         rows = {
-            skin_kind: people_results.get(ComparisonCase("human", view, skin_kind).key)
+            skin_kind: people_results.get(_view_case(view, skin_kind).key)
             for skin_kind in SHARED_SKIN_KINDS
         }
         matched = rows["matched"]
@@ -427,8 +437,8 @@ def view_rows(people_results: ComparisonResult) -> str:
 
 
 def people_rows(people_results: ComparisonResult) -> str:
-    """Return Markdown rows with the errors of all people but "human", which is the package's default head."""
-    keys = [(one, view) for one in get_args(PersonName)[1:] for view in _PEOPLE_VIEWS]
+    """Return Markdown rows with the errors of people other than the package's default head."""
+    keys = [(one, view) for one in _OTHER_PEOPLE for view in _PEOPLE_VIEWS]
     rows = ((one, view, people_results.get(ComparisonCase(one, view, "matched").key)) for one, view in keys)
     return "\n".join(f"| {one} | {view} | {_error_cells(row)} |" for one, view, row in rows)
 
@@ -447,7 +457,7 @@ def head_rows(head_results: ComparisonResult) -> str:
 
 def region_table(people_results: ComparisonResult) -> str:
     """Return a Markdown table with the ratio of light in frames to that in references, by region and view."""
-    rows = {view: people_results.get(ComparisonCase("human", view, "matched").key) for view in ALL_VIEWS}
+    rows = {view: people_results.get(_view_case(view, "matched").key) for view in ALL_VIEWS}
     found = {view: row["regions"] for view, row in rows.items() if row}
     names = list(dict.fromkeys(name for regions in found.values() for name in regions))
     lines = [f"| region | {' | '.join(found)} |", "|---" * (len(found) + 1) + "|"]
@@ -458,7 +468,7 @@ def region_table(people_results: ComparisonResult) -> str:
 
 
 def omitted_feature_table(people_results: ComparisonResult) -> str:
-    """Return a Markdown table with the errors of the person "human" without features that cause errors.
+    """Return a Markdown table with the errors of people without features that cause errors.
 
     The errors are the relative RMSE and the energy ratio. In the first row, both renderers omit nothing. In
     each further row, they omit one feature that causes errors, such as the hair.
@@ -469,7 +479,7 @@ def omitted_feature_table(people_results: ComparisonResult) -> str:
     ]
     for omitted_feature in (None, *OMITTED_FEATURES):
         rows = (
-            people_results.get(ComparisonCase("human", view, "matched", omitted_feature).key)
+            people_results.get(_view_case(view, "matched", omitted_feature).key)
             for view in _ABLATED_VIEWS
         )
         lines.append(f"| {omitted_feature or 'nothing'} | {' | '.join(_error_cells(row) for row in rows)} |")

@@ -90,6 +90,7 @@ VIEWS: dict[str, View] = {
     "lips and teeth": View(lips_camera, "studio", "smile-with-teeth"),
     "cheek": View(cheek, "studio"),
     "ear from behind": View(behind_ear_camera, "studio"),
+    "hair": View(behind_ear_camera, "studio"),
     "portrait, window": View(portrait, "window"),
     "portrait, esplanade": View(portrait, "royal_esplanade"),
     "three-quarter, lebombo": View(three_quarter, "lebombo"),
