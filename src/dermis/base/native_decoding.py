@@ -36,7 +36,7 @@ _REMOVED_ENVIRONMENT_VARIABLES = ("PXR_AR_DEFAULT_SEARCH_PATH", "PXR_PLUGINPATH_
 
 
 def run_decoder(
-    decoder_module: str, request_arrays: Arrays, data_bytes: int, error_subject: object, expected: str
+    decoder_module: str, request_arrays: Arrays, data_bytes: int, error_subject: object, expected_content: str
 ) -> Arrays:
     """Run a decoder in a separate process and return its answer.
 
@@ -44,7 +44,7 @@ def run_decoder(
     request_arrays : dictionary from name to numeric array
     data_bytes : size of the data to decode [bytes]; determines the time limit
     error_subject : name of the file, for errors
-    expected : what the file should be, for errors
+    expected_content : what the file should be, for errors
 
     Raises DermisError when the decoder refuses the data, fails, or exceeds a limit.
     """
@@ -64,10 +64,12 @@ def run_decoder(
                 check=False,
             ).returncode
         except subprocess.TimeoutExpired:
-            refuse(error_subject, expected, f"its decoder takes more than {cpu_s:.0f} s", _DAMAGED_ADVICE)
+            refuse(
+                error_subject, expected_content, f"its decoder takes more than {cpu_s:.0f} s", _DAMAGED_ADVICE
+            )
         if status != 0 or output.seek(0, os.SEEK_END) > _MAX_ANSWER_BYTES:
             actual = f"its decoder stopped ({_stop_reason(status)})"
-            refuse(error_subject, expected, actual, _DAMAGED_ADVICE)
+            refuse(error_subject, expected_content, actual, _DAMAGED_ADVICE)
         output.seek(0)
         answer = _unpack_arrays(output.read())
     if _REFUSED_KEY in answer:
@@ -75,7 +77,7 @@ def run_decoder(
     if _FAILED_KEY in answer:
         refuse(
             error_subject,
-            expected,
+            expected_content,
             f"it cannot be decoded ({text_from_array(answer[_FAILED_KEY])})",
             _DAMAGED_ADVICE,
         )

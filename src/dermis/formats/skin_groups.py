@@ -54,7 +54,7 @@ NON_SKIN_WORDS = (
     *("eyeline", "eyeliner", "leather", "moleskin", "sheepskin", "horn", "horns", "background", "plinth"),
 )
 """Words in the names of groups that are not skin, unless another word of the name is in `SKIN_WORDS`."""
-HEAD_HEIGHT_FRACTION = 0.3
+HEAD_SHARE_OF_FIGURE_HEIGHT = 0.3
 """Top fraction of a mesh's height that counts as the head when its skin is identified by area [-]."""
 _MIN_HEAD_AREA_FRACTION = 0.1  # smallest fraction of the head's area that a part covers if it is skin
 
@@ -103,7 +103,7 @@ def _covers_head(mesh_parts: Sequence[MeshPart], is_not_skin: Sequence[bool]) ->
         these parts is not included in the area of the head
     """
     heights = np.concatenate([part.positions[:, 1] for part in mesh_parts])
-    lowest = heights.max() - HEAD_HEIGHT_FRACTION * np.ptp(heights)
+    lowest = heights.max() - HEAD_SHARE_OF_FIGURE_HEIGHT * np.ptp(heights)
     area = np.zeros(len(mesh_parts))
     for index, part in enumerate(mesh_parts):
         corners = part.positions[part.triangles]

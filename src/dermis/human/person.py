@@ -92,7 +92,7 @@ _SHAPE_CONCENTRATIONS_OF_SKIN = {
     "iraqi": (0.3, 0.1, 3.0),
     "arabian": (0.4, 0.1, 3.0),
 }
-_MIN_HAIR_FRACTION = 0.05
+_MIN_FRACTION_OF_STRANDS = 0.05
 _TARGET_WEIGHT_RANGE = -2.0, 2.0
 _NO_TARGETS: Mapping[str, float] = MappingProxyType({})
 
@@ -446,7 +446,7 @@ class Human:
         if layout not in get_args(Layout):
             actual = f"got {format_value(layout)}"
             refuse("layout", f"one of {', '.join(get_args(Layout))}", actual, "Choose one")
-        checked_number("hairs", hairs, _MIN_HAIR_FRACTION, 1.0)
+        checked_number("hairs", hairs, _MIN_FRACTION_OF_STRANDS, 1.0)
         painted = maps or PaintedMaps(look=self.look)
         control_head = build_head(self.target_weights(), painted, layout, self.iris)
         shared = head_template(layout, resolve_levels(control_head, subdivide))

@@ -136,12 +136,12 @@ def _grow_chunk(
     """
     roots, seed = groom.roots, groom.parameters["seed"].astype(np.uint32) * np.uint32(131071)
     part = groom.parameters[roots.part[strand_index]]
-    strand_number = strand_index.astype(np.uint32) + seed[roots.part[strand_index]]
+    strand_seed = strand_index.astype(np.uint32) + seed[roots.part[strand_index]]
     clump = roots.clump[strand_index]
-    clump_number = clump.astype(np.uint32) + seed[roots.part[strand_index]]
+    clump_seed = clump.astype(np.uint32) + seed[roots.part[strand_index]]
     above_hairline_mm = _heights_above_hairline(groom, strand_index)
     t = np.linspace(0.0, 1.0, groom.knots)[None]
-    u = t * _length_fractions(groom, strand_index, part, strand_number, above_hairline_mm)[:, None]
+    u = t * _length_fractions(groom, strand_index, part, strand_seed, above_hairline_mm)[:, None]
     own, at = (
         _interpolate_guides(groom, posed_guides, strand_index, u, root_mm),
         _interpolate_guides(groom, posed_guides, clump, u, clump_centre_mm),
@@ -152,28 +152,28 @@ def _grow_chunk(
     pull = (
         _parameter_column(part, "clump")
         * near
-        * np.where(rope, 1.0, 0.6 + 0.4 * _uniform_random(strand_number, 2)[:, None])
+        * np.where(rope, 1.0, 0.6 + 0.4 * _uniform_random(strand_seed, 2)[:, None])
     )
     side, other = _cross_section_axes(at)
     to_middle = pull[..., None] * (at.position - own.position)
     across = (
         near
         * np.where(rope, 1.0, 0.0)
-        * _rope_offsets(strand_number, part, s + roots.along_mm[strand_index, None])
+        * _rope_offsets(strand_seed, part, s + roots.along_mm[strand_index, None])
     )
-    across = across + np.where(rope, 0.0, 1.0) * _curl_offsets(strand_number, clump_number, part, s)
-    across = across + _frizz_offsets(strand_number, part, s)
+    across = across + np.where(rope, 0.0, 1.0) * _curl_offsets(strand_seed, clump_seed, part, s)
+    across = across + _frizz_offsets(strand_seed, part, s)
     varied = across[0][..., None] * side + across[1][..., None] * other
     height = (1.0 - pull) * own.height + pull * at.height + (varied * own.normal).sum(axis=-1)
     least = _MIN_HEIGHT_ABOVE_SKIN_MM * np.minimum(s / _RISE_LENGTH_MM, 1.0)
     positions = own.position + to_middle + varied + np.maximum(least - height, 0.0)[..., None] * own.normal
     taper = 1.0 - (1.0 - _TIP_WIDTH_RATIO) * _smoothstep(1.0 - _TIP_FRACTION, 1.0, t)
     edge = 1.0 - part["hairline"] * (0.45 - 0.45 * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_hairline_mm))
-    radius = (part["radius_mm"] * (0.8 + 0.4 * _uniform_random(strand_number, 3)) * edge)[:, None] * taper
+    radius = (part["radius_mm"] * (0.8 + 0.4 * _uniform_random(strand_seed, 3)) * edge)[:, None] * taper
     return (
         offsets_in_root_axes(root_axes, positions - root_mm[:, None]),
         radius,
-        _strand_absorption(strand_number, part),
+        _strand_absorption(strand_seed, part),
         part["cover"],
     )
 
@@ -182,24 +182,24 @@ def _parameter_column(hair_parameters: NDArray[np.void], parameter_name: str) ->
     return hair_parameters[parameter_name].astype(np.float64)[:, None]
 
 
-def _uniform_random(strand_number: UInt32s, stream: int) -> Doubles:
+def _uniform_random(strand_seed: UInt32s, stream: int) -> Doubles:
     """Return a uniform random number (n,) for each strand, 0 to 1.
 
-    strand_number : (n,) numbers that identify the strands
+    strand_seed : (n,) numbers that identify the strands
     stream : number that selects one of several random numbers of a strand
 
     Source: PCG hash [Jarzynski2020].
     """
     with np.errstate(over="ignore"):
-        state = (strand_number * np.uint32(64) + np.uint32(stream)) * np.uint32(747796405) + np.uint32(
+        state = (strand_seed * np.uint32(64) + np.uint32(stream)) * np.uint32(747796405) + np.uint32(
             2891336453
         )
         word = ((state >> ((state >> np.uint32(28)) + np.uint32(4))) ^ state) * np.uint32(277803737)
         return np.asarray((((word >> np.uint32(22)) ^ word) >> np.uint32(8)) / 16777216.0)
 
 
-def _normal_random(strand_number: UInt32s, stream: int) -> Doubles:
-    return np.asarray(2.0 * (sum(_uniform_random(strand_number, stream + k) for k in range(3)) - 1.5))
+def _normal_random(strand_seed: UInt32s, stream: int) -> Doubles:
+    return np.asarray(2.0 * (sum(_uniform_random(strand_seed, stream + k) for k in range(3)) - 1.5))
 
 
 def _heights_above_hairline(groom: Groom, strand_index: Ints) -> Doubles:
@@ -215,22 +215,22 @@ def _growing_root_indices(groom: Groom, root_count: int) -> Ints:
     fade = _smoothstep(*_HAIRLINE_FADE_MM, _heights_above_hairline(groom, index))
     density = 1.0 + part["hairline"] * (fade - 1.0)
     density = density * part["density"] * (1.0 - part["thinning"] * roots.place[:root_count, 2])
-    strand_number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
-    return np.flatnonzero(_uniform_random(strand_number, 0) < density).astype(np.int32)
+    strand_seed = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
+    return np.flatnonzero(_uniform_random(strand_seed, 0) < density).astype(np.int32)
 
 
 def _length_fractions(
     groom: Groom,
     strand_index: Ints,
     hair_parameters: NDArray[np.void],
-    strand_number: UInt32s,
+    strand_seed: UInt32s,
     above_hairline_mm: Doubles,
 ) -> Doubles:
     """Return the length (n,) of each strand as a fraction of the length of its guides.
 
     strand_index : (n,) indices of the strands
     hair_parameters : (n,) row of `Groom.parameters` for each strand
-    strand_number : (n,) numbers that identify the strands, for `_uniform_random`
+    strand_seed : (n,) random seeds of the strands, for `_uniform_random`
     above_hairline_mm : (n,) heights of the roots above the hairline [mm]
     """
     roots = groom.roots
@@ -240,7 +240,7 @@ def _length_fractions(
         0.75 - 0.75 * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_hairline_mm)
     )
     length = np.minimum(cut, hair_parameters["length_mm"] / hair_parameters["guide_mm"] * sides) * edge
-    return np.asarray(length * (1.0 - hair_parameters["layers"] * _uniform_random(strand_number, 1)))
+    return np.asarray(length * (1.0 - hair_parameters["layers"] * _uniform_random(strand_seed, 1)))
 
 
 def _interpolate_guides(
@@ -294,21 +294,21 @@ def _cross_section_axes(curves: _Curves) -> tuple[Doubles, Doubles]:
     return side, np.cross(side, curves.tangent)
 
 
-def _rope_offsets(strand_number: UInt32s, hair_parameters: NDArray[np.void], length_mm: Doubles) -> Doubles:
+def _rope_offsets(strand_seed: UInt32s, hair_parameters: NDArray[np.void], length_mm: Doubles) -> Doubles:
     """Return the offsets (2, n, k) of strands from the centre line of their twist or braid [mm].
 
     The first axis is for the two directions of `_cross_section_axes`.
 
-    strand_number : (n,) numbers that identify the strands, for `_uniform_random`
+    strand_seed : (n,) random seeds of the strands, for `_uniform_random`
     hair_parameters : (n,) row of `Groom.parameters` for each strand
     length_mm : (n, k) lengths from the root along the rope [mm]
     """
     rope = np.maximum(_parameter_column(hair_parameters, "rope_mm"), 1e-6)
     radius, turn = (
-        rope * np.sqrt(_uniform_random(strand_number, 4))[:, None],
-        2 * np.pi * _uniform_random(strand_number, 5)[:, None],
+        rope * np.sqrt(_uniform_random(strand_seed, 4))[:, None],
+        2 * np.pi * _uniform_random(strand_seed, 5)[:, None],
     )
-    bundle = np.floor(3.0 * _uniform_random(strand_number, 6))[:, None]
+    bundle = np.floor(3.0 * _uniform_random(strand_seed, 6))[:, None]
     phase = 2 * np.pi * (length_mm / (8.0 * rope) + bundle / 3.0)
     middle = rope * np.sin(phase), 0.45 * rope * np.sin(2 * phase)
     braided = np.stack([middle[0] + 0.5 * radius * np.cos(turn), middle[1] + 0.5 * radius * np.sin(turn)])
@@ -318,27 +318,25 @@ def _rope_offsets(strand_number: UInt32s, hair_parameters: NDArray[np.void], len
 
 
 def _curl_offsets(
-    strand_number: UInt32s, clump_number: UInt32s, hair_parameters: NDArray[np.void], length_mm: Doubles
+    strand_seed: UInt32s, clump_seed: UInt32s, hair_parameters: NDArray[np.void], length_mm: Doubles
 ) -> Doubles:
     """Return the offsets (2, n, k) by which curls displace the points of strands [mm].
 
     The first axis is for the two directions of `_cross_section_axes`.
 
-    strand_number, clump_number : (n,) numbers that identify strands and their clumps, for `_uniform_random`
+    strand_seed, clump_seed : (n,) random seeds of the strands and of their clumps, for `_uniform_random`
     hair_parameters : (n,) row of `Groom.parameters` for each strand
     length_mm : (n, k) lengths from the root along the strand [mm]
     """
     pitch = (
         _parameter_column(hair_parameters, "pitch_mm")
-        * (0.85 + 0.3 * _uniform_random(clump_number, 8))[:, None]
+        * (0.85 + 0.3 * _uniform_random(clump_seed, 8))[:, None]
     )
-    shift = _uniform_random(clump_number, 9) + hair_parameters["incoherence"] * _uniform_random(
-        strand_number, 7
-    )
+    shift = _uniform_random(clump_seed, 9) + hair_parameters["incoherence"] * _uniform_random(strand_seed, 7)
     phase = 2 * np.pi * (length_mm / pitch + shift[:, None])
     radius = (
         _parameter_column(hair_parameters, "curl_mm")
-        * (0.75 + 0.5 * _uniform_random(strand_number, 10))[:, None]
+        * (0.75 + 0.5 * _uniform_random(strand_seed, 10))[:, None]
     )
     radius = radius * np.minimum(
         length_mm / (0.5 * _parameter_column(hair_parameters, "pitch_mm") + 4.0), 1.0
@@ -346,47 +344,47 @@ def _curl_offsets(
     return np.stack([radius * np.cos(phase), radius * np.sin(phase)])
 
 
-def _frizz_offsets(strand_number: UInt32s, hair_parameters: NDArray[np.void], length_mm: Doubles) -> Doubles:
+def _frizz_offsets(strand_seed: UInt32s, hair_parameters: NDArray[np.void], length_mm: Doubles) -> Doubles:
     """Return smooth random offsets (2, n, k) by which frizz displaces the points of strands [mm].
 
     The first axis is for the two directions of `_cross_section_axes`.
 
-    strand_number : (n,) numbers that identify the strands, for `_uniform_random`
+    strand_seed : (n,) random seeds of the strands, for `_uniform_random`
     hair_parameters : (n,) row of `Groom.parameters` for each strand
     length_mm : (n, k) lengths from the root along the strand [mm]
     """
     amount = hair_parameters["frizz_mm"] * np.where(
-        _uniform_random(strand_number, 11) < hair_parameters["flyaways"], 5.0, 1.0
+        _uniform_random(strand_seed, 11) < hair_parameters["flyaways"], 5.0, 1.0
     )
     amount = amount[:, None] * np.minimum(length_mm / 25.0, 1.0)
-    x, y = (2 * np.pi * _uniform_random(strand_number, stream)[:, None] for stream in (12, 13))
+    x, y = (2 * np.pi * _uniform_random(strand_seed, stream)[:, None] for stream in (12, 13))
     slow, fast = 2 * np.pi * length_mm / 90.0, 2 * np.pi * length_mm / 31.0
     waves = np.sin(slow + x) + 0.4 * np.sin(fast + y), np.cos(slow + y) + 0.4 * np.cos(fast + x)
     return np.stack(
         [
-            amount * _normal_random(strand_number, k)[:, None] * wave
+            amount * _normal_random(strand_seed, k)[:, None] * wave
             for k, wave in zip((14, 17), waves, strict=True)
         ]
     )
 
 
-def _strand_absorption(strand_number: UInt32s, hair_parameters: NDArray[np.void]) -> Doubles:
+def _strand_absorption(strand_seed: UInt32s, hair_parameters: NDArray[np.void]) -> Doubles:
     """Return the absorption coefficients (n, 3) of strands [1/mm].
 
     Each strand represents several hairs, some of which may be white.
 
-    strand_number : (n,) numbers that identify the strands, for `_uniform_random`
+    strand_seed : (n,) random seeds of the strands, for `_uniform_random`
     hair_parameters : (n,) row of `Groom.parameters` for each strand
     """
     white = (
         sum(
-            _uniform_random(strand_number, 20 + k) < hair_parameters["grey"]
+            _uniform_random(strand_seed, 20 + k) < hair_parameters["grey"]
             for k in range(_HAIRS_SAMPLED_PER_STRAND)
         )
         / _HAIRS_SAMPLED_PER_STRAND
     )
     white = np.asarray(white)[:, None]
-    dark = hair_parameters["dark"] * np.exp(0.12 * _normal_random(strand_number, 26))[:, None]
+    dark = hair_parameters["dark"] * np.exp(0.12 * _normal_random(strand_seed, 26))[:, None]
     mixed = (1.0 - white) ** 2 * ((1.0 - white) * dark + white * dark.mean(axis=1, keepdims=True))
     return np.asarray(
         np.maximum(mixed, hair_parameters["white"]) / hair_parameters["hairs_per_strand"][:, None]

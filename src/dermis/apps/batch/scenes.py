@@ -34,7 +34,7 @@ from dermis.scene.skin import Skin
 from dermis.scene.smoothness import SmoothOutlineLevels
 
 _FULL_HAIR_PICTURE_SIDE = 1000  # side from which pictures have all hairs [pixel]; a close-up shows 230 mm
-_MIN_HAIR_FRACTION = 0.2
+_MIN_FRACTION_OF_STRANDS = 0.2
 _GAZE_DISTANCE_MM = 1e4  # distance of the gaze target if the gaze is given by angles
 _SEED_PARAMETER, _HEAD_PARAMETER = "person.seed", "person.head"
 _MAX_CACHED_SAMPLED_PEOPLE = 1  # a sampled person is not used again
@@ -178,7 +178,7 @@ def _hair_count_fraction(picture_size: tuple[int, int]) -> float:
 
     picture_size : width and height of the picture [pixel]
     """
-    return min(1.0, max(_MIN_HAIR_FRACTION, max(picture_size) / _FULL_HAIR_PICTURE_SIDE))
+    return min(1.0, max(_MIN_FRACTION_OF_STRANDS, max(picture_size) / _FULL_HAIR_PICTURE_SIDE))
 
 
 def _head_rotation(parameters: Parameters) -> NDArray[np.float64]:

@@ -424,8 +424,7 @@ def view_rows(people_results: ComparisonResult) -> str:
     lines = []
     for view, where in ALL_VIEWS.items():
         rows = {
-            skin_kind: people_results.get(_view_case(view, skin_kind).key)
-            for skin_kind in SHARED_SKIN_KINDS
+            skin_kind: people_results.get(_view_case(view, skin_kind).key) for skin_kind in SHARED_SKIN_KINDS
         }
         matched = rows["matched"]
         shipped = matched["default"] if matched else None
@@ -479,8 +478,7 @@ def omitted_feature_table(people_results: ComparisonResult) -> str:
     ]
     for omitted_feature in (None, *OMITTED_FEATURES):
         rows = (
-            people_results.get(_view_case(view, "matched", omitted_feature).key)
-            for view in _ABLATED_VIEWS
+            people_results.get(_view_case(view, "matched", omitted_feature).key) for view in _ABLATED_VIEWS
         )
         lines.append(f"| {omitted_feature or 'nothing'} | {' | '.join(_error_cells(row) for row in rows)} |")
     return "\n".join(lines)
