@@ -46,6 +46,8 @@ _KEPT_STYLE_COUNT = 12  # hair styles whose buffers, of at most 8 MB each, are k
 _MIN_STRANDS_PER_PIXEL = 2.0  # where all strands are short; fewer would look like dots
 _HAIRY_SKIN_AREA_MM2 = 6e4  # approximate area of the skin on which scalp hair and beard grow
 _MAX_KNOT_FRACTION_FOR_SHORT_HAIR = 0.4  # largest fraction of `Detail.drawn_knots` that is spent against dots
+_MAX_BEND_MM = 20.0  # radius of curvature of the guides near the skin
+_ROPE_PITCH_RATIO = 7.0  # pitch of twists and braids relative to their radius, see strands_grow.wgsl
 _DETAIL_LEVELS_PER_OCTAVE = 4  # levels of detail for each doubling of the size of a pixel
 KNOTS_PER_BOUNDS_WORKGROUP = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
@@ -70,19 +72,21 @@ class StrandDetail(NamedTuple):
     casters : largest number of strands that are drawn into shadow maps in place of all coarse strands
     caster_knots : largest number of knots of a strand in shadow maps
     width_px : least width of drawn strands [pixel]
-    segment_px : least length of the segments of drawn strands [pixel]
+    deviation_px : largest deviation of a curl from the segments that represent it [pixel]
+    segment_px : largest length of the segments of drawn strands [pixel]
     """
 
     drawn_knots: int
     casters: int
     caster_knots: int
     width_px: float
+    deviation_px: float
     segment_px: float
 
 
 _GPU_DETAIL, _SOFTWARE_DETAIL = (
-    StrandDetail(1 << 23, 10_000, 24, 0.6, 2.0),
-    StrandDetail(1 << 20, 5_000, 10, 0.9, 4.0),
+    StrandDetail(1 << 23, 10_000, 24, 0.6, 0.1, 6.0),
+    StrandDetail(1 << 20, 5_000, 10, 0.9, 0.25, 10.0),
 )
 
 
@@ -290,6 +294,7 @@ class StrandTables:
     possible : total number of coarse strands of the person
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
     length_mm : length of the longer of scalp hair and beard [mm]
+    bend_mm : least radius of curvature of the strands [mm]
     shortest_mm : length of the shorter of the two, at least 1 [mm]
     width_mm : width of one strand of the longer of the two [mm]
     cover : projected area of hair per area of skin, where the longer of the two grows [-]
@@ -307,6 +312,7 @@ class StrandTables:
     possible: int
     centre_mm: NDArray[np.float64]
     length_mm: float
+    bend_mm: float
     shortest_mm: float
     width_mm: float
     cover: float
@@ -383,7 +389,10 @@ def drawn_strand_counts(strand_tables: StrandTables, pixel_mm: float) -> StrandC
     tables, detail = strand_tables, strand_tables.detail
     drawn_px = detail.width_px + _WIDTH_PER_COVER_PX * min(tables.cover, _MAX_DRAWN_COVER)
     hairs = max(_MIN_DRAWN_STRANDS, tables.possible * tables.width_mm / (drawn_px * pixel_mm))
-    knots = max(_MIN_KNOTS, 1 + np.ceil(tables.length_mm / (detail.segment_px * pixel_mm)))
+    segment_px = np.clip(
+        np.sqrt(8.0 * detail.deviation_px * tables.bend_mm / pixel_mm), 1.0, detail.segment_px
+    )
+    knots = max(_MIN_KNOTS, 1 + np.ceil(tables.length_mm / (segment_px * pixel_mm)))
     crossing = _MIN_STRANDS_PER_PIXEL * _HAIRY_SKIN_AREA_MM2 / (pixel_mm * tables.shortest_mm)
     hairs = max(hairs, min(crossing, _MAX_KNOT_FRACTION_FOR_SHORT_HAIR * detail.drawn_knots / knots))
     return StrandCounts(int(min(tables.coarse.hairs, hairs)), int(min(tables.coarse.knots, knots)))
@@ -419,11 +428,26 @@ def make_strand_tables(
         possible=0 if hair is None else len(hair.roots),
         centre_mm=np.zeros(3) if hair is None else hair.centre_mm,
         length_mm=0.0 if largest is None else float(largest["length_mm"]),
+        bend_mm=_MAX_BEND_MM if parts is None else _least_bend_mm(parts),
         shortest_mm=1.0 if parts is None else max(1.0, float(parts["length_mm"].min(initial=500.0))),
         width_mm=0.0 if largest is None else 2.0 * float(largest["radius_mm"]),
         cover=0.0 if largest is None else float(largest["cover"]),
         absorptance=1.0 if hair is None else mean_hair_absorptance(hair),
     )
+
+
+def _least_bend_mm(hair_parameters: NDArray[np.void]) -> float:
+    """Return the least radius of curvature of curls and twists [mm], at most that of the guides.
+
+    hair_parameters : rows of `Groom.parameters`, for scalp hair and beard
+
+    A helix of radius r and pitch p has the radius of curvature r + p^2 / (4 pi^2 r).
+    """
+    rope = hair_parameters["rope_mm"].astype(float)
+    radius = np.where(rope > 0.0, rope, hair_parameters["curl_mm"])
+    pitch = np.where(rope > 0.0, _ROPE_PITCH_RATIO * rope, hair_parameters["pitch_mm"])
+    bend = radius + (pitch / (2.0 * np.pi)) ** 2 / np.maximum(radius, 1e-3)
+    return float(min(bend.min(initial=_MAX_BEND_MM), _MAX_BEND_MM))
 
 
 def make_guide_tables(device: Device, guides: Guides) -> GuideTables:

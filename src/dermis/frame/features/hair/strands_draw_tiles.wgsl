@@ -7,13 +7,15 @@
 
 var<private> depths: Depths;
 
-fn begin_pixel(pixel: vec2u) {
+fn begin_pixel(pixel: vec2u) -> f32 {
     clear_fragments();
     depths = Depths(vec4f(-1.0), vec4f(-1.0), 1.0);
     if (all(pixel < textureDimensions(image))) {
         depths = depths_at(pixel);
         begin_labels(pixel);
     }
+    let farther = max(depths.first, depths.second);
+    return max(max(farther.x, farther.y), max(farther.z, farther.w));
 }
 
 fn visit_segment(fragment: Fragment) {
