@@ -44,6 +44,11 @@ fn shared_count(index: u32) -> u32 {
 // Returns whether there is any segment.
 fn visit_segments(pixel: vec2u, tile: vec2u, lane: u32, layer: u32) -> bool {
     let index = LANES * layer + lane;
+    if (index == 0u) {
+        atomicStore(&found, 0u);
+        atomicStore(&farthest, 0u);
+    }
+    workgroupBarrier();
     var link = 0u;
     if (layer == 0u && lane < SEGMENT_LISTS) {
         link = list_heads[1u + (tile.y * tiles_across(strand_view.size) + tile.x) * SEGMENT_LISTS + lane];
