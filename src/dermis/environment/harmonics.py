@@ -16,9 +16,10 @@ _KERNEL_QUADRATURE_NODES = 4096
 def legendre_functions(cosine: Floats, degree: int, order_count: int) -> list[Floats]:
     """Return the associated Legendre functions up to `degree`, as one array for each order m.
 
-    The array of order m has the shape (degree + 1 - m, n). The functions are fully normalised: if a function
-    is multiplied by exp(i m phi), the squared modulus of the product has integral 1 over the sphere. The
-    functions are computed by recurrence in the degree [HolmesFeatherstone2002].
+    The array of order m has the shape (degree + 1 - m, n): a row for each degree from m to `degree`, and a
+    column for each cosine. The functions are fully normalised: if a function is multiplied by exp(i m phi),
+    the squared modulus of the product has integral 1 over the sphere. The functions are computed by
+    recurrence in the degree [HolmesFeatherstone2002].
 
     cosine : (n,) cosines of the polar angle
     order_count : number of orders m, from 0
@@ -41,8 +42,9 @@ def legendre_functions(cosine: Floats, degree: int, order_count: int) -> list[Fl
 def analyse_panorama(radiance: Floats, degree: int) -> list[Complex]:
     """Return the spherical harmonic coefficients of a panorama, an array for each order m from 0 to `degree`.
 
-    The array of order m has the shape (degree + 1 - m, c). Negative orders are omitted; they follow from the
-    others, as radiance is real.
+    The array of order m has the shape (degree + 1 - m, c): a row for each degree from m to `degree`, and a
+    column for each colour channel. Negative orders are omitted; they follow from the others, as radiance is
+    real.
 
     radiance : (h, w, c) radiance of the panorama
     """

@@ -32,7 +32,10 @@ LOBE_TABLE_ROUGHNESSES = np.geomspace(0.05, 1.0, ROUGHNESS_COUNT)
 LOBE_TABLE_COSINES = np.maximum(np.linspace(0.0, 1.0, VIEW_COUNT) ** 2, 0.02)
 """Cosines of the view angles, one for each column of the table, raised to at least 0.02."""
 _IN_PLANE_LOBE_COUNTS = (3,) * 10 + (2,) * 3 + (1,) * 3
-"""Number of lobes in the plane of incidence for each view angle, without the pair (`fit_isotropic_lobes`)."""
+"""Number of lobes of the fit, not counting the pair of lobes, for each view angle.
+
+These lobes are in the plane of incidence; see `fit_isotropic_lobes` for the pair.
+"""
 _MIN_LOBE_ELONGATION = 1.8  # ratio of length to width above which the pair lies in the plane
 _FIT_PASS_COUNT = 2
 _REGULARISATION_WEIGHT = 0.01  # strength of the pull of undetermined parameters to the mean of the neighbours

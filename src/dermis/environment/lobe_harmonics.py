@@ -20,7 +20,7 @@ from dermis.specular.models import Lobe
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 _FIT_DEGREES = (40, 80, 128)
-"""Degrees up to which lobes are fitted."""
+"""Highest degrees of harmonics that fits choose from; narrow lobes need a high degree."""
 _MIN_DEGREE_TIMES_WIDTH = 10.0  # least product of a fit's degree and the lobe's deviation across the plane
 _SKY_POWER_FALLOFF = 1.0  # exponent by which light falls with the degree: 0 for lamps, 2 for smooth light
 _DEGREE_1_WEIGHT = 10.0  # additional weight of degree 1, which determines the mean direction
@@ -104,9 +104,10 @@ def harmonic_terms(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Flo
     """Return degree, order and weight of the n harmonics that are symmetric about the plane of incidence.
 
     The weights serve to compare two lobes by the light that each of them reflects from a randomly rotated
-    environment. The expected squared difference between their reflections is a sum over the harmonics: of the
-    squares of the weight times the difference of the two lobes' coefficients. The weight of degree 1 is
-    larger than this rule requires, because degree 1 determines the mean direction of a lobe.
+    environment. For each harmonic, the difference of the coefficients of the two lobes is multiplied by the
+    weight. The sum of the squares of these products is the expected squared difference between the two
+    reflections. The weight of degree 1 is larger than this rule requires, because degree 1 determines the
+    mean direction of a lobe.
 
     degree : highest degree of the harmonics
     """
@@ -120,9 +121,10 @@ def harmonic_terms(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Flo
 def isotropic_sum_harmonics(lobes: IsotropicLobes, degree: int) -> tuple[Complex, Complex]:
     """Return the harmonic coefficients (n,) of a sum of isotropic lobes, and their derivatives (n, 4, 5).
 
-    Each lobe is averaged with its mirror image in the plane of incidence. The four derivatives for each lobe
-    are with respect to the angle, the out-of-plane angle, the log roughness, and the log weight of the lobe.
-    For the log weight, the sum of all weights is kept constant.
+    Each lobe is averaged with its mirror image in the plane of incidence. The axes of the derivatives are
+    harmonic, parameter, and lobe. The parameters are `IsotropicLobes.angle`, `IsotropicLobes.out_of_plane`,
+    the logarithm of the roughness, and the logarithm of the weight. The derivatives with respect to a weight
+    keep the sum of all weights constant.
     """
     order = harmonic_terms(degree)[1]
     azimuthal = np.exp(-1j * np.outer(np.arange(degree + 1), lobes.angle))[order]

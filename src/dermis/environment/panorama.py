@@ -18,7 +18,10 @@ Floats = NDArray[np.float64]
 UNIFORM_PANORAMA = "uniform"
 """Name of the panorama with radiance 1 everywhere."""
 _MIN_PANORAMA_ROWS, _MAX_PANORAMA_ROWS = 256, 512
-"""Least and largest number of rows of a loaded panorama; others are resampled, for accuracy and for speed."""
+"""Least and largest number of rows of a loaded panorama.
+
+Smaller panoramas are resampled for accuracy, larger panoramas for speed.
+"""
 _MAX_RADIANCE = 1e12  # far above the radiance of the sun; prevents overflow of single precision
 MAX_SUNS = 4
 _SUN_PEAK_FACTOR = 32.0  # radiance above which a texel may belong to a sun, relative to the mean

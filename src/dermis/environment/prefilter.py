@@ -68,7 +68,7 @@ class PrefilteredPanorama:
 def prefilter(panorama_name: str) -> PrefilteredPanorama:
     """Load a panorama, separate its brightest areas, and convolve the remainder with isotropic kernels.
 
-    The brightest areas, such as the sun, become directional lights, the field `suns` of the result.
+    The brightest areas, such as the sun, become directional lights in the field `suns` of the result.
 
     panorama_name : see `load_panorama`
 

@@ -17,14 +17,15 @@ from dermis.scene.techniques import TECHNIQUES
 
 _RENDERER_CACHE_SIZE = 32  # variants per resource, for all combinations of the player's controls
 ADAPTER_KINDS = {"gpu": "DiscreteGPU", "software": "CPU"}
-"""Kinds of adapters for which frames can be captured, by the values of `device_kind`."""
+"""Kinds of adapters that frames can be captured for; the keys are the values of `device_kind`."""
 
 
 def capture_renderer(device_kind: str, adapter: str) -> Renderer:
     """Return a renderer that records passes for GPUs or for software adapters.
 
     device_kind : kind of adapter on which the passes will be replayed, "gpu" or "software"
-    adapter : adapter on which the passes are recorded, as in `Renderer`; it may be of another kind
+    adapter : adapter on which the passes are recorded, as in `Renderer`; its kind may differ from
+        `device_kind`
     """
     renderer = Renderer(adapter, cache_size=_RENDERER_CACHE_SIZE, cache_ttl=1000)
     if renderer.device.adapter.kind != ADAPTER_KINDS[device_kind]:

@@ -31,7 +31,7 @@ _MIN_SUGGESTED_SIDE = 64  # smaller sides save nothing
 
 
 def check_limits(device: Device, request: FrameRequest) -> None:
-    """Raise DermisError for sizes or memory over the limits of the device."""
+    """Raise DermisError if the sizes or the memory of a frame exceed the limits of the device."""
     limit, name, settings = device.max_texture_size, device.adapter.name, request.settings
     sides = {
         "size": max(settings.size),
@@ -135,7 +135,7 @@ def _halved_settings(settings: Settings, option_name: str) -> Settings | None:
 
 
 def _command_line_options(settings: Settings, option_name: str) -> dict[str, str]:
-    """Return a dictionary from the name of a size setting to the command line options that set its value."""
+    """Return the command line options that set a size setting, as {name of the setting: options}."""
     if option_name != "size":
         return {option_name: f"--{option_name.replace('_', '-')} {getattr(settings, option_name)}"}
     width, height = settings.size

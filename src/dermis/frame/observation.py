@@ -55,11 +55,11 @@ class Observation(ShortRepr):
     landmarks : mapping
         Dictionary from the name of a set to its landmarks.
     head_pose : ndarray
-        (3, 4) rotation and translation [mm] from the coordinates of the head in its rest pose to those of
-        the camera.
+        (3, 4) rotation and translation [mm] from coordinates of the head in its rest pose to camera
+        coordinates.
     gaze : ndarray or None
-        (2, 3) unit vectors of the left and the right eye in camera axes (x right, y down, z forward); None
-        for heads without modelled eyes.
+        (2, 3) unit vectors of the gaze of the left and the right eye in camera axes (x right, y down,
+        z forward); None for heads without modelled eyes.
 
     Examples
     --------

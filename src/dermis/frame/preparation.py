@@ -84,7 +84,8 @@ class Preparation:
         Resources are taken from the cache where nothing has changed; cached resources that are no longer used
         are released.
 
-        view : name under which the lights of the scene are cached, for callers that draw scenes in turn
+        view : name under which the lights of the scene are cached, for callers that draw several scenes in
+            turn
         outputs : names of outputs besides the picture
         previous : scene of the same head for motion vectors; without it, motion is 0
         landmarks : names of landmark sets
@@ -233,7 +234,7 @@ def _pose_bytes(head: Head, pose_arrays: PoseArrays, rest_bytes: PoseBytes) -> P
 def _rest_positions_mm(scene: Scene) -> NDArray[np.float32] | None:
     """Return the (p, 3) positions of the person's control points in the rest pose [mm].
 
-    The result is None for a person whose control points are those of the shared mesh.
+    The result is None if they are the control points of the shared mesh itself.
     """
     pose_arrays = scene.pose_arrays or scene.head.control_rig.rest
     positions_mm = pose_arrays.positions_mm

@@ -26,12 +26,15 @@ HALF_TEXEL_FORMAT = "rgba16float"
 """Texture format of light in half precision."""
 FRAME_FOLDER = Path(__file__).parent
 OPTIONAL_BINDING_CONSTANTS = ("PARTS", "CUTOUTS")
-"""Pipeline constants that are conditions of `//#if` as well, because bindings depend on them."""
+"""Pipeline constants that are also conditions of `//#if`, because they decide which bindings a shader has."""
 FEATURES_FOLDER = FRAME_FOLDER / "features"
 """Folder to which shader paths such as "shading/shade.wgsl" are relative."""
 SPECULAR_FOLDER = Path(str(specular.__file__)).parent
 TILE_SIDE = 16
-"""Side of the square workgroups of short shaders; smaller ones take a GPU longer to start than to run."""
+"""Side of the square workgroups of short shaders [invocations].
+
+A GPU takes longer to start smaller workgroups than to run them.
+"""
 WORKGROUP_SIZE = 64
 """Invocations per workgroup of shaders that process lists, the constant EACH of each.wgsl."""
 _WORKGROUPS_PER_ROW = 32768  # workgroups along x, at most 65535
@@ -159,7 +162,7 @@ def registry_version() -> int:
 
 
 def device_constants(device: Device) -> Constants:
-    """Return the values of pipeline constants with which shaders run fastest on the device.
+    """Return the values of pipeline constants that make shaders run fastest on the device.
 
     GPUs read buffers faster than textures, but software adapters read textures faster than buffers. On
     software adapters, shaders also skip lights behind the surface, shade a column of pixels per invocation,

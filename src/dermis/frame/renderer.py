@@ -36,7 +36,10 @@ from dermis.scene.techniques import TECHNIQUES
 
 T = TypeVar("T")
 FRAMES_IN_FLIGHT = 3
-"""Limit of submitted, incomplete frames, so that Python and the device overlap with little latency."""
+"""Largest number of frames that are submitted but not complete.
+
+With three frames, Python and the device work in parallel, and the latency stays low.
+"""
 
 SubmitFrame = Callable[[], Readback]
 ReceiveResult = Callable[[Readback], T]
@@ -324,7 +327,7 @@ class Renderer:
         return self.reopening_device.run(run)
 
     def draw_after_warm_up(self, scene: Scene, settings: Settings | None = None) -> RenderedFrame:
-        """Render a scene after warm-up frames that bring a GPU to its full clock rate, to measure times.
+        """Render a scene to measure its times, after warm-up frames that bring a GPU to its full clock rate.
 
         Software adapters render without warm-up frames.
 
@@ -389,7 +392,7 @@ class Renderer:
         Yields
         ------
         ndarray
-            (h, w, 3) or, with alpha, (h, w, 4).
+            (h, w, 3) picture or, with alpha, (h, w, 4) picture.
 
         Raises
         ------

@@ -29,14 +29,14 @@ class FrameRequest:
         are the control points of `topology_head`, the template whose mesh several people can share
     environment : light from all directions around the head, None if there is none
     environment_map : prefiltered panorama of `environment`
-    light_part_counts : number of parts into which each light is divided. The last lights are those that
-        replace the brightest areas of the panorama, such as the sun
+    light_part_counts : number of parts into which each light is divided. The last entries are for the lights
+        that replace the brightest areas of the panorama, such as the sun
     shadow_layers : number of shadow maps
     posed : whether the scene has a pose
     view_name : cache key of the scene, for callers that draw several scenes in turn
     other_profiles : further diffusion profiles of the skin, which `blend_weights` blends with `profile`; all
         profiles have the same variances
-    blend_weights : (h, w, 2) map over the skin of the weights of the other profiles [-], None for a single
+    blend_weights : (h, w, 2) weights of the other profiles as a map over the skin [-], None for a single
         profile
     outputs : names of the requested outputs besides the picture
     landmarks : names of the requested landmark sets
@@ -81,7 +81,7 @@ class FrameRequest:
 
     @cached_property
     def profile_split(self) -> ProfileSplit:
-        """Return the profile, split into a narrow Gaussian and the Gaussians with which light is blurred.
+        """Return the profile, split into a narrow Gaussian and the Gaussians that blur light.
 
         The narrow Gaussian is not blurred: its share of the light leaves the skin where it enters, and is
         computed at each pixel. If the skin has several profiles, the field `others` of the result contains
@@ -149,7 +149,7 @@ class FrameRequest:
 
     @property
     def blur_count(self) -> int:
-        """Return the number of Gaussians with which light is blurred over the atlas."""
+        """Return the number of Gaussians that blur light over the atlas."""
         return len(self.profile_split.blurred_mm2)
 
     @property

@@ -58,7 +58,8 @@ class AtlasPlan(NamedTuple):
 def plan_atlases(method: SeamMethod, settings: Settings, blur_count: int, has_occlusion: bool) -> AtlasPlan:
     """Return the names of the atlas layouts, and the side of the atlases.
 
-    If no light is blurred over an atlas and none stores occlusion, the result is one atlas of minimum size.
+    If no light is blurred over an atlas and no atlas stores occlusion, the result is one atlas of minimum
+    size.
 
     method : method of treating seams; its field `layouts` has the names of the layouts
     blur_count : number of Gaussians that blur light over the atlas

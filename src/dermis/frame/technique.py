@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ProfileSplit:
-    """Split of a profile into a narrow Gaussian, and wider Gaussians with which light is blurred.
+    """Split of a profile into a narrow Gaussian, and wider Gaussians that blur light.
 
     The narrow Gaussian spreads light over so short a distance that no blur is needed: its share of the light
     leaves where it enters. Instead of being read from the atlas, this share is computed again at each pixel
@@ -26,11 +26,11 @@ class ProfileSplit:
     unblurred_weight : (3,) weights of the unblurred Gaussian in red, green and blue; 0 if all Gaussians are
         blurred [-]
     total : (3,) sums of the weights of all Gaussians [-]
-    blurred_mm2 : (k,) variances of the Gaussians with which light is blurred [mm^2]
+    blurred_mm2 : (k,) variances of the Gaussians that blur light [mm^2]
     weight : (k, 3) weights of these Gaussians [-]
     others : splits of the other profiles, if the skin is a blend of several; their variances are the same
-    fine : members of the shader struct Fine, with which the shader corrects light that varies within a texel;
-        empty for no correction
+    fine : members of the shader struct Fine, for the correction of light that varies within a texel; empty
+        for no correction
     """
 
     unblurred_weight: Floats
@@ -42,15 +42,15 @@ class ProfileSplit:
 
     @property
     def unblurred_differences(self) -> Floats:
-        """Return, for each of the n profiles in `others`, its `unblurred_weight` minus that of this one [-].
+        """Return the `unblurred_weight` of each split in `others` minus `self.unblurred_weight` [-].
 
-        The result has the shape (n, 3).
+        The result has the shape (n, 3) for n other splits.
         """
         return np.array([one.unblurred_weight - self.unblurred_weight for one in self.others]).reshape(-1, 3)
 
     @property
     def weight_differences(self) -> tuple[Floats, ...]:
-        """Return, for each profile in `others`, its field `weight` minus that of this profile, (k, 3) [-]."""
+        """Return the (k, 3) `weight` of each split in `others` minus `self.weight` [-]."""
         return tuple(one.weight - self.weight for one in self.others)
 
 
@@ -83,7 +83,7 @@ class TechniqueTraits:
     subsurface_layer_bytes: ClassVar[int] = 0
 
     def split_profile(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Split a profile into a narrow Gaussian and the Gaussians with which light is blurred.
+        """Split a profile into a narrow Gaussian and the Gaussians that blur light.
 
         The narrow Gaussian is not blurred: its share of the light leaves the skin where it enters, and is
         computed at each pixel. In this class, no light is blurred, and the narrow Gaussian has all the
@@ -105,7 +105,7 @@ class TechniqueTraits:
         The estimate is for software adapters, which store blurred light in full precision. This base class
         blurs no light and needs no memory.
 
-        blur_count : number of Gaussians with which light is blurred
+        blur_count : number of Gaussians that blur light
         """
         return 0.0
 

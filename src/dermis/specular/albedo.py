@@ -16,7 +16,10 @@ Floats = NDArray[np.float64]
 MIN_ROUGHNESS_ROOT = 0.2
 TABLE_COSINES: Floats = np.linspace(0.0, 1.0, 64) ** 2
 TABLE_ROUGHNESSES: Floats = np.linspace(MIN_ROUGHNESS_ROOT, 1.0, 32) ** 2
-"""Cosines and roughnesses of `albedo_table`, uniform in the square root to resolve grazing angles."""
+"""Roughnesses of `albedo_table`, spaced evenly in the square root.
+
+TABLE_COSINES has the same spacing, to resolve grazing angles.
+"""
 
 _TABLE_NODE_COUNTS = (24, 12)
 _MIN_COSINE = 1e-3

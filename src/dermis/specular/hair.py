@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 KERATIN_ETA = 1.55
 """Index of refraction of keratin [Marschner2003]."""
 CUTICLE_TILT = np.radians(2.0)
-"""Tilt of the scales of the cuticle towards the tip [rad]."""
+"""Angle by which the scales of the cuticle are tilted against the axis of the fibre [rad]."""
 LONGITUDINAL_ROUGHNESS, AZIMUTHAL_ROUGHNESS = 0.22, 0.5
 """Default perceptual roughness along and around the fibre, 0 to 1 [Chiang2016]."""
 FIBRE_SAMPLE_COUNT = 16

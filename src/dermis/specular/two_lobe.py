@@ -14,8 +14,8 @@ from dermis.specular.models import SpecularModel
 from dermis.specular.torrance_sparrow import masked_lobe, smith_masking
 
 NARROW_FACTOR, WIDE_FACTOR = 0.75**2, 1.3**2
-"""Ratios of the roughness of the narrow and of the wide lobe to m; the engine applies 0.75 and 1.3 to the
-root of m [EpicGames2025]."""
+"""Roughness of the narrow and of the wide lobe, divided by m [-]; the engine applies 0.75 and 1.3 to the root
+of m [EpicGames2025]."""
 
 NARROW_WEIGHT = 0.85
 """Weight of the narrow lobe; the wide lobe has the weight 1 - NARROW_WEIGHT [-] [EpicGames2025]."""

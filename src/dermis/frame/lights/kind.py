@@ -16,7 +16,7 @@ from dermis.mesh.head import Head
 from dermis.scene.lights import Light, PointLight
 
 StructMembers = dict[str, ArrayLike]
-"""StructMembers of a shader struct, by name."""
+"""Values of the members of a shader struct, by the names of the members."""
 LightT = TypeVar("LightT", bound=Light)
 
 

@@ -25,9 +25,9 @@ class OneBlur(TextureSpace):
         return single_gaussian(profile)
 
     def split_profile(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Return the split of a profile: a single Gaussian with which light is blurred.
+        """Return the split of a profile: a single Gaussian that blurs light.
 
-        Unlike that of the base class, the split has no correction for light that varies within a texel.
+        Unlike the split of `TextureSpace`, this split has no correction for light that varies within a texel.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo

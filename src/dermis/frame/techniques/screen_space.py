@@ -85,7 +85,7 @@ class ScreenSpace(Technique):
         return replace(layers, kernel=memo.get(make_kernel, device, profile))
 
     def make_subsurface_layers(self, memo: Memo, device: Device, settings: Settings) -> SubsurfaceLayers:
-        """Return textures for subsurface light that is diffused separately from that of the picture.
+        """Return textures for subsurface light that is diffused separately from the light of the picture.
 
         The output "diffuse" needs them. They have neither a texture for a finished picture nor a kernel.
         """
@@ -176,8 +176,8 @@ def draw_blur(
 ) -> None:
     """Declare the passes that diffuse the subsurface light along rows, then along columns.
 
-    subsurface_layers : texture of the subsurface light, which the second pass overwrites with the diffused
-        light; and the texture to which the first pass, along rows, writes
+    subsurface_layers : textures of the subsurface light, and a scratch texture. The first pass writes to the
+        scratch texture; the second pass overwrites the subsurface light with the diffused light
     kernel : diffusion kernel of the profile
     image_rectangle : rectangle of the image plane that the picture shows
     """

@@ -70,7 +70,7 @@ class Technique(TechniqueTraits):
         Return the new split of the profile, and the indices of the inserted levels. This base class inserts
         none.
 
-        split : Gaussians with which light is blurred
+        split : split of the profile; its Gaussians blur the light of the levels
         atlas : textures of the atlas
         edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
@@ -79,7 +79,7 @@ class Technique(TechniqueTraits):
     def level_halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
-        split : Gaussians with which light is blurred
+        split : split of the profile; its Gaussians blur the light of the levels
         atlas : textures of the atlas
         edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """
@@ -94,7 +94,7 @@ class Technique(TechniqueTraits):
     def make_subsurface_layers(
         self, memo: Memo, device: Device, settings: Settings
     ) -> TechniqueResources | None:
-        """Return textures for subsurface light that is diffused separately from that of the picture.
+        """Return textures for subsurface light that is diffused separately from the light of the picture.
 
         The output "diffuse" needs them if the technique diffuses light over the pixels of the picture. The
         result is None for all other techniques.
@@ -158,7 +158,7 @@ class AtlasTechnique(Technique):
     uses_atlas = True
 
     def gaussians(self, profile: GaussianSum) -> GaussianSum:
-        """Return the Gaussians with which the technique approximates a profile; here the profile itself."""
+        """Return the Gaussians that replace a profile in this technique; here the profile itself."""
         return profile
 
     def leaves_narrowest_unblurred(self, profile: GaussianSum) -> bool:
@@ -169,7 +169,7 @@ class AtlasTechnique(Technique):
         return bool(profile.variance_mm2[0] <= _MAX_UNBLURRED_VARIANCE_MM2)
 
     def split_profile(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Split a profile into its narrowest Gaussian and the Gaussians with which light is blurred.
+        """Split a profile into its narrowest Gaussian and the Gaussians that blur light.
 
         The narrowest Gaussian is not blurred: its share of the light leaves the skin where it enters, and is
         computed at each pixel. If even this Gaussian is too wide for that, light is blurred with all
@@ -198,7 +198,7 @@ class AtlasTechnique(Technique):
 
         The estimate is for software adapters, which store blurred light in full precision.
 
-        blur_count : number of Gaussians with which light is blurred
+        blur_count : number of Gaussians that blur light
         """
         mips = sum(0.25**halving for halving in range(MAX_ATLAS_HALVINGS + 1))
         return TEXEL_FORMAT_BYTES[FLOAT_TEXEL_FORMAT] * (
@@ -208,7 +208,7 @@ class AtlasTechnique(Technique):
     def level_halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
-        split : Gaussians with which light is blurred
+        split : split of the profile; its Gaussians blur the light of the levels
         atlas : textures of the atlas
         edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """

@@ -25,12 +25,12 @@ class TextureSpace(AtlasTechnique):
     mixes_profiles = True
 
     def split_profile(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
-        """Split a profile into its narrowest Gaussian and the Gaussians with which light is blurred.
+        """Split a profile into its narrowest Gaussian and the Gaussians that blur light.
 
         The narrowest Gaussian is not blurred: its share of the light leaves the skin where it enters, and is
         computed at each pixel. If even this Gaussian is too wide for that, light is blurred with all
-        Gaussians of the profile. From the field `fine` of the result, the shader corrects light that varies
-        within a texel.
+        Gaussians of the profile. The field `fine` of the result holds the values with which the shader
+        corrects light that varies within a texel.
 
         normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
             colour map sets the albedo
@@ -46,7 +46,7 @@ class TextureSpace(AtlasTechnique):
 
         Return the new split of the profile, and the indices of the inserted levels.
 
-        split : Gaussians with which light is blurred
+        split : split of the profile; its Gaussians blur the light of the levels
         atlas : textures of the atlas
         edge_mode : what blurs read beyond the edge of a chart, one of `blur.CHART_EDGE_MODES`
         """

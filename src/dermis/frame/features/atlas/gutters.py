@@ -33,7 +33,7 @@ class GutterTracing:
     seam. The position where the path ends is the source of the texel.
 
     starts : buffer of the point at which each path starts, for gutter_trace.wgsl
-    sides : buffer of the neighbouring triangle across each edge of each triangle, for gutter_trace.wgsl
+    sides : buffer of the neighbours of each triangle across its three edges, for gutter_trace.wgsl
     halvings : for each coarser resolution of the atlas, a dictionary from names in gutter_halve.wgsl to
         buffers. The buffers list the coarser gutter texels and, for each of them, the finer gutter texels
         inside it. The source of the coarser texel is the mean of the sources of the finer ones, without

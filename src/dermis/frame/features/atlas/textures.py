@@ -26,7 +26,11 @@ _ATLAS_TEXTURE_NAME = "map of the atlas"
 _GUTTER_LIGHT_BYTES = 16  # size of the light of a gutter texel
 _GUTTER_BIT = 1 << 15  # bit of the first component of reach_map that marks gutter texels, see reach.wgsl
 MAX_SAME_SOURCE_DISTANCE_TEXELS = 4.0
-"""Largest distance between sources of gutter texels that are averaged at half the resolution [texels]."""
+"""Distance along x or y below which sources of gutter texels are averaged at half the resolution [texels].
+
+A source is the position from which a gutter texel copies light. In each square of 2 x 2 texels, sources that
+are farther from the first source are ignored as outliers.
+"""
 
 
 def atlas_constants() -> dict[str, int | float]:

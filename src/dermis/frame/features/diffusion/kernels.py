@@ -15,17 +15,17 @@ Floats = NDArray[np.float64]
 ROWS_PER_UNIT_VARIANCE = 64
 """Number of rows of the kernel table per unit of variance."""
 MAX_TABLE_VARIANCE = 9
-"""Variance of the last row of the kernel table [step^2]."""
+"""Largest variance in the kernel table, in units of the squared distance between taps."""
 KERNEL_TRUNCATION_SIGMAS = 3.3
-"""Half-width of a kernel in standard deviations."""
+"""Half-width of a kernel in standard deviations, unless `CHAINED_TRUNCATION_SIGMAS` applies."""
 CHAINED_TRUNCATION_SIGMAS = 2.4
 """Half-width of a kernel whose source is already blurred, in standard deviations.
 
-The kernel still has the exact variance, and the next blur smooths its truncated shape: the error is at
-most 0.014 % of an image.
+The kernel still has the exact variance, and the next blur smooths its truncated shape: the truncation changes
+an image by at most 0.014 %.
 """
 MAX_CHAINED_SIGMA_TEXELS = 1.5
-"""Largest standard deviation at which `CHAINED_TRUNCATION_SIGMAS` suits unblurred light too [texel]."""
+"""Standard deviation up to which `CHAINED_TRUNCATION_SIGMAS` also suits blurs of unblurred light [texel]."""
 _MAX_TAPS_PER_SIDE = math.ceil(KERNEL_TRUNCATION_SIGMAS * math.sqrt(MAX_TABLE_VARIANCE))
 _KERNEL_BISECTION_COUNT = 60
 _WIDE_TRUNCATION_SIGMAS, _MAX_TAP_STEP_TEXELS = 4.0, 1.6  # as in diffuse.wgsl

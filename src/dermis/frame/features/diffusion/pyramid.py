@@ -16,12 +16,12 @@ _MAX_SCALED_IRRADIANCE = 16.0  # sum of all lights after scaling, 1/4000 of the 
 _MAX_IRRADIANCE_SCALE = 2.0**100  # its inverse is a float too; for dimmer light the scale is limited
 Floats = NDArray[np.float64]
 Halvings = tuple[tuple[int, ...], ...]
-"""For each layout, how often the resolution of each level is halved."""
+"""For each atlas layout, the number of times that the resolution of each level is halved."""
 MIN_SIGMA_PER_TEXEL_AREA = 0.45
-"""Least blur at reduced resolutions: standard deviation of the stored light [mm], divided by the squared side
-of a texel [mm^2]."""
+"""Least blur of light that is stored at a reduced resolution [1/mm]: the standard deviation of the blur [mm],
+divided by the squared side of a texel [mm^2]."""
 MIN_WEIGHT_SUM = 1e-12
-"""Least divisor of a sum of weights, for channels without any weight."""
+"""Lower limit of sums of weights in divisions, for channels without any weight."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class PyramidLevels:
         """Return a view of one level, which is a layer of one of the texture arrays in `stacks`.
 
         level_index : index of the level in the pyramid
-        halvings : index of the texture array in `stacks`: how often its resolution is halved
+        halvings : number of times that the resolution is halved, which is the index of the array in `stacks`
         """
         if (level_index, halvings) not in self._views:
             layer = level_index - self.first[halvings]
@@ -58,7 +58,7 @@ class PyramidLevels:
     def scratch_view(self, halvings: int = 0) -> TextureView:
         """Return a view of the scratch texture at one resolution.
 
-        halvings : how often the full resolution is halved
+        halvings : number of times that the full resolution is halved
         """
         if (-1, halvings) not in self._views:
             self._views[-1, halvings] = make_view(self.scratch, mip=halvings)

@@ -40,7 +40,7 @@ class BlurScheme(Protocol):
         for the next level to be computed at a lower resolution. Return a copy of `split` with the inserted
         levels, and their indices.
 
-        split : division of a profile into Gaussians with which the atlas is blurred, and a narrower Gaussian
+        split : division of a profile into Gaussians that blur light over the atlas, and a narrower Gaussian
             that is evaluated at each pixel
         edge_mode : how blurs treat texels beyond a chart, see `Blur.edge`
         """
@@ -48,7 +48,7 @@ class BlurScheme(Protocol):
     def level_halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
-        split : division of a profile into Gaussians with which the atlas is blurred, and a narrower Gaussian
+        split : division of a profile into Gaussians that blur light over the atlas, and a narrower Gaussian
             that is evaluated at each pixel
         edge_mode : how blurs treat texels beyond a chart, see `Blur.edge`
         """

@@ -58,7 +58,8 @@ def draw_shadows(
 ) -> None:
     """Declare the passes that move the hair with the skin, and compute the shadows of the hair.
 
-    The shadows are the deep opacity maps of lights, and the grid of sky transmittance for an environment.
+    The passes fill the deep opacity maps of lights. For an environment, they also fill the grid of sky
+    transmittance.
 
     geometry : current shape of the head, and its vertices and triangles
     """
@@ -167,7 +168,7 @@ def draw(
         the lights
     visibility_buffer : texture with the index of the triangle that is visible at each sample
     radiance : texture of the picture without hair
-    labels : resources with which the pass labels pixels of hair, None if no labels are requested
+    labels : resources that the pass needs to label pixels of hair, None if no labels are requested
     """
     tables, picture, (lighting, view, light_constants) = strands.tables, strands.picture, shading_inputs
     shape, head = geometry

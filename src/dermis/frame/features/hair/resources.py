@@ -21,14 +21,14 @@ from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_constants
 
 TILE_SIDE_PIXELS = 8
-"""Side of a tile of the picture, for which strand segments are listed [pixels]."""
+"""Side of a square tile of the picture; each tile has its own lists of strand segments [pixels]."""
 _GPU_SEGMENT_LISTS_PER_TILE = (
     64  # linked lists of a tile on GPUs: one for each invocation of the tile's workgroup
 )
 DEEP_OPACITY_WIDTH = 256
 """Width of a deep opacity map, twice its height [texels]."""
 DEEP_OPACITY_LAYERS = 6
-"""Number of depth intervals of a deep opacity map, each with the cover of the hair within it."""
+"""Number of depth intervals of a deep opacity map, which stores the cover by the hair in each interval."""
 DEEP_OPACITY_HEADER_WORDS = 8
 """Number of words that precede the texels of each light's deep opacity map."""
 SKY_CELLS = 24, 32, 24
@@ -494,7 +494,7 @@ def _fill_strand_rows(strand_rows: NDArray[np.void], head: Head, strands: Strand
 
 
 def _knot_rows(strands: Strands) -> NDArray[np.float32]:
-    """Return (n k, 4) rows of position and radius [mm], one for each of the k knots of n strands."""
+    """Return (n k, 4) rows of position and radius [mm], one for each knot of n strands with k knots each."""
     rows = np.empty((*strands.radius_mm.shape, 4), np.float32)
     rows[..., :3], rows[..., 3] = strands.knots_mm, strands.radius_mm
     return rows.reshape(-1, 4)

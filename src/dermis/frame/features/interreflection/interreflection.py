@@ -16,7 +16,7 @@ from dermis.gpu import Bindings, Buffer, Constants, Device, Memo, Recorder, mark
 from dermis.mesh.head import Head
 
 FormFactorBuffers = tuple[tuple[Buffer, int], dict[str, Buffer], dict[str, Buffer]]
-"""Buffer and number of sample points, form factors of patches, and form factors of cells."""
+"""Sample points (their buffer and number), and buffers of the form factors of patches and of cells."""
 _FLOAT4_BYTES = 16  # bytes of four floats
 _BOUNCE_COUNT = 4  # number of bounces between patches; the gathering by cells is one more
 _INVOCATIONS_PER_PATCH = 16  # shader invocations per patch or cell

@@ -11,7 +11,7 @@ from dermis.frame.programs import FLOAT_TEXEL_FORMAT, program
 from dermis.gpu import Constants, Recorder, TextureOrView
 
 MAX_FINE_GAUSSIANS = 8
-"""Largest number of Gaussians, narrowest first, whose light is corrected within texels in the picture."""
+"""Largest number of Gaussians that are corrected for light that varies within a texel: the narrowest ones."""
 LIGHT_FILTER_SIGMA_TEXELS = 0.5
 """Standard deviation of the filter that keeps light on the atlas from aliasing [texels]."""
 
@@ -26,7 +26,7 @@ def subtexel_light_members(
 ) -> dict[str, float | NDArray[np.floating]]:
     """Return the members of the shader struct `Fine`, which corrects light that varies within a texel.
 
-    variance_mm2 : (k,) variances of the Gaussians with which the atlas is blurred [mm^2]
+    variance_mm2 : (k,) variances of the Gaussians that blur light over the atlas [mm^2]
     weight : (k, 3) weights of these Gaussians for red, green and blue [-]
     unblurred_mm2 : variance of the narrowest Gaussian of the profile [mm^2]. This Gaussian is too narrow
         for a blur over the atlas; its light is evaluated at each pixel instead

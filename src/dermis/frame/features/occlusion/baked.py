@@ -55,8 +55,7 @@ def bake_occlusion(
     `result_side` rows of the result are the texels of the atlas, NaN where there is no surface; the other
     rows hold the vertices of the mesh.
 
-    bindings : resources that lighting shaders read; the geometry and the lights among them are replaced by
-        those of the bake
+    bindings : resources that lighting shaders read; the bake replaces the geometry and the lights among them
     surface_texels : texture that maps each atlas texel to a surface point
     result_side : side of the atlas in the result [texels]
     direction_count : number of depth maps
@@ -136,8 +135,7 @@ def cached_occlusion_map(
 ) -> Texture:
     """Return a texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
 
-    bindings : resources that lighting shaders read; the geometry and the lights among them are replaced by
-        those of the bake
+    bindings : resources that lighting shaders read; the bake replaces the geometry and the lights among them
     surface_texels : texture that maps each atlas texel to a surface point
     """
     side = min(atlas.size, _MAX_OCCLUSION_MAP_SIDE)

@@ -143,8 +143,8 @@ class MovingOcclusion:
     """Resources from which the occlusion map of a moving head is updated.
 
     rest_map : texture of the occlusion map that was baked at rest
-    corners : texture of the indices and the weights of the vertices between which each texel interpolates,
-        see moving_occlusion_corners.wgsl
+    corners : texture of the vertices that each texel interpolates, as indices and weights, see
+        moving_occlusion_corners.wgsl
     """
 
     rest_map: Texture
@@ -271,7 +271,7 @@ def _draw_vertex_visibility(
     """Declare the passes that compute the visible fraction of the sky at the vertices of a shape.
 
     views_record : uniform record of `views`, from `sky_views_record`
-    is_at_rest : whether to store the fractions as those of the head at rest
+    is_at_rest : whether `head` is at rest; the fractions are then stored as the fractions at rest
     """
     draw_layers(
         graph,

@@ -36,7 +36,7 @@ class LabelBuffers:
     hair_labels: Buffer
 
     def hair_bindings(self, centre_triangles: Texture) -> Bindings | None:
-        """Return the resources with which the hair pass labels pixels, None if there is no hair.
+        """Return the resources that the hair pass needs to label pixels, None if there is no hair.
 
         centre_triangles : texture with the index of the triangle that covers each pixel centre
         """

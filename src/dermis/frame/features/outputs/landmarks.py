@@ -16,9 +16,9 @@ from dermis.human.landmarks.points import LandmarkPoints, check_landmarks, landm
 from dermis.mesh.head import Head
 
 LandmarkPositions = dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]
-"""Names of the landmarks of each set, and (n, 4) positions [mm] with 1 for visible landmarks, else 0."""
+"""For each set, the names of its n landmarks, and (n, 4) rows x, y, z [mm] and visibility (1 or 0)."""
 LANDMARK_TOLERANCE_MM = 2.0
-"""Largest depth by which the mesh may be in front of a landmark that counts as visible."""
+"""Largest depth by which the mesh may be in front of a landmark that counts as visible [mm]."""
 # Struct Landmark of landmarks.wgsl.
 _LANDMARK_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("material", "u4", 4)])
 _FLOATS_PER_LANDMARK = 4  # x, y, z and visibility

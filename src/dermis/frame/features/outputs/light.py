@@ -148,7 +148,7 @@ def make_thickness_map(device: Device, pair_buffers: PairBuffers) -> Texture:
     The texture has one texel for each cell of the atlas. The limit is the largest distance between the cells
     of a pair, because thickness is measured between these cells.
 
-    pair_buffers : pairs of cells between which light crosses the head
+    pair_buffers : pairs of cells on opposite sides of thin parts of the head
     """
     surface = pair_buffers.cells.receiver_mask
     texels = np.zeros((*surface.shape, 4), np.float32)
@@ -187,7 +187,7 @@ def _shading_bindings(shader: ComputeProgram, inputs: StageInputs) -> MutableBin
 def _translucent_pairs(
     request: FrameRequest, translucency: Sequence[Translucency | None]
 ) -> PairBuffers | None:
-    """Return the pairs of surface cells between which light crosses the head; None if no output needs them.
+    """Return the pairs of cells on opposite sides of thin parts; None if no output needs them.
 
     Raises DermisError if an output needs them, but the frame is rendered without light through thin parts.
     """

@@ -52,8 +52,8 @@ class PictureDiffusion:
 class StageInputs:
     """Inputs of the shaders that compute outputs.
 
-    Some methods of treating seams use atlases with several uv layouts. Inputs that depend on the layout are
-    those of the first layout.
+    Some methods of treating seams use atlases with several uv layouts. Inputs that depend on the layout then
+    belong to the first layout.
 
     lighting : dictionary from names in shaders to the resources that light the skin, for the first layout
     view : uniform record of the struct Shade

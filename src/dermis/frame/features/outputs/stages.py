@@ -25,7 +25,7 @@ _SURFACE_CONSTANT_NAMES = ("DETAIL",)  # pipeline constants of surface.wgsl
 
 
 def hair_label_bindings(graph: Graph, resources: Resources | None, inputs: StageInputs) -> Bindings | None:
-    """Return the resources with which the hair pass labels pixels, None if no labels are requested."""
+    """Return the resources that the hair pass needs to label pixels, None if no labels are requested."""
     if not _needs_hair_labels(resources, inputs):
         return None
     assert resources is not None and resources.labels is not None

@@ -14,11 +14,11 @@ from dermis.scene.settings import Settings
 METER_GRID_SIDE = 64
 """Number of metered points along each side of a grid over the picture."""
 METERED_IRRADIANCE = 0.85
-"""Linear value to which white skin is exposed, such that the exposure of studio light is about 1."""
+"""Linear value of white skin after exposure, chosen so that the exposure of studio light is about 1."""
 MAX_CLIPPED_FRACTION = 0.01
 """Largest fraction of the visible skin that may be overexposed."""
 MIN_HIGHLIGHT_FACTOR = 0.5
-"""Least factor by which highlights reduce the exposure, which is one stop."""
+"""Least factor by which the exposure is scaled to preserve highlights; 0.5 is one stop."""
 
 
 def shader_constants() -> dict[str, float]:

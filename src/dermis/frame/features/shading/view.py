@@ -85,7 +85,7 @@ def view_record(
 ) -> UniformRecord:
     """Return the uniform record of the struct Shade; `with_camera` adds the camera and the eye poses.
 
-    profile_split : division of the diffusion profile into Gaussians with which the atlas is blurred, and a
+    profile_split : division of the diffusion profile into Gaussians that blur light over the atlas, and a
         narrower Gaussian that is evaluated at each pixel
 
     Raises DermisError for a head with too many materials.

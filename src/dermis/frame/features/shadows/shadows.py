@@ -70,5 +70,8 @@ def draw(
 
 
 def _squares_per_side(map_side: int) -> int:
-    """Return the number of squares of 4 x 4 texels along a shadow map, rounded up to a multiple of 16."""
+    """Return the number of squares of 4 x 4 texels along a side of a shadow map.
+
+    The number is rounded up to a multiple of 16.
+    """
     return 16 * -(-map_side // 64)

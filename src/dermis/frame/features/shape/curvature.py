@@ -44,7 +44,7 @@ class Curvature:
 
 
 def make_curvature(device: Device, mesh: Mesh) -> Curvature:
-    """Create the buffers with which the curvature of a mesh is computed."""
+    """Create the buffers that are needed to compute the curvature of a mesh."""
     corners, count = mesh.point[mesh.triangles].astype(np.int64), len(mesh.positions)
     pairs, _, _ = edges(corners)
     directed = np.concatenate([pairs, pairs[:, ::-1]])

@@ -36,7 +36,7 @@ class HeadGeometry:
 
     @property
     def cutout_constants(self) -> Constants:
-        """Return the pipeline constants with which passes leave out the holes in parts of the head.
+        """Return the pipeline constants that make passes leave out the holes in parts of the head.
 
         The result is empty if no part has holes.
         """
@@ -63,7 +63,7 @@ def upload_geometry(
     """Upload the triangles of a head with their atlas coordinates, to be drawn with the vertices of a shape.
 
     part_maps : maps of the parts that are not skin, among them an opacity map that cuts holes into parts;
-        None to leave out all triangles into which holes are cut
+        None to leave out all triangles that can have holes
     """
     table, cut_out = _triangle_table(mesh, atlas), mesh.cut_out_mask
     if part_maps is None or not cut_out.any():

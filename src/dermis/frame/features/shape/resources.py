@@ -16,8 +16,8 @@ class Resources:
 
     shape : buffers of the posed shape
     tables : buffers that are constant for a mesh
-    rest_shape : buffers of the shape at rest of a person whose control points differ from those of the mesh,
-        which several people may share; else None
+    rest_shape : buffers of the person at rest. They are None if the person has the control points of the mesh
+        itself, which several people can share
     curvature : buffers of the surface's curvature, None unless the technique reads it
     """
 

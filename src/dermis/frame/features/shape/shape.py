@@ -19,13 +19,16 @@ from dermis.mesh.rig import MorphTargets, Rig, Skeleton, Stencils
 Doubles = NDArray[np.float64]
 Words = NDArray[np.uint32]
 VERTICES_PER_ROW = 512
-"""Vertices per row of the vertex texture; each has four texels."""
+"""Number of vertices per row of the vertex texture; each vertex has four texels."""
 VERTEX_RESOURCES = ("vertex_table", "vertex_buffer", "vertex_lengths")
 """Names of the vertex textures and buffers in geometry.wgsl and texel_stretch.wgsl."""
 _VERTEX_STRUCT_MEMBERS = ("uv", "f4", 2), ("point", "u4"), ("pad", "u4"), ("normal", "f4", 3), ("last", "u4")
 _VERTEX_DTYPE = np.dtype(list(_VERTEX_STRUCT_MEMBERS))  # struct of a vertex in shape_vertices.wgsl
 MIN_RELATIVE_TANGENT = 1e-3
-"""Least length of the part of dpdu orthogonal to the normal, relative to dpdu; shorter ones are replaced."""
+"""Least length, relative to dpdu, of the part of dpdu that is orthogonal to the normal.
+
+Where this part is shorter, another direction that is orthogonal to the normal replaces it.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,7 +251,7 @@ def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
 
 
 def run_bounds(sorted_values: NDArray[np.integer], searched_values: NDArray[np.integer]) -> Words:
-    """Return (n, 2) bounds: where the elements equal to each searched value start and end in a sorted array.
+    """Return the (n, 2) start and end of the range in a sorted array that holds each searched value.
 
     sorted_values : sorted array
     searched_values : (n,) values; for a value that is not in the array, start and end are equal
@@ -277,8 +280,8 @@ def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
 def _run_offsets(sorted_index: NDArray[np.integer], run_count: int) -> Words:
     """Return the offset in a sorted array where each integer from 0 to run_count - 1 first occurs.
 
-    The result has the shape (run_count + 1,); its last element is the length of the array. For an integer
-    that does not occur, the offset is that of the next larger integer.
+    The result has the shape (run_count + 1,); its last element is the length of the array. An integer that
+    does not occur gets the offset of the next larger integer.
 
     sorted_index : sorted integers from 0 to run_count - 1
     run_count : number of different integers that can occur
@@ -292,8 +295,8 @@ class PoseBytes(NamedTuple):
     positions : position of each control point at rest, three floats [mm]
     weights : weight of each morph target, one float
     matrices : matrix of each bone, from rest to pose, twelve floats row by row [mm]
-    displacements : result of `displacement_rows` if the person's morph targets replace those of the template,
-        else empty
+    displacements : result of `displacement_rows` if the person's morph targets replace the targets of the
+        template, else empty
     """
 
     positions: bytes

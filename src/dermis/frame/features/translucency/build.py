@@ -52,7 +52,7 @@ def thin_part_tables(memo: Memo, request: FrameRequest) -> ThinParts | None:
     """Return tables of the light that thin tissue transmits, and of the light that it fails to reflect.
 
     Both are functions of the thickness. The light that thin tissue fails to reflect is the reflectance of
-    thick tissue minus that of the thin tissue. The result is None for Lambertian skin.
+    thick tissue minus the reflectance of thin tissue. The result is None for Lambertian skin.
     """
     if request.skin.direction != "half-space":
         return None
@@ -75,15 +75,15 @@ def _thin_part_weights(
     """Return tables of the light that thin tissue transmits, and of the light that it fails to reflect.
 
     Both are functions of the thickness. The light that thin tissue fails to reflect is the reflectance of
-    thick tissue minus that of the thin tissue. For each thickness, each table holds the weights of the
-    Gaussians with which light is blurred. The weights are scaled down where the light that thin tissue fails
-    to reflect would exceed the light that is blurred.
+    thick tissue minus the reflectance of thin tissue. For each thickness, each table holds the weights of the
+    Gaussians that blur light. The weights are scaled down where the light that thin tissue fails to reflect
+    would exceed the light that is blurred.
 
     colour : (3,) diffuse reflectance of thick skin [-]
     eta : index of refraction of skin [-]
     anisotropy : anisotropy of scattering [-]
     total_weight : (3,) sums of the weights of all Gaussians of the profile [-]
-    variance_mm2 : (k,) variances of the Gaussians with which light is blurred [mm^2]
+    variance_mm2 : (k,) variances of the Gaussians that blur light [mm^2]
     level_weight : (k, 3) weights of these Gaussians for red, green and blue [-]
     """
     reach = min(_MAX_THICKNESS_SIGMAS * float(np.sqrt(variance_mm2[-1])), _MAX_THICKNESS_MM)
@@ -111,8 +111,8 @@ def make_translucency(
     A pair consists of a cell of the atlas where light enters a thin part, and a cell where this light leaves.
 
     surface_bindings : resources of geometry.wgsl and of the atlas, for the current shape
-    rest_surface_bindings : the same resources for the shape in which pairs are searched
-    variance_mm2 : (k,) variances of the Gaussians with which light is blurred [mm^2]
+    rest_surface_bindings : the same resources for the shape that is searched for pairs
+    variance_mm2 : (k,) variances of the Gaussians that blur light [mm^2]
     weight : (k, 3) weights of these Gaussians for red, green and blue [-]
     thickness_tables : transmittance of thin tissue, and how much less it reflects than thick tissue, as
         functions of its thickness; None to compute the weight of a pair from the Gaussians, at the
@@ -146,7 +146,7 @@ class PairCache:
 
     A pair consists of a cell of the atlas where light enters a thin part, and a cell where this light leaves.
 
-    surface_bindings : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
+    surface_bindings : resources of geometry.wgsl and of the atlas, for the shape that is searched for pairs
     """
 
     def __init__(self, device: Device, surface_bindings: Bindings, atlas: Atlas) -> None:
@@ -154,7 +154,7 @@ class PairCache:
         self._cache: dict[Cells, PairBuffers] = {}
 
     def pairs_for_cells(self, cells: Cells) -> PairBuffers:
-        """Return the pairs of cells between which light crosses thin parts of the head.
+        """Return the pairs of cells on opposite sides of thin parts of the head.
 
         The pairs come from the cache or from a new search.
 
@@ -182,11 +182,11 @@ def rounded_sigma_mm(widest_sigma_mm: float) -> float:
 
 @logged_step("finding the thin parts")
 def find_pairs(device: Device, surface_bindings: Bindings, atlas: Atlas, cells: Cells) -> PairBuffers:
-    """Find the pairs of cells between which light passes through thin tissue.
+    """Find the pairs of cells on opposite sides of thin tissue.
 
     If a buffer cannot hold all pairs, coarser cells are used.
 
-    surface_bindings : resources of geometry.wgsl and of the atlas, for the shape to search in
+    surface_bindings : resources of geometry.wgsl and of the atlas, for the shape that is searched for pairs
     cells : division of the atlas into cells
     """
     table, times = search_pairs(device, surface_bindings, cells), count(1)
@@ -246,7 +246,7 @@ def with_profile_weights(
 
     Each pair of cells, one where light enters and one where it leaves, has one weight.
 
-    variance_mm2 : (k,) variances of the Gaussians with which light is blurred [mm^2]
+    variance_mm2 : (k,) variances of the Gaussians that blur light [mm^2]
     weight : (k, 3) weights of these Gaussians for red, green and blue [-]
     thickness_tables : transmittance of thin tissue, and how much less it reflects than thick tissue, as
         functions of its thickness; None to compute the weight of a pair from the Gaussians, at the

@@ -1,6 +1,6 @@
-"""Choice of the head shape, at rest or deformed, in which pairs for translucency are searched.
+"""Choice of the head shape, at rest or deformed, that is searched for translucent pairs.
 
-A pair is two cells of the skin between which light crosses a thin part of the head.
+A pair is two cells of the skin on opposite sides of a thin part of the head.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dermis.gpu import Memo
 from dermis.mesh.head import Head
 
 MAX_SHARED_PAIR_STRAIN = 0.2
-"""Relative change of lengths on the surface up to which the pairs of the head at rest are used."""
+"""Largest strain of a shape that still uses the pairs of the head at rest, see `StrainGauge.strain` [-]."""
 _SAMPLED_LENGTH_COUNT, _SAMPLING_SEED = 2000, 0
 _STRAIN_QUANTILE = 0.9  # quantile of the changes of length; it ignores the few lengths from lip to lip
 
@@ -33,9 +33,10 @@ class StrainGauge:
         self._rest_lengths = self._pair_lengths(self._rest_mm, self._pairs)
 
     def strain(self, positions_mm: Floats) -> float:
-        """Return the strain of a shape, the 90th percentile of the relative changes of distances [-].
+        """Return the strain of a shape, which is a relative change of distances [-].
 
-        The distances are those between neighbouring control points.
+        It is the 90th percentile of the relative changes of the distances between neighbouring control
+        points.
 
         positions_mm : (p, 3) control points of the shape [mm]
         """
@@ -49,11 +50,11 @@ class StrainGauge:
 
 
 def pair_positions_mm(memo: Memo, request: FrameRequest) -> Floats | None:
-    """Return the control points of the shape in which pairs are searched [mm], None for the head at rest.
+    """Return the control points of the shape that is searched for pairs [mm], None for the head at rest.
 
-    A pair is two cells of the skin between which light crosses a thin part. All people of one template use
-    the pairs of the template at rest. Other heads use their pairs at rest for all shapes with a strain of at
-    most `MAX_SHARED_PAIR_STRAIN`.
+    A pair is two cells of the skin on opposite sides of a thin part. All people of one template use the pairs
+    of the template at rest. Other heads use their pairs at rest for all shapes with a strain of at most
+    `MAX_SHARED_PAIR_STRAIN`.
     """
     positions = request.rest_positions_mm
     if positions is None or request.has_shared_mesh:

@@ -16,7 +16,7 @@ from dermis.optics.gaussians import MAX_GAUSSIANS
 from dermis.optics.thin_parts import THICKNESS_ROWS, ThinParts
 
 RECEIVER_BYTES, SOURCE_BYTES = 48, 32
-"""Sizes of the structs Receiver and Source of translucent_pair.wgsl."""
+"""Sizes of the structs Receiver and Source of translucent_pair.wgsl [bytes]."""
 
 _GPU_WORKGROUP_CONSTANTS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
 # On software adapters barriers are slow, so that each invocation works alone.
@@ -109,8 +109,8 @@ def draw_direction_factors(
 ) -> None:
     """Declare the pass that computes how the directions of incident light change the transmission.
 
-    The result is one factor for each source cell. It applies in full only where the tissue is so thick that
-    light scatters many times.
+    The result is one factor for each source cell. The factor applies in full only where the tissue is so
+    thick that light scatters many times.
 
     constants : pipeline constants of the lights
     """
@@ -191,7 +191,7 @@ def choose_source_level(source_spacing_mm: float, variance_mm2: Floats) -> int:
     it is the widest.
 
     source_spacing_mm : distance between neighbouring source cells [mm]
-    variance_mm2 : (k,) increasing variances of the Gaussians with which light is blurred [mm^2]
+    variance_mm2 : (k,) increasing variances of the Gaussians that blur light [mm^2]
     """
     smooth = np.flatnonzero(variance_mm2 >= (_MIN_SOURCE_SMOOTHNESS * source_spacing_mm) ** 2)
     return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
@@ -207,7 +207,7 @@ def pair_weight_bindings(
 ) -> Bindings:
     """Return the uniform record and the transmittance table of a profile for translucency_weights.wgsl.
 
-    variance_mm2 : (k,) variances of the Gaussians with which light is blurred [mm^2]
+    variance_mm2 : (k,) variances of the Gaussians that blur light [mm^2]
     weight : (k, 3) weights of these Gaussians for red, green and blue [-]
     thickness_tables : transmittance of thin tissue, and how much less it reflects than thick tissue, as
         functions of its thickness; None to compute the weights of the pairs of cells from the Gaussians

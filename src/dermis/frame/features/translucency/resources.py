@@ -10,7 +10,7 @@ from dermis.gpu import Bindings, Buffer, Texture
 
 @dataclass(frozen=True, eq=False)
 class PairBuffers:
-    """Pairs of surface cells between which light passes through thin tissue.
+    """Pairs of surface cells on opposite sides of thin tissue, through which light passes.
 
     Light enters the source cell and leaves the receiver cell. Both are squares of texels of the atlas.
 
@@ -46,8 +46,8 @@ class Translucency:
     weights : buffer of the fraction of light that passes from source to receiver, for each pair
     source_light : buffer of the light that enters at each source
     unit_light : buffer that holds light of 1 at all sources
-    direction_factors : buffer of one factor per source, by which the directions of its incident light change
-        the transmission; filled by `passes.draw_direction_factors`
+    direction_factors : buffer of one factor per source, which describes how the directions of the incident
+        light change the transmission; filled by `passes.draw_direction_factors`
     weight_bindings : resources of translucency_weights.wgsl for transmitted light
     loss_bindings : resources of translucency_weights.wgsl for the diffused light that thin tissue does not
         return

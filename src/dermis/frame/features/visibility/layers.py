@@ -51,12 +51,12 @@ class ViewLayers:
 
     A single view gets two layers, because OpenGL does not treat a texture of one layer as an array.
 
-    texture : depth as float (1 near, 0 nothing), or triangle index plus 1 as integer if `triangles`
+    texture : depth as float (1 near, 0 nothing), or triangle index plus 1 as integer if `triangles` is true
     size : (width, height) of each layer [pixels]
     count : number of layers in use
     triangles : whether layers store triangle indices instead of depth
-    depth : depth attachments of the rasteriser: one for each layer, or a single attachment if
-        `triangles`
+    depth : depth attachments of the rasteriser: one for each layer, or a single attachment if `triangles` is
+        true
     targets : colour targets of the rasteriser, one for each layer; None for layers of depth
     nearness : buffer of the compute pass: depth at each sample, in some modes packed with the triangle index
     triangle_ids : buffer of the compute pass: triangle index at each sample, allocated on first use
@@ -260,7 +260,7 @@ def _views_record(
 
 
 def _max_distance_per_depth_mm(clip_matrix: Matrix) -> float:
-    """Return the largest change of distance per unit of z-buffer depth, as an upper bound [mm].
+    """Return an upper bound of the change of distance per unit of z-buffer depth [mm].
 
     If depth is stored as an integer, the error of the distance is at most this bound divided by the number of
     integer steps.

@@ -93,8 +93,9 @@ class PaintInputs(NamedTuple):
     tables : tables of procedural noises, layers of dots on the skin (such as freckles, moles and stubble),
         facial zones, folds of the skin, and the hairline
     colours : (3, n, n, 3) colour tables, linear Rec. 709 [-]. Table 0 is for skin with the lowest oxygen
-        saturation, table 1 for skin with the highest, and table 2 for lips. The rows of a table are for
-        evenly spaced square roots of the melanin fraction, the columns for those of the blood fraction
+        saturation, table 1 for skin with the highest, and table 2 for lips. In a table, the square root of
+        the melanin fraction increases evenly from row to row, and the square root of the blood fraction from
+        column to column
     surface : mesh that is painted
     """
 

@@ -1,1 +1,1 @@
-"""Search for pairs of surface cells between which light passes through thin tissue, by shaders."""
+"""Search by shaders for pairs of surface cells on opposite sides of thin tissue."""

@@ -1,4 +1,4 @@
-"""Search for pairs of surface cells between which light passes through thin tissue.
+"""Search for pairs of surface cells on opposite sides of thin tissue, through which light passes.
 
 The cells are grouped into tiles, and tiles into blocks. Only pairs of tiles with opposed normals are
 searched.
@@ -96,14 +96,14 @@ def list_offsets(list_lengths: Index) -> Index:
 
 @dataclass(frozen=True, eq=False)
 class TilePairs:
-    """Pairs of tiles between which light may pass through thin tissue.
+    """Pairs of tiles that may be on opposite sides of thin tissue.
 
     A tile is a square of cells of the atlas.
 
     bounds : buffer of the bounding box and normal cone of each tile
     tile : (t,) indices of the tiles that are in at least one pair
     first : (t + 1,) offsets into `partners`; the partners of tile[i] are from first[i] up to first[i + 1]
-    partners : buffer of the tiles with which each tile is paired
+    partners : buffer of the indices of the tiles that form pairs with each tile
     """
 
     bounds: Buffer
@@ -113,7 +113,7 @@ class TilePairs:
 
 
 def find_tile_pairs(passes: SearchPasses, surface_bindings: Bindings, cells: Cells) -> TilePairs:
-    """Find the pairs of tiles between which light may pass through thin tissue.
+    """Find the pairs of tiles that may be on opposite sides of thin tissue.
 
     A tile is a square of cells of the atlas.
 
@@ -158,7 +158,7 @@ def _find_block_pairs(
 
 @dataclass(frozen=True, eq=False)
 class CandidateCells:
-    """Cells between which light may pass through thin tissue, ordered by the tiles that contain them.
+    """Cells that may be on opposite sides of thin tissue, ordered by the tiles that contain them.
 
     receiver : (r,) cells that receive light, as indices into `Cells.receivers`
     source : (s,) indices of the cells that emit light
@@ -296,11 +296,11 @@ def upload_sources(device: Device, cells: Cells, source_cells: Index) -> tuple[B
 
 @dataclass(frozen=True, eq=False)
 class PairTable:
-    """Pairs of cells between which light passes through thin tissue, ordered by receiver.
+    """Pairs of a source cell and a receiver cell on opposite sides of thin tissue, ordered by receiver.
 
     receiver : (m,) cells that receive light from at least one source, as indices into `Cells.receivers`
     first : (m + 1,) offsets into `pairs`; the pairs of receiver[i] are from first[i] up to first[i + 1]
-    source : (n,) cells that emit light in at least one pair
+    source : (n,) indices of the cells that emit light in at least one pair
     pairs : buffer of three words for each pair: source, receiver, and the offset in the atlas between the two
     """
 
@@ -311,9 +311,9 @@ class PairTable:
 
 
 def search_pairs(device: Device, surface_bindings: Bindings, cells: Cells) -> PairTable | None:
-    """Return all pairs of cells between which enough light passes, None if a buffer is too small.
+    """Return all pairs of cells that exchange enough light, None if a buffer is too small.
 
-    surface_bindings : resources of geometry.wgsl for the shape to search in, and of the atlas
+    surface_bindings : resources of geometry.wgsl and of the atlas, for the shape that is searched
     """
     passes = SearchPasses(device, cells)
     tile_pairs = find_tile_pairs(passes, surface_bindings, cells)
