@@ -318,7 +318,7 @@ class GroupNames(NamedTuple):
 
 
 class FileSurfaceData(NamedTuple):
-    """Data with which the materials and pictures of a mesh file are applied to the mesh read from it.
+    """Data needed to apply the materials and pictures of a mesh file to the mesh that was read from the file.
 
     in_file : (m,) index in the file of each material of the mesh, -1 for a material that is not in the file
     has_uv : (m,) mask of materials whose triangles have uv in the file

@@ -86,7 +86,7 @@ def height_map(path: PathLike, relief_mm: np.float32) -> Floats:
 
 
 def mixture_map(path: PathLike) -> Floats:
-    """Read a map (H, W, 2) of the fractions of two further diffusion profiles, mixed with the main profile.
+    """Read a map (H, W, 2) with the fractions of two diffusion profiles that are mixed with the main profile.
 
     At each texel, the two fractions and the fraction of the main profile sum to 1. If the two fractions in
     the picture sum to more than 1, they are scaled so that their sum is 1.
@@ -233,8 +233,8 @@ def load_maps(
         is ignored
     normal : tangent-space normals, red towards +u, green as given by `normal_y`
     height : grey, white outwards; requires `height_mm`
-    height_mm : height difference between white and black, divided by 255: for an 8-bit map, the height of
-        one grey level [mm]
+    height_mm : height of one grey level of an 8-bit map [mm]; for a map of any bit depth, 1/255 of the height
+        difference between white and black
     specular, roughness : grey, linear values without sRGB conversion
     region : 8-bit grey labels of the regions of the face
     normal_y : "up" if green points towards row 0 (OpenGL, Blender), "down" if away from row 0 (DirectX)

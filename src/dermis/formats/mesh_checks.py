@@ -17,9 +17,11 @@ from dermis.mesh.rig import Rig
 
 UV_TOLERANCE = 1e-4
 MAX_DISTANCE_FROM_ORIGIN_MM = 1e6
-"""Largest distance from the origin: beyond a kilometre single precision is too coarse for skin [mm]."""
+"""Largest distance of a vertex from the origin along an axis [mm]. Beyond a kilometre, the rounding errors of
+single precision are too large for skin."""
 MIN_RELATIVE_AREA = 1e-6
-"""Ratio of a triangle's area to its squared longest side below which single precision is too coarse [-]."""
+"""Limit of the ratio of a triangle's area to the square of its longest side [-]. Triangles with a smaller
+ratio count as triangles without area, because single precision is too coarse for them."""
 _UNIT_ADVICE = "Set the millimetres per unit of the file with --unit-mm"
 
 
@@ -31,7 +33,7 @@ def check_mesh(mesh: Mesh, error_subject: object, *, has_pictures: bool = False)
         packed into a new uv layout later
 
     Raises `DermisError` for numbers that are not finite, indices out of range, uv outside [0, 1], degenerate
-    triangles, edges of more than two triangles, and a mesh without skin.
+    triangles, edges shared by more than two triangles, and a mesh without skin.
     """
     check_arrays(mesh.positions, mesh.uv, mesh.triangles, error_subject)
     for name in ("normals", "dpdu", "dpdv"):

@@ -33,13 +33,16 @@ _MAX_FLAT_FRACTION = 0.5
 _MAX_NON_MANIFOLD_EDGES = 100_000
 """Number of non-manifold edges above which a mesh is refused instead of repaired."""
 _MAX_TRIANGLES_PER_EDGE = 8
-"""Number of triangles at an edge above which it is cut open without a search for sheets that cross it."""
+"""An edge with more triangles is cut open, without a search for surfaces that continue across the edge."""
 _MIN_MEAN_CONVEXITY_COSINE = -0.05
-"""Mean cosine of normals and directions from the centroid: below it, a component may be inside out [-]."""
+"""Limit of the mean cosine between a component's normals and the directions from its centroid [-]. If the
+mean cosine is smaller, the component may be inside out."""
 _MAX_COSINE_OF_OPPOSITE_NORMALS = -0.5
-"""Mean cosine of the file's normals and the triangles' normals: below it, they count as opposite [-]."""
+"""Limit of a component's mean cosine between the normals in the file and the normals of the triangles [-]. If
+the mean cosine is smaller, the two kinds of normals count as opposite."""
 _MIN_VISIBILITY_BALANCE = 0.25
-"""Absolute visible balance above which the more visible side of a component is its outer side [-]."""
+"""Limit of the absolute value of the number that `visible_sides` returns for a component [-]. If the absolute
+value is larger, the more visible side of the component counts as its outer side."""
 _MIN_VISIBLE_SAMPLES = 8
 _MIN_VIEW_COSINE = 0.05  # smallest cosine of normal and view; surfaces seen at grazing angles do not count
 _MIN_VISIBLE_FRACTION = 0.02  # smallest ratio of visible samples to those visible without other components
@@ -47,7 +50,7 @@ _VIEW_COUNT, _CELLS_PER_VIEW_SIDE = 20, 64  # views from outside, and cells alon
 _VISIBILITY_SAMPLE_COUNT = 120_000  # points on the mesh whose visibility is tested
 _DOUBTFUL_SAMPLE_FRACTION = 0.25  # reserved for components that may be inside out
 _MAX_UV_EXCESS = 0.02
-"""Largest distance of uv from [0, 1] at which they are clamped [-]."""
+"""Largest distance outside [0, 1] at which uv are still clamped to [0, 1] [-]."""
 _UNLIMITED_UV_PERIOD = 1e9
 _UV_PERIOD_OF_WRAP: dict[Wrap, float] = {"repeat": 1.0, "mirror": 2.0, "clamp": _UNLIMITED_UV_PERIOD}
 
@@ -102,7 +105,7 @@ class RawMesh:
         return _group_sides(self.corner_points)
 
     def with_triangles(self, triangle_mask: Mask) -> RawMesh:
-        """Return the mesh with the triangles that a mask (f,) selects."""
+        """Return the mesh with only those triangles that a mask (f,) selects."""
         quads = (np.cumsum(triangle_mask) - 1)[self.quads[triangle_mask[self.quads].all(axis=1)]]
         return replace(
             self, triangles=self.triangles[triangle_mask], material=self.material[triangle_mask], quads=quads
@@ -151,10 +154,10 @@ def repair_mesh(
 ) -> tuple[RawMesh, tuple[str, ...]]:
     """Return a mesh without the faults that can be repaired, and a note on each fault.
 
-    Degenerate and repeated triangles are dropped. Sheets of the surface that meet at non-manifold edges (of
-    more than two triangles) are separated. Connected components that are wound inside out are reversed, and
-    inward normals are turned outwards. uv slightly outside [0, 1] are clamped, and uv charts in other tiles
-    are moved to [0, 1]. A mesh without faults is returned unchanged.
+    Degenerate and repeated triangles are dropped. Sheets of the surface that meet at non-manifold edges
+    (shared by more than two triangles) are separated. Connected components that are wound inside out are
+    reversed, and inward normals are turned outwards. uv slightly outside [0, 1] are clamped, and uv charts in
+    other tiles are moved to [0, 1]. A mesh without faults is returned unchanged.
 
     materials : for each material of the mesh, its description in the file; None for a material without
         description

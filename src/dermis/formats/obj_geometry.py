@@ -84,7 +84,7 @@ OBJ_PROPERTIES = (
     ),
     noted_property("other statements"),
 )
-"""Statements of OBJ files; `parse_geometry` reads those that are drawn, and `s`."""
+"""Statements of OBJ files. `parse_geometry` reads the statements that are listed as drawn, and `s`."""
 _USED_STATEMENTS = {*keys_of(OBJ_PROPERTIES, "drawn", "drawn with a note"), "s"}
 _STATEMENTS_WITHOUT_EFFECT = keys_of(OBJ_PROPERTIES, "no effect")
 _KIND_OF_LEFT_OUT_STATEMENT = {key: kind for kind, keys in _LEFT_OUT_STATEMENTS.items() for key in keys}
@@ -324,9 +324,9 @@ def _first_non_numeric(statement_rows: _StatementRows, dtype: type[np.float64] |
 
 
 def _parse_faces(path: Path, rows_of_statement: Mapping[str, _StatementRows]) -> tuple[Index, Index]:
-    """Return the number of corners of each face, and the indices (c, 3) of each corner.
+    """Return the number of corners of each face, and three indices for each of the c corners, (c, 3).
 
-    The indices are those of position, uv and normal; a missing uv or normal has the index -1.
+    The three indices select the position, the uv and the normal. A missing uv or normal has the index -1.
     """
     faces = rows_of_statement["f"]
     slash = faces.text == _SLASH

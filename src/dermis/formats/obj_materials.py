@@ -28,9 +28,10 @@ TEXTURE_ROLES = {
     "map_bump": "bump",
     "bump": "bump",
 }
-"""Roles of pictures by the statements of .mtl files; "bump" may contain heights or normals."""
+"""Dictionary from a statement of .mtl files, in lower case, to the role of the picture that it references. A
+picture with the role "bump" contains heights or normals."""
 NUMERIC_STATEMENTS = {"kd": 3, "ke": 3, "d": 1, "tr": 1, "pr": 1, "pm": 1, "ns": 1}
-"""Number of values that each numeric statement of a material needs, by the statement in lower case."""
+"""Dictionary from a numeric statement of .mtl files, in lower case, to the number of values that it needs."""
 MTL_PROPERTIES = (
     drawn_property("`newmtl`", "begins a material", "newmtl"),
     drawn_property("`Kd`", "linear colour; a grey of 0.8 counts as none", "Kd"),

@@ -129,7 +129,7 @@ class _ListColumn(NamedTuple):
 class _Header(NamedTuple):
     """Header of a PLY file.
 
-    order : byte order as in NumPy types, "=" for text
+    order : byte order of the numbers, "<" or ">" as in NumPy types; "=" for a text file
     size : size of the header [bytes]
     pictures : file names of pictures, which the comments of the header state
     """
@@ -292,7 +292,7 @@ def _read_elements(path: Path, header: _Header, ply_data: Bytes) -> dict[str, _C
 class _ElementReader:
     """Reader of the rows of an element.
 
-    order : byte order as in NumPy types
+    order : byte order of the numbers, "<" or ">" as in NumPy types; "=" for a text file
     is_text : whether `data` holds the numbers of a text file, converted to float64
     """
 
@@ -382,7 +382,7 @@ class _ElementReader:
     def _lists_have_equal_lengths(
         self, byte_position: int, row_bytes: int, list_steps: Sequence[_ListStep], list_lengths: Index
     ) -> bool:
-        """Return whether the lists of all rows are as long as in the first row.
+        """Return whether the lists in every row have the same lengths as the lists in the first row.
 
         byte_position : position of the first row [bytes]
         row_bytes : size of the first row [bytes]

@@ -140,7 +140,9 @@ def refuse_without_faces(path: Path, point_count: int) -> NoReturn:
 
 
 def triangulate(corner_counts: Index, triangle_order: TriangleOrder) -> tuple[Index, Index]:
-    """Triangulate polygons as fans; return the corners of triangles (f, 3), and the halves of quads (q, 2).
+    """Triangulate polygons as fans; return triangles, and the pairs of triangles that are halves of quads.
+
+    Each triangle (f, 3) is three indices of corners, and each pair (q, 2) is two indices of triangles.
 
     corner_counts : (n,) number of corners of each polygon; corners are numbered consecutively
     triangle_order : "by polygon", or "by kind": all triangles first, then the first halves of all quads, then

@@ -13,8 +13,8 @@ from dermis.formats.size_limits import DAMAGED_ADVICE
 from dermis.mesh.rig import BONES_PER_POINT, MorphTargets, Rig, Skeleton, no_targets
 
 COINCIDENCE_TOLERANCE_MM = 0.01
-"""Distance beyond which coincident vertices that a morph target moves apart become separate points, such as
-those of touching lips [mm]."""
+"""Coincident vertices become separate points if a morph target moves them farther apart than this distance
+[mm]. Vertices of touching lips are an example."""
 _MAX_COINCIDENT_VERTICES = 64  # vertices at one position that move differently
 _BONE_WEIGHT_TOLERANCE = 0.004  # one step of 8-bit weights
 _MIN_DISPLACEMENT_MM = 1e-4  # smaller displacements are rounding errors and count as 0

@@ -11,14 +11,14 @@ DAMAGED_ADVICE = "The file is damaged: export it again"
 DECIMATE_ADVICE = "Decimate it (in Blender: Modifiers > Decimate)"
 
 MAX_FILE_BYTES = 512 << 20
-"""Largest mesh file, and largest total size of the buffers of a glTF file."""
+"""Largest size of a mesh file, and largest total size of the buffers of a glTF file [byte]."""
 MAX_TRIANGLES = 1_250_000
 """Largest total number of triangles in all groups; the parametric human has at most 856,064."""
 MAX_VERTICES = 1_250_000
 MAX_POLYGON_CORNERS = 4096
 """Largest number of corners of a polygon."""
 MAX_GROUPS = 4096
-"""Largest number of materials, groups, or primitives of a glTF scene."""
+"""Largest number of groups of an OBJ file, meshes of a USD file, or primitives of a glTF scene."""
 MAX_RELIEF_MM = 1.0
 """Largest height difference of one grey level of an 8-bit height map [mm]."""
 MAX_NODES, MAX_NODE_DEPTH = 1 << 16, 1024
@@ -31,11 +31,11 @@ MAX_TARGETS = 4096
 MAX_ANIMATION_CURVES = 1 << 14
 """Largest number of curves of an animation clip."""
 MAX_ACCESSOR_COMPONENTS = 1 << 27
-"""Largest number of accessor components that are read in total; each read counts as at least 512."""
+"""Largest total number of accessor components that are read; each read counts as 512 components or more."""
 MAX_JSON_VALUES = 1 << 21
 """Largest number of values in the JSON tree of a glTF file."""
 MAX_MTL_BYTES = 4 << 20
-"""Largest total size of the .mtl files of an OBJ file."""
+"""Largest total size of the .mtl files of an OBJ file [byte]."""
 MAX_MTL_FILES = 64
 """Largest number of .mtl files of an OBJ file."""
 

@@ -26,10 +26,10 @@ _PRIMARIES: dict[str, tuple[float, ...]] = {
 """Chromaticities x, y of red, green, blue and white."""
 _ADOBE_GAMMA = 563 / 256
 _CODED_PRIMARIES = {1: "Rec. 709", 2: "Rec. 709", 5: "PAL", 6: "Rec. 601", 9: "Rec. 2020", 12: "Display P3"}
-"""Name in `_PRIMARIES` by the number of the primaries in ITU-T H.273."""
+"""Dictionary from code points of primaries in ITU-T H.273 to names in `_PRIMARIES`."""
 _CODED_GAMMAS = {1: None, 2: None, 4: 2.2, 5: 2.8, 6: None, 8: 1.0, 13: None, 14: None, 15: None}
-"""Gamma by the number of a transfer function in ITU-T H.273; None for sRGB and for the curves of video, which
-programs display as sRGB."""
+"""Dictionary from code points of transfer functions in ITU-T H.273 to gammas; None for sRGB and for the
+curves of video, which programs display as sRGB."""
 _HDR_CURVES = {16: "PQ", 18: "HLG"}
 _CURVE_LEVEL_COUNT, _MAX_CURVE_LEVEL = 65536, 65535
 _CURVE_SAMPLE_LEVELS = np.linspace(0.0, 1.0, _CURVE_LEVEL_COUNT)

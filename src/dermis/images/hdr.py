@@ -44,7 +44,8 @@ _RADIANCE_HEADER_DEFAULTS = {
     "GAMMA": [1.0],
     "PIXASPECT": [1.0],
 }
-"""Names of numbers in a header, with their defaults; primaries of 0 are unknown."""
+"""Dictionary from the name of a variable in a Radiance header to the default values of its numbers; primaries
+of 0 are unknown."""
 _UNUSED_RADIANCE_HEADER_NAMES = ("GAMMA", "PIXASPECT")  # named in a note if they are not 1
 EXR_PROPERTIES = (
     drawn_property("half, float, 32-bit integers; all kinds of compression; scan lines, tiles"),
@@ -85,9 +86,9 @@ _MAX_RADIANCE_HEADER_BYTES = 1 << 16
 _PIXELS_PER_STRIP = 1 << 18  # pixels decoded at a time
 _MAX_LITERAL_RUN = 128  # codes up to this count literal bytes, larger codes are runs
 _DECODED_BYTES_BY_RUN_CODE = [k if k <= _MAX_LITERAL_RUN else k - _MAX_LITERAL_RUN for k in range(256)]
-"""Number of decoded bytes by code."""
+"""Number of bytes to which each run-length code, from 0 to 255, is decoded."""
 _ENCODED_BYTES_BY_RUN_CODE = [k + 1 if k <= _MAX_LITERAL_RUN else 2 for k in range(256)]
-"""Number of stored bytes by code: the code itself and its data."""
+"""Number of bytes that each run-length code, from 0 to 255, takes in the file, including its data."""
 
 
 def decode_exr(file_bytes: bytes) -> Floats:

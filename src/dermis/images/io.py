@@ -49,7 +49,7 @@ _UNSUPPORTED_FORMATS_BY_SIGNATURE = {
     b"\0\0\0\x0cJXL ": "JPEG XL",
     b"\0\0\0\x0cjP  ": "JPEG 2000",
 }
-"""Formats that are not read, by their first bytes."""
+"""Dictionary from the first bytes of a file to the name of its format, for formats that are not read."""
 UNSUPPORTED_PICTURE_PROPERTIES = (
     refused_property(", ".join(dict.fromkeys(_UNSUPPORTED_FORMATS_BY_SIGNATURE.values())), "by name"),
 )
@@ -214,9 +214,9 @@ def _apply_format_function(
     radiance_function: Callable[[bytes], T],
     default_function: Callable[[bytes], T],
 ) -> T:
-    """Call the function for the format of a picture file with the bytes of the file; return its result.
+    """Call the function that handles the format of a picture file; return the result of the function.
 
-    The format is recognised by the first bytes of the file.
+    The function gets `file_bytes`. The format is recognised by the first of these bytes.
 
     file_bytes : bytes of the file
     exr_function : function for OpenEXR files

@@ -46,7 +46,7 @@ _FORMATS_BY_SIGNATURE = {PNG_SIGNATURE: "PNG", b"\xff\xd8\xff": "JPEG"} | dict.f
 _FORMATS_BY_BRAND = {b"avif": "AVIF", b"avis": "AVIF"} | dict.fromkeys(
     (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"hevm", b"hevs"), "HEIC"
 )
-"""Formats by brand of the container that AVIF and HEIC share."""
+"""Dictionary from the brand in a file to the picture format; AVIF and HEIC share one container format."""
 PICTURE_PROPERTIES = (
     drawn_property(
         ", ".join(dict.fromkeys((*_FORMATS_BY_SIGNATURE.values(), "WebP", *_FORMATS_BY_BRAND.values()))),

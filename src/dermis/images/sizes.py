@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 MAX_FILE_BYTES = 256 << 20
-"""Largest size of a picture file."""
+"""Largest size of a picture file [byte]."""
 MAX_PIXELS = 8192**2
 """Largest number of pixels of a picture: the size of the largest texture that every device supports."""
 MAX_TOTAL_PIXELS = 2 * MAX_PIXELS

@@ -14,13 +14,14 @@ from dermis.images.colour import decode_srgb, delta_e_2000, lab
 SKIN_CLASS_DISCLAIMER = (
     "ITA and the nearest classes describe this colour, not a person, ancestry or risk of sunburn"
 )
-"""Statement for users, beside the numbers."""
+"""Statement that users see beside the numbers."""
 _ITA_CENTRE_LIGHTNESS = 50.0  # L* of the pivot of the angle
 _MONK_SRGB = (
     "f6ede4", "f3e7db", "f7ead0", "eadaba", "d7bd96", "a07e56", "825c43", "604134", "3a312a", "292420",
 )  # fmt: skip
 _MIN_ITA_OF_FITZPATRICK_TYPES = (("I", 55.0), ("II", 41.0), ("III", 28.0), ("IV", 10.0), ("V", -30.0))
-"""Type and the ITA above which a colour is assigned to it; VI is below all [degrees]."""
+"""Fitzpatrick types, each with a limit: the individual typology angle (ITA) of its colours is larger than
+this limit [degrees]. Type VI has no limit."""
 
 
 class SkinTone(NamedTuple):

@@ -14,9 +14,9 @@ from dermis.base.arrays import Numbers
 from dermis.formats.gltf.document import FrozenTree, Tree
 
 VERTEX_TARGET, INDEX_TARGET = 34962, 34963
-"""Kinds of data in a buffer view, which glTF calls its target."""
+"""Codes for vertex data and for triangle indices in a buffer view; glTF calls such a code a target."""
 CLAMPED_SAMPLER = {"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071}
-"""Sampler with mip levels and without repetition."""
+"""glTF texture sampler with mip levels; the texture is not repeated beyond its edges."""
 _COMPONENT_TYPES = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
 _ELEMENT_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 _MAX_UINT16_VERTICES = 65535  # most vertices with 16-bit indices, of which 65535 means primitive restart

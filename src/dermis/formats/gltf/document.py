@@ -23,7 +23,7 @@ from dermis.formats.size_limits import MAX_ACCESSOR_COMPONENTS, MAX_FILE_BYTES, 
 
 Tree = dict[str, Any]
 FrozenTree = Mapping[str, Any]
-"""JSON of another program, whose values are checked where they are used."""
+"""JSON object written by another program; its values are checked where they are used."""
 
 _GLB_MAGIC = 0x46546C67
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942

@@ -65,8 +65,9 @@ class SkinMaterialAdditions:
 def encode_skin_maps(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], Tree]:
     """Return the maps of a skin as PNG files, and their description for the extras of the glTF material.
 
-    The first dictionary contains the PNG file of each picture by its name. The second contains an entry
-    {"index": name of the picture} for each map by its role. `embedded_materials` reads these entries.
+    The first result is a dictionary from picture name to PNG file. The second result is a dictionary from
+    the role of a map to {"index": picture name}; if there is a height map, it also contains "height_mm".
+    `embedded_materials` reads these entries.
 
     slopes : (n, n, 2) slopes of the relief, which become a normal map for other programs if `maps` contains
         no normal map

@@ -33,7 +33,7 @@ from dermis.formats.size_limits import MAX_RELIEF_MM
 from dermis.images.io import EmbeddedPicture
 
 EMBEDDED_MAP_ROLES = ("normal", "height", "specular", "roughness", "region")
-"""Maps besides the colour that files of this package store in the extras of the skin's material."""
+"""Roles of maps, besides the colour map, that this package stores in the extras of the skin's material."""
 _WRAP_OF_GLTF_CODE: Mapping[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 _NEAREST_FILTER = 9728
 _SOURCE_EXTENSIONS = ("EXT_texture_webp", "EXT_texture_avif")

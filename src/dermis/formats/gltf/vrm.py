@@ -118,7 +118,7 @@ class _TargetBind(NamedTuple):
 
 
 def _vrm_0_binds(document: Document, vrm_extension: Tree) -> Iterator[_TargetBind]:
-    """Yield the morph targets of all expressions in a VRM 0.x file, where weights are percentages.
+    """Yield the morph targets of all expressions in a VRM 0.x file; weights are converted from percent.
 
     vrm_extension : VRM extension of the file
     """

@@ -30,7 +30,8 @@ from dermis.mesh.head import Head
 from dermis.mesh.skeleton import Skeleton
 
 BROWS, HAIR = "brows and lashes", "hair"
-"""Names of the materials and pictures of hairs."""
+"""Names of two materials: one for brows and lashes, one for all other hair. Their pictures have the same
+names."""
 _KNOTS_PER_HAIR = {BROWS: 5, HAIR: 4}
 _MAX_EXPORTED_HAIRS = 16_000  # more hairs are represented by fewer, wider ones
 _METRES_PER_MM = 1e-3

@@ -17,7 +17,7 @@ from dermis.mesh.rotations import matrix_angles, matrix_quaternion, quaternion_m
 from dermis.mesh.skeleton import Skeleton
 
 MAX_CLIP_BYTES = 48 << 20
-"""Largest capture file."""
+"""Largest size of a capture file [byte]."""
 MAX_CAPTURE_FRAMES, MAX_CAPTURE_COLUMNS = 200_000, 500
 """Largest numbers of frames (almost an hour at 60 per second) and of columns in a capture."""
 SECONDS_PER_TIME_KEY: Mapping[str, float | None] = {
@@ -31,9 +31,10 @@ SECONDS_PER_TIME_KEY: Mapping[str, float | None] = {
     "timestampus": 1e-6,
     "timestamp": None,
 }
-"""Unit [s] of a frame's time, by the plain key under which it is stored; None if the key states no unit."""
+"""Dictionary from the key of a frame's time (see `plain_key`) to the unit of the time [s]; None if the key
+states no unit."""
 FRAME_NUMBER_KEYS = ("frame", "frameindex", "framenumber", "frameid")
-"""Plain keys under which the number of a frame is stored."""
+"""Keys (see `plain_key`) under which files store the number of a frame."""
 NEUTRAL_SHAPE_NAME = "_neutral"
 """MediaPipe's score of the neutral face, which is not a blend shape."""
 MAX_STATED_TIME = 1e19
@@ -113,7 +114,7 @@ def capture_clip(error_subject: object, clip_name: str, samples: CaptureSamples,
 
 
 def refuse_unmatched_motion(error_subject: object, capture_names: Sequence[str], head: Head) -> None:
-    """Raise an error for a motion in which no name matches a morph target or bone of the head."""
+    """Raise the error for a motion whose names match no morph target and no bone of the head."""
     targets = _abbreviated_list(head.targets) if head.targets else "none"
     actual = f"it has {_abbreviated_list(capture_names)} and the head {targets}"
     advice = "Use a head with targets of these names, such as those of ARKit"

@@ -30,8 +30,8 @@ class _MatchedTrack(NamedTuple):
     """Animation curve of a track, and the indices of those n bones or morph targets that the head has.
 
     path : property that the track animates: "translation", "rotation", "scale" or "weights"
-    columns : (n,) index of each of the n bones or morph targets in the track
-    indices : (n,) index of each of them in the list that `_matched_names` returns for the whole clip
+    columns : (n,) for each of these n bones or morph targets, its index among the names in the track
+    indices : (n,) for each of them, its index in the list that `_matched_names` returns for the whole clip
     """
 
     path: str

@@ -46,7 +46,7 @@ _MATRIX_KEYS = (
     "facialtransformationmatrices",
 )
 _FACE_KEYS = ("faces", "landmarks", "facelandmarks")
-"""Plain keys of lists with one entry for each face; landmarks are not used."""
+"""Keys (see `plain_key`) of lists with one entry for each face; such a list is not a list of frames."""
 _CATEGORY_LIST_KEYS = ("categories", "classification")
 _MATRIX_DATA_KEYS = ("data", "packeddata", "value")
 _NAME_KEYS = ("categoryname", "label", "name", "displayname")
@@ -66,7 +66,8 @@ class _CapturedFrame(NamedTuple):
     number : number of the frame
     time : time of the frame, in the unit `unit`; NaN if the frame has none
     unit : unit of the time [s]; None if it is not stated
-    columns : (n,) indices of the frame's blend shapes among those of all frames; empty if there is no face
+    columns : (n,) indices of the frame's blend shapes among the blend shapes of all frames; empty if there is
+        no face
     weights : (n,) weights of these blend shapes
     matrix : (4, 4) facial transformation; None if the frame has none
     faces : number of faces in the frame

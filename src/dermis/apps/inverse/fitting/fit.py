@@ -46,8 +46,9 @@ _MIN_SUN_COSINE = -0.35  # smallest cosine between sun and camera directions
 _MELANIN_GRID, _BLOOD_GRID = np.geomspace(0.002, 0.4, 14), np.geomspace(0.002, 0.06, 8)
 _SPECULAR_STRENGTH_GRID = 0.5, 0.75, 1.0
 _MAX_RIVAL_RESIDUAL_RATIO, _GRID_NODES_BESIDE_MINIMUM = 2.0, 2
-"""Ratio of the squared residual of a local minimum of the coarse search to the smallest one, up to which a
-fit also starts there, and half width of the range of melanin around it in nodes of the grid."""
+"""A fit also starts at a local minimum of the coarse search if its squared residual is less than the first
+number times the smallest squared residual. The second number says how many nodes of the melanin grid
+on each side of the minimum this fit may use."""
 _SUN_RING_DEGREES, _SUNS_PER_RING = (9.0, 18.0), 6
 """Angular radii of rings around a sun of the coarse search, and number of directions on each ring. The suns
 of the coarse search are 35 degrees apart."""
@@ -55,8 +56,8 @@ DEFAULT_NOISE = 0.02
 DEFAULT_SIDE, DEFAULT_ATLAS, SHADOW_SIZE = 128, 256, 512
 _MIN_SKIN_PIXELS = 200
 _MAX_BLOCK_RESIDUAL = 0.1
-"""Median relative residual of blocks above which a picture probably does not show the head, see docs/fit.md
-[-]."""
+"""Limit of the median relative residual over blocks of a picture [-]. A picture with a larger residual
+probably does not show the head, see docs/fit.md."""
 WhitePoint = Sequence[float] | Literal["specular"]
 
 
@@ -169,8 +170,7 @@ class CoarseSearch:
     def _select_suns(self, log_parameters: Floats, sun_count: int) -> list[int]:
         """Return the indices of `sun_count` candidate suns, chosen greedily one after the other.
 
-        Each of them is the candidate that lowers the residual more than any other candidate would, together
-        with the suns that are already chosen.
+        Each step adds the candidate that gives the smallest residual together with the suns chosen before.
 
         log_parameters : (4,) logarithms of the skin parameters, see `FitUnknowns`
         """
@@ -252,7 +252,7 @@ def fit(
     robust : float
         Number of standard deviations beyond which residuals have less weight [Huber1964].
     side : int
-        Longer side to which the photograph is reduced for the fit [pixel].
+        Largest length of the photograph's longer side; a larger photograph is reduced for the fit [pixel].
     atlas : int
         Side of the renderer's atlas [texel].
     adapter : str
@@ -357,7 +357,8 @@ def warn_of_poor_fit(photo_source: object, median_residual: float) -> None:
 def _find_skin(face_renderer: FaceRenderer, photo: Photograph) -> FitUnknowns:
     """Set the renderer's mask to the pixels of lit skin; return the unknowns with which the search starts.
 
-    They are the median skin parameters of the priors, and the directions of all candidate suns.
+    The unknowns are the medians of the priors of the skin parameters, and the directions of all candidate
+    suns.
     """
     camera = face_renderer.scene.camera
     view_direction = np.subtract(camera.position, camera.target)

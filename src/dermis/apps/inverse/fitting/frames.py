@@ -50,7 +50,8 @@ class FaceRenderer:
         """Set the mask (h, w) to the pixels of skin that are neither clipped nor seen at grazing angles.
 
         fit_unknowns : unknowns of the fit, of which only the skin parameters are used
-        unclipped_pixels : (h, w) fraction of each pixel of the photograph in which no channel is clipped
+        unclipped_pixels : (h, w) for each pixel of the photograph, the fraction of its area that is opaque
+            and has no clipped channel
         """
         scene = with_skin(self._scene_with_lights(()), fit_unknowns)
         scene = replace(scene, lights=sun_lights(np.array([[0.0, 0.0, 1.0]]), [1.0], np.ones(3)))

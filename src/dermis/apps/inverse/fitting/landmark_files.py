@@ -27,14 +27,15 @@ _SETS_BY_LANDMARK_COUNT: Mapping[int, tuple[str, range]] = {
     468: ("mediapipe", range(468)),
     478: ("mediapipe", range(478)),
 }
-"""By the number of landmarks in a file: the name of the landmark set, and the numbers of the landmarks in
-that set, in the order of the file."""
+"""Dictionary from the number of landmarks in a file to the name of their landmark set, and to the number of
+each landmark within this set, in the order of the file."""
 _DETECTOR_FIVE_LANDMARKS = ("face-synthetics-70", (68, 69, 30, 48, 54))
-"""Landmark set and numbers of the five landmarks of face detectors: the eyes, the tip of the nose and the
-corners of the mouth; eyes and corners from left to right in the picture."""
+"""Landmark set of the five landmarks of face detectors, and their numbers within this set: the two eyes, the
+tip of the nose and the two corners of the mouth. Eyes and corners are ordered from left to right in the
+picture."""
 _DLIB_FIVE_LANDMARKS = ("ibug-68", (45, 42, 36, 39, 33))
-"""Landmark set and numbers of the five landmarks of dlib: outer and inner corner of the eye on the right of
-the picture, outer and inner corner of the other eye, and base of the nose."""
+"""Landmark set of the five landmarks of dlib, and their numbers within this set: outer and inner corner of
+the eye on the right of the picture, outer and inner corner of the other eye, and base of the nose."""
 _MAX_EYE_LINE_DEVIATION = 0.2  # largest distance of dlib's eye corners from a line, relative to their spread
 _KNOWN_LANDMARK_COUNTS = ", ".join(map(str, (5, *_SETS_BY_LANDMARK_COUNT)))
 _JSON_LIST_KEYS = ("facelandmarks", "multifacelandmarks", "landmarks", "landmark", "value")
@@ -59,8 +60,8 @@ class _FileLandmarks(NamedTuple):
 def read_landmarks(path: str | Path, photo_size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
     """Read landmarks in a photograph; return the name of the landmark set and the landmarks' positions.
 
-    The positions are a dictionary from landmark name to pixel coordinates (2,). The centre of the first pixel
-    has the coordinates 0, 0; in .pts files it has 1, 1.
+    The positions are a dictionary from landmark name to pixel coordinates (2,). In the result, the centre of
+    the first pixel has the coordinates 0, 0. In .pts files it has 1, 1; this is converted.
 
     photo_size : width and height of the photograph; relative coordinates are multiplied by it [pixel]
 

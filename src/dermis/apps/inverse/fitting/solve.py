@@ -24,8 +24,8 @@ from dermis.base.renamed import renamed_attribute
 from dermis.optics.media import Floats
 
 _NOISE_FLOOR_FRACTION = 0.03
-"""Radiance that is added to that of a pixel before its standard deviation is computed, relative to the
-photograph's median; it limits the weight of dark pixels [-]."""
+"""Radiance that is added to a pixel's radiance when the pixel's standard deviation is computed, as a fraction
+of the photograph's median radiance [-]. It limits the weight of dark pixels."""
 ROBUST_LIMIT_SD = 3.0
 """Number of standard deviations above which the weight of a residual decreases [Huber1964]."""
 NO_ADDITIONAL_SD: Mapping[str, float] = MappingProxyType({})
@@ -64,7 +64,7 @@ class FitProblem:
     """Photograph to fit, with its noise, and the renderer of the face.
 
     frames : renderer of the face
-    target : (p, 3) values of the p pixels of the photograph that are fitted (those in the mask of `frames`),
+    target : (p, 3) values of the photograph at the p fitted pixels (the pixels in the mask of `frames`),
         divided by the exposure and by the light colour that the user gives
     noise : relative standard deviation of a pixel [-]
     free_white : whether the colour of the light is an unknown
@@ -267,10 +267,11 @@ class Uncertainty:
     sd : dictionary from name of an unknown to its standard deviation, which includes errors of the renderer
         and of assumed skin parameters. Directions have standard deviations of angles [rad]; skin parameters
         and the light's colour have standard deviations of logarithms
-    undetermined : unknowns whose standard deviation exceeds half that of their prior, and unknowns at a limit
+    undetermined : unknowns at a limit, and unknowns whose standard deviation is more than half the standard
+        deviation of their prior
     correlated : pairs of unknowns that the photograph cannot separate, with their correlation
-    singular_values : singular values of the weighted derivatives, with each unknown in standard deviations of
-        its prior, largest first
+    singular_values : singular values, largest first, of the weighted derivatives of the radiance with respect
+        to the unknowns, each unknown being measured in standard deviations of its prior
     """
 
     sd: dict[str, float]
@@ -291,8 +292,8 @@ def fit_uncertainty(
     Residuals are taken as correlated within blocks of pixels, and as independent otherwise [White1980].
 
     derivatives : (p, 3, u) derivatives of the radiance with respect to the unknowns
-    sd_from_assumed_parameters : dictionary from pigment to the standard deviation of its logarithm that is
-        due to assumed parameters of the skin
+    sd_from_assumed_parameters : dictionary from pigment name to a standard deviation of the pigment's
+        logarithm, which is due to the values assumed for other skin parameters
     """
     sun_angles = 2 * len(fit_state.unknowns.suns)
     suns = [f"sun {k + 1} {axis}" for k in range(sun_angles // 2) for axis in ("across", "along")]

@@ -23,7 +23,7 @@ SUN_DIAMETER_DEGREES = 0.53
 
 @dataclass(frozen=True)
 class SkinUnknown:
-    """Unknown parameter of the skin, of which the logarithm is fitted.
+    """Unknown parameter of the skin; a fit varies its logarithm.
 
     name : name of the parameter
     prior_median : median of the parameter's prior
@@ -58,8 +58,9 @@ SKIN_UNKNOWNS = (
     SkinUnknown("roughness", 0.3, 0.35, 0.05, 1.0, 0.06),
     SkinUnknown("rho_s", 0.7, 0.5, 0.02, 1.0, 0.1),
 )
-"""Unknown parameters of the skin. The priors of pigments are those of measured people; the others are wide:
-roughness covers all regions of a face, and `rho_s` the range from dry skin to a smooth boundary."""
+"""Unknown parameters of the skin. The prior of each pigment is its distribution among measured people. The
+other priors are wide: the prior of the roughness covers all regions of a face, and the prior of `rho_s`
+covers the range from dry skin to a smooth boundary."""
 _PROFILE_LOG_STEP = 0.25
 """Step to which logarithms of pigments are rounded for the diffusion profile, as profiles are slow to fit."""
 SUN_STEP_RAD = 0.02

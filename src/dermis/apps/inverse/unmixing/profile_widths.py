@@ -23,8 +23,8 @@ from dermis.optics.tissue import Tissue, load_tissue
 
 Pixels = NDArray[np.float32]
 PROFILE_GRID_CORNERS = {"profile": (0, 0), "profile_blood": (0, -1), "profile_dark": (-1, -1)}
-"""File name of each profile, with its indices on the grid of melanin and blood: pale skin without blood, pale
-skin with blood, and dark skin with blood."""
+"""Dictionary from the file name of each profile to its indices on the grid of melanin and blood. The profiles
+are those of pale skin with little blood, pale skin with much blood, and dark skin with much blood."""
 WEIGHT_MAP_NAME = "profile_map"
 _PIGMENT_GRID_NODES_PER_AXIS = 4  # number of grid nodes along the logarithms of melanin and of blood
 _PIGMENT_GRID_PERCENTILES = 0.5, 99.5  # percentiles of the pigments of the skin texels, which bound the grid
@@ -37,7 +37,8 @@ _UNIT_SUM_EQUATION_WEIGHT = 1e4  # weight of the equation by which the mixture w
 class ProfileMixture:
     """Three diffusion profiles with the same variances, and a map of their weights.
 
-    profiles : profiles of pale skin without blood, of pale skin with blood, and of dark skin with blood
+    profiles : profiles of pale skin with little blood, of pale skin with much blood, and of dark skin with
+        much blood
     weights : (h, w, 2) weights of the second and the third profile; all weights sum to 1 [-]
     error : (3,) relative root-mean-square error of the mixture over the skins of a grid of pigments, by
         channel. It is the error of the fractions of light that leave the skin through concentric rings around

@@ -20,7 +20,7 @@ from dermis.optics.skin_colours import colour_table
 
 ExtraUnknown = Literal["none", "oxygen", "shade"]
 MIN_REFLECTANCE = 1e-4
-"""Smallest reflectance of which a logarithm is taken, below that of all skins [-]."""
+"""Limit to which smaller reflectances are raised before their logarithm is taken; no skin is as dark [-]."""
 BLOOD_ROOT_MEAN, BLOOD_ROOT_SD = 0.1, 0.1
 """Mean and standard deviation of the prior of the blood fraction's square root. The prior only matters where
 melanin hides the blood."""
@@ -149,7 +149,8 @@ MAX_STEPS = 40  # colours of skin need four to six steps
 _STEP_TOLERANCE = 1e-10
 _MIN_CURVATURE = 1e-9  # added to curvatures, for nodes where an unknown has no effect
 COLOUR_FLOOR = 2e-4
-"""Absolute standard deviation of colours: half a step of 8-bit sRGB near black, in linear light [-]."""
+"""Part of a colour's standard deviation that is equal for all colours: half a step of 8-bit sRGB near black,
+in linear light [-]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,7 +35,8 @@ UNKNOWN_NAMES_BY_SET = {
     "oxygen": PIGMENT_AND_OXYGEN_UNKNOWNS,
     "all": TISSUE_UNKNOWNS,
 }
-"""Names of all fitted parameters, by the word that selects those besides melanin and blood."""
+"""Dictionary from a value of `extra_unknowns` (see `unmix_spectra`) to the names of all parameters that are
+fitted, including melanin and blood."""
 _EXPECTED_TABLE = "a table of reflectance spectra (CSV), a spectrum in each row or in each column"
 _WAVELENGTH_PATTERN = re.compile(r"[^\d.]{0,20}?(\d{3,4}(?:\.\d+)?)\s*(?:nm)?", re.IGNORECASE)
 _MAX_FILE_BYTES = 32 << 20
@@ -165,7 +166,7 @@ class UnmixedSpectra:
     labels : for each spectrum, a dictionary from heading to text, for all cells that are not reflectances
     names : names of the parameters that were estimated
     fit : parameters fitted to the spectra that have no missing values
-    complete : indices in the table of the spectra that have no missing values
+    complete : for each fitted spectrum, its index in the table
     """
 
     labels: list[dict[str, str]]

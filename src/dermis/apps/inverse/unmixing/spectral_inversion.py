@@ -114,7 +114,8 @@ class SpectralFit:
     def delta_e(self, colour_weights: Floats | None = None) -> Floats:
         """Return the CIEDE2000 difference (n,) between the model's colour and the measured colour.
 
-        colour_weights : (3, 31) weights that convert spectra to linear Rec. 709; by default those of D65
+        colour_weights : (3, 31) weights that convert spectra to linear Rec. 709; by default, the weights for
+            the illuminant D65
         """
         w = rgb_weights() if colour_weights is None else colour_weights
         return delta_e_2000(self.model @ w.T, self.measured @ w.T)

@@ -37,7 +37,7 @@ def sd_from_assumed_parameters(
 
     melanin, blood : volume fractions that were estimated from a picture [-]
     skin : parameters that are assumed for unmixing
-    known_parameters : those of the `FIXED_PARAMETERS` that are known for the person
+    known_parameters : names from `FIXED_PARAMETERS` of the parameters whose values are known for the person
     is_oxygen_fitted : whether unmixing also estimates oxygen
     """
     if set(FIXED_PARAMETERS) <= set(known_parameters):
