@@ -46,7 +46,7 @@ _CYCLES_TASK = BlenderTask(
     "Cycles", "to render the scene", "Try bpy 5.0, the version that this is tested with"
 )
 _MAX_STARTUP_S, _MAX_SECONDS_PER_PATH = 300.0, 5e-4
-"""Time limits for the start of Blender and for each path: a hundred times the times on two cores."""
+"""Time limits for the start of Blender and for each path: a hundred times those measured on two cores."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 PIXELS_PER_DEGREE = 67.0
-"""FLIP's default: a 4K screen 0.7 m wide, seen from 0.7 m."""
+"""Resolution at the viewer's eye, as FLIP assumes by default: a 4K screen 0.7 m wide, seen from 0.7 m."""
 ZERO_DIFFERENCE_GREY = 0.5
 """sRGB value that shows equality in `signed_difference`, near the middle of lightness (L* 53)."""
 

@@ -162,7 +162,9 @@ def transmission_table() -> str:
 
 
 def error_against_published_sum(profile: RadialProfile) -> Floats:
-    """Return the relative difference (3,) between a profile and that published in GPU Gems 3, by channel.
+    """Return the relative RMS difference (3,) between a profile and the sum published in GPU Gems 3 [-].
+
+    The sum of Gaussians and the profile are compared in each of the three channels.
 
     The profile is first scaled to a total energy of 1 in each channel.
     """

@@ -92,7 +92,7 @@ def technique_rows(
 ) -> tuple[str, dict[str, Comparison]]:
     """Return a Markdown table with the errors of techniques under each light, and the comparisons by light.
 
-    All techniques are compared, or three of them with the reference "heat".
+    If the reference is "heat", only three techniques are compared; otherwise, all techniques are compared.
 
     reference_name : key of `comparisons.references.REFERENCES`, such as "path-traced"
     medium : published medium of the skin, such as "skin1"

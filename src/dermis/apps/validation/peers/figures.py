@@ -218,7 +218,6 @@ def _equal_error_costs(
     alone is as large as the error of dermis.
 
     mean_image : mean of all images rendered by Cycles with random walks
-
     dermis_row : row of dermis; its error against the reference is the target for Cycles
     """
     reference, levels = scene_renders.reference, list(zip(*scene_renders.cycles["random-walk"], strict=True))

@@ -137,8 +137,10 @@ def cheek_table(archive: Archive, random_people: Mapping[str, RandomPeople]) -> 
 def two_sample_distance(first_sample: Doubles, second_sample: Doubles) -> tuple[float, float, float]:
     """Return the energy distance of two samples, and its mean and 95 % quantile for the null hypothesis.
 
-    The null hypothesis is that both samples are from one population. Its mean and quantile are estimated by
-    permutation.
+    The null hypothesis is that both samples are from one population. The mean and the quantile of the
+    distance are estimated by random permutations of the samples.
+
+    first_sample, second_sample : samples, one value or one row of values for each person
     """
     rng, both = np.random.default_rng(0), np.concatenate([first_sample, second_sample])
     permuted = []
@@ -172,7 +174,7 @@ def site_differences(
 def sites_table(archive: Archive, random_people: Mapping[str, RandomPeople]) -> str:
     """Return a Markdown table of median colours of measured people, by group and site.
 
-    It also has the median colours of randomly sampled people minus these.
+    It also has the differences of randomly sampled people: their median colours minus the measured ones.
     """
     lines = [
         "| group | site | people | archive: L*, a*, b* | drawn minus archive | |",
