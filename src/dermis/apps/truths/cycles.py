@@ -56,7 +56,7 @@ class CyclesPass:
     image : (h, w, 3) radiance, linear Rec. 709
     coverage : (h, w) fraction of each pixel's area that is covered by the head
     samples : paths per pixel
-    seconds : elapsed time; that of the first pass includes the construction of the scene [s]
+    seconds : elapsed time; for the first pass, it includes the construction of the scene [s]
     core_seconds : CPU time, summed over all cores [s]
     version : version of Blender
     """

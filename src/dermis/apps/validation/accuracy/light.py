@@ -81,7 +81,7 @@ def prefiltered_panorama(
 
     The light of a texel is its radiance times its solid angle. Suns are removed from the panorama.
 
-    row_count : number of rows to which the panorama is resampled for the directions and the light
+    row_count : number of rows to which the panorama is resampled before its texels are listed
     """
     radiance = resample_panorama(split_suns(load_panorama(panorama_name))[0], row_count)
     light = radiance * texel_solid_angles(*radiance.shape[:2])[..., None]

@@ -53,7 +53,7 @@ def tissue_by_name(tissue_name: str) -> Tissue:
 def diffusion_models_table() -> str:
     """Return Markdown rows with errors of diffusion models against Monte Carlo, by tissue.
 
-    The errors are those of the total energy, and of the energies in rings around the point of entry.
+    Errors are given for the total energy, and for the energies in rings around the point of entry.
     """
     return "\n".join(row for name in COMPARED_TISSUES for row in _model_rows(name, tissue_by_name(name)))
 

@@ -156,8 +156,8 @@ def lambertian_limit_text(head: Head, medium: str, path_traced_comparison: Compa
     """Return text with the errors of an ideal Lambertian skin against path tracing, under the front light.
 
     The errors are the relative RMSE and the energy ratio. The ideal skin reflects as much light as a
-    half-space does for the same angle of incidence. Its errors show how small those of Lambertian skin can
-    become.
+    half-space does for the same angle of incidence. Its errors show how small the errors of Lambertian
+    skin can become.
 
     path_traced_comparison : comparison with path tracing under the front light
     """

@@ -32,7 +32,7 @@ class RendererRow:
     noise : relative RMS of the noise in the image [-]
     relrmse : relative RMSE against the reference [-]; None for the reference itself
     relrmse_se : standard error of `relrmse`
-    energy_ratio : ratio of the total light to that of the reference [-]; None for the reference itself
+    energy_ratio : total light, divided by the total light of the reference [-]; None for the reference itself
     energy_ratio_se : standard error of `energy_ratio`
     """
 

@@ -157,7 +157,7 @@ def two_sample_distance(first_sample: Doubles, second_sample: Doubles) -> tuple[
 def site_differences(
     archive: Archive, random_people: Mapping[str, RandomPeople]
 ) -> Iterator[tuple[str, str, int, Doubles, Doubles]]:
-    """Yield median colours of measured people, and how those of sampled people differ, by group and site.
+    """Yield median colours of measured people, and differences of sampled people, by group and site.
 
     Each tuple has the group, the site, the number of measured people, their median CIELAB colour (3,), and
     the difference (3,): the median colour of randomly sampled people minus that of measured people.
@@ -195,7 +195,7 @@ def sites_table(archive: Archive, random_people: Mapping[str, RandomPeople]) -> 
 def sex_age_table(archive: Archive, random_people: Mapping[str, RandomPeople]) -> str:
     """Return a Markdown table of how the colour of the cheek differs between sexes and between ages.
 
-    The differences are those of measured people and of randomly sampled people, averaged over the groups.
+    Differences are given for measured people and for randomly sampled people, averaged over the groups.
     """
     lines = ["| difference | archive: L*, a*, b* | drawn |", "|---|---|---|"]
     for name in ("men minus women", "from 55 years minus below 45"):

@@ -128,10 +128,10 @@ def rewrite_measured_page() -> None:
 def _default_skin_errors(archive: Archive) -> JsonObject:
     """Return the errors of fits with two, three and five unknowns, for four choices of the fixed parameters.
 
-    Fixed parameters are those that are not fitted. The keys name their values: "present" for those of the
-    default skin, "former" for those of `PREVIOUS_DEFAULT_SKIN`, the default skin of earlier versions; "half"
-    and "quarter" for those of `PREVIOUS_DEFAULT_SKIN` with a half and a quarter of the absorption by
-    bloodless tissue.
+    Fixed parameters are those that are not fitted. Each key names a skin that provides their values.
+    "present" is the default skin. "former" is `PREVIOUS_DEFAULT_SKIN`, the default skin of earlier versions.
+    "half" and "quarter" are `PREVIOUS_DEFAULT_SKIN` with a half and a quarter of the absorption by bloodless
+    tissue.
     """
     skins = {
         "former": PREVIOUS_DEFAULT_SKIN,
@@ -274,8 +274,8 @@ def _cross_validation_errors(archive: Archive) -> list[JsonObject]:
     """Return one object for each fold of the cross-validation, with fitted constants and median errors.
 
     The measured people are divided into folds. For each fold, the constants are fitted to the spectra of the
-    people outside it. The errors are those of the people in the fold, under the key "fitted" with these
-    constants and under the key "default" with the constants of the default skin.
+    people outside the fold. Errors are then computed for the people in the fold. The key "fitted" has the
+    errors with the fitted constants; the key "default" has the errors with the constants of the default skin.
     """
     rows = []
     for fold in range(FOLD_COUNT):
