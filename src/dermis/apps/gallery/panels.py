@@ -117,7 +117,7 @@ _LIGHT_OUTPUT_FACTORS = {
     "specular": 1.0,
     "translucent": 4.0,
 }
-"""Factor by which each output that is light is multiplied for display."""
+"""Factors by which render outputs that contain light are multiplied for display, by name of the output."""
 _LABEL_COLOUR_COUNT = 8192
 _DISPLAY_QUANTILES = 0.02, 0.98  # quantiles of non-zero values that are shown as black and white
 

@@ -46,7 +46,7 @@ _CYCLES_TASK = BlenderTask(
     "Cycles", "to render the scene", "Try bpy 5.0, the version that this is tested with"
 )
 _MAX_STARTUP_S, _MAX_SECONDS_PER_PATH = 300.0, 5e-4
-"""Time limits for the start of Blender and for each path: a hundred times the times on two cores."""
+"""Time limits for the start of Blender and for each path: a hundred times those measured on two cores."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class CyclesPass:
     image : (h, w, 3) radiance, linear Rec. 709
     coverage : (h, w) fraction of each pixel's area that is covered by the head
     samples : paths per pixel
-    seconds : elapsed time; that of the first pass includes the construction of the scene [s]
+    seconds : elapsed time; for the first pass, it includes the construction of the scene [s]
     core_seconds : CPU time, summed over all cores [s]
     version : version of Blender
     """

@@ -43,7 +43,7 @@ class IrradianceSamples:
 
     positions : (n, 3) sample positions [mm]
     triangles : (m, 3) sample indices of the corners; the triangles cover the surface without overlaps
-    irradiance : (n, 3) irradiance at each sample, never negative
+    irradiance : (n, 3) irradiance at each sample, by channel, never negative
     """
 
     positions: Floats
@@ -100,7 +100,8 @@ class _Subdivision:
 
     corners : (m, 3) sample indices of the small triangles' corners
     face : (m,) index of the mesh triangle that contains each small triangle
-    barycentric : (m, 3, 3) barycentric weights of the small triangles' corners in these mesh triangles
+    barycentric : (m, 3, 3) for each corner of each small triangle, three barycentric weights in the mesh
+        triangle that contains it
     """
 
     mesh: Mesh

@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 PIXELS_PER_DEGREE = 67.0
-"""FLIP's default: a 4K screen 0.7 m wide, seen from 0.7 m."""
+"""Resolution at the viewer's eye, as FLIP assumes by default: a 4K screen 0.7 m wide, seen from 0.7 m."""
 ZERO_DIFFERENCE_GREY = 0.5
 """sRGB value that shows equality in `signed_difference`, near the middle of lightness (L* 53)."""
 
@@ -102,9 +102,9 @@ def energy_ratio(
 ) -> Estimate:
     """Return the sum of an image's values, divided by the sum of the reference's values [-].
 
-    The parameters are those of `relative_rmse`. The relative standard error of the ratio equals that of the
-    reference's sum. In each channel, the variances of the pixels are added; the standard deviations of the
-    channels are then added, because all channels may be computed from the same light paths.
+    The parameters are those of `relative_rmse`. The ratio has the same relative standard error as the
+    sum of the reference. In each channel, the variances of the pixels are added; the standard deviations of
+    the channels are then added, because all channels may be computed from the same light paths.
     """
     I, T, s2 = _masked_pixels(image, reference, mask, reference_variance)
     total = float(T.sum())

@@ -34,10 +34,13 @@ RUSSIAN_ROULETTE_DEPTH = 100
 then has nearly twice the variance in the same time, and with few samples its mean is 1 % low."""
 _DIRECT_LIGHT_DEPTH = 2
 _RELATIVE_INTERFACE_GAP = 0.97
-"""Ratio of the distance between the two surfaces of an interface to the offset by which Mitsuba avoids a
-second hit of the same surface. That offset skips 0.01 mm of medium on a head, which makes skin with a mean
-free path of 1 mm up to 1 % darker. With two surfaces, an inward ray hits the upper one and skips the lower
-one, an outward ray hits the lower one and skips the upper one, so that only the gap is skipped."""
+"""Distance between the two surfaces of an interface, divided by the offset that Mitsuba adds to rays [-].
+
+The offset moves the start of a ray, so that the ray does not hit the same surface again. On a head, it skips
+0.01 mm of the medium. With a single surface, this makes skin with a mean free path of 1 mm up to 1 % darker.
+With two surfaces, an inward ray hits the upper surface and skips the lower one, and an outward ray hits the
+lower surface and skips the upper one, so that only the gap between them is skipped.
+"""
 _MIN_REPORTED_FOLDED_FRACTION = 1e-3  # folded fraction of a surface above which a note reports it
 
 

@@ -35,8 +35,8 @@ class Octree(NamedTuple):
         the points [mm²]
     moment_error : (n,) difference between the second moments of the triangles' light and of the points [mm²]
     centroid_error : (n,) distance between the centroids of the triangles' light and of the points [mm]
-    corners : (m, 3, 3) corners of the triangles [mm]
-    irradiance : (m, 3, 3) irradiance at the corners
+    corners : (m, 3, 3) position of each corner of each triangle [mm]
+    irradiance : (m, 3, 3) irradiance at each corner of each triangle, by channel
     area : (m,) areas of the triangles [mm²]
     """
 

@@ -1,4 +1,6 @@
-"""Random walks of photons through a stack of layers, compiled by numba: import this inside functions.
+"""Random walks of photons through a stack of layers, compiled by numba.
+
+Importing this module loads numba, which takes time, so callers import it inside the function that needs it.
 
 Layers are numbered from 1, topmost first; layer 0 and the layer after the last are air. Face k lies below
 layer k.

@@ -105,8 +105,9 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
     """Return the table of a profile, with bounds of its derivatives and the permitted error at each radius.
 
     The error of a surface integral is a sum over surface patches. Most of the permitted error is distributed
-    over the radii in proportion to the square root of the profile's second derivative, with which few patches
-    are needed for a given total error. The rest is spread widely, so that distant patches can be large.
+    over the radii in proportion to the square root of the profile's second derivative. This distribution
+    needs few patches for a given total error. The rest of the permitted error is spread widely, so that
+    distant patches can be large.
     """
     max_radius_mm = profile.max_radius_mm
     root = np.linspace(0.0, np.sqrt(max_radius_mm), PROFILE_TABLE_ROWS)

@@ -70,7 +70,7 @@ def mitsuba_projector(
 ) -> SceneDict:
     """Return Mitsuba's projector with a given intensity for each texel of its slide.
 
-    intensity : (h, w, 3) radiant intensity [irradiance mm2]
+    intensity : (h, w, 3) radiant intensity, in units of irradiance times mm2
     cosine : (h, w) cosine of the angle between the axis and the direction towards each texel
     to_world : Mitsuba's transform of the projector, see `mitsuba_look_at`
     half_fov_tangent : tangent of half the horizontal field of view

@@ -303,7 +303,7 @@ class SlabResult:
     """Reflected, transmitted and absorbed fractions of the beam's power, with standard errors [-].
 
     The specular, total, unscattered, absorbed and unfinished fractions sum to 1. Names that end in `_se` are
-    standard errors. They are those of a binomial distribution, and 0 where no photon was counted.
+    standard errors. They are computed from binomial distributions, and are 0 where no photon was counted.
 
     photons : number of photons traced, all of which entered the stack
     edges_mm : (n + 1,) radii of the ring edges, from 0 [mm]

@@ -23,14 +23,17 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
 TIME_STEPS_PER_LEVEL = 12
-"""Time steps per level; the peak of a diffused point is then within 0.2 % of the limit."""
+"""Time steps per level; the peak of a diffused point is then within 0.2 % of its limit for many steps."""
 EDGES_PER_SIGMA = 2.0
-"""Smallest ratio of the standard deviation that a level adds to the length of an edge [-]."""
+"""Smallest permitted number of edge lengths per standard deviation of the blur that a level adds [-]."""
 PATCH_MARGIN_SIGMAS = 4.0
-"""Standard deviations beyond which a Gaussian has 0.03 % of its energy."""
+"""Width of a patch's margin, in standard deviations of the widest blur [-].
+
+Beyond this distance, a Gaussian has 0.03 % of its energy.
+"""
 
 _TRAPEZOIDAL_STEP_FRACTION = 2 - np.sqrt(2)
-"""Fraction of a time step that the trapezoidal stage covers; this value gives both stages one matrix."""
+"""Fraction of a time step that the trapezoidal stage covers; with this value, both stages use one matrix."""
 
 
 def diffuse_on_surface(
@@ -52,8 +55,8 @@ def diffuse_on_surface(
     variances_mm2 : (k,) increasing variances above 0 [mm2]
     step_count : number of time steps per level
 
-    Raises DermisError when an edge is longer than half the standard deviation that a level adds to the next
-    smaller level; `refine_patch` makes edges shorter.
+    Raises DermisError when an edge is too long: longer than half the standard deviation of the blur that a
+    level adds to the previous level. `refine_patch` makes edges shorter.
 
     Source: [Bank1985] for TR-BDF2, [BobenkoSpringborn2007] for the Laplacian.
     """
@@ -192,11 +195,11 @@ def _check_resolution(vertices: Floats, corners: Index, variances: ArrayLike, st
 
 
 _MIN_RELATIVE_TRIANGLE_SLACK = 1e-5
-"""Smallest excess of two sides of a triangle over the third, relative to the mean edge; flatter triangles
-have unusable angles."""
+"""Smallest amount by which two sides of a triangle together exceed the third side, relative to the mean edge
+length; flatter triangles have unusable angles."""
 _COTANGENT_FLIP_TOLERANCE = 1e-6
-"""An edge is flipped if the cotangents of its two opposite angles sum to less than minus this; for four
-points on a circle they sum to 0."""
+"""Tolerance of edge flips: an edge is flipped if the cotangents of its two opposite angles sum to less than
+minus this tolerance. If the corners of its two triangles lie on one circle, the cotangents sum to 0."""
 _MAX_FLIP_SWEEPS = 1000
 
 

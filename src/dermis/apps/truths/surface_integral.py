@@ -16,10 +16,12 @@ Floats = NDArray[np.float64]
 
 _POINTS_PER_CALL = 1024  # between two checks for Ctrl-C
 _OBSERVED_ERROR_PER_BOUND = 1e-3
-"""Actual error where the error bound is 1, measured on waves, spheres, bumps and the scan. The errors of
-three points are of third order in the size of a patch, their bound is of second order."""
+"""Actual error of the integral where the error bound is 1, measured on waves, spheres, bumps and a scan. The
+error of replacing a patch by three points is of third order in the size of the patch; its bound is of second
+order."""
 _CHANNEL_ERROR_WEIGHT = 50.0
-"""Factor for errors caused by different light in the channels; they are of second order and cancel less."""
+"""Largest bound of errors due to different light in the channels, divided by the integral's relative error.
+These errors are of second order, and cancel less than other errors."""
 
 
 def integrate_exitance(

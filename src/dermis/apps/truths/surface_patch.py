@@ -24,7 +24,8 @@ class SurfacePatch:
     positions : (n, 3) vertex positions [mm]
     triangles : (f, 3) vertex indices of the patch triangles
     parent : (f,) index of the mesh triangle that contains each patch triangle
-    weights : (f, 3, 3) barycentric weights of each patch triangle's corners in its mesh triangle
+    weights : (f, 3, 3) for each corner of each patch triangle, three barycentric weights in the mesh triangle
+        that contains it
     centre_mm, radius_mm : ball inside which results are valid; the patch extends beyond it [mm]
     """
 
@@ -36,7 +37,10 @@ class SurfacePatch:
     radius_mm: float
 
     def contains(self, positions: Floats) -> NDArray[np.bool_]:
-        """Return the mask (m,) of positions (m, 3) inside the ball where results are valid [mm]."""
+        """Return the mask (m,) of positions that are inside the ball where results are valid.
+
+        positions : (m, 3) positions [mm]
+        """
         return np.asarray(np.linalg.norm(positions - self.centre_mm, axis=1) <= self.radius_mm)
 
     def vertex_barycentrics(self) -> tuple[Index, Floats]:

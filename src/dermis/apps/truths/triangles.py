@@ -45,8 +45,8 @@ def split_triangles(
     of them is a part of; and the barycentric weights (m, 3, 3) of their corners, defined as in `barycentric`.
 
     corners : (f, 3) vertex indices of the triangles
-    barycentric : (f, 3, 3) barycentric weights of the triangles' corners in the unsplit mesh triangle that
-        contains the triangle
+    barycentric : (f, 3, 3) for each corner of each triangle, three barycentric weights in the original mesh
+        triangle that contains it
     side_midpoints : (f, 3) index of the vertex at the middle of each side; -1 for sides that are not halved
     positions : (n, 3) positions of all vertices; with these, quadrilaterals are split along their shorter
         diagonal [mm]

@@ -30,7 +30,7 @@ COAT_IOR = SKIN_ETA
 ALBEDO_GRID_SIDE_VOXELS = 96
 """Number of cells along the longest side of the albedo grid."""
 _HALF_SIDE_PER_FRAME_HEIGHT, _MIN_HALF_SIDE_MM = 0.75, 25.0
-"""Half the side of the albedo grid, relative to the height that the picture shows, and its lower limit."""
+"""Half the side of the albedo grid, divided by the height of the visible area; and the smallest half side."""
 _COLOURED_DEPTH_MM = 3.0  # depth to which the medium has the colour of the surface
 _SAMPLES_PER_VOXEL = 3.0  # samples per area of one voxel face
 _MAX_SKIN_REFLECTANCE = 0.97
@@ -38,7 +38,7 @@ _MIN_SQRT_CO_ALBEDO = 0.02  # smallest tabulated square root of 1 - albedo
 _DISTANCE_PHOTON_COUNT, _TABLE_PHOTON_COUNT = 40_000, 40_000
 _HALF_SPACE_TABLE_ALBEDO_COUNT = 48
 _STACK_TABLE_ALBEDO_COUNT = 20
-"""Number of tabulated albedos of the last of several layers."""
+"""Number of albedos of the last layer for which the reflectance of several layers is tabulated."""
 
 
 def uniform_skin(colour: ArrayLike, exit_distance_mm: ArrayLike, eta: float) -> Medium:
@@ -158,7 +158,7 @@ def _half_space_reflectance_table(eta: float) -> tuple[Doubles, Doubles]:
 
 @cache
 def _mean_exit_distance(albedo: float, eta: float) -> float:
-    """Return the mean lateral distance between entry and exit in a half-space, in mean free paths.
+    """Return the mean lateral distance between entry and exit of light in a half-space, in mean free paths.
 
     albedo : single-scattering albedo [-]
     eta : index of refraction [-]

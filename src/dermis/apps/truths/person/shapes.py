@@ -184,7 +184,7 @@ LIMBUS_BLUR_MM = 0.55
 EYE_UV_RADIUS = 0.49
 """Distance in uv from the middle of the texture that corresponds to 180 degrees from the eye's axis."""
 _EYEBALL_STEPS_AROUND, _CORNEA_STEPS, _SCLERA_STEPS = 192, 96, 96
-"""Steps of the eyeball mesh around the axis, and from the apex over cornea and sclera."""
+"""Number of steps of the eyeball mesh: around the axis, from the apex to the limbus, and on to the back."""
 _CORNEA_TEXTURE_SIDE = 1024
 _IRIS_GAP_MM = 0.02  # between the edge of the disc and the eyeball [mm]
 
@@ -240,7 +240,7 @@ def cornea_weight_map() -> Doubles:
 def iris_disc() -> tuple[Doubles, Index, float]:
     """Return the iris as a disc: positions [mm], triangles, and its radius [mm].
 
-    Its rim nearly touches the eyeball.
+    The rim of the disc nearly touches the eyeball.
     """
     radius = float(np.sqrt(SCLERA_MM**2 - iris_plane_mm() ** 2)) - _IRIS_GAP_MM
     azimuth = 2.0 * np.pi * np.arange(_EYEBALL_STEPS_AROUND) / _EYEBALL_STEPS_AROUND
@@ -298,7 +298,7 @@ CUTICLE_TILT_DEGREES = 2.0
 LONGITUDINAL_ROUGHNESS, AZIMUTHAL_ROUGHNESS = 0.22, 0.5
 """Roughness in the parametrisation for artists [Chiang2016]."""
 MAX_HAIR_GROUPS = 12
-"""Largest number of hair groups; all fibres of a group have the mean absorption coefficient."""
+"""Largest number of hair groups; all fibres of a group get the group's mean optical depth."""
 _MIN_HAIR_RADIUS_MM = 1e-3
 
 

@@ -108,9 +108,10 @@ def lit_texel_row(device: Device, texels_per_mm: float) -> str:
 def sheared_uv_row(device: Device, shear_degrees: float) -> str:
     """Return a Markdown row with errors of the blur on a flat surface whose uv axes are sheared.
 
-    One texel is lit, and the width of the blurred spot is measured along the surface, relative to the exact
-    width. The cells have `shear_degrees`, then the smallest and the largest width over all directions for a
-    blur that ignores the angle between the uv axes, then the same for a blur that corrects for this angle.
+    One texel is lit. The width of the blurred spot is measured along the surface and divided by the exact
+    width. The first cell has the angle between the uv axes. The next two cells have the smallest and the
+    largest width over all directions, for a blur that ignores this angle. The last two cells have the same
+    widths for a blur that corrects for this angle.
 
     shear_degrees : angle between the uv axes on the flat surface [degrees]
     """

@@ -55,7 +55,7 @@ class HighlightRow(TypedDict):
 
     view : camera preset
     model : model of surface reflection
-    energy : ratio of the reflected light to that of Cycles [-]
+    energy : light reflected in the picture by dermis, divided by the light reflected in that by Cycles [-]
     grain : contrast of fine detail in the picture rendered by dermis [-]
     grain_of_cycles : contrast of fine detail in the picture rendered by Cycles [-]
     correlation : correlation of the two pictures in bright pixels [-]

@@ -166,11 +166,11 @@ def _scattered_cosines(downward_cosines: Floats, mean_cosine: float, rng: np.ran
 
 
 def _studio_brightness_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
-    """Return the factors by which skin is brighter if `Skin.direction` is "half-space", not "lambertian".
+    """Return how much brighter skin is if `Skin.direction` is "half-space" instead of "lambertian" [-].
 
-    `Skin.direction` sets how diffuse light depends on the directions of light and view. The two lists are the
-    medians and the 99th percentiles of the factors in red, green and blue, over the pixels that show a head
-    in studio light.
+    `Skin.direction` sets how diffuse light depends on the directions of light and view. The brightness ratio
+    is computed for each pixel that shows a head in studio light. The two lists are the medians and the 99th
+    percentiles of these ratios, each in red, green and blue.
     """
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
 

@@ -81,7 +81,7 @@ def prefiltered_panorama(
 
     The light of a texel is its radiance times its solid angle. Suns are removed from the panorama.
 
-    row_count : number of rows to which the panorama is resampled for the directions and the light
+    row_count : number of rows to which the panorama is resampled before its texels are listed
     """
     radiance = resample_panorama(split_suns(load_panorama(panorama_name))[0], row_count)
     light = radiance * texel_solid_angles(*radiance.shape[:2])[..., None]
@@ -95,7 +95,7 @@ def prefiltered_panorama(
 def irradiance_error(panorama_name: str, normal_count: int = 200) -> float:
     """Return the largest relative error of the irradiance from a prefiltered panorama, over random normals.
 
-    normal_count : number of normals
+    normal_count : number of random normals for which the irradiance is compared
     """
     towards, light, prefiltered = prefiltered_panorama(panorama_name)
     normals = normalise(np.random.default_rng(1).normal(size=(normal_count, 3)))
@@ -112,7 +112,7 @@ def reflection_error(
 
     roughness_m : roughness of the specular lobe
     view_degrees : angle between view and normal [degrees]
-    normal_count : number of normals
+    normal_count : number of random normals for which the radiance is compared
     """
     cosine = float(np.cos(np.radians(view_degrees)))
     towards, light, prefiltered = prefiltered_panorama(

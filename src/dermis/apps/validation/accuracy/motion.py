@@ -57,7 +57,11 @@ DEFORMATIONS: dict[str, Callable[[Points], Points]] = {
     "ears 20 % thinner": lambda points: _with_thinner_ears(points, 0.2),
     "ears 40 % thinner": lambda points: _with_thinner_ears(points, 0.4),
 }
-"""Functions that return deformed positions (p, 3), as of a mesh sequence, given those of the head at rest."""
+"""Functions that deform a head, as a frame of a mesh sequence would.
+
+Their argument is the positions (p, 3) of the head's points at rest; the result is the deformed positions
+(p, 3) [mm].
+"""
 LIGHT_AND_CAMERA = {"front": ("studio", "portrait"), "back": ("rim", "ear")}
 SETTINGS = Settings(size=(384, 384), atlas=1024, samples=4)
 OCCLUSION_ATLAS_SIDE = 512
@@ -89,7 +93,7 @@ def write_motion_page(adapter: str = "auto") -> None:
 
 
 def rebuilt_head(head: Head, point_positions: Points) -> Head:
-    """Return a head whose mesh has its points at given positions at rest, as if it was loaded in this shape.
+    """Return a head whose points are at given positions at rest, as if it had been loaded in this shape.
 
     point_positions : (p, 3) positions [mm]
     """

@@ -53,7 +53,7 @@ def tissue_by_name(tissue_name: str) -> Tissue:
 def diffusion_models_table() -> str:
     """Return Markdown rows with errors of diffusion models against Monte Carlo, by tissue.
 
-    The errors are those of the total energy, and of the energies in rings around the point of entry.
+    Errors are given for the total energy, and for the energies in rings around the point of entry.
     """
     return "\n".join(row for name in COMPARED_TISSUES for row in _model_rows(name, tissue_by_name(name)))
 
@@ -162,7 +162,9 @@ def transmission_table() -> str:
 
 
 def error_against_published_sum(profile: RadialProfile) -> Floats:
-    """Return the relative difference (3,) between a profile and that published in GPU Gems 3, by channel.
+    """Return the relative RMS difference (3,) between a profile and the sum published in GPU Gems 3 [-].
+
+    The sum of Gaussians and the profile are compared in each of the three channels.
 
     The profile is first scaled to a total energy of 1 in each channel.
     """

@@ -49,7 +49,7 @@ def read_albedo(lobe_model: str, cosine: Floats, roughness_m: Floats) -> Floats:
 def albedo_rows() -> str:
     """Return Markdown rows with errors of each lobe's directional albedo, and the time to tabulate it [ms].
 
-    The errors are those of the quadrature and those of the table that is computed with it.
+    Each row has the error of the quadrature, then the error of the table that is computed by this quadrature.
     """
     m, c = np.linspace(0.1, 0.5, 17)[:, None], np.linspace(0.05, 1.0, 39)
     rows = []
@@ -81,9 +81,9 @@ def beckmann_table_error() -> float:
 def furnace_cell(energy_scheme: EnergyConservationScheme, roughness_m: float, rho_s: float) -> str:
     """Return a table cell with results of a white furnace test: a white sphere in uniform light.
 
-    They are the minimum, mean and maximum ratio of outgoing to incoming light.
+    The results are the minimum, the mean and the maximum ratio of outgoing to incoming light.
 
-    energy_scheme : energy conservation scheme
+    energy_scheme : scheme by which the skin conserves energy
     roughness_m : roughness of the surface
     rho_s : specular strength of the surface
     """

@@ -92,7 +92,7 @@ def technique_rows(
 ) -> tuple[str, dict[str, Comparison]]:
     """Return a Markdown table with the errors of techniques under each light, and the comparisons by light.
 
-    All techniques are compared, or three of them with the reference "heat".
+    If the reference is "heat", only three techniques are compared; otherwise, all techniques are compared.
 
     reference_name : key of `comparisons.references.REFERENCES`, such as "path-traced"
     medium : published medium of the skin, such as "skin1"
@@ -156,8 +156,8 @@ def lambertian_limit_text(head: Head, medium: str, path_traced_comparison: Compa
     """Return text with the errors of an ideal Lambertian skin against path tracing, under the front light.
 
     The errors are the relative RMSE and the energy ratio. The ideal skin reflects as much light as a
-    half-space does for the same angle of incidence. Its errors show how small those of Lambertian skin can
-    become.
+    half-space does for the same angle of incidence. Its errors show how small the errors of Lambertian
+    skin can become.
 
     path_traced_comparison : comparison with path tracing under the front light
     """

@@ -1,7 +1,7 @@
 """Causes of the difference between texture-space diffusion and the surface integral.
 
-The surface integral is a reference for scattered light: at each pixel, irradiance times diffusion profile is
-integrated over the surface of the head.
+The surface integral is a reference for scattered light: at each pixel, the product of irradiance and
+diffusion profile is integrated over the surface of the head.
 """
 
 from __future__ import annotations
@@ -46,13 +46,16 @@ LANDMARKS_BY_REGION: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "back": {"ear": ("left ear top", "left ear lobe", "left ear back")},
 }
-"""Landmarks of the regions that are visible under each light; their mean is the centre of the region."""
+"""Landmarks of each region, by light and then by region; the mean of the landmarks is the region's centre.
+
+The regions are visible in the pictures rendered under the light.
+"""
 
 
 def texture_space_error_tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
-    """Return texts on errors of texture-space diffusion, and of the surface integral that is its reference.
+    """Return texts on errors of texture-space diffusion and of its reference, the surface integral.
 
-    They are keyed by the placeholders of docs/templates/techniques.md that they replace.
+    The texts are keyed by the placeholders of docs/templates/techniques.md that they replace.
     """
     rows: dict[str, list[str]] = {"by_atlas": [], "zero_width": [], "places": [], "even": []}
     for light in COMPARED_LIGHTS:

@@ -43,7 +43,7 @@ class BenchmarkCase:
     samples : samples per pixel
     technique : scattering technique of `Settings`; or `FRAGMENT_TECHNIQUE`, for the passes of GPU Gems 3 in
         the graphics pipeline
-    varies : name of the parameter whose value differs from that of the base case; "" for the base case
+    varies : name of the only parameter that differs from the base case; "" for the base case itself
     """
 
     image: tuple[int, int] = (1920, 1080)

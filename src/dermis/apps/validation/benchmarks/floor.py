@@ -104,7 +104,7 @@ def _scattering_bytes(traffic: FrameTraffic, shadow_bytes: int) -> dict[str, flo
 
 
 def _blur_surface_bytes(inputs: FrameInputs, texel_count: int) -> float:
-    """Return the memory traffic of the blur passes, without that of the light itself [byte].
+    """Return the memory traffic of the blur passes, not counting the light itself [byte].
 
     The passes also read the stretch map (texels per millimetre) and the reach map (how far the chart extends
     from each texel), and fill the gutters. The passes of GPU Gems 3 use no reach map and no gutters, but also

@@ -87,9 +87,9 @@ def row_cells(benchmark_row: BenchmarkRow) -> tuple[str, ...]:
 def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
     """Return a table of the stages of the base case, with column titles as its first row.
 
-    The base case is the frame from which all other cases differ in one parameter. The first columns are its
-    device time, the lower bound of this time, and the ratio of the two. Further columns have the device times
-    of the same frame drawn with the passes of GPU Gems 3.
+    The base case is the frame from which all other cases differ in one parameter. Each row has the name of a
+    stage, the device time of this stage, the lower bound of this time, and the ratio of the two. Further
+    columns have the device time of this stage when the frame is drawn with the passes of GPU Gems 3.
     """
     if benchmark.base_row is None:
         return []

@@ -80,9 +80,10 @@ class PersonComparison:
 SharedSkinKind = Literal["matched", "refracting", "layered"]
 """Model of the skin that frame and path tracer share.
 
-"matched": homogeneous skin without refraction, whose surface adds its reflection. "refracting": homogeneous
-skin below a refracting surface of index 1.4 with a strength of 1. "layered": epidermis over dermis with the
-pigments of the person, with the surface of "matched".
+"matched": homogeneous skin without refraction; the reflection of its surface is added to the scattered
+light. "refracting": homogeneous skin below a refracting surface with an index of refraction of 1.4 and a
+specular strength of 1. "layered": epidermis over dermis, with the pigments of the person and the same surface
+as "matched".
 """
 SHARED_SKIN_KINDS: tuple[SharedSkinKind, ...] = get_args(SharedSkinKind)
 OmittedFeature = Literal["pigments", "relief", "reflection", "hair", "scattering", "bounces"]
@@ -90,7 +91,7 @@ OmittedFeature = Literal["pigments", "relief", "reflection", "hair", "scattering
 
 "pigments": variation of the colour. "relief": folds, pores, and variation of gloss. "reflection": specular
 lobe of the skin. "hair": hair, brows and lashes. "scattering": subsurface scattering, so that skin is
-Lambertian. "bounces": all light but direct light on Lambertian skin, so that eyes are black; and hair.
+Lambertian. "bounces": subsurface scattering, hair, and all light that is not direct, so that eyes are black.
 """
 OMITTED_FEATURES: tuple[OmittedFeature, ...] = get_args(OmittedFeature)
 
@@ -360,8 +361,8 @@ class IrisErrors(NamedTuple):
 
     right : distance by which the path-traced pupil is further to the right [pixel]
     down : distance by which the path-traced pupil is further down [pixel]
-    brightness : mean brightness of the iris outside highlights in the picture by dermis, divided by that in
-        the path-traced picture [-]
+    brightness : mean brightness of the iris in the picture by dermis, divided by its mean brightness in the
+        path-traced picture; highlights are left out [-]
     left_half : `brightness` of the left half of the iris [-]
     right_half : `brightness` of the right half of the iris [-]
     """

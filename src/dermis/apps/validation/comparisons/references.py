@@ -76,7 +76,9 @@ class ReferenceImage:
 
 
 def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Return the reference image in which irradiance times profile is integrated over the surface.
+    """Return the reference image in which the product of irradiance and profile is integrated.
+
+    At each pixel, the integral extends over the whole surface of the head.
 
     The profile is a function of Euclidean distance.
 

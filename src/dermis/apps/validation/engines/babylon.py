@@ -75,7 +75,8 @@ def measured_radiance(
     profile_colour : colour by which Babylon.js describes the diffusion profile
     meters_per_unit : value of the setting metersPerUnit of Babylon.js; the scene is in millimetres
     pixel_mm : size of a pixel [mm]
-    azimuth : direction in the picture perpendicular to the edge of the lit half, towards the lit side [rad]
+    azimuth : angle in the picture from the x axis to the direction that points from the edge of the lit half,
+        perpendicular to this edge, into the lit half [rad]
     """
     edge = {
         "colour": list(map(float, profile_colour)),
@@ -93,13 +94,14 @@ def predicted_radiance(
 ) -> Floats:
     """Return the radiance (side, side, 3) that Babylon.js is predicted to draw for a half-lit plane.
 
-    It is relative to that of a fully lit plane. It is computed from the positions at which the shader of
-    Babylon.js samples the light, rounded to whole pixels.
+    The radiance is relative to that of a fully lit plane. The prediction uses the positions at which the
+    shader of Babylon.js samples the light; these positions are rounded to whole pixels.
 
     profile_colour : colour by which Babylon.js describes the diffusion profile
     meters_per_unit : value of the setting metersPerUnit of Babylon.js; the scene is in millimetres
     pixel_mm : size of a pixel [mm]
-    azimuth : direction in the picture perpendicular to the edge of the lit half, towards the lit side [rad]
+    azimuth : angle in the picture from the x axis to the direction that points from the edge of the lit half,
+        perpendicular to this edge, into the lit half [rad]
     """
     r, angle, weight = spiral_samples(profile_colour)
     distance = RENDERED_WIDTH_RATIO * 1e-3 * r / meters_per_unit / pixel_mm
@@ -119,7 +121,8 @@ def edge_profile(
 
     picture : (side, side, 3) radiance
     pixel_mm : size of a pixel [mm]
-    azimuth : direction in the picture perpendicular to the edge, towards the lit side [rad]
+    azimuth : angle in the picture from the x axis to the direction that points from the edge, perpendicular
+        to this edge, into the lit half [rad]
     edge_distance_mm : (n,) evenly spaced distances from the edge, positive on the lit side [mm]
     half_width_mm : half the width of the strip [mm]
     """

@@ -93,9 +93,9 @@ def measure_edges(python_by_version: dict[str, Path]) -> Iterator[JsonObject]:
 
 
 def column_edge_distances() -> Floats:
-    """Return the distances of the pixel columns from the edge of the lit half of the plane.
+    """Return the distances (n,) of the n pixel columns from the edge of the lit half of the plane [-].
 
-    They are in units of the width d of Burley's profile, and positive on the lit side.
+    The distances are in units of the width d of Burley's profile, and positive on the lit side.
     """
     return 12.0 * (np.arange(EDGE_BIN_COUNT * PIXELS_PER_BIN) + 0.5) / (EDGE_BIN_COUNT * PIXELS_PER_BIN) - 6.0
 
@@ -154,7 +154,7 @@ def measure_edge_response(
 def binned_edge_response(cumulative_profile: CumulativeProfile, burley_width_mm: Floats) -> Floats:
     """Return the predicted edge response (3, n) of a profile, averaged over groups of pixel columns.
 
-    The pixel columns of the picture, 12 Burley widths wide, are divided into n groups of neighbours.
+    The picture is 12 Burley widths wide. Its pixel columns are divided into n groups of adjacent columns.
 
     cumulative_profile : cumulative form of the profile
     burley_width_mm : (3,) Burley width of each channel [mm]

@@ -64,7 +64,7 @@ def fill_tables(page_text: str) -> str:
 def predicted_errors_table() -> str:
     """Return a Markdown table with predicted errors of each export target and its variants.
 
-    The errors are those of exports to the target's newest version.
+    The errors are computed for exports to the newest version of each target.
     """
     lines = []
     subjects = [load_subject(name) for name in COMPARED_SKINS]

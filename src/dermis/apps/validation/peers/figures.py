@@ -32,7 +32,7 @@ class RendererRow:
     noise : relative RMS of the noise in the image [-]
     relrmse : relative RMSE against the reference [-]; None for the reference itself
     relrmse_se : standard error of `relrmse`
-    energy_ratio : ratio of the total light to that of the reference [-]; None for the reference itself
+    energy_ratio : total light, divided by the total light of the reference [-]; None for the reference itself
     energy_ratio_se : standard error of `energy_ratio`
     """
 
@@ -218,7 +218,6 @@ def _equal_error_costs(
     alone is as large as the error of dermis.
 
     mean_image : mean of all images rendered by Cycles with random walks
-
     dermis_row : row of dermis; its error against the reference is the target for Cycles
     """
     reference, levels = scene_renders.reference, list(zip(*scene_renders.cycles["random-walk"], strict=True))

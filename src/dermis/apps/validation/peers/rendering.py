@@ -68,8 +68,7 @@ class ComparisonSettings:
     side : side of the square image [pixel]
     samples : paths per pixel of each pass of Cycles
     paths : paths per pixel of Mitsuba
-    frames : number of frames that are timed per turn with each of the settings of dermis; the programs take
-        turns
+    frames : number of frames that are timed with each of the settings of dermis, in each of its turns
     """
 
     side: int = 512

@@ -137,8 +137,10 @@ def cheek_table(archive: Archive, random_people: Mapping[str, RandomPeople]) -> 
 def two_sample_distance(first_sample: Doubles, second_sample: Doubles) -> tuple[float, float, float]:
     """Return the energy distance of two samples, and its mean and 95 % quantile for the null hypothesis.
 
-    The null hypothesis is that both samples are from one population. Its mean and quantile are estimated by
-    permutation.
+    The null hypothesis is that both samples are from one population. The mean and the quantile of the
+    distance are estimated by random permutations of the samples.
+
+    first_sample, second_sample : samples, one value or one row of values for each person
     """
     rng, both = np.random.default_rng(0), np.concatenate([first_sample, second_sample])
     permuted = []
@@ -155,7 +157,7 @@ def two_sample_distance(first_sample: Doubles, second_sample: Doubles) -> tuple[
 def site_differences(
     archive: Archive, random_people: Mapping[str, RandomPeople]
 ) -> Iterator[tuple[str, str, int, Doubles, Doubles]]:
-    """Yield median colours of measured people, and how those of sampled people differ, by group and site.
+    """Yield median colours of measured people, and differences of sampled people, by group and site.
 
     Each tuple has the group, the site, the number of measured people, their median CIELAB colour (3,), and
     the difference (3,): the median colour of randomly sampled people minus that of measured people.
@@ -172,7 +174,7 @@ def site_differences(
 def sites_table(archive: Archive, random_people: Mapping[str, RandomPeople]) -> str:
     """Return a Markdown table of median colours of measured people, by group and site.
 
-    It also has the median colours of randomly sampled people minus these.
+    It also has the differences of randomly sampled people: their median colours minus the measured ones.
     """
     lines = [
         "| group | site | people | archive: L*, a*, b* | drawn minus archive | |",
@@ -193,7 +195,7 @@ def sites_table(archive: Archive, random_people: Mapping[str, RandomPeople]) -> 
 def sex_age_table(archive: Archive, random_people: Mapping[str, RandomPeople]) -> str:
     """Return a Markdown table of how the colour of the cheek differs between sexes and between ages.
 
-    The differences are those of measured people and of randomly sampled people, averaged over the groups.
+    Differences are given for measured people and for randomly sampled people, averaged over the groups.
     """
     lines = ["| difference | archive: L*, a*, b* | drawn |", "|---|---|---|"]
     for name in ("men minus women", "from 55 years minus below 45"):

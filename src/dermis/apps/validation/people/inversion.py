@@ -17,8 +17,11 @@ _VARIABLE_UPPER_BOUNDS: Final = np.array([-0.3, -1.5, 1.0, np.log2(0.2)])
 _START_MELANIN, _START_BLOOD = 0.04, 0.01
 _PRIOR_MEAN: Final = np.array([0.7, np.log2(DEFAULT_SKIN.epidermis_mm)])
 _PRIOR_SD: Final = np.array([0.3, 0.2])
-"""Prior of oxygen and of log2 of the thickness. With a wide prior of thickness, skin that the model cannot
-match would get an epidermis of the least thickness, which melanin cannot darken enough for every tone."""
+"""Standard deviations of the priors of oxygenation and of log2 of the thickness of the epidermis.
+
+If the prior of the thickness were wide, skin that the model cannot match would get the thinnest possible
+epidermis. Melanin cannot darken such a thin layer enough for every skin tone.
+"""
 _CIELAB_SD = 0.3
 """Standard deviation of colours in the fit [CIELAB]; small, so that colours take precedence over spectra."""
 _REFLECTANCE_SD = 0.01

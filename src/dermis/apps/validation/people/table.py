@@ -43,7 +43,10 @@ _POOLED_DIFFERENCE_WEIGHT = (
 )
 _POPULATION_SIZE = 2000
 _CORRECTION_SD: Final = np.array([0.5, 0.5, 0.15, 0.15])
-"""Typical size of the corrections of the four variables by which median colours are made to agree."""
+"""Typical size of the corrections of the four skin variables.
+
+The corrections make the median colours of sampled people agree with the archive.
+"""
 _MEDIAN_COLOUR_SD = 0.05
 _ARCHIVE_SOURCE = (
     "Lu et al. 2025, International Skin Spectra Archive, CC BY 4.0, doi 10.6084/m9.figshare.28228571.v4"
@@ -165,7 +168,7 @@ def _sex_age_effects(cheek: Archive, skin_variables: Doubles) -> tuple[Doubles, 
 
 
 def _centred_sex_age_effects(cheek: Archive, sex_effect: Doubles, age_effect: Doubles) -> Doubles:
-    """Return the changes (n, 4) of the four skin variables of n people that are due to sex and age.
+    """Return how much sex and age change the four skin variables of n people, (n, 4).
 
     Each change is relative to a person whose sex (0 for female, 1 for male) and `age_term` are the means of
     the same ancestry group. `age_term` rises from 0 for young adults to 1 for old people.

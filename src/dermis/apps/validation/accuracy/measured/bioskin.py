@@ -20,9 +20,9 @@ _MIDDLE_INPUT_VALUES = {"melanin": 0.3, "blood": 0.3, "epidermis_mm": 0.4, "oxyg
 BIOSKIN_UNKNOWNS = {
     name: SpectralUnknown(name, 0.0, 1.0, _MIDDLE_INPUT_VALUES[name]) for name in _DECODER_INPUTS
 }
-"""Inputs of the decoder, which its authors map to 0 to 1; fits start from plausible values."""
+"""Inputs of the decoder, scaled by its authors to the range 0 to 1; fits start from plausible values."""
 BIOSKIN_UNKNOWN_SETS = (("melanin", "blood"), ("melanin", "blood", "oxygen"), _DECODER_INPUTS)
-"""Inputs to fit, with two, three and five unknowns."""
+"""Names of the inputs to fit, for fits with two, three and five unknowns."""
 
 
 def bioskin_model(weights_path: Path) -> SpectralModel:

@@ -41,8 +41,8 @@ FITTABLE_CONSTANTS = UNKNOWNS | {
 }
 """Constants that may be fitted, and additions to the package's model.
 
-dermis : ratio of the scattering of the dermis to that of the epidermis
-small_fibres : ratio of Rayleigh scattering to that of [DonnerJensen2006]
+dermis : scattering of the dermis, divided by the scattering of the epidermis
+small_fibres : Rayleigh scattering, divided by the Rayleigh scattering in [DonnerJensen2006]
 vessel_mm : mean path through a vessel; light does not reach its inside if blood absorbs strongly
 bandwidth_nm : half width of the instrument's triangular band
 bilirubin, carotene, methaemoglobin : absorption of the dermis at the peak of bands at 460, 480 and 630 nm

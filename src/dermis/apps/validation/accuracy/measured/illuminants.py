@@ -12,14 +12,14 @@ from dermis.optics.media import Floats
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, interpolate_spectrum, rgb_weights
 
 ILLUMINANTS = {"D65": "", "A": "a", "FL11": "fl11", "LED-B3": "led_b3"}
-"""Columns of the table by name of the illuminant."""
+"""Column of each illuminant in the table of illuminants; D65 needs no column."""
 
 
 @cache
 def colour_weights(illuminant: str) -> Floats:
     """Return weights (3, 31) that convert reflectance spectra to linear Rec. 709 colours.
 
-    The colour has the same L*a*b* coordinates under D65 as the spectrum under the illuminant.
+    Each colour has the L*a*b* coordinates under D65 that its spectrum has under the illuminant.
 
     illuminant : key of `ILLUMINANTS`
 

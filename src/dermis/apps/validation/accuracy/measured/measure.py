@@ -49,9 +49,9 @@ from dermis.optics.pigments.spectra import (
 from dermis.optics.skin_spectra import two_layer_reflectance
 
 CHEEK_AND_FOREHEAD = SITES.index("cheek"), SITES.index("forehead")
-"""Indices of the two facial sites that most people have."""
+"""Indices of the two facial sites at which most people were measured."""
 PREVIOUS_DEFAULT_SKIN = replace(DEFAULT_SKIN, baseline=1.0, epidermis_mm=0.05, oxygen=0.75)
-"""Default skin before it was compared with the archive."""
+"""Default skin of earlier versions, before default skin was compared with the spectral archive."""
 _SPECTRA_SAMPLE_COUNT, _CONSTANTS_SAMPLE_COUNT = (
     1500,
     600,
@@ -128,10 +128,10 @@ def rewrite_measured_page() -> None:
 def _default_skin_errors(archive: Archive) -> JsonObject:
     """Return the errors of fits with two, three and five unknowns, for four choices of the fixed parameters.
 
-    Fixed parameters are those that are not fitted. The keys name their values: "present" for those of the
-    default skin, "former" for those of `PREVIOUS_DEFAULT_SKIN`, the default skin of earlier versions; "half"
-    and "quarter" for those of `PREVIOUS_DEFAULT_SKIN` with a half and a quarter of the absorption by
-    bloodless tissue.
+    Fixed parameters are those that are not fitted. Each key names a skin that provides their values.
+    "present" is the default skin. "former" is `PREVIOUS_DEFAULT_SKIN`, the default skin of earlier versions.
+    "half" and "quarter" are `PREVIOUS_DEFAULT_SKIN` with a half and a quarter of the absorption by bloodless
+    tissue.
     """
     skins = {
         "former": PREVIOUS_DEFAULT_SKIN,
@@ -274,8 +274,8 @@ def _cross_validation_errors(archive: Archive) -> list[JsonObject]:
     """Return one object for each fold of the cross-validation, with fitted constants and median errors.
 
     The measured people are divided into folds. For each fold, the constants are fitted to the spectra of the
-    people outside it. The errors are those of the people in the fold, under the key "fitted" with these
-    constants and under the key "default" with the constants of the default skin.
+    people outside the fold. Errors are then computed for the people in the fold. The key "fitted" has the
+    errors with the fitted constants; the key "default" has the errors with the constants of the default skin.
     """
     rows = []
     for fold in range(FOLD_COUNT):
@@ -371,9 +371,9 @@ def _jacques_model(parameter_values: ParameterValues) -> Floats:
 def _additional_constant_errors(archive_sample: Archive) -> list[JsonObject]:
     """Return errors of fits in which one more constant of the skin model is fitted, such as carotene.
 
-    Each of the fits has a constant of `_ADDED_CONSTANTS_BY_NAME`, which all spectra share. The fit named
-    "none" has none of these constants. The key "three" has the errors for three unknowns per spectrum, "five"
-    those for five.
+    There is one result for each entry of `_ADDED_CONSTANTS_BY_NAME`. The added constant has one value for all
+    spectra; the entry "none" adds no constant. The keys "three" and "five" have the errors of fits with three
+    and with five unknowns per spectrum.
     """
     rows = []
     for name, free in _ADDED_CONSTANTS_BY_NAME.items():
@@ -395,7 +395,7 @@ def _additional_constant_errors(archive_sample: Archive) -> list[JsonObject]:
 def _site_fits(archive: Archive) -> list[JsonObject]:
     """Return the epidermis thickness and the oxygenation for which the model fits each site's spectra best.
 
-    The key "colour" has the values for which the model fits the colours of these spectra best.
+    The key "colour" has the values for which the model fits the colours of the site's spectra best.
     """
     rows = []
     for site in range(len(SITES)):
@@ -447,8 +447,8 @@ def _site_cross_validation_errors(archive: Archive) -> JsonObject:
 def _edge_loss_errors(archive_sample: Archive) -> JsonObject:
     """Return the edge loss of each aperture, and skin constants fitted to spectra corrected for this loss.
 
-    The edge loss is the fraction of the reflected light that an aperture of a spectrophotometer misses. To
-    correct them, the measured spectra are divided by the fraction that the aperture receives. The key
+    The edge loss is the fraction of the reflected light that an aperture of a spectrophotometer misses.
+    Measured spectra are corrected by dividing them by the fraction that the aperture receives. The key
     "uncorrected" has the constants fitted to the spectra as measured.
     """
     skins = [replace(DEFAULT_SKIN, melanin=m, blood=0.008) for m in _EDGE_LOSS_MELANIN]

@@ -10,7 +10,7 @@ from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.pigments.skin import spectral_medium
 
 APERTURES_MM = {"8 mm of 11 mm": (4.0, 5.5), "3 mm of 6 mm": (1.5, 3.0)}
-"""Radii of the measured and of the lit disc of common apertures [mm]."""
+"""For common apertures, the radius of the measured disc and the radius of the lit disc [mm]."""
 _RADIUS_COUNT = 400  # number of points of the measured disc, by their radii
 
 
