@@ -26,7 +26,7 @@ from dermis.mesh.head import Head
 
 T = TypeVar("T", Human, SkinLook, EyeLook, HairLook)
 _STRETCH_ATLAS_SIDE = 1024
-"""Largest side of the atlas from which texel lengths on the skin are computed; they vary slowly [texel]."""
+"""Largest side of the atlas that gives the size of texels on the skin; this size varies slowly [texel]."""
 
 
 def person_parameters(person: Human) -> dict[str, Any]:

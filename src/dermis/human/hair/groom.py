@@ -141,7 +141,7 @@ def _concatenate_roots(root_groups: Iterable[Roots]) -> Roots:
 
 
 def _repeat_per_hair(hair_groups: list[HairGroup], field_name: str) -> Doubles:
-    """Return for each hair (n,) the value of a scalar field, such as "cover", of the group it belongs to."""
+    """Return for each hair the value (n,) of a scalar field of its group, such as "cover"."""
     return np.concatenate([np.full(len(group.radius), getattr(group, field_name)) for group in hair_groups])
 
 

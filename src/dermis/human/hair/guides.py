@@ -161,7 +161,7 @@ COMBS: dict[str, Callable[[Doubles, Style], Doubles]] = {
     "twist": _rope_directions,
     "beard": _beard_directions,
 }
-"""Directions (n, 3) along which hair is combed at points (n, 3) of the scalp, by the comb of a style."""
+"""Functions that return the combed directions (n, 3) of hair at scalp points (n, 3), by `Style.comb`."""
 
 
 @cache

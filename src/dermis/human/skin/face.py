@@ -26,7 +26,7 @@ MOVEMENTS = (
     "flush",
     "pressed",
 )
-"""Facial movements: first those that deepen folds, see folds.csv, then those that move blood."""
+"""Facial movements. Movements before "flush" deepen folds, see folds.csv; the others move blood."""
 FOLD_MOVEMENT_COUNT = MOVEMENTS.index("flush")
 """Number of movements that deepen folds."""
 _AMOUNTS_IN_CSV = (
@@ -34,7 +34,7 @@ _AMOUNTS_IN_CSV = (
     "sun", "level", "around", "hair", "beard", "veins", "flush",
 )  # fmt: skip
 ZONE_AMOUNTS = (*_AMOUNTS_IN_CSV, "oxygen", "_unused", "_unused_too")
-"""Quantities that zones change, see zones.csv; their number is a multiple of four."""
+"""Quantities that zones of the face change, see zones.csv; padded to a multiple of four names."""
 _REFERENCE_SITE = "cheek"
 HAIRLINE_STEP_DEGREES = 2
 """Angle between samples of `hairline_heights` [degrees]."""

@@ -38,18 +38,18 @@ GROUP_OF_CODE: Final[Mapping[str, str]] = MappingProxyType(
         "AB": "arabian",
     }
 )
-"""Groups of the archive by its codes; "southeast asian" is Thai, "south asian" is Pakistani."""
+"""Group of people for each code of the archive; "southeast asian" is Thai, "south asian" is Pakistani."""
 SITES: Final = (
     "back of hand", "cheek", "cheekbone", "chin", "ear lobe", "forehead",
     "inner arm", "neck", "nose tip", "outer arm", "palm", "ring finger",
 )  # fmt: skip
-"""Sites of the archive, in the order of its codes from 1."""
+"""Sites of the body in the archive, in the order of the archive's site codes, which start at 1."""
 FACE_SITES: Final = ("cheekbone", "forehead", "chin", "nose_tip", "ear_lobe", "neck")
 """Sites of the head beside the cheek, as fields of `SiteDifferences`."""
 GROUPS_OF_ANCESTRY: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {"asian": ("chinese", "japanese", "southeast asian"), "middle eastern": ("iraqi", "arabian")}
 )
-"""Names that each stand for several groups with equal weights."""
+"""Names of broader ancestries, each with the groups that it averages with equal weights."""
 SKIN_ANCESTRIES: Final = (*GROUP_OF_CODE.values(), *GROUPS_OF_ANCESTRY)
 """Names of skin ancestries."""
 ITA_RANGE: Final = (-65.0, 70.0)
@@ -153,7 +153,8 @@ class MeasuredTable(NamedTuple):
 
     probabilities : (k,) cumulative probabilities, 0 to 1, to which the k quantiles of each variable belong
     groups : mapping from group name to distribution
-    sex, age : (4,) changes of the variables from female to male, and from young to old
+    sex : (4,) change of each variable from female to male
+    age : (4,) change of each variable from young to old, times `age_term`
     mean_age_term : mean of `age_term` over the ages that `Human.sampled` samples
     site_slope : (12, 2) slope of the difference between each site and the cheek as a function of the cheek's
         own value, for log2 of melanin and for log2 of blood [-]
