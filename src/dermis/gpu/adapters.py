@@ -247,7 +247,7 @@ def device_limits(adapter_limits: Mapping[str, int], full_limit_names: Sequence[
     Most limits are WebGPU's defaults, or lower where the adapter offers less.
 
     adapter_limits : dictionary from the name of a limit to its value on the adapter
-    full_limit_names : names of the limits that are requested as high as the adapter offers instead
+    full_limit_names : names of the other limits, which are requested as high as the adapter offers
     """
     limits = {
         name: (max if name.startswith("min-") else min)(default, adapter_limits.get(name, default))

@@ -359,7 +359,7 @@ class Timestamps:
             encoder.resolve_query_set(self._queries, 0, len(self._stages), self._resolved, 0)
 
     def stage_ms(self) -> dict[str, float]:
-        """Return the time of the frame ("total") and, without `whole_frame_only`, that of each stage [ms]."""
+        """Return the time of the frame ("total"), and of each stage unless `whole_frame_only` is set [ms]."""
         if not self._stages:
             return {"total": 0.0}
         raw = self._device.handle.queue.read_buffer(self._resolved, 0, 8 * len(self._stages))

@@ -42,7 +42,7 @@ class Program:
     path : WGSL file
     folders : folders that are searched for included files
     constants : pipeline constants by name
-    stages : names in `wgpu.ShaderStage` of the shader stages to which the bindings are visible
+    stages : shader stages that can use the bindings, by their names in `wgpu.ShaderStage`
     """
 
     stages: ClassVar[tuple[str, ...]]

@@ -25,7 +25,7 @@ from dermis.optics.angular_response import (
 
 Floats = NDArray[np.float64]
 DIRECTION_NODE_COUNT = 16
-"""Number of discrete directions that leave a slab, and of directions that are totally reflected."""
+"""Number of discrete directions in which light leaves a slab; as many others are totally reflected."""
 DEEP_OPTICAL_DEPTH = 1e4
 """Thickness from which a slab is treated as a half-space [mean free paths]."""
 _MIN_OPTICAL_DEPTH = 1e-6  # optical depth of a slab in which light scatters at most once
@@ -216,7 +216,7 @@ class _Transport:
 def _slabs_in_air(
     transport: _Transport, reflection: Floats, transmission: Floats, unscattered_fraction: Floats
 ) -> Slabs:
-    """Return the reflection and transmission of slabs in air, from those of slabs with index-matched faces.
+    """Return the reflection and transmission of slabs in air, computed from slabs with index-matched faces.
 
     transport : discrete directions, and reflectance of the faces
     reflection, transmission : (n, m, m) reflection and transmission with index-matched faces, as pi times the
@@ -342,8 +342,8 @@ def _add_faces(
 def anisotropic_response(total_reflectance: ArrayLike, eta: float, g: float) -> AngularResponse:
     """Return the angular response of half-spaces with anisotropic scattering.
 
-    Their reduced absorption and scattering coefficients equal those of isotropically scattering half-spaces
-    with the reflectance `total_reflectance`.
+    The half-spaces have the same absorption and reduced scattering coefficients as isotropically scattering
+    half-spaces with the reflectance `total_reflectance`.
 
     total_reflectance : (c,) reflectance of the isotropic half-spaces for light at normal incidence [-]
     eta : index of refraction relative to air, at least 1 [-]

@@ -75,7 +75,7 @@ class ThinParts:
 def solve_thin_parts(
     medium: Medium, variance_mm2: Floats, max_thickness_mm: float, g: float = 0.0
 ) -> ThinParts:
-    """Return the light that slabs transmit, and the light that they reflect less than a half-space would.
+    """Return the light that slabs transmit, and the light that a half-space reflects but the slabs do not.
 
     The slabs consist of a medium with one layer; their thicknesses range from 0 to `max_thickness_mm`.
 
@@ -180,8 +180,8 @@ def _uniform_light_responses(
 ) -> Iterator[_UniformLightResponse]:
     """Yield the `_UniformLightResponse` of each channel for slabs of n thicknesses.
 
-    They are interpolated by cubic splines between the optical thicknesses `_OPTICAL_DEPTHS`, for which they
-    are solved once.
+    The responses are computed once for the optical thicknesses `_OPTICAL_DEPTHS`, and interpolated between
+    these by cubic splines.
 
     layer : medium of the slabs, with reduced coefficients; its field `thickness_mm` is ignored
     thickness_mm : (n,) thicknesses of the slabs [mm]
