@@ -230,7 +230,7 @@ def adapters_like_best_match(selector: str) -> list[Adapter]:
 def check_limits(adapter_name: str, adapter_limits: Mapping[str, int]) -> None:
     """Raise DermisError for an adapter whose limits are too low for the shaders of a frame.
 
-    adapter_name : name of the adapter
+    adapter_name : name of the adapter, for the message
     adapter_limits : dictionary from the name of a limit to its value on the adapter
     """
     for name in _REQUIRED_LIMITS:

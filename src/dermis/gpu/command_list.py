@@ -338,8 +338,8 @@ class Timestamps:
     def begin(self, stage: str) -> TimestampWrites | None:
         """Reserve the timestamp at the start of a pass, and return its description for wgpu.
 
-        Returns None if the pass gets no timestamp: with `whole_frame_only`, all passes except the first get
-        none, and neither do passes for which the pool has no timestamps left.
+        Returns None if the pass gets no timestamp. This is so if the pool has no timestamps left, and, with
+        `whole_frame_only`, for all passes except the first.
 
         stage : name of the stage to which the time of the pass is added
         """

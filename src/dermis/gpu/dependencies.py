@@ -40,7 +40,7 @@ class ResourceState:
     scratch: bool = False
 
     def overlapping_states(self, written_states: Container[ResourceState]) -> list[ResourceState]:
-        """Return the states in `written_states` whose content overlaps with that of this state.
+        """Return the states in `written_states` that share content with this state.
 
         These may be the state itself, the states of its views, or the state of the texture that it views.
         """

@@ -54,7 +54,7 @@ class Device:
     """Logical device with its queue, which holds all resources and programs of a renderer.
 
     The device has WebGPU's default limits, even if the adapter offers more, so that a program that exceeds
-    them fails on every machine. Only the maximum sizes of textures and buffers are those of the adapter. The
+    them fails on every machine. Only the maximum sizes of textures and buffers are the adapter's own. The
     device has the features in `OPTIONAL_FEATURES` that the adapter supports.
 
     adapter : opened adapter

@@ -290,7 +290,7 @@ def used_constants(path: Path, folders: Sequence[Folder], constants: Constants) 
 def shader_source(path: Path, folders: Sequence[Folder]) -> ShaderSource:
     """Return a shader with its includes and other directives expanded.
 
-    folders : folders in which included files are searched, before the shaders of `dermis.gpu`
+    folders : folders that are searched for included files, before the shaders of `dermis.gpu`
     """
     return compose_shader(path, (*folders, _GPU_SHADER_FOLDER))
 

@@ -69,8 +69,7 @@ class LidSide(NamedTuple):
 
     rings : (r,) indices of the lid points, row by row of lid_rings.csv
     point : (n,) indices of the lid points and of the points of the surrounding skin
-    weights : (n, r) weights with which the points in `point` follow the displacements of the points in
-        `rings`
+    weights : (n, r) weight, 0 to 1, with which each point in `point` follows each point in `rings`
     contact : (c,) indices of the points that slide over the eye
     clearances_mm : (c,) minimum distances of these points from the eye [mm]
     """
@@ -242,7 +241,7 @@ def _sliding_points(rings: Index, candidate_points: Index, side_name: str) -> In
     """Return the indices (c,) of the skin points outside the lid rings that slide over the eye in a blink.
 
     rings : (rows, 4) lid points from lid_rings.csv
-    candidate_points : (n,) points from which the result is selected
+    candidate_points : (n,) indices of the points to select from
     side_name : "Left" or "Right"
     """
     index = target_deltas().names.index(f"{EXPRESSION_PREFIX}eyeBlink{side_name}")

@@ -118,7 +118,7 @@ def write_person_glb(
 
 
 def relief_slopes(head: Head) -> NDArray[np.float32] | None:
-    """Return the slopes (n, n, 2) of a head's height map, from which a normal map is computed [-].
+    """Return the slopes (n, n, 2) of a head's height map, for computing a normal map [-].
 
     The channels are the slopes to the right and upwards.
 

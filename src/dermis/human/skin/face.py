@@ -40,7 +40,7 @@ HAIRLINE_STEP_DEGREES = 2
 """Angle between samples of `hairline_heights` [degrees]."""
 _HAIRLINE_SAMPLE_COUNT = 180 // HAIRLINE_STEP_DEGREES + 1
 _FOLD_SAMPLES_PER_SEGMENT = 4
-_MAX_CACHED_TABLES = 32  # number of cached tables, one for each recession of the hair
+_MAX_CACHED_TABLES = 32  # number of results that each function caches
 _CROWN_ZONE = "crown"  # zone where hair thins first
 _TEMPLE_RECESSION_MM, _FOREHEAD_RECESSION_MM = 22.0, 16.0  # maximum recession of the hairline
 _TEMPLE_DEGREES, _TEMPLE_WIDTH_DEGREES, _FOREHEAD_WIDTH_DEGREES = 33.0, 15.0, 38.0  # from the front

@@ -151,7 +151,7 @@ class MeasuredTable(NamedTuple):
     The four variables describe the cheek: log2 of melanin, log2 of blood, oxygen, and log2 of the thickness
     of the epidermis in mm. Their distributions in each group are stored as quantiles.
 
-    probabilities : (k,) cumulative probabilities, 0 to 1, to which the k quantiles of each variable belong
+    probabilities : (k,) cumulative probabilities, 0 to 1, of the k quantiles of each variable
     groups : mapping from group name to distribution
     sex : (4,) change of each variable from female to male
     age : (4,) change of each variable from young to old, times `age_term`
@@ -207,8 +207,8 @@ class MeasuredTable(NamedTuple):
 
         weight_of_group : weight of each group in the mixture
         cheek_variables : (n, 4) result of the method `cheek_variables`
-        normal_samples : (n, 12, 2) independent samples of the standard normal distribution, zeros for typical
-            people
+        normal_samples : (n, 12, 2) independent samples of the standard normal distribution, for melanin and
+            blood at each site; zeros for typical people
         """
         middle = self.group_mean("quantiles", weight_of_group)[:2, len(self.probabilities) // 2]
         deviation = np.clip(
@@ -349,7 +349,8 @@ def _pigments_and_sites(
     sex, age : sex, from 0 (female) to 1 (male), and age [years]
     ita : individual typology angle (ITA) that the cheek must have [degrees]; None for any
     normal_samples : (4,) independent samples of the standard normal distribution, zeros for a typical person
-    site_normal_samples : (12, 2) independent samples of the same distribution; None for a typical person
+    site_normal_samples : (12, 2) independent samples of the same distribution, for melanin and blood at each
+        site; None for a typical person
     """
     table = measured_table()
     correlation = table.group_mean("correlation", weight_of_group)
@@ -471,8 +472,8 @@ class MeasuredMedians(NamedTuple):
     site : name of the site of the body, one of `SITES`
     sex : "F" or "M", or "" for both
     age_group : "1" (under 20), "2" (20 to 29) ... "6" (over 60), or "" for all ages
-    people : number of measured people; 0 if too few were measured, in which case the medians are estimates
-        from the measurements of all groups
+    people : number of measured people. If too few were measured, the number is 0, and the medians are
+        estimates from the measurements of all groups
     cielab : (3,) CIELAB colour under D65, without surface reflection
     pigments : pigments that the package's model infers from the measurements
     """

@@ -188,7 +188,7 @@ def _propagate_up(
 ) -> tuple[_BoundaryCondition, _DownwardTransfer]:
     """Propagate the boundary condition from the lower face of a sublayer to its upper face.
 
-    frequency : frequencies [1/mm]
+    frequency : (n, 1) frequencies s [1/mm]
     lower_condition : boundary condition at the lower face
 
     Returns the boundary condition at the upper face, and the coefficients that transfer the fluence from the
