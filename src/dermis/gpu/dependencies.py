@@ -108,7 +108,7 @@ def resource_state(device: Device, resource: Bindable) -> ResourceState:
 
 
 PassAccess = tuple[int, tuple[ResourceState, ...], tuple[ResourceState, ...]]
-"""`Access.id` of a pass, states of the resources that it reads, and states of those that it writes."""
+"""`Access.id` of a pass, states of the resources it reads, and states of the resources it writes."""
 
 
 class Dependencies:

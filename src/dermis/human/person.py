@@ -45,7 +45,7 @@ _MIN_BEARD_SHADOW = 0.6  # shadow of shaved hair below a beard
 _ANCESTRY_CONCENTRATION = 0.35  # of a Dirichlet distribution; small, so that mostly one ancestry prevails
 _SEX_SD = 0.08  # standard deviation of `sex` from 0 or 1
 _OPPOSITE_SUFFIXES = {"decr": "incr", "down": "up", "in": "out", "backward": "forward", "concave": "convex"}
-"""Pairs of suffixes: a target whose name ends in the first has the opposite effect with the second."""
+"""Pairs of suffixes; two targets whose names differ only by such a pair have opposite effects."""
 _WEIGHT_SD_BY_FOLDER = {  # standard deviation of the weights of targets by folder
     "head": 0.1,
     "forehead": 0.25,
@@ -243,7 +243,7 @@ def _sample_hair_pigments(rng: np.random.Generator, ancestry: NDArray[np.float64
 
 
 def _sample_targets(rng: np.random.Generator) -> Iterator[tuple[str, float]]:
-    """Yield pairs of a morph target of the face and its random weight; of two opposite targets, yield one."""
+    """Yield names of morph targets of the face with random weights; of two opposite targets, only one."""
     common: dict[str, float] = {}
     samples = iter(
         rng.standard_normal(sum(1 + bool(one.shared_name) for one in _opposite_targets())).tolist()

@@ -19,7 +19,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, interpolate_quads, quad_corners
 
 HEAD_AXIS_Z = -72.0
-"""z coordinate of the vertical axis of the head; angles on the hairline are measured around it [mm]."""
+"""z coordinate of the vertical axis of the head; angles along the hairline are about this axis [mm]."""
 _R2_SEQUENCE_STEPS = np.array(
     [0.7548776662, 0.5698402909]
 )  # of a low-discrepancy sequence in the unit square

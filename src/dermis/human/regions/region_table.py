@@ -48,7 +48,7 @@ _CHIN_OUTLINE = np.array([[-110.0, 26.0], [-68, 22.0]])
 _MIN_NOSE_Z_MM, _JAW_Y_MM = -20.0, -108.0
 _NECK_NOTCH_YZ_MM = -195.0, -42.0  # notch between the collar bones, at the base of the neck
 DEFAULT_TABLE_NAME = "default"
-"""Name of the package's own table, whose values were chosen by an artist."""
+"""Name of the package's own table, which holds artist's values instead of measured ones."""
 REGION_VALUE_LIMITS = {"m": (0.05, 1.0), "rho_s": (0.0, 1.0)}
 _KEYS_WITH_FILE_NAMES = ("landmarks", "labels")
 

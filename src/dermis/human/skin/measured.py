@@ -154,7 +154,7 @@ class MeasuredTable(NamedTuple):
     probabilities : (k,) cumulative probabilities, 0 to 1, of the k quantiles of each variable
     groups : mapping from group name to distribution
     sex : (4,) change of each variable from female to male
-    age : (4,) change of each variable from young to old, times `age_term`
+    age : (4,) change of each variable from young to old, to be multiplied by `age_term`
     mean_age_term : mean of `age_term` over the ages that `Human.sampled` samples
     site_slope : (12, 2) slope of the difference between each site and the cheek as a function of the cheek's
         own value, for log2 of melanin and for log2 of blood [-]
