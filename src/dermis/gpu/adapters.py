@@ -230,7 +230,7 @@ def adapters_like_best_match(selector: str) -> list[Adapter]:
 def check_limits(adapter_name: str, adapter_limits: Mapping[str, int]) -> None:
     """Raise DermisError for an adapter whose limits are too low for the shaders of a frame.
 
-    adapter_name : name of the adapter
+    adapter_name : name of the adapter, for the message
     adapter_limits : dictionary from the name of a limit to its value on the adapter
     """
     for name in _REQUIRED_LIMITS:
@@ -247,7 +247,7 @@ def device_limits(adapter_limits: Mapping[str, int], full_limit_names: Sequence[
     Most limits are WebGPU's defaults, or lower where the adapter offers less.
 
     adapter_limits : dictionary from the name of a limit to its value on the adapter
-    full_limit_names : names of the limits that are requested as high as the adapter offers instead
+    full_limit_names : names of the other limits, which are requested as high as the adapter offers
     """
     limits = {
         name: (max if name.startswith("min-") else min)(default, adapter_limits.get(name, default))

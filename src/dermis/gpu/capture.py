@@ -34,9 +34,9 @@ T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
 
 PlainData = dict[str, Any]
-"""Plain data for JSON."""
+"""Dictionary that can be written as JSON."""
 BoundIndices = list[int]
-"""For each binding of the program the index of a resource, or -1 - k for record k of the frame."""
+"""For each binding of a program, the index of its resource, or -1 - k for uniform record k of the frame."""
 
 
 @dataclass
@@ -83,8 +83,8 @@ class CapturedFrame:
     def add(self, captured_pass: CapturedPass, replay_unit_index: int | None) -> None:
         """Append a pass to the captured frame.
 
-        replay_unit_index : index of the unit, a group of passes that are run or skipped together, to which
-            the pass belongs; None for a pass that is run or skipped on its own
+        replay_unit_index : index of the pass's unit, a group of passes that are run or skipped together; None
+            for a pass that is run or skipped on its own
         """
         last = self.passes[-1].unit if self.passes else -1
         captured_pass.unit = last + 1 if replay_unit_index is None else replay_unit_index
@@ -260,9 +260,10 @@ class FrameCapture(Graph):
 
 
 def describe_resource(device: Device, resource: Bindable) -> PlainData:
-    """Return the parameters with which a resource can be created again, as plain data for JSON.
+    """Return the parameters that are needed to create a resource again, as plain data for JSON.
 
-    These are sizes, format and usage flags of a texture or buffer, or the options of a sampler.
+    The parameters of a texture are its size, format, number of mip levels and usage flags. A buffer has only
+    a size and usage flags, and a sampler has its options.
     """
     if is_texture(resource):
         size, mips = list(resource.size), resource.mip_level_count

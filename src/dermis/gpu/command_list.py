@@ -338,8 +338,8 @@ class Timestamps:
     def begin(self, stage: str) -> TimestampWrites | None:
         """Reserve the timestamp at the start of a pass, and return its description for wgpu.
 
-        Returns None if the pass gets no timestamp: with `whole_frame_only`, all passes except the first get
-        none, and neither do passes for which the pool has no timestamps left.
+        Returns None if the pass gets no timestamp. This is so if the pool has no timestamps left, and, with
+        `whole_frame_only`, for all passes except the first.
 
         stage : name of the stage to which the time of the pass is added
         """
@@ -359,7 +359,7 @@ class Timestamps:
             encoder.resolve_query_set(self._queries, 0, len(self._stages), self._resolved, 0)
 
     def stage_ms(self) -> dict[str, float]:
-        """Return the time of the frame ("total") and, without `whole_frame_only`, that of each stage [ms]."""
+        """Return the time of the frame ("total"), and of each stage unless `whole_frame_only` is set [ms]."""
         if not self._stages:
             return {"total": 0.0}
         raw = self._device.handle.queue.read_buffer(self._resolved, 0, 8 * len(self._stages))

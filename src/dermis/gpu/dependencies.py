@@ -40,7 +40,7 @@ class ResourceState:
     scratch: bool = False
 
     def overlapping_states(self, written_states: Container[ResourceState]) -> list[ResourceState]:
-        """Return the states in `written_states` whose content overlaps with that of this state.
+        """Return the states in `written_states` that share content with this state.
 
         These may be the state itself, the states of its views, or the state of the texture that it views.
         """
@@ -108,7 +108,7 @@ def resource_state(device: Device, resource: Bindable) -> ResourceState:
 
 
 PassAccess = tuple[int, tuple[ResourceState, ...], tuple[ResourceState, ...]]
-"""`Access.id` of a pass, the states of the resources that it reads, and of those that it writes."""
+"""`Access.id` of a pass, states of the resources it reads, and states of the resources it writes."""
 
 
 class Dependencies:

@@ -54,7 +54,7 @@ class Device:
     """Logical device with its queue, which holds all resources and programs of a renderer.
 
     The device has WebGPU's default limits, even if the adapter offers more, so that a program that exceeds
-    them fails on every machine. Only the maximum sizes of textures and buffers are those of the adapter. The
+    them fails on every machine. Only the maximum sizes of textures and buffers are the adapter's own. The
     device has the features in `OPTIONAL_FEATURES` that the adapter supports.
 
     adapter : opened adapter
@@ -66,7 +66,7 @@ class Device:
     ffi : cffi interface of wgpu's native library
     lib : functions of the native library, called directly to save the overhead of wgpu's Python code; errors
         in a pass are raised when its encoder is submitted
-    checked : the same functions with checks: they raise the errors that the library reports
+    checked : the same functions, wrapped so that they raise the errors that the library reports
     resource_states : versions of the content of textures, buffers and views, see dependencies.py
     programs : compiled shaders, see program.py
     spare_chunks : unused host memory for uniforms, kept for later frames because allocation is slow

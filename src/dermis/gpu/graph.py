@@ -118,7 +118,7 @@ class FrameListing:
 class ListingRecorder(Recorder):
     """Recorder that only adds the passes of a recording (see `Recording`) to a listing.
 
-    listing : listing to which the passes are added
+    listing : listing that receives the passes
     declared_index : index of the recording among the passes declared on the graph
     """
 

@@ -14,7 +14,7 @@ import numpy as np
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
 FunctionKey = tuple[Callable[..., object], str]
-"""A function and the owner that it is called for."""
+"""A function, and the name of its caller, see `Memo.get`."""
 
 
 @dataclass(eq=False, slots=True)

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from dermis.gpu.device import Device
 
 _DRIVER_BASE_AND_THREAD_BYTES = 0.5e9, 0.15e9
-"""Address space for loading all drivers of Mesa 22.3, and the addition for each thread of its adapter."""
+"""Address space for loading all drivers of Mesa 22.3, and extra space per thread of its adapter [byte]."""
 
 _RENDERING_BASE_AND_THREAD_BYTES = 0.9e9, 0.22e9
-"""Address space for rendering the package's human in software, and the addition for each thread.
+"""Address space for rendering the package's human in software, and extra space per thread [byte].
 
 Measured at 512x512 with an atlas of 1024.
 """

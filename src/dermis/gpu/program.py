@@ -42,7 +42,7 @@ class Program:
     path : WGSL file
     folders : folders that are searched for included files
     constants : pipeline constants by name
-    stages : names in `wgpu.ShaderStage` of the shader stages to which the bindings are visible
+    stages : shader stages that can use the bindings, by their names in `wgpu.ShaderStage`
     """
 
     stages: ClassVar[tuple[str, ...]]
@@ -290,7 +290,7 @@ def used_constants(path: Path, folders: Sequence[Folder], constants: Constants) 
 def shader_source(path: Path, folders: Sequence[Folder]) -> ShaderSource:
     """Return a shader with its includes and other directives expanded.
 
-    folders : folders in which included files are searched, before the shaders of `dermis.gpu`
+    folders : folders that are searched for included files, before the shaders of `dermis.gpu`
     """
     return compose_shader(path, (*folders, _GPU_SHADER_FOLDER))
 

@@ -30,7 +30,7 @@ class DrawTarget(NamedTuple):
 
 
 class Recorder(ABC):
-    """Interface for adding passes, with which the same code can run, schedule, store or list passes.
+    """Interface for adding passes, so that the same code can run, schedule, store or list them.
 
     The implementations are a command list, which runs the passes; a graph, which runs only passes with
     outdated output; a recording, which stores compute passes to replay them in later frames; a capture, which
@@ -67,7 +67,7 @@ class Recorder(ABC):
         tile_side: int = 8,
         in_place_resource: str = "",
     ) -> None:
-        """Add a dispatch in which square workgroups cover a 2-D grid of invocations.
+        """Add a dispatch of square workgroups that cover a 2-D grid of invocations.
 
         stage : name of the stage, under which the pass is timed
         resources : resources and uniform records by their names in the shader

@@ -166,7 +166,7 @@ def _contains_weak_reference(weak_copy: object) -> bool:
 
 
 def _matches_copy(weak_copy: object, argument: object) -> bool:
-    """Return whether an argument equals the argument from which `_weak_copy` made a copy."""
+    """Return whether an argument equals the original of a copy that `_weak_copy` made."""
     if isinstance(weak_copy, weakref.ref):
         return weak_copy() is argument
     if isinstance(weak_copy, tuple):

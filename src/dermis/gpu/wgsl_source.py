@@ -71,13 +71,13 @@ Folder = os.PathLike[str]
 
 @dataclass(frozen=True)
 class ShaderSource:
-    """Composed shader: its text, with the file and line number from which each line comes."""
+    """Composed shader: its text, and the original file and line number of each line."""
 
     text: str
     origin: tuple[tuple[str, int], ...]
 
     def locate(self, compiler_message: str) -> str:
-        """Return a compiler message in which line numbers of the composed text are replaced by file:line."""
+        """Return a compiler message with original file:line instead of line numbers of the composed text."""
 
         def file_and_line(match: re.Match[str]) -> str:
             line = int(match[1])
@@ -93,7 +93,7 @@ def compose_shader(path: Path, folders: Sequence[Folder]) -> ShaderSource:
     """Return a shader with its directives expanded.
 
     path : file of the shader
-    folders : folders in which an included file is searched if it is not next to the file that includes it
+    folders : folders that are searched for an included file if it is not next to the including file
 
     Raises DermisError if an included file or a list does not exist, if a {word} has no replacement, or if
     `//#if`, `//#else` and `//#end` do not match.
@@ -109,9 +109,9 @@ def compose_shader(path: Path, folders: Sequence[Folder]) -> ShaderSource:
 
 
 class _Definitions(NamedTuple):
-    """Definitions to which the directives of shaders refer; they are hashable, to be part of a cache key.
+    """Definitions that the directives of shaders refer to; they are hashable, to be part of a cache key.
 
-    folders : folders in which included files are searched
+    folders : folders that are searched for included files
     lists : pairs of the name and the members of each list for `//#include <list>` and `//#each`
     numbers : pairs of a {word} of `//#fill` and the number, as text, that replaces it
     options : names for which `//#if` is true
@@ -134,7 +134,7 @@ def _compose_with_definitions(path: Path, definitions: _Definitions) -> ShaderSo
 class _Composer:
     """Composer that expands the directives of one shader.
 
-    lines : composed lines so far, each with the file and line number from which it comes
+    lines : composed lines so far, each with its original file and line number
     """
 
     def __init__(self, definitions: _Definitions) -> None:
@@ -182,7 +182,7 @@ class _Composer:
             conditions.pop()
 
     def _expand_lines(self, directive: re.Match[str], shader_file: Path) -> list[str]:
-        """Return the lines to which a directive `//#each` or `//#fill` expands."""
+        """Return the lines that replace a directive `//#each` or `//#fill`."""
         if text := directive["filled"]:
             return [directive["indent"] + _substitute_words(text, self._numbers, shader_file)]
         members = enumerate(self._list_members(directive["list"], shader_file))

@@ -15,7 +15,7 @@ TARGET_SIDES = "Left", "Right"
 EXPRESSIONS: Registry[Weights] = Registry(
     "expression", tomllib.loads(resources.files(__package__).joinpath("expressions.toml").read_text("utf-8"))
 )
-"""Weights by name of the expression, from expressions.toml; other packages may register their own."""
+"""Morph target weights of each named expression, from expressions.toml; other packages may register more."""
 
 
 def expression(name: str) -> dict[str, float]:
@@ -35,7 +35,7 @@ def expand_targets(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def expand_sides(target_name: str) -> tuple[str, ...]:
-    """Return the names of the left and right targets for a name without a side; return other names alone."""
+    """Return the names of the left and right targets for a name without a side; any other name unchanged."""
     return (
         tuple(f"{target_name}{side}" for side in TARGET_SIDES)
         if f"{target_name}Left" in _arkit_names()

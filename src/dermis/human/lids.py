@@ -17,7 +17,7 @@ Index = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 MAKEHUMAN_EYE_RADIUS_MM = 15.4
-"""Mean radius of MakeHuman's eyeball of the average person, which MakeHuman's lids touch [mm]."""
+"""Mean radius of the average person's eyeball in MakeHuman; MakeHuman's lids touch this eyeball [mm]."""
 EYE_FORWARD_OFFSET_MM = 2.2
 """How far the smaller anatomical eyeball is in front of MakeHuman's, to align the corneas [mm]."""
 EYEBALL_CONTROL_MESH_SCALE = 1.0045
@@ -33,13 +33,13 @@ _LID_ROW_CONTACT = np.array([0, 0.2, 0.6, *21 * [1.0], 0.6, 0.2, 0, 0])
 """Contact of each row of lid_rings.csv with the eyeball, 0 to 1; none around the caruncle."""
 _CARUNCLE_RISE_MM = np.array([[0.3, 0.7, 0.0, 0.0], [0.0, 0.2, 0.0, 0.0], *23 * [4 * [0.0]],
                          [0.0, 0.3, 0.0, 0.0], [0.5, 1.0, 0.0, 0.0], [0.6, 1.1, 0.0, 0.0]])  # fmt: skip
-"""Rise of the floor of the inner corner for each row while the eye is open."""
+"""Rise of the floor of the inner eye corner while the eye is open, by row and column of `lid_rings` [mm]."""
 _UPPER_LID_ROWS, _LOWER_LID_ROWS = (
     slice(1, 12),
     slice(13, 28),
 )  # rows of lid_rings.csv that hold the upper and the lower lid
 _LID_OVERLAP_MM = 1.6 * np.array([0.4, 0.8, *7 * [1.0], 0.8, 0.4])
-"""Overlap of closed upper lids over the lower lids."""
+"""Overlap of a closed upper lid over the lower lid, for each of the rows `_UPPER_LID_ROWS` [mm]."""
 _SLIDING_QUAD_ROWS = 6  # rows of quads around the lids that may slide over the eye
 _MIN_BLINK_DISPLACEMENT_MM = 2.0  # minimum displacement of sliding skin by a blink
 _RING_COUNT, _EDGE_COLUMN, _CREST_COLUMN = (
@@ -69,8 +69,7 @@ class LidSide(NamedTuple):
 
     rings : (r,) indices of the lid points, row by row of lid_rings.csv
     point : (n,) indices of the lid points and of the points of the surrounding skin
-    weights : (n, r) weights with which the points in `point` follow the displacements of the points in
-        `rings`
+    weights : (n, r) weight, 0 to 1, with which each point in `point` follows each point in `rings`
     contact : (c,) indices of the points that slide over the eye
     clearances_mm : (c,) minimum distances of these points from the eye [mm]
     """
@@ -242,7 +241,7 @@ def _sliding_points(rings: Index, candidate_points: Index, side_name: str) -> In
     """Return the indices (c,) of the skin points outside the lid rings that slide over the eye in a blink.
 
     rings : (rows, 4) lid points from lid_rings.csv
-    candidate_points : (n,) points from which the result is selected
+    candidate_points : (n,) indices of the points to select from
     side_name : "Left" or "Right"
     """
     index = target_deltas().names.index(f"{EXPRESSION_PREFIX}eyeBlink{side_name}")
@@ -282,9 +281,11 @@ class _LidTargets(NamedTuple):
     axis : (t, 1, 3) viewing direction of the eyes when each target is active
     point : (n,) indices of the points around both eyes
     lid_sides : lid points of the left and of the right eye, as indices into `point`
-    target_index : indices of the targets that move the lid points of the left and of the right eye
-    row : (m,) indices into `MorphTargets.delta_mm` of the displacements around the eyes
-    target, point_index : (m,) target of each of these displacements, and its point as an index into `point`
+    target_index : indices, 0 to t - 1, of the targets that move the left eye's lid points, then of those that
+        move the right eye's
+    row : (m,) indices into `MorphTargets.delta_mm` that select the displacements of points around the eyes
+    target : (m,) index, 0 to t - 1, of the target that causes each selected displacement
+    point_index : (m,) index into `point` of the point that each selected displacement moves
     """
 
     closed: BoolArray

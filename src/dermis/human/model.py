@@ -40,14 +40,14 @@ MATERIAL_OF_GROUP = {
     "helper-tongue": Material("tongue", "opaque", _TONGUE_COLOUR, "tongue"),
     "cap": Material("cut", "opaque", (0.02, 0.02, 0.02)),
 }
-"""Materials by group of quads."""
+"""Material of each group of quads."""
 _EQUAL_MACRO_WEIGHT = 1 / 6
 MEAN_PERSON_WEIGHTS = {
     f"macrodetails/{people}-{sex}-young": _EQUAL_MACRO_WEIGHT
     for people in ("african", "asian", "caucasian")
     for sex in ("female", "male")
 }
-"""Weights of the mean person, for whom atlas, tables and brows are defined."""
+"""Morph target weights of the mean person; the uv atlas, tables and brows are defined on this person."""
 
 
 class _LayoutFaces(NamedTuple):
@@ -171,7 +171,7 @@ class Template:
     refinement: Refinement | None
 
     def refine_head(self, control_head: Head) -> Head:
-        """Return the subdivided head of a person, which uses the uv atlas of `head`, the mean person's head.
+        """Return a person's head after subdivision, with the same uv atlas as the mean person's head, `head`.
 
         control_head : the person's head before subdivision, in the same uv layout as `head`
         """

@@ -33,7 +33,10 @@ _GAZE_ANGLES = {
     "Up": (-_GAZE_UP_DEGREES, 0.0, 0.0),
     "Down": (_GAZE_DOWN_DEGREES, 0.0, 0.0),
 }
-"""Angles of the left eye, at +X, about x, y and z [degrees]; of the right eye with the opposite sign of y."""
+"""Rotation angles of the left eye (at +X) about x, y and z for each direction of gaze [degrees].
+
+For the right eye, the angle about y has the opposite sign.
+"""
 
 
 def gaze_rotations() -> tuple[BoneRotation, ...]:
@@ -99,7 +102,7 @@ def build_skeleton(
 def _skin_weights(
     eye_bones: tuple[int, ...], eyeball_point_count: int
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return the bone indices (p, 4) of all points, and the skinning weights (p, 4) of these bones.
+    """Return the indices (p, 4) of the four bones that move each point, and their skinning weights (p, 4).
 
     The points of an eyeball follow only the bone of that eye.
 

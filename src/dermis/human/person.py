@@ -45,7 +45,7 @@ _MIN_BEARD_SHADOW = 0.6  # shadow of shaved hair below a beard
 _ANCESTRY_CONCENTRATION = 0.35  # of a Dirichlet distribution; small, so that mostly one ancestry prevails
 _SEX_SD = 0.08  # standard deviation of `sex` from 0 or 1
 _OPPOSITE_SUFFIXES = {"decr": "incr", "down": "up", "in": "out", "backward": "forward", "concave": "convex"}
-"""Suffixes of the names of targets with opposite effects."""
+"""Pairs of suffixes; two targets whose names differ only by such a pair have opposite effects."""
 _WEIGHT_SD_BY_FOLDER = {  # standard deviation of the weights of targets by folder
     "head": 0.1,
     "forehead": 0.25,
@@ -163,9 +163,8 @@ def _sample_ancestry(
 ) -> tuple[NDArray[np.float64], dict[str, float]]:
     """Sample the ancestry of a person, in one form for the shape of the head and in another for the skin.
 
-    Returns the fractions (3,) of African, Asian and Caucasian ancestry for the shape. For the skin, returns a
-    dictionary from names of groups of people, whose skin has been measured, to weights with which the
-    pigments of these groups are averaged.
+    For the shape, returns the fractions (3,) of African, Asian and Caucasian ancestry. For the skin, returns
+    a dictionary from the name of each group of measured people to the weight of its pigments in the average.
 
     If the ancestry of the shape is fixed, the skin follows the shape. If only a skin ancestry or an ITA is
     fixed, the shape follows the skin. If nothing is fixed, the skin follows the shape, too, except that some
@@ -244,7 +243,7 @@ def _sample_hair_pigments(rng: np.random.Generator, ancestry: NDArray[np.float64
 
 
 def _sample_targets(rng: np.random.Generator) -> Iterator[tuple[str, float]]:
-    """Yield random names and weights of morph targets of the face, in a fixed order."""
+    """Yield names of morph targets of the face with random weights; of two opposite targets, only one."""
     common: dict[str, float] = {}
     samples = iter(
         rng.standard_normal(sum(1 + bool(one.shared_name) for one in _opposite_targets())).tolist()
@@ -324,8 +323,8 @@ class Human:
     hair : HairLook, optional
         Look of the hair; by default typical for the person.
     skin_ancestry : str
-        Name of a group of measured people whose colours of skin, eyes and hair the person gets, independently
-        of the shape, such as "south asian"; "" for the colours of the shape's ancestries.
+        Name of a group of measured people, such as "south asian". The person gets the skin, eye and hair
+        colours of this group, whatever the shape; "" for the colours of the shape's ancestries.
     ita : float, optional
         Individual typology angle of the cheek, -65 (darkest) to 70 (lightest) [degrees]; the pigments are
         typical of measured people whose skin has this angle. Ignored if `skin` is given.
@@ -385,10 +384,10 @@ class Human:
         seed : int
             0 to 2**32 - 1; the same seed gives the same person.
         **given
-            Fields that are not sampled, such as `age=70` or `ita=-30`, or some values of targets, skin, eyes
-            and hair, such as `skin={"melanin": 0.1}`. Skin and hair are sampled for the given age, sex and
-            ancestry. If `ita` is given without an ancestry, the ancestry is sampled from measured people with
-            this angle.
+            Fields that are not sampled, such as `age=70` or `ita=-30`. For targets, skin, eyes and hair, it
+            is enough to give some of the values, such as `skin={"melanin": 0.1}`. Skin and hair are sampled
+            for the given age, sex and ancestry. If `ita` is given without an ancestry, the ancestry is
+            sampled from measured people with this angle.
 
         Returns
         -------

@@ -26,7 +26,7 @@ from dermis.mesh.head import Head
 
 T = TypeVar("T", Human, SkinLook, EyeLook, HairLook)
 _STRETCH_ATLAS_SIDE = 1024
-"""Largest side of the atlas from which texel lengths on the skin are computed; they vary slowly [texel]."""
+"""Largest side of the atlas that gives the size of texels on the skin; this size varies slowly [texel]."""
 
 
 def person_parameters(person: Human) -> dict[str, Any]:
@@ -118,7 +118,7 @@ def write_person_glb(
 
 
 def relief_slopes(head: Head) -> NDArray[np.float32] | None:
-    """Return the slopes (n, n, 2) of a head's height map, from which a normal map is computed [-].
+    """Return the slopes (n, n, 2) of a head's height map, for computing a normal map [-].
 
     The channels are the slopes to the right and upwards.
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 INTERPOLATION_STEPS = 64
-"""Number of intervals into which tables over [0, 1] divide their argument."""
+"""Number of equal intervals between the columns of a table, whose positions range from 0 to 1."""
 DIRECTION_ROWS = 32
 """Number of incident directions in tables; the square roots of their cosines are evenly spaced."""
 _QUADRATURE_NODES = 32
@@ -25,7 +25,7 @@ def interpolate_table(column_at: Callable[[float], Floats], table_position: floa
 
     The positions of the table's columns are the multiples of 1 / INTERPOLATION_STEPS from 0 to 1.
 
-    column_at : function from the position of a column to the column, an array; it should cache its results
+    column_at : function that computes the column at a position, as an array; it should cache its results
     table_position : position between 0 and 1; values outside this range are clamped
     """
     scaled = min(max(table_position, 0.0), 1.0) * INTERPOLATION_STEPS
@@ -181,7 +181,7 @@ class _HalfSpace:
         return np.asarray(leaving.reshape(np.shape(cosine)))
 
     def diffuse_reflectance(self) -> float:
-        """Return the fraction of the light entering from a uniform sky that leaves again [-]."""
+        """Return the fraction of the entering light that leaves again, under a uniform sky [-]."""
         return float((self.leaving * self.reflectance(self._mu)).sum() / self.leaving.sum())
 
 
@@ -219,7 +219,7 @@ def _mean_kernel(eta: float) -> float:
 
 
 def albedo_for_reflectance(total_reflectance: float, eta: float) -> float:
-    """Return the single-scattering albedo for which a half-space has a given reflectance [-].
+    """Return the single-scattering albedo of the half-space that has a given reflectance [-].
 
     The exact reflectance of an isotropically scattering half-space is inverted numerically.
 

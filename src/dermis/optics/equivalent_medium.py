@@ -109,7 +109,7 @@ def _gaussian_transform(gaussians: tuple[tuple[float, float], ...], frequency: f
     """Return the Hankel transform of a sum of Gaussians in one channel at a frequency [-].
 
     gaussians : variance [mm2] and weight of each Gaussian
-    frequency : frequency [1/mm]
+    frequency : frequency s [1/mm]
     """
     return sum(weight * math.exp(-0.5 * variance * frequency**2) for variance, weight in gaussians)
 
@@ -117,7 +117,7 @@ def _gaussian_transform(gaussians: tuple[tuple[float, float], ...], frequency: f
 def _cumulative_transform(cumulative_profile: CumulativeProfile, frequency: float) -> float:
     """Return the Hankel transform of a profile's first channel, relative to its value at frequency 0 [-].
 
-    frequency : frequency [1/mm]
+    frequency : frequency s [1/mm]
     """
     from scipy.special import j0
 
@@ -129,7 +129,7 @@ def _cumulative_transform(cumulative_profile: CumulativeProfile, frequency: floa
 def _reflectance_transform(medium: Medium, frequency: float) -> float:
     """Return the Hankel transform of R(r) of a half-space with one channel, at one frequency [-].
 
-    frequency : frequency [1/mm]
+    frequency : frequency s [1/mm]
     """
     A = boundary_mismatch(medium.eta, "exact")
     return float(layered_diffusion.solve_reflectance(np.array([frequency]), medium, A)[0, 0])

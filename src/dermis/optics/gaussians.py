@@ -85,7 +85,7 @@ class GaussianSum:
         return np.asarray(gaussians @ self.weight)
 
     def energy_within(self, radius_mm: ArrayLike) -> Floats:
-        """Return the light (..., c) of a narrow beam of unit power that emerges within distances from it [-].
+        """Return the light (..., c) that emerges within given distances from a narrow beam of unit power [-].
 
         radius_mm : distances from the beam [mm]
         """

@@ -20,8 +20,9 @@ from dermis.optics.radial import RadialProfile, missing_light_warnings, radius_g
 HalfSpaceKind = Literal["skin", "matched", "walk"]
 """Name of a tabulated half-space, which states its surface and illumination.
 
-"skin" has a smooth surface of index 1.4 and "matched" an index-matched one, both lit perpendicularly; "walk"
-has an index-matched surface that is lit uniformly from all directions.
+"skin" has a smooth surface and an index of refraction of 1.4, and is lit perpendicularly. "matched" has an
+index-matched surface and is also lit perpendicularly. "walk" has an index-matched surface and is lit
+uniformly from all directions.
 """
 
 PHOTON_TABLE_SOURCES = ("Wang1995",)
@@ -105,7 +106,7 @@ def fractions_within(
 
 
 def tabulated_albedo(half_space_kind: HalfSpaceKind, total_reflectance: ArrayLike) -> Floats:
-    """Return the single-scattering albedos for which half-spaces have given reflectances, from a table [-].
+    """Return the single-scattering albedos of half-spaces with given reflectances, from a table [-].
 
     half_space_kind : surface and illumination of the half-spaces
     """
@@ -124,7 +125,7 @@ def _table_position(photon_table: _PhotonTable, albedo: ArrayLike) -> Floats:
 
 
 def _sqrt_absorbed_fraction(albedo: ArrayLike) -> Floats:
-    """Return sqrt(1 - albedo), on which reflectances and profiles depend smoothly up to an albedo of 1."""
+    """Return sqrt(1 - albedo); reflectances and profiles are smooth functions of it, up to an albedo of 1."""
     return np.sqrt(np.maximum(1.0 - np.asarray(albedo, np.float64), 0.0))
 
 

@@ -229,7 +229,7 @@ def _read_media(table_name: str) -> dict[str, list[Layer]]:
 
 
 def albedo_from_colour(diffuse_reflectance: ArrayLike, g: float = 0.0) -> Floats:
-    """Return the single-scattering albedo for which a half-space has a given diffuse reflectance [-].
+    """Return the single-scattering albedo of a half-space with a given diffuse reflectance [-].
 
     diffuse_reflectance : diffuse reflectances from 0 to 1, an array of any shape [-]
     g : mean cosine of the scattering angle [-]

@@ -175,7 +175,7 @@ def fit_profile(
     the total reflectance of the profile. Such profiles are so steep at the centre that a fit without this
     constraint would lose up to 2 % of the light.
 
-    profile_name : preset or file, from which the name of the fitted profile is made
+    profile_name : preset or file after which the fitted profile is named
     similar_fit : fit of a similar tissue, as start of the new fit, which is then several times faster
 
     Raises DermisError when the fit is not a valid profile.

@@ -1,4 +1,4 @@
-"""Checks that files contain reduced scattering coefficients; if not, errors state the reduced values."""
+"""Errors for files with unreduced scattering coefficients; their messages state the reduced coefficients."""
 
 from __future__ import annotations
 

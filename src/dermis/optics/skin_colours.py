@@ -88,7 +88,7 @@ def spectral_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_N
 
 
 def _with_axis(layer: Layer, axis: int, rows: NDArray[np.int64] | None = None) -> Layer:
-    """Return a layer with coefficients (n, c), or some rows of them, that have a further axis of length 1.
+    """Return a layer with an axis of length 1 added to its coefficients (n, c), or to some of their rows.
 
     axis : position of the new axis
     rows : indices of the rows; None for all rows

@@ -25,7 +25,7 @@ from dermis.optics.angular_response import (
 
 Floats = NDArray[np.float64]
 DIRECTION_NODE_COUNT = 16
-"""Number of discrete directions that leave a slab, and of directions that are totally reflected."""
+"""Default number of discrete directions in which light can leave a slab, see `solve_slabs`."""
 DEEP_OPTICAL_DEPTH = 1e4
 """Thickness from which a slab is treated as a half-space [mean free paths]."""
 _MIN_OPTICAL_DEPTH = 1e-6  # optical depth of a slab in which light scatters at most once
@@ -115,7 +115,7 @@ def solve_slabs(
         anisotropic [-]
     eta : index of refraction relative to the air on both sides, at least 1 [-]
     direction_node_count : number of discrete directions in which light can leave the slab; if eta is above 1,
-        the same number of directions is added in which light is totally reflected
+        the computation adds as many directions with total reflection
     g : mean cosine of the scattering angle, at least 0 [-]
 
     Source: [Chandrasekhar1960] section 50 for the addition of layers.
@@ -137,7 +137,7 @@ def solve_doubled_slabs(
 ) -> Slabs:
     """Return the reflection and transmission of slabs, and of slabs that are 2, 4, 8 ... times as thick.
 
-    The time is about that of `solve_slabs` for the thickest slabs alone.
+    This takes about as long as `solve_slabs` for the thickest slabs alone.
 
     albedo, eta, direction_node_count, g : as in `solve_slabs`
     smallest_depth : (n,) optical depths before the doublings; they should be of similar size [-]
@@ -216,7 +216,7 @@ class _Transport:
 def _slabs_in_air(
     transport: _Transport, reflection: Floats, transmission: Floats, unscattered_fraction: Floats
 ) -> Slabs:
-    """Return the reflection and transmission of slabs in air, from those of slabs with index-matched faces.
+    """Return the reflection and transmission of slabs in air, computed from slabs with index-matched faces.
 
     transport : discrete directions, and reflectance of the faces
     reflection, transmission : (n, m, m) reflection and transmission with index-matched faces, as pi times the
@@ -273,7 +273,7 @@ def _direction_quadrature(eta: float, direction_node_count: int) -> tuple[Floats
 def _doubling_steps(
     transport: _Transport, initial_depth: Floats, doubling_count: int
 ) -> Iterator[tuple[Floats, Floats, Floats]]:
-    """Yield reflection, transmission and unscattered light of slabs, then those of slabs twice as thick, etc.
+    """Yield reflection, transmission and unscattered light of slabs, then of slabs twice as thick, and so on.
 
     Reflection and transmission (n, m, m) are pi times the radiance for unit power from each direction. The
     unscattered light (n, m) is the fraction that crosses the slab without scattering.
@@ -309,8 +309,8 @@ def _add_faces(
     """Return the scattered light that arrives at the faces of reflecting slabs from inside.
 
     The light has been scattered at least once, and may have been reflected by the faces any number of times.
-    The results (n, m, m) are pi times the radiance at the upper face and at the lower face, with a column for
-    each direction in which unit power enters.
+    The results (n, m, m) are pi times the radiance at the upper face and at the lower face. Each column is
+    for light of unit power that enters in one direction.
 
     reflection_operator, transmission_operator : (n, m, m) matrices that convert the radiance of light inside
         a face to the reflected and transmitted radiance: `reflection` and `transmission` below, with each
@@ -342,8 +342,8 @@ def _add_faces(
 def anisotropic_response(total_reflectance: ArrayLike, eta: float, g: float) -> AngularResponse:
     """Return the angular response of half-spaces with anisotropic scattering.
 
-    Their reduced absorption and scattering coefficients equal those of isotropically scattering half-spaces
-    with the reflectance `total_reflectance`.
+    The half-spaces have the same absorption and reduced scattering coefficients as isotropically scattering
+    half-spaces with the reflectance `total_reflectance`.
 
     total_reflectance : (c,) reflectance of the isotropic half-spaces for light at normal incidence [-]
     eta : index of refraction relative to air, at least 1 [-]

@@ -62,8 +62,8 @@ class ThinParts:
     transmitted : (THICKNESS_ROWS, k, 3) weights of the light that leaves on the far side [-]
     lost : (THICKNESS_ROWS, k, 3) weights of the light that a half-space would reflect but the thin part does
         not; lost light spreads as widely as transmitted light [-]
-    directionality : (THICKNESS_ROWS,) dependence of the transmittance on the incident direction, relative to
-        that of optically thick slabs (see `oblique_transmittance`); 0 for no dependence [-]
+    directionality : (THICKNESS_ROWS,) how strongly the transmittance depends on the incident direction: 0 for
+        no dependence, 1 for the dependence of optically thick slabs (see `oblique_transmittance`) [-]
     """
 
     max_thickness_mm: float
@@ -75,7 +75,7 @@ class ThinParts:
 def solve_thin_parts(
     medium: Medium, variance_mm2: Floats, max_thickness_mm: float, g: float = 0.0
 ) -> ThinParts:
-    """Return the light that slabs transmit, and the light that they reflect less than a half-space would.
+    """Return the light that slabs transmit, and the light that a half-space reflects but the slabs do not.
 
     The slabs consist of a medium with one layer; their thicknesses range from 0 to `max_thickness_mm`.
 
@@ -180,8 +180,8 @@ def _uniform_light_responses(
 ) -> Iterator[_UniformLightResponse]:
     """Yield the `_UniformLightResponse` of each channel for slabs of n thicknesses.
 
-    They are interpolated by cubic splines between the optical thicknesses `_OPTICAL_DEPTHS`, for which they
-    are solved once.
+    The responses are computed once for the optical thicknesses `_OPTICAL_DEPTHS`, and interpolated between
+    these by cubic splines.
 
     layer : medium of the slabs, with reduced coefficients; its field `thickness_mm` is ignored
     thickness_mm : (n,) thicknesses of the slabs [mm]
@@ -225,7 +225,7 @@ def _spread_weights(medium: Medium, thickness_mm: Floats, variance_mm2: Floats) 
 
     The profiles are normalised, so the weights of each slab sum to 1.
 
-    medium : medium with one layer, of which the first channel is used
+    medium : medium with one layer; only its first channel is used
     thickness_mm : (n,) thicknesses of the slabs [mm]
     variance_mm2 : (k,) variances of the Gaussians [mm2]
     """

@@ -1,4 +1,4 @@
-"""Tissues from presets and files: media with colours as channels, and skins defined by their pigments."""
+"""Tissues from presets and files: media given in red, green and blue, and skins defined by their pigments."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, interpolate_quads, quad_corners
 
 HEAD_AXIS_Z = -72.0
-"""Position of the vertical axis around which the hairline is defined [mm]."""
+"""z coordinate of the vertical axis of the head; angles along the hairline are about this axis [mm]."""
 _R2_SEQUENCE_STEPS = np.array(
     [0.7548776662, 0.5698402909]
 )  # of a low-discrepancy sequence in the unit square
@@ -52,8 +52,8 @@ def sample_roots(
 ) -> Roots:
     """Return random hair roots, ordered by quad, whose number per area follows `density`.
 
-    Within a quad, the candidates are points of a low-discrepancy sequence, so that roots do not cluster. No
-    hair grows on the ears, on the lips or in the mouth.
+    The roots in a quad are selected from the points of a low-discrepancy sequence, so that they do not
+    cluster. No hair grows on the ears, on the lips or in the mouth.
 
     mesh : control mesh of the person
     density : relative density over the skin

@@ -116,7 +116,7 @@ def _hair_group(
 
     root_frames : roots of the n hairs, with their frames
     knots_mm, radius_mm : (n, k, 3) positions and (n, k) radii of the knots [mm]
-    pigment_factor : pigment concentrations relative to those of the person's look [-]
+    pigment_factor : pigment concentrations, divided by the concentrations in the person's look [-]
     """
     offsets = offsets_in_root_axes(root_frames.frame, knots_mm - root_frames.positions_mm[:, None])
     return HairGroup(root_frames.roots, offsets, radius_mm.astype(np.float32), pigment_factor)
@@ -141,7 +141,7 @@ def _concatenate_roots(root_groups: Iterable[Roots]) -> Roots:
 
 
 def _repeat_per_hair(hair_groups: list[HairGroup], field_name: str) -> Doubles:
-    """Return for each hair (n,) the value of a scalar field, such as "cover", of the group it belongs to."""
+    """Return for each hair the value (n,) of a scalar field of its group, such as "cover"."""
     return np.concatenate([np.full(len(group.radius), getattr(group, field_name)) for group in hair_groups])
 
 

@@ -161,7 +161,7 @@ COMBS: dict[str, Callable[[Doubles, Style], Doubles]] = {
     "twist": _rope_directions,
     "beard": _beard_directions,
 }
-"""Directions (n, 3) along which hair is combed at points (n, 3) of the scalp, by the comb of a style."""
+"""Functions that return the combed directions (n, 3) of hair at points (n, 3), by `Style.comb`."""
 
 
 @cache
@@ -208,7 +208,7 @@ def ear_weight(points: Doubles) -> Doubles:
 def grow_guides(root_finder: RootFinder, roots_mm: Doubles, style: Style) -> tuple[Doubles, Doubles, Doubles]:
     """Return the knots (g, k, 3) of guides [mm], with skin normals (g, k, 3) and heights (g, k) [mm].
 
-    The normals are those of the skin below the knots, and the heights are measured from this skin.
+    The normals and the heights refer to the skin below each knot.
 
     roots_mm : (g, 3) roots on the skin of the mean person [mm]
     """

@@ -44,7 +44,7 @@ HAIR_PARAMETERS_DTYPE = np.dtype(
         ("pad", "f4"),
     ]
 )
-"""Numbers of a part of a groom, the struct GroomPart in strands_grow.wgsl."""
+"""Parameters of scalp hair or of a beard, laid out like the struct GroomPart in strands_grow.wgsl."""
 
 
 def make_groom(

@@ -73,8 +73,8 @@ def sample_shapes(
     """Return random shape parameters (7, n) of lashes.
 
     The seven rows are: the splay [-], the elevation of the first segment [rad], the elevation of the last
-    segment [rad], the length [mm], the radius at the root [mm], the index of the clump to which the lash
-    sticks, and the attraction of the tip to this clump, 0 to 1.
+    segment [rad], the length [mm], the radius at the root [mm], the index of the lash's clump, and the
+    attraction of the tip to this clump, 0 to 1.
 
     edge_position : (n,) positions along the edge of the lid, from `sample_positions`
     first_clump : index of the first clump of this row

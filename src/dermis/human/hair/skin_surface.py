@@ -50,7 +50,7 @@ def tangent_component(vectors: Doubles, normals: Doubles) -> Doubles:
 
 
 class RootFrames:
-    """Hair roots on the subdivided mesh, each with the coordinate frame in which knots are stored.
+    """Hair roots on the subdivided mesh, each with a coordinate frame for the knots of its hair.
 
     roots : roots on quads of the subdivided mesh
     positions_mm : (n, 3) positions of the roots [mm]
@@ -105,7 +105,7 @@ class HairGroup(NamedTuple):
     roots : roots of the n hairs on the subdivided mesh
     knots : (n, k, 3) positions of the knots in the root frames, see `Strands` [mm]
     radius : (n, k) radii of the hairs at the knots [mm]
-    pigment_factor : pigment concentrations relative to those of the person's look [-]
+    pigment_factor : pigment concentrations, divided by the concentrations in the person's look [-]
     hairs_per_strand : number of real hairs that each strand represents
     cover : projected area of the hairs around their roots, per area of skin, see `Strands` [-]
     """

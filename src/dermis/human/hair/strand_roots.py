@@ -27,9 +27,9 @@ from dermis.mesh.groom import KNOTS_PER_GUIDE, Guides, StrandRoots
 from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
 STRANDS_PER_CM2 = 150.0
-"""Density of the possible strands of the scalp [1/cm2]."""
+"""Density of the strand roots on the scalp; strands grow from all or some of them [1/cm2]."""
 BEARD_STRANDS_PER_CM2 = 60.0
-"""Density of the possible strands of beards [1/cm2]."""
+"""Density of the strand roots in beards [1/cm2]."""
 _CACHE_VERSION = 9  # of this module's algorithm, part of the keys of cached tables
 _MAX_CACHED_STYLES, _MAX_CACHED_LOOKS = 4, 24  # single styles; hair styles with or without a beard
 # Distances between guides from which strands are less, and then not at all, interpolated between them [mm].

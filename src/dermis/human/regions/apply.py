@@ -50,8 +50,8 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE_NAM
     Parameters
     ----------
     head : Head
-        Head with known regions: a parametric human, a sample head of the package, a head with a label map, or
-        a head for which the table names landmarks or labels.
+        Head with known regions: a parametric human, a sample head of the package, or a head with a label map.
+        Any other head needs a table that names a file of landmarks or a label map.
     table : RegionTable, str or path
         Roughness and specular strength of each region: a table, the path of a TOML file, or "default" for the
         package's table.

@@ -36,19 +36,19 @@ REGIONS = (
 _NOSE_OUTLINE = np.array(
     [[-49.0, 7.0], [-46, 15], [-41, 19.5], [-35, 19.5], [-29, 17.5], [-20, 12], [-10, 9], [6, 6]]
 )
-"""Heights on the nose, and its half width at each."""
+"""Outline of the nose as pairs: a height on the nose, and half the width of the nose there [mm]."""
 _NOSE_BASE = np.array([[0.0, -49.0], [7, -48], [12, -45.5], [18, -43]])
-"""Distances from the middle of the face, and height of the base of the nose at each."""
+"""Base of the nose as pairs: a distance from the middle of the face, and the base's height there [mm]."""
 _NASOLABIAL_FOLD = np.array([[-68.0, 27.0], [-60, 24.5], [-50, 21.5], [-43, 20]])
-"""Heights on the fold between upper lip and cheek, and its distance from the middle of the face at each."""
+"""Fold between upper lip and cheek as pairs: a height, and the distance from the middle of the face [mm]."""
 _CHIN_OUTLINE = np.array([[-110.0, 26.0], [-68, 22.0]])
-"""Heights on the chin, and its half width at each."""
+"""Outline of the chin as pairs: a height on the chin, and half the width of the chin there [mm]."""
 
 
 _MIN_NOSE_Z_MM, _JAW_Y_MM = -20.0, -108.0
 _NECK_NOTCH_YZ_MM = -195.0, -42.0  # notch between the collar bones, at the base of the neck
 DEFAULT_TABLE_NAME = "default"
-"""Name of the package's table, which has artist's values."""
+"""Name of the package's own table, which holds artist's values instead of measured ones."""
 REGION_VALUE_LIMITS = {"m": (0.05, 1.0), "rho_s": (0.0, 1.0)}
 _KEYS_WITH_FILE_NAMES = ("landmarks", "labels")
 
@@ -92,7 +92,8 @@ def classify_regions(points: Doubles, on_lips: Mask, on_ears: Mask) -> NDArray[n
     """Return the face region (n,) of points on the average human, as indices into `REGIONS`.
 
     points : (n, 3) positions [mm]
-    on_lips, on_ears : (n,) masks of points on the lips, including the inside of the mouth, and on the ears
+    on_lips : (n,) mask of points on the lips or inside the mouth
+    on_ears : (n,) mask of points on the ears
     """
     x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     front, above_jaw = z > _MIN_NOSE_Z_MM, neck_distance_mm(points) < 0

@@ -26,7 +26,7 @@ MOVEMENTS = (
     "flush",
     "pressed",
 )
-"""Facial movements: first those that deepen folds, see folds.csv, then those that move blood."""
+"""Facial movements. Movements before "flush" deepen folds, see folds.csv; the others move blood."""
 FOLD_MOVEMENT_COUNT = MOVEMENTS.index("flush")
 """Number of movements that deepen folds."""
 _AMOUNTS_IN_CSV = (
@@ -34,13 +34,13 @@ _AMOUNTS_IN_CSV = (
     "sun", "level", "around", "hair", "beard", "veins", "flush",
 )  # fmt: skip
 ZONE_AMOUNTS = (*_AMOUNTS_IN_CSV, "oxygen", "_unused", "_unused_too")
-"""Quantities that zones change, see zones.csv; their number is a multiple of four."""
+"""Quantities that zones of the face change, see zones.csv; padded to a multiple of four names."""
 _REFERENCE_SITE = "cheek"
 HAIRLINE_STEP_DEGREES = 2
 """Angle between samples of `hairline_heights` [degrees]."""
 _HAIRLINE_SAMPLE_COUNT = 180 // HAIRLINE_STEP_DEGREES + 1
 _FOLD_SAMPLES_PER_SEGMENT = 4
-_MAX_CACHED_TABLES = 32  # number of cached tables, one for each recession of the hair
+_MAX_CACHED_TABLES = 32  # number of results that each function caches
 _CROWN_ZONE = "crown"  # zone where hair thins first
 _TEMPLE_RECESSION_MM, _FOREHEAD_RECESSION_MM = 22.0, 16.0  # maximum recession of the hairline
 _TEMPLE_DEGREES, _TEMPLE_WIDTH_DEGREES, _FOREHEAD_WIDTH_DEGREES = 33.0, 15.0, 38.0  # from the front

@@ -38,18 +38,18 @@ GROUP_OF_CODE: Final[Mapping[str, str]] = MappingProxyType(
         "AB": "arabian",
     }
 )
-"""Groups of the archive by its codes; "southeast asian" is Thai, "south asian" is Pakistani."""
+"""Group of people for each code of the archive; "southeast asian" is Thai, "south asian" is Pakistani."""
 SITES: Final = (
     "back of hand", "cheek", "cheekbone", "chin", "ear lobe", "forehead",
     "inner arm", "neck", "nose tip", "outer arm", "palm", "ring finger",
 )  # fmt: skip
-"""Sites of the archive, in the order of its codes from 1."""
+"""Sites of the body in the archive, in the order of the archive's site codes, which start at 1."""
 FACE_SITES: Final = ("cheekbone", "forehead", "chin", "nose_tip", "ear_lobe", "neck")
 """Sites of the head beside the cheek, as fields of `SiteDifferences`."""
 GROUPS_OF_ANCESTRY: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {"asian": ("chinese", "japanese", "southeast asian"), "middle eastern": ("iraqi", "arabian")}
 )
-"""Names that each stand for several groups with equal weights."""
+"""Names of broader ancestries, each with the groups that it averages with equal weights."""
 SKIN_ANCESTRIES: Final = (*GROUP_OF_CODE.values(), *GROUPS_OF_ANCESTRY)
 """Names of skin ancestries."""
 ITA_RANGE: Final = (-65.0, 70.0)
@@ -151,9 +151,10 @@ class MeasuredTable(NamedTuple):
     The four variables describe the cheek: log2 of melanin, log2 of blood, oxygen, and log2 of the thickness
     of the epidermis in mm. Their distributions in each group are stored as quantiles.
 
-    probabilities : (k,) cumulative probabilities, 0 to 1, to which the k quantiles of each variable belong
+    probabilities : (k,) cumulative probabilities, 0 to 1, of the k quantiles of each variable
     groups : mapping from group name to distribution
-    sex, age : (4,) changes of the variables from female to male, and from young to old
+    sex : (4,) change of each variable from female to male
+    age : (4,) change of each variable from young to old, to be multiplied by `age_term`
     mean_age_term : mean of `age_term` over the ages that `Human.sampled` samples
     site_slope : (12, 2) slope of the difference between each site and the cheek as a function of the cheek's
         own value, for log2 of melanin and for log2 of blood [-]
@@ -206,8 +207,8 @@ class MeasuredTable(NamedTuple):
 
         weight_of_group : weight of each group in the mixture
         cheek_variables : (n, 4) result of the method `cheek_variables`
-        normal_samples : (n, 12, 2) independent samples of the standard normal distribution, zeros for typical
-            people
+        normal_samples : (n, 12, 2) independent samples of the standard normal distribution, for melanin and
+            blood at each site; zeros for typical people
         """
         middle = self.group_mean("quantiles", weight_of_group)[:2, len(self.probabilities) // 2]
         deviation = np.clip(
@@ -348,7 +349,8 @@ def _pigments_and_sites(
     sex, age : sex, from 0 (female) to 1 (male), and age [years]
     ita : individual typology angle (ITA) that the cheek must have [degrees]; None for any
     normal_samples : (4,) independent samples of the standard normal distribution, zeros for a typical person
-    site_normal_samples : (12, 2) independent samples of the same distribution; None for a typical person
+    site_normal_samples : (12, 2) independent samples of the same distribution, for melanin and blood at each
+        site; None for a typical person
     """
     table = measured_table()
     correlation = table.group_mean("correlation", weight_of_group)
@@ -470,8 +472,8 @@ class MeasuredMedians(NamedTuple):
     site : name of the site of the body, one of `SITES`
     sex : "F" or "M", or "" for both
     age_group : "1" (under 20), "2" (20 to 29) ... "6" (over 60), or "" for all ages
-    people : number of measured people; 0 if too few were measured, in which case the medians are estimates
-        from the measurements of all groups
+    people : number of measured people. If too few were measured, the number is 0, and the medians are
+        estimates from the measurements of all groups
     cielab : (3,) CIELAB colour under D65, without surface reflection
     pigments : pigments that the package's model infers from the measurements
     """

@@ -15,8 +15,9 @@ NoiseSpace = Literal["body", "lip", "level", "ring"]
 NOISE_SPACES: tuple[NoiseSpace, ...] = ("body", "lip", "level", "ring")
 """Coordinates in which noise is evaluated.
 
-"body" is the position on the body; "lip" is this position with x warped along the creases of the lips,
-"level" with y warped along the lines of the forehead; "ring" is the distance from the eye, and x and y.
+"body" is the position on the body. "lip" is this position with x warped along the creases of the lips, and
+"level" is this position with y warped along the lines of the forehead. "ring" has the coordinates: distance
+from the eye, x, and y.
 """
 NoiseRegion = Literal["all", "lips", "lines", "furrows", "folds", "veins", "hairline"]
 NOISE_REGIONS: tuple[NoiseRegion, ...] = ("all", "lips", "lines", "furrows", "folds", "veins", "hairline")

@@ -14,7 +14,7 @@ _CENTRE_FREQUENCY_PER_MM = 10.0  # skin scatters over tenths of a millimetre
 _LOG_FREQUENCY_STEP = _FREQUENCY_DECADES * np.log(10.0) / TRANSFORM_SAMPLE_COUNT
 
 NEAR_ZERO_FREQUENCY = np.array([1e-8])
-"""Frequency so low that a Hankel transform equals the total reflectance there, (1,) [1/mm]."""
+"""Frequency (1,) near 0, where the Hankel transform of a profile equals its total reflectance [1/mm]."""
 
 
 @cache

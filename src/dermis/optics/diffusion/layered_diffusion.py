@@ -23,7 +23,7 @@ _NEAR_ZERO_FREQUENCY = np.array([1e-8])  # so low that a Hankel transform equals
 
 
 class _Sublayer(NamedTuple):
-    """Layer, or one of the two parts into which a layer is divided, with its source of light.
+    """Layer, or one of the two parts of a divided layer, with the light source that it contains.
 
     layer : absorption and scattering; its field `thickness_mm` is ignored
     thickness_mm : thickness of the sublayer [mm]
@@ -48,7 +48,7 @@ class _BoundaryCondition(NamedTuple):
 
 
 class _DownwardTransfer(NamedTuple):
-    """Coefficients for computing the fluence at the lower face of a sublayer from that at its upper face.
+    """Coefficients that give the fluence at the lower face of a sublayer from the fluence at its upper face.
 
     The fluence is a sum of three solutions of the diffusion equation: one decays downwards, one grows
     downwards, and a particular solution accounts for the source of light and is 0 at the upper face.
@@ -84,9 +84,9 @@ def solve_layers(
 
     frequency : (n,) frequencies s > 0 [1/mm]
     boundary_mismatch : boundary mismatch with air; internal interfaces are index-matched [-]
-    source_kind : "beam" if light first scatters along the beam, in which case R(r) diverges logarithmically
-        at r = 0; "point" if all light first scatters at a depth of one mean free path, in which case R(r) is
-        finite
+    source_kind : where light scatters for the first time. For "beam", this is anywhere along the beam, and
+        R(r) diverges logarithmically at r = 0; for "point", it is at a depth of one mean free path, and R(r)
+        is finite
 
     Source: [Haskell1994] for the boundary, [Kienle1998] for layers, [Farrell1992] for the beam.
     """
@@ -188,7 +188,7 @@ def _propagate_up(
 ) -> tuple[_BoundaryCondition, _DownwardTransfer]:
     """Propagate the boundary condition from the lower face of a sublayer to its upper face.
 
-    frequency : frequencies [1/mm]
+    frequency : (n, 1) frequencies s [1/mm]
     lower_condition : boundary condition at the lower face
 
     Returns the boundary condition at the upper face, and the coefficients that transfer the fluence from the

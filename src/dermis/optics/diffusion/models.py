@@ -160,7 +160,7 @@ def _closed_form_profile(
 
 
 def _medium_warnings(medium: Medium, model: DiffusionModel, clamp: SourceDepthClamp) -> list[str]:
-    """Return warnings about properties of the medium for which the model is inaccurate."""
+    """Return a warning for each property of the medium that makes the model inaccurate."""
     warnings = []
     for number, layer in enumerate(medium.layers, 1):
         thin = layer.thickness_mm < layer.mean_free_path_mm

@@ -137,7 +137,7 @@ def image_pairs_needed(slab: Slab, tolerance: float, max_pairs: int = 2000) -> i
     """Return how many pairs of image sources the multipole model needs on each side of a slab.
 
     tolerance : upper bound of the light from all omitted pairs, relative to the power that enters [-]
-    max_pairs : largest result; it is returned if the slab does not absorb, where no bound can be computed
+    max_pairs : largest result; also the result for a slab without absorption, where no bound can be computed
     """
     decay = float((slab.image_period_mm * slab.layer.sigma_tr).min())
     if decay <= 0.0:

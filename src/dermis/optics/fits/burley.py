@@ -37,7 +37,7 @@ class BurleyProfile:
         return np.asarray(self.albedo * self.shape * (np.exp(-sr) + np.exp(-sr / 3.0)) / (8.0 * np.pi * r))
 
     def energy_within(self, radius_mm: ArrayLike) -> Floats:
-        """Return the light (..., c) of a narrow beam of unit power that emerges within distances from it [-].
+        """Return the light (..., c) that emerges within given distances from a narrow beam of unit power [-].
 
         radius_mm : distances from the beam [mm]
         """

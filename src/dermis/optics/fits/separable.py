@@ -12,7 +12,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
 
 SECTORS_PER_QUADRANT = 16
-"""Number of equal sectors of a quarter circle into which each ring is divided."""
+"""Number of equal sectors in each quarter of a ring."""
 
 _QUADRATURE_NODES = 8
 _START_LIGHT_FRACTIONS = (

@@ -1,4 +1,4 @@
-"""Data to which profiles are fitted: samples of R(r), or the light that emerges through rings."""
+"""Targets of profile fits: samples of R(r), or the light that emerges through rings."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class PointTarget:
         """Return samples (n, k) of k Gaussians at the n radii of the target, and their derivatives (n, k).
 
         The integral of each Gaussian over the plane is 1. The samples are weighted like `samples`. The
-        derivatives are those with respect to the logarithm of the variance.
+        derivatives are with respect to the logarithm of the variance.
 
         variance_mm2 : (k,) variances of the Gaussians [mm2]
         """
@@ -113,8 +113,8 @@ class RingTarget:
     def design_matrix_and_derivatives(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
         """Return the light (n, k) of k Gaussians through each of the n rings, and its derivatives (n, k).
 
-        The integral of each Gaussian over the plane is 1. The derivatives are those with respect to the
-        logarithm of the variance.
+        The integral of each Gaussian over the plane is 1. The derivatives are with respect to the logarithm
+        of the variance.
 
         variance_mm2 : (k,) variances of the Gaussians [mm2]
         """

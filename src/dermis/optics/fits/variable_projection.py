@@ -95,7 +95,8 @@ def _anderson_step(
 
     log_variance : (k,) current logarithms of the variances
     step : (k,) plain step from these logarithms
-    last_log_variance, last_step : (k,) the same for the previous iteration
+    last_log_variance : (k,) logarithms of the variances one iteration earlier
+    last_step : (k,) plain step from these earlier logarithms
     """
     change = step - last_step
     size = float(change @ change)

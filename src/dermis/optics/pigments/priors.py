@@ -11,25 +11,24 @@ from dermis.base.tables import float_columns, read_rows
 from dermis.optics.media import Floats
 
 PRIOR_NAMES = ("melanin", "blood", "oxygen", "epidermis_mm")
-"""Parameters of the prior; all but oxygen are distributed by their logarithms."""
+"""Parameters of `SkinPrior`, which uses the logarithm of each of them except oxygen."""
 _OXYGEN_INDEX = PRIOR_NAMES.index("oxygen")
 _MIN_PIGMENT_FRACTION = 1e-4
 _COVARIANCE_COLUMNS = [f"{a}_{b}" for i, a in enumerate(PRIOR_NAMES) for b in PRIOR_NAMES[: i + 1]]
 PRIOR_COLUMNS = ("weight", *PRIOR_NAMES, *_COVARIANCE_COLUMNS)
-"""Columns of the table: weight, mean and lower triangle of the covariance of each component."""
+"""Columns of the table: weight, means, and lower triangle of the covariance of a normal distribution."""
 
 
 @dataclass(frozen=True, eq=False)
 class SkinPrior:
     """Joint distribution of four skin parameters, a mixture of k normal distributions.
 
-    The parameters are melanin, blood, oxygen and the thickness of the epidermis (`PRIOR_NAMES`). The normal
-    distributions are those of the parameters' logarithms, except for oxygen, where the value itself is
-    normally distributed.
+    The parameters are melanin, blood, oxygen and the thickness of the epidermis (`PRIOR_NAMES`). In each
+    normal distribution, the variables are oxygen itself and the logarithms of the other three parameters.
 
-    weight : (k,) weights, which sum to 1
-    mean : (k, 4) means
-    covariance : (k, 4, 4) covariances
+    weight : (k,) weights of the normal distributions, which sum to 1
+    mean : (k, 4) means of the four variables
+    covariance : (k, 4, 4) covariances of the four variables
     """
 
     weight: Floats
@@ -92,8 +91,8 @@ def skin_prior() -> SkinPrior:
 def prior_points(parameter_values: dict[str, Floats]) -> Floats:
     """Return the parameters of n skins as points (n, 4) in the coordinates of `SkinPrior`.
 
-    The coordinates are the logarithms of the parameters, except for oxygen, where the coordinate is the
-    value.
+    The coordinates are oxygen itself and the logarithms of the other three parameters, in the order of
+    `PRIOR_NAMES`.
 
     parameter_values : dictionary from the name of each parameter (`PRIOR_NAMES`) to its values (n,)
     """

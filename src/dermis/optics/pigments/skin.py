@@ -23,7 +23,7 @@ from dermis.optics.pigments.spectra import (
 )
 
 MELANIN_SHEET_ABSORPTION_RATIO: Final = 0.175
-"""Ratio of the absorption of the melanin sheet to that of all epidermal melanin, after [Donner2008] [-]."""
+"""Absorption by the melanin sheet, relative to all melanin of the epidermis, after [Donner2008] [-]."""
 
 _MELANIN_SHEET_MM = 0.001
 _STRATUM_CORNEUM_MM, _PAPILLARY_DERMIS_MM = 0.01, 0.2
@@ -149,8 +149,8 @@ def _dermis_layer(
 ) -> Layer:
     """Return a semi-infinite dermis, a mixture of blood and bloodless tissue.
 
-    sigma_s_prime : (n,) reduced scattering coefficient of the epidermis at the n wavelengths, from which that
-        of the dermis is computed [1/mm]
+    sigma_s_prime : (n,) reduced scattering coefficient of the epidermis at the n wavelengths; it is
+        multiplied by `DERMIS_SCATTERING_RATIO` [1/mm]
     """
     sigma_a = _dermal_absorption(parameters, parameters.blood, wavelength_nm)
     return Layer(sigma_a, DERMIS_SCATTERING_RATIO * sigma_s_prime, name=name)

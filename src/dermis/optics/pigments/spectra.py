@@ -16,7 +16,7 @@ from dermis.optics.media import Floats
 SHORTEST_WAVELENGTH_NM, LONGEST_WAVELENGTH_NM = 380.0, 780.0
 
 WAVELENGTHS_NM: Floats = np.arange(400.0, 701.0, 10.0)
-"""Wavelengths from which colours are computed, (31,) [nm]."""
+"""Wavelengths (31,) of the spectra that are converted to colours [nm]."""
 WAVELENGTHS_NM.setflags(write=False)
 
 _PRIMARIES_XY = np.array([[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]])  # red, green, blue; CIE 1931 x, y
