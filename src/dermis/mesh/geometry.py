@@ -10,7 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.base.arrays import Doubles, Floats, Index, Ints
 
 MIN_DOUBLE_UV_AREA = 1e-12
-"""Twice the signed uv area below which u and v have no direction on a triangle (1/70 texel at 8192)."""
+"""Value of twice the uv area of a triangle up to which u and v have no usable directions on the triangle.
+
+It is the area of a square whose side is 1/120 texel in a map of 8192 x 8192 texels.
+"""
 T = TypeVar("T", np.float32, np.float64)
 
 

@@ -162,6 +162,7 @@ class Rig(ShortRepr):
         """Return the points that bound the mesh in every pose, after a change of the rest positions.
 
         The last result is cached. It is returned again if its points have the same rest positions.
+
         rest_positions : (p, 3) rest positions of all control points [mm]
         """
         points, outline = self._last_outline

@@ -1,4 +1,4 @@
-"""Division of an atlas into coarse cells, and of the cells into tiles, to compute translucency."""
+"""Division of an atlas into coarse cells, which are grouped into tiles, to compute translucency."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ CELLS_PER_TILE_SIDE = 4
 """Number of cells along each side of a tile."""
 
 TILE_MARGIN_TEXELS = 0.7
-"""Margin around a tile in which triangles count as overlapping, as interpolation reads beyond it [texel]."""
+"""Margin around a tile [texel].
+
+Triangles in the margin count as overlapping the tile, because interpolation reads beyond the tile.
+"""
 
 # In standard deviations of the widest Gaussian: largest distance between an entry and an exit cell; and side
 # of a cell, so small that light interpolated between cells is smooth.
@@ -30,7 +33,7 @@ _SAME_POINT_TEXELS = 0.1  # largest distance in the atlas at which a texel and a
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Division of an atlas into side x side cells, and of the cells into tiles, to compute translucency.
+    """Division of an atlas into side x side cells, which are grouped into tiles, to compute translucency.
 
     Translucency is light that enters the skin in one cell and leaves it in another, for example on the other
     side of an ear.
@@ -83,7 +86,7 @@ class Cells:
 
 
 def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: float = 1.0) -> Cells:
-    """Divide an atlas into cells, between which light passes through ears, lips and other thin parts.
+    """Divide an atlas into the cells with which translucency is computed, see `Cells`.
 
     max_sigma_mm : standard deviation of the widest Gaussian of the diffusion profiles; 10 mm is used for
         larger values [mm]
@@ -213,10 +216,10 @@ def _tile_triangles(atlas: Atlas, cells_per_side: int, tiles_per_side: int) -> t
 
 
 def _gutter_copies(atlas: Atlas, cells_per_side: int) -> tuple[Index, Words]:
-    """Return the texels that copy light from another texel, sorted by the cell that contains the other texel.
+    """Return the texels that copy the light of another texel, each with the texel that it copies.
 
-    The results are the fields `gutter_copy_first` (index of the first entry of each cell) and `gutter_copies`
-    (pairs of texels) of `Cells`.
+    The pairs are sorted by the cell of the copied texel. The results are the fields `gutter_copy_first`
+    (index of the first pair of each cell) and `gutter_copies` (the pairs) of `Cells`.
     """
     rim, uv = _rim_texels(atlas)
     texel = np.concatenate([atlas.gutter, rim])

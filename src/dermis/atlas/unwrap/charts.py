@@ -69,7 +69,7 @@ def merge_stray_pieces(triangle_chart: Index, triangles: Index) -> Index:
 def _smooth_chart_borders(triangle_chart: Index, triangles: Index) -> Index:
     """Return for each triangle the most frequent chart (f,) in its neighbourhood, which smooths borders.
 
-    The neighbourhood grows in a few steps, in each of which a triangle averages the triangles that share a
+    The neighbourhood grows in a few steps. In each step, a triangle averages the triangles that share a
     corner with it.
 
     triangle_chart : (f,) chart of each triangle

@@ -385,7 +385,7 @@ SURFACE_STYLES = {
 ALBEDO_STYLES = {
     "albedo": FieldStyle("colour by###colour from", names={"map": "albedo map", "profile": "profile"})
 }
-"""Presentation of the profile fields of `Skin`."""
+"""Presentation of the field `albedo` of `Skin`."""
 
 TECHNIQUE_STYLES = {
     "technique": FieldStyle(
