@@ -114,7 +114,7 @@ def _integers_between(low: Doubles, high: Doubles, grid_side: int, margin: float
 
 
 def _row_interval(corners: Doubles, row_triangle: Index, y: Index) -> tuple[Doubles, Doubles]:
-    """Return the lowest and highest x at which each row y of texels intersects its triangle.
+    """Return the lowest and highest x, (n,) each, of the intersections of texel rows with triangles.
 
     corners : (t, 3, 2) corners of the triangles [texel]
     row_triangle : (n,) index of the triangle that each row intersects

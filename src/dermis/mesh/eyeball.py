@@ -37,9 +37,9 @@ proportional to 1 - exp(-t / a).
 def limbus_plane_mm(radius_mm: float) -> float:
     """Return the distance from a sphere's centre to the plane of the limbus [mm].
 
-    The limbus is the circle in which the spheres of sclera and cornea intersect.
+    The limbus is the circle where sclera and cornea meet.
 
-    radius_mm : radius of one of these two spheres [mm]
+    radius_mm : radius of the sphere, which is the sclera or the cornea [mm]
     """
     return math.sqrt(radius_mm**2 - LIMBUS_MM**2)
 
@@ -62,7 +62,7 @@ def iris_plane_mm() -> float:
 def surface_distance_mm(angle_from_axis: Doubles) -> Doubles:
     """Return the distance from the ball's centre to the outer surface of ball and cornea [mm].
 
-    angle_from_axis : angle between the eye's axis and the direction in which the distance is measured [rad]
+    angle_from_axis : angle between the eye's axis and the ray along which the distance is measured [rad]
     """
     centre = cornea_centre_mm()
     within = np.maximum(CORNEA_MM**2 - (centre * np.sin(angle_from_axis)) ** 2, 0.0)

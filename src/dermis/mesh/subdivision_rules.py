@@ -47,7 +47,7 @@ class _Sides:
     face : (n,) index of the face of each side
     ends : (e, 2) indices of the points at the ends of each of the e edges
     edge : (n,) index of the edge on which each side lies
-    border : (e,) mask of edges on which the number of sides is not two
+    border : (e,) mask of border edges, which have one side or more than two sides
     seam_edges : (s, 2) indices of the vertices at the ends of each edge; an edge on a uv seam occurs twice,
         once for each chart
     seam_edge : (n,) row of `seam_edges` for each side

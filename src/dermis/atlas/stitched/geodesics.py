@@ -46,7 +46,7 @@ class Geodesics(NamedTuple):
     orientation: Doubles
 
     def select(self, mask: Mask) -> Geodesics:
-        """Return only those of the n geodesics for which a mask (n,) is true."""
+        """Return the geodesics that a mask (n,) selects."""
         return Geodesics._make(part[mask] for part in self)
 
 

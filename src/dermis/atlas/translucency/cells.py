@@ -76,7 +76,7 @@ class Cells:
 
     @property
     def radius_mm(self) -> float:
-        """Return the largest distance from a cell in which light enters to the cell where it leaves [mm]."""
+        """Return the largest distance between a cell where light enters and the cell where it leaves [mm]."""
         return _PAIR_RADIUS_SIGMAS * self.max_sigma_mm
 
     @property
@@ -86,7 +86,7 @@ class Cells:
 
 
 def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: float = 1.0) -> Cells:
-    """Divide an atlas into the cells with which translucency is computed, see `Cells`.
+    """Divide an atlas into cells for translucency, see `Cells`.
 
     max_sigma_mm : standard deviation of the widest Gaussian of the diffusion profiles; 10 mm is used for
         larger values [mm]
@@ -177,7 +177,7 @@ def _tiles_of_points(atlas: Atlas, points: Words, cells_per_side: int, tiles_per
     """Return the index (m,) of the tile of the atlas in which each surface point lies.
 
     A point may appear twice in the atlas: in the chart of its triangle, and in the gutter of another chart.
-    The tile is that of the position in the chart.
+    The position in the chart determines the tile.
 
     points : (m, 2) triangle index, and packed barycentric weights
     cells_per_side, tiles_per_side : cells and tiles along each side of the atlas
@@ -231,7 +231,7 @@ def _gutter_copies(atlas: Atlas, cells_per_side: int) -> tuple[Index, Words]:
 
 
 def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], Floats]:
-    """Return the rim texels, and the positions inside charts at which the atlas contains the same points.
+    """Return the rim texels, and the positions inside charts that show the same surface points.
 
     Rim texels lie just outside a chart and are read by bilinear interpolation inside it. Their light is
     computed, not copied. Each represents a surface point that is also inside the chart of its triangle.

@@ -141,7 +141,7 @@ def _seed_triangles(corners: Doubles, connected_piece: Index, chart_count: int, 
     corners : (f, 3, 3) positions of the corners [mm]
     connected_piece : (f,) connected piece to which each triangle belongs
     chart_count : number of triangles to draw at random; one triangle is then added for each connected piece
-        in which none was drawn
+        without a drawn triangle
     seed : seed of the random choice
     """
     area = triangle_areas(corners)

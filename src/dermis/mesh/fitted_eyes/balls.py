@@ -12,7 +12,7 @@ from dermis.mesh.geometry import label_components, triangle_areas
 from dermis.mesh.mesh import Mesh
 
 EYEBALL_RADIUS_RANGE_MM = 8.0, 20.0
-"""Accepted radii of the eyeballs of a file: real eyeballs have 12 mm, but those of artists vary [mm]."""
+"""Accepted radii of the eyeballs in a file; real eyeballs have about 12 mm, but artists' models vary [mm]."""
 MAX_SPHERE_DEVIATION = 0.06
 """Largest accepted `Sphere.deviation` of an eyeball [-]."""
 _MIN_EYEBALL_POINTS = 20
