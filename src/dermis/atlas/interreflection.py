@@ -22,7 +22,7 @@ Words = NDArray[np.uint32]
 CELLS_PER_SIDE = 128
 """Cells along each side of the uv square. A cell receives light; a patch of 2 x 2 cells emits it."""
 SAMPLES_PER_PATCH = 8
-"""Number of sample points of a patch, at which its radiosity is computed."""
+"""Number of sample points of a patch; its radiosity is computed at these points."""
 # Number of directions of parallel lines; fewest and most lines along a bundle's side.
 LINE_BUNDLE_COUNT, LINES_PER_SIDE_RANGE = 128, (96, 256)
 _TRIAL_BUNDLE_COUNT, _TRIAL_LINES_PER_SIDE = 12, 64  # for a test whether any skin faces other skin

@@ -94,9 +94,9 @@ def covered_texels(
 
     corners : (t, 3, 2) corners of the triangles [texel]; texel centres are at integers
     grid_shape : height and width of the grid of texels
-    margin : distance by which a covered centre must be inside the triangle: along x, from both edges that its
-        row crosses, and along y, from the lowest and highest corner; if negative, centres up to this distance
-        outside count as covered, too [texel]
+    margin : distance by which a covered centre must be inside the triangle [texel]. It is measured along x to
+        the two edges that the centre's row crosses, and along y to the lowest and the highest corner. If
+        negative, centres up to this distance outside also count as covered
     """
     height, width = grid_shape
     low, high = corners[..., 1].min(axis=1), corners[..., 1].max(axis=1)
@@ -114,7 +114,7 @@ def _integers_between(low: Doubles, high: Doubles, grid_side: int, margin: float
 
 
 def _row_interval(corners: Doubles, row_triangle: Index, y: Index) -> tuple[Doubles, Doubles]:
-    """Return the lowest and highest x at which each row y of texels intersects its triangle.
+    """Return the lowest and highest x, (n,) each, of the intersections of texel rows with triangles.
 
     corners : (t, 3, 2) corners of the triangles [texel]
     row_triangle : (n,) index of the triangle that each row intersects

@@ -82,7 +82,7 @@ class _Baker:
     side: int
 
     def roles(self, required_roles: Sequence[Role]) -> list[Role]:
-        """Return the map roles, such as "colour", that are required or for which a material has a picture."""
+        """Return the map roles, such as "colour", that are required or that a material has a picture for."""
         used = {role for tile in self.tiles for role in self._tile_material(tile).textures}
         return [role for role in _ROLE_DEFAULTS if role in used or role in required_roles]
 

@@ -17,7 +17,7 @@ from dermis.mesh.geometry import label_components, triangle_areas
 from dermis.mesh.mesh import Mesh
 
 UV_TOLERANCE = 2e-2
-"""Distance by which uv may lie outside [0, 1] without the picture being repeated there [-]."""
+"""Largest distance of uv from [0, 1] that counts as an inaccuracy, not as repetition of the picture [-]."""
 TILE_PADDING_TEXELS = 8
 """Texels around each tile that continue its border, so that mip levels do not mix materials."""
 _UNTEXTURED_TILE_SIDE = 16  # side of a tile without pictures that is not skin [texel]

@@ -316,7 +316,7 @@ def _draw_lobes_and_albedo(folder: Path, roughness: float) -> None:
 
 
 def _distinct_model_names() -> list[str]:
-    """Return the names of the specular models, except "kelemen-direct", whose lobe is that of "kelemen"."""
+    """Return the names of the specular models, except "kelemen-direct", which has the lobe of "kelemen"."""
     return [name for name in MODELS if name != _OMITTED_DUPLICATE_MODEL]
 
 

@@ -201,7 +201,7 @@ def check_fields(
 def refuse_options(
     fields: Iterable[str], option_names: Mapping[str, str] | None, context: str, advice: str
 ) -> None:
-    """Raise DermisError if any option is given in a context in which it would have no effect.
+    """Raise DermisError if any option is given where it would have no effect.
 
     fields : names of the fields that the given options set
     option_names : dictionary from fields to option names, for fields whose option has a different name

@@ -30,9 +30,9 @@ _PIGMENT_OPTION_NAMES = {"structure": "skin"}
 
 
 def _pigment_default_texts() -> dict[str, str]:
-    """Return a dictionary from pigment option to its default as help text.
+    """Return a dictionary from each pigment field to a help text with its default.
 
-    The text also lists the named skins that have another value, with this value.
+    If named skins, such as "dark", have other values, the text lists these skins and values too.
     """
     defaults: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
     for field in Pigments.model_fields.keys() - defaults.keys():

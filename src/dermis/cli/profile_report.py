@@ -109,7 +109,8 @@ class ProfileReport:
     def ring_error(self) -> Floats:
         """Return the relative error (3,) of the fitted Gaussians for each colour channel [-].
 
-        The light that emerges through each of several concentric rings around the point of entry is compared.
+        The fit and the profile are compared by the light that emerges in concentric rings around the point of
+        entry.
         """
         return self.radial.ring_target().error(self.fit.profile.variance_mm2, self.fit.profile.weight)
 

@@ -35,10 +35,12 @@ if TYPE_CHECKING:
     from dermis.scene.settings import Settings
 
 _MAX_UNSCATTERED_FRACTION = 0.05
-"""Fraction of the skin's triangles above which a note says that they are lit without scattering; closed eyes
-and other collapsed charts of scans stay below it."""
+"""Largest fraction of the skin's triangles that may be lit without scattering before a note says so.
+
+Closed eyes and other collapsed charts of scans stay below it.
+"""
 _MAX_CLIPPED_FRACTION = 0.02
-"""Fraction of the head's pixels above which a note says that they are overexposed."""
+"""Largest fraction of the head's pixels that may be overexposed before a note says so."""
 
 
 def render(

@@ -81,8 +81,8 @@ def unmix(
         Recolour: new fraction of the melanin that is eumelanin, 0 to 1.
     find:
         What to estimate besides melanin and blood. oxygen: oxygen saturation, with a prior whose mean is
-        --model-oxygen and whose standard deviation is that of saturations measured on people; all (only with
-        --spectra): also the level of scattering and the thickness of the epidermis.
+        --model-oxygen and whose standard deviation was measured on people; all (only with --spectra): also
+        the level of scattering and the thickness of the epidermis.
     model_oxygen:
         Oxygen saturation of the skin in the colour map, 0 to 1.
     model_eumelanin:

@@ -34,7 +34,7 @@ def view(
     """Show a head in an interactive window or web page.
 
     Drag to rotate, right-drag to pan, scroll to zoom, double-click to set the centre of rotation, and
-    Shift-drag to move the light. Keys 1 to 5 select camera presets, Space plays and pauses a motion, Tab
+    Shift-drag to move the light. Keys 1 to 6 select camera presets, Space plays and pauses a motion, Tab
     hides the panel, Ctrl+Z and Ctrl+Y undo and redo, and ? shows all keys. The panel can save the scene as a
     TOML file for `dermis render`. All other options are those of `dermis render`, but --size is the size of
     the window [default: 1280x800].

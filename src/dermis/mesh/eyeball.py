@@ -1,7 +1,7 @@
 """The standard eyeball: its shape, mesh and uv, and contact with the lids.
 
-The eyeball is a sphere (the sclera, in short *ball*) with the spherical cap of a cornea. Lengths are for
-an adult eye [mm], and the origin is the centre of the ball.
+The eyeball is a sphere, the sclera (*ball* for short), with a spherical cap, the cornea. Lengths are for an
+adult eye [mm], and the origin is the centre of the ball.
 """
 
 from __future__ import annotations
@@ -16,23 +16,30 @@ from dermis.base.arrays import Doubles, Floats, Index, Ints
 from dermis.base.summary import ShortRepr
 
 SCLERA_MM, CORNEA_MM, LIMBUS_MM = 12.0, 7.8, 5.85
-"""Radii of the ball, of the front of the cornea, and of the circle where both meet, in adults [mm]."""
+"""Radii in adults: of the ball, of the front of the cornea, and of the circle where they meet [mm]."""
 IRIS_DEPTH_MM = 3.0
 """Depth of the plane of the iris behind the cornea's apex [mm]."""
 QUADS_PER_EDGE = 10
-"""Quads along each edge of the cube that becomes a ball; even, so that a point is on the axis."""
+"""Number of quads along each edge of the cube that is projected to a ball.
+
+The number is even, so that the axis of the eye passes through a point.
+"""
 UV_RADIUS_OF_BACK = 0.49
 """Distance of the back of the eye from the centre of the uv layout [-]."""
 UV_RADIUS_FALLOFF_RADIANS = 0.9
-"""Constant a: at the angle t from the axis, the distance in uv is proportional to 1 - exp(-t / a) [rad]."""
+"""Constant a of `eye_uv` [rad].
+
+A surface point at the angle t from the axis has a distance from the centre of the uv layout that is
+proportional to 1 - exp(-t / a).
+"""
 
 
 def limbus_plane_mm(radius_mm: float) -> float:
     """Return the distance from a sphere's centre to the plane of the limbus [mm].
 
-    The limbus is the circle in which the spheres of sclera and cornea intersect.
+    The limbus is the circle where sclera and cornea meet.
 
-    radius_mm : radius of one of these two spheres [mm]
+    radius_mm : radius of the sphere, which is the sclera or the cornea [mm]
     """
     return math.sqrt(radius_mm**2 - LIMBUS_MM**2)
 
@@ -55,7 +62,7 @@ def iris_plane_mm() -> float:
 def surface_distance_mm(angle_from_axis: Doubles) -> Doubles:
     """Return the distance from the ball's centre to the outer surface of ball and cornea [mm].
 
-    angle_from_axis : angle between the eye's axis and the direction in which the distance is measured [rad]
+    angle_from_axis : angle between the eye's axis and the ray along which the distance is measured [rad]
     """
     centre = cornea_centre_mm()
     within = np.maximum(CORNEA_MM**2 - (centre * np.sin(angle_from_axis)) ** 2, 0.0)
@@ -81,13 +88,13 @@ def radial_distances_mm(points: Doubles, eye_axis: Doubles) -> tuple[Doubles, Do
 class LidContact(ShortRepr):
     """Collision response that keeps control points of the eyelids outside the eyeballs.
 
-    point : (n,) control points of the lids
-    ball : (n,) index of the eyeball over which each lid point slides
+    point : (n,) indices of the control points of the lids
+    ball : (n,) index of the eyeball over which each of these points slides
     min_clearance_mm : (n,) smallest distance of each lid point from the eyeball's surface, for an eye of
         adult size [mm]
-    apex, back : (k,) control points of each eyeball: the apex of the cornea, and the opposite point of the
-        ball
-    edge : (k, r) control points along the lid edges, once around each opening
+    apex, back : (k,) indices of two control points of each eyeball: the apex of the cornea, and the opposite
+        point of the ball
+    edge : (k, r) indices of the control points along the lid edges of each eye, once around the opening
     """
 
     point: Ints

@@ -17,14 +17,16 @@ from dermis.mesh.rig import PoseArrays, Rig
 class Eyes(ShortRepr):
     """The k eyeballs of a head: spheres with a cornea, see mesh/eyeball.py.
 
-    apex, back : (k,) control points of each eyeball: the apex of the cornea, and the point opposite to it
-    side : (k,) control point of each eyeball on its equator, on the side of +X when the head looks along +Z
+    apex, back : (k,) indices of two control points of each eyeball: the apex of the cornea, and the point
+        opposite to it
+    side : (k,) index of the control point on each eyeball's equator, on the side of +X when the head looks
+        along +Z
     material : (k,) index of the material of each eyeball
     look : appearance of both eyes
     radius_mm : (k,) radius of the ball when the eye is scaled to a cornea of adult size [mm]
     centre_offset_mm : (k,) shift of the ball's centre along the axis, from its position in an adult eye [mm]
-    gaze : (k, 3) unit direction of gaze in eye coordinates: the axis of the eye, or a direction inferred from
-        the lids
+    gaze : (k, 3) unit direction of gaze in eye coordinates: the axis of the eye (0, 0, 1); for eyes of a file
+        without corneas, whose axes follow from the lids, the direction straight ahead
     """
 
     apex: Ints

@@ -10,12 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.base.arrays import Doubles, Floats, Index, Ints
 
 MIN_DOUBLE_UV_AREA = 1e-12
-"""Twice the signed uv area below which u and v have no direction on a triangle (1/70 texel at 8192)."""
+"""Value of twice the uv area of a triangle up to which u and v have no usable directions on the triangle.
+
+It is the area of a square whose side is 1/120 texel in a map of 8192 x 8192 texels.
+"""
 T = TypeVar("T", np.float32, np.float64)
 
 
 def weld(vertex_rows: ArrayLike) -> Ints:
-    """Return one index (v,) for each vertex, which is the same for vertices with equal attributes.
+    """Return an index (v,) for each vertex; vertices with equal attributes get the same index.
 
     vertex_rows : (v, k) attributes of each vertex, such as its position, or its position and uv; they are
         compared in float32
@@ -141,7 +144,7 @@ def sum_by_index(row_index: NDArray[np.integer], row_values: Doubles, sum_count:
     """Return the sums (sum_count, k) of all rows with the same index.
 
     row_index : (n,) index of the sum to which each row is added
-    row_values : (n, k) rows
+    row_values : (n, k) rows to add
     sum_count : number of sums
     """
     columns = [np.bincount(row_index, weights=column, minlength=sum_count) for column in row_values.T]
@@ -242,7 +245,7 @@ def cross_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
 def label_components(
     node_count: int, link_start: NDArray[np.integer], link_end: NDArray[np.integer]
 ) -> Index:
-    """Return the index (n,) of the connected component to which each node of a graph belongs.
+    """Return the index (n,) of the connected component of each node of a graph.
 
     Components are numbered in the order in which they first appear.
 

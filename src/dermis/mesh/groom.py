@@ -52,7 +52,7 @@ class StrandRoots(ShortRepr):
         height above the midpoint of the eyes [mm]; how much its hair thins if the crown goes bald, 0 to 1;
         and its position from the nape (0) to the top of the head (1)
     along_mm : (n,) position of each strand's clump along its cornrow [mm]
-    part : (n,) row of `Groom.parameters` that applies to each strand: that of scalp hair, or of the beard
+    part : (n,) index of the row of `Groom.parameters` for each strand: the row of scalp hair or of the beard
     """
 
     roots: Roots

@@ -15,7 +15,7 @@ from dermis.mesh.strands import Roots, Strands, offsets_in_root_axes, root_frame
 
 UInt32s = NDArray[np.uint32]
 MAX_EXPORTED_STRANDS = 40_000
-"""Number of strands with which exports and path tracing show hair."""
+"""Largest number of strands in exports and in path tracing."""
 _SMOOTHING_KNOTS, _SMOOTH_HEIGHTS_MM = 8, (2.0, 18.0)
 _MIN_HEIGHT_ABOVE_SKIN_MM, _RISE_LENGTH_MM = 0.35, 4.0
 _HAIRLINE_FADE_MM, _SHORT_HAIR_HEIGHTS_MM = (-3.0, 11.0), (-2.0, 14.0)

@@ -106,8 +106,9 @@ class Head:
     def topology_head(self) -> Head:
         """Return the head from which the uv atlas and other data that depend on topology are computed.
 
-        Heads with the same `template` share these data: for them, it is the template. It is `without_maps` if
-        there is no template, or if the template's rig is not the `Rig.template` of this head's rig.
+        The result is the `template`, so that all heads with this template share these data. The result is
+        `without_maps` if there is no template, or if the template's rig is not the `Rig.template` of this
+        head's rig.
         """
         template = self.template
         if template is None or self.rig is None or self.rig.template is not template.rig:
@@ -173,8 +174,8 @@ class Head:
     def front_view_positions_mm(self) -> Floats:
         """Return the positions (v, 3) of the vertices as seen from the front, relative to the centre [mm].
 
-        Along the directions `front_view_axes`: x to the viewer's right, y up, and z to the front, towards the
-        viewer.
+        The coordinates are along the directions of `front_view_axes`: x to the viewer's right, y up, and z to
+        the front, towards the viewer.
         """
         positions = self.mesh.positions - np.array(self.centre_mm, dtype=np.float32)
         return (

@@ -41,7 +41,7 @@ class Pose(ShortRepr):
         matrix from the bone's space to its parent's space, in the units of the file, as in animations.
     positions_mm : (n, 3) array, optional
         Rest positions of all points of the control mesh, in the order of `Head.positions_mm` [mm]. They may
-        be those of another person with the same topology, or a frame of a motion from another program.
+        come from another person with the same topology, or from a frame of another program's motion.
 
     Raises
     ------

@@ -81,7 +81,7 @@ class RigidFollowers(NamedTuple):
     """Points that follow other points as one rigid body, such as the points of a fitted eyeball.
 
     leaders : (n,) indices of the points that are followed; all of them come from the mesh file
-    points : (m,) indices of the points that follow the leaders; dermis added them to those of the file
+    points : (m,) indices of the points that follow the leaders; dermis added them, they are not in the file
     """
 
     leaders: Ints
@@ -96,8 +96,8 @@ class Rig(ShortRepr):
     targets, skeleton : morph targets and bones; `skeleton` is None without bones
     stencils : subdivision from control points to mesh points; None without subdivision
     bone_rotations : rotations of bones by morph targets
-    rigid_followers : points that dermis added to those of the file, such as fitted eyeballs; they follow
-        points of the file
+    rigid_followers : points that dermis added, such as the points of fitted eyeballs, and the points of the
+        file that they follow
     contact : lids that must stay outside the eyeballs; None if lids may intersect eyeballs
     template : rig with corresponding points, targets and bones, from which this rig takes the points of its
         `outline`, to avoid a search for its own; None if there is no such rig
@@ -162,6 +162,7 @@ class Rig(ShortRepr):
         """Return the points that bound the mesh in every pose, after a change of the rest positions.
 
         The last result is cached. It is returned again if its points have the same rest positions.
+
         rest_positions : (p, 3) rest positions of all control points [mm]
         """
         points, outline = self._last_outline

@@ -47,8 +47,9 @@ class _Sides:
     face : (n,) index of the face of each side
     ends : (e, 2) indices of the points at the ends of each of the e edges
     edge : (n,) index of the edge on which each side lies
-    border : (e,) mask of edges on which the number of sides is not two
-    seam_edges : edges as pairs of vertices; an edge on a uv seam occurs twice, once for each chart
+    border : (e,) mask of border edges, which have one side or more than two sides
+    seam_edges : (s, 2) indices of the vertices at the ends of each edge; an edge on a uv seam occurs twice,
+        once for each chart
     seam_edge : (n,) row of `seam_edges` for each side
     """
 
@@ -174,7 +175,7 @@ def _inner_edge_weights(sides: _Sides, edge_weight: float) -> Doubles:
 
 
 def _inner_point_weights(sides: _Sides, point_weight: Doubles) -> Doubles:
-    """Return a weight (n,) for each side: that of the point where it starts, or 0 if this is a border point.
+    """Return a weight (n,) for each side: the weight of its start point, or 0 if this is a border point.
 
     point_weight : (p,) weight of each point
     """
@@ -182,7 +183,7 @@ def _inner_point_weights(sides: _Sides, point_weight: Doubles) -> Doubles:
 
 
 def _edge_end_weights(sides: _Sides, edge_weight: Doubles) -> csr_array:
-    """Return a matrix (e, p) in which the row of each edge has its weight in the columns of its end points.
+    """Return a matrix (e, p): the row of an edge has the edge's weight in the columns of its two end points.
 
     edge_weight : (e,) weight of each edge
     """

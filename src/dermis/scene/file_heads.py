@@ -90,7 +90,7 @@ def load_file_head(
 ) -> tuple[Head, EyeLook]:
     """Return the head of a sample or a mesh file, and the look of its eyes.
 
-    The look of the eyes is that in the file, or the default look if the file has none.
+    The look of the eyes is read from the file. If the file has none, it is the default look.
 
     sample_or_path : name of a sample head of the package, or path of a mesh file
     mesh_options : keyword arguments of `load_rigged`

@@ -141,7 +141,7 @@ class FrozenModel(BaseModel, metaclass=_DocumentedMeta):
 
 
 class SliderRange(NamedTuple):
-    """Range of the slider with which the viewer sets a numeric field.
+    """Range of the viewer's slider for a numeric field.
 
     low, high : values at the ends of the slider
     logarithmic : whether equal slider steps multiply the value by equal factors
@@ -164,7 +164,7 @@ def slider(low: float, high: float, *, logarithmic: bool = False) -> dict[str, A
 def field_help(model: type[BaseModel], field: str) -> str:
     """Return the help text of a field as one line, followed by summaries of the names that it accepts.
 
-    Only names from a registry, such as those of profiles, have summaries.
+    Only names from a registry, such as the names of techniques, have summaries.
     """
     info = model.model_fields[field]
     text = re.sub(r"\s+", " ", info.description or "")

@@ -1,4 +1,4 @@
-"""Light stage: lights in all directions, and weights with which the lights reproduce an environment."""
+"""Light stage: lights in all directions, and their weights to reproduce an environment."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ def light_stage(count: int) -> list[DirectionalLight]:
 
 
 def light_stage_weights(lights: Sequence[DirectionalLight], environment: Environment) -> NDArray[np.float64]:
-    """Return weights (n, 3), linear Rec. 709, with which a light stage of n lights reproduces an environment.
+    """Return the weights (n, 3) of the lights of a light stage that reproduce an environment.
 
-    The weight of a light is the irradiance from all directions for which this light is the nearest. To obtain
-    the picture under the environment, multiply the picture under each light by the light's weight, and add
-    the products.
+    The weight of a light, linear Rec. 709, is the irradiance from all directions to which this light is the
+    nearest. To obtain the picture under the environment, multiply the picture under each light by the light's
+    weight, and add the products.
 
     Raises DermisError when the panorama cannot be read.
     """

@@ -58,7 +58,7 @@ class _LightBase(FrozenModel):
     synonyms: ClassVar[Mapping[str, str]] = dict.fromkeys(_BRIGHTNESS_SYNONYMS, "irradiance")
 
     irradiance: Annotated[Colour, BeforeValidator(_equal_channels)] = (3.14, 3.14, 3.14)
-    """Irradiance at the target of a surface that faces the light, linear Rec. 709; with pi white skin has
+    """Irradiance at the target, on a surface that faces the light, linear Rec. 709; with pi, white skin has
     radiance 1."""
     shadows: bool = True
     """Whether the light casts shadows."""
@@ -254,8 +254,9 @@ LIGHTS: Registry[type[Light]] = Registry(
 )
 """Classes of lights by their names in scene files.
 
-`dermis.frame.lights.kind.KINDS` draws them, MITSUBA_LIGHTS and CYCLES_LIGHTS of `dermis.apps.truths.lights`
-render the reference; exports write a registered light as the class that it derives from."""
+A new class also needs an entry in `dermis.frame.lights.kind.KINDS`, which draws lights. With entries in
+MITSUBA_LIGHTS and CYCLES_LIGHTS of `dermis.apps.truths.lights`, the reference renderers draw it too. Exports
+write its lights as lights of the class that it derives from."""
 
 
 # Reach of a typical head, and largest reach for which the lights of presets are not moved away.

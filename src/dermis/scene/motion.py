@@ -50,8 +50,8 @@ def load_motion(
         Frame rate of a mesh sequence (by default 30), of a CSV file whose timecode does not imply a frame
         rate, or of MediaPipe results without times [1/s].
     unit_mm : float, optional
-        Length of one unit in the files of a mesh sequence [mm]; by default the length for which the meshes
-        are as large as the head.
+        Length of one unit in the files of a mesh sequence [mm]; by default, a unit in which the first mesh
+        is about as large as the head.
     up : {"y", "z", "x", "-y", "-z", "-x"}, optional
         Upward axis of the files of a mesh sequence; without `up` and `front`, these files have the axes of
         the head's file.

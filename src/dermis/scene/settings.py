@@ -106,7 +106,7 @@ class Settings(FrozenModel):
     "gradient", the "environment", or a colour as linear Rec. 709 or #rrggbb."""
     background_blur: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Blur of an environment in the background: the roughness of a mirror that blurs it as much. 0 is sharp;
-    smaller values than 0.018 count as 0.018."""
+    values between 0 and 0.018 count as 0.018."""
     strands: bool = True
     """Whether to draw hair strands: hair, beard, brows and lashes of heads that have them."""
     parts: Literal["all", "diffuse", "specular"] = "all"

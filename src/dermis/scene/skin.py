@@ -26,7 +26,7 @@ SKIN_PRESETS: dict[str, dict[str, Any]] = {
     "default": {},
     "deck-2007": {"specular": "kelemen", "rho_s": 0.18, "direction": "lambertian"},
 }
-"""For each preset skin, the settings that differ from the default; "deck-2007" is that of the 2007 talk."""
+"""For each preset, the settings that differ from the default; "deck-2007" is the skin of the 2007 talk."""
 
 
 _Fraction = Annotated[float | None, Field(ge=0, le=1)]
@@ -58,7 +58,7 @@ class Pigments(FrozenModel):
     epidermal_blood: Annotated[_Fraction, Field(json_schema_extra=slider(0, 0.1))] = None
     """Volume fraction of blood in the epidermis, for "donner2008" only."""
     baseline: _Fraction = None
-    """Absorption of tissue without blood and melanin, relative to that of [Jacques1998]."""
+    """Absorption of tissue without blood and melanin, relative to the values of [Jacques1998]."""
 
     def overrides(self) -> dict[str, float]:
         """Return a dictionary from field names to the values that override pigments of the profile."""
@@ -123,10 +123,10 @@ class Skin(FrozenModel):
     roughness: Annotated[
         float, Field(ge=0.05, le=1), BoundsReason("from near-mirror skin to slopes of 45 degrees")
     ] = DEFAULT_ROUGHNESS
-    """Beckmann roughness m of the surface; with a roughness map a factor relative to 0.3: 0.6 doubles the
-    values of the map."""
+    """Beckmann roughness m of the surface. A roughness map is multiplied by this value divided by 0.3: 0.6
+    doubles the values of the map."""
     rho_s: Annotated[float, Field(ge=0, le=1)] = DEFAULT_RHO_S
-    """Specular strength: 1 is that of a rough dielectric boundary of index 1.4."""
+    """Specular strength, relative to a rough dielectric boundary of index 1.4."""
     oiliness: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Single control of strength and roughness: 1 is shiny skin, with twice the strength and 0.6 times the
     roughness; an artist's mapping, not a measured one."""
@@ -144,12 +144,13 @@ class Skin(FrozenModel):
         Field(ge=0, le=0.95),
         BoundsReason("more is nearly unscattered light, which the model does not describe"),
     ] = 0.0
-    """Mean cosine of the scattering angle, with direction "half-space", at constant reduced scattering: at
-    0.8, as in real tissue, more oblique light is reflected and more light passes thin parts."""
+    """Mean cosine of the scattering angle, used with direction "half-space"; it does not change the reduced
+    scattering. At 0.8, as in real tissue, skin reflects more of the light at oblique incidence, and more
+    light passes through thin parts."""
     pigments: Pigments | None = None
     """Overrides of the pigments of the profile, which is "spectral", "light", "medium", "dark" or a file."""
     layers: Annotated[tuple[TissueLayer, ...], Field(max_length=MAX_LAYERS)] = ()
-    """Replacement of the layers of the profile's medium ("dj3", "skin1" or a file), topmost first."""
+    """Layers that replace the layers of the profile's medium ("dj3", "skin1" or a file), topmost first."""
 
     @classmethod
     def preset(cls, name: str) -> Skin:

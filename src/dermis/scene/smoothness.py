@@ -26,7 +26,7 @@ Doubles = NDArray[np.float64]
 MAX_SMOOTH_TRIANGLES = 300_000
 """Largest number of triangles that `SmoothOutlineLevels` subdivides to."""
 MAX_SILHOUETTE_DEVIATION_PX = 0.6
-"""Largest deviation of a silhouette from its smooth curve that the pixel filter hides."""
+"""Largest deviation of a silhouette from its smooth curve that the pixel filter hides [pixel]."""
 _TYPICAL_DEVIATION_QUANTILE = (
     0.9  # fraction of the silhouette that must be smooth; the rest is mostly hidden or creases
 )

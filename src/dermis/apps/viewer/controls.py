@@ -80,7 +80,7 @@ class Controls:
         self._pinch = _measure_pinch(event)
 
     def _release(self, event: Event, picture_size: Point) -> None:
-        """End a drag at the position at which the pointer was released."""
+        """End a drag where the pointer was released."""
         if self._pressed_button and not self._pinch and (event["x"], event["y"]) != self._pointer_position:
             self._drag(event, picture_size)
         self._pressed_button, self._pinch = 0, None

@@ -36,7 +36,7 @@ class MotionFile:
 
 
 class MotionPlayer:
-    """Player of a motion, which knows the current time in the motion and the state to display.
+    """Player that keeps track of the current time in a motion and of the state to display.
 
     While the motion plays, its current pose is displayed instead of the pose of the viewer state; everything
     else in the state can be changed. When the motion pauses or ends, its current pose becomes a step of the

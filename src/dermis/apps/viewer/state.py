@@ -74,7 +74,7 @@ Table = Mapping[str, Any]
 """The [head] table of a scene file."""
 PICTURE_VIEW_NAME = "picture"
 LIGHT_COMPONENT_VIEWS = {"diffuse": "diffuse", "specular": "specular"}
-"""Views that show a part of the reflected light, with the value of `Settings.parts` for each."""
+"""Dictionary from views that show only a part of the light to their values of `Settings.parts`."""
 
 
 @dataclass(frozen=True, eq=False)

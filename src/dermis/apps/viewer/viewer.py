@@ -192,7 +192,9 @@ class Viewer:
     def _placed_images(
         self, live_image: Texture, frozen_image: Texture | None, picture_size: tuple[int, int]
     ) -> list[PlacedImage]:
-        """Return the live image and, if there is one, the frozen image left of the divider, with places.
+        """Return the live image and, if there is one, the frozen image, each with its place in the target.
+
+        A frozen image is placed left of the divider, and the live image right of it.
 
         picture_size : width and height of the picture [pixel]
         """

@@ -56,7 +56,7 @@ def compute_coverage(
     gutter_width: GutterWidth,
     grid_shape: tuple[int, int],
 ) -> Coverage:
-    """Compute which point of the surface each texel of the packed chart pieces and their gutters represents.
+    """Compute the surface point that each texel shows, for packed chart pieces and their gutters.
 
     triangle_piece : (f,) index of each triangle's chart piece, -1 for triangles in no piece
     member_triangles : (t,) indices of the triangles to rasterise
@@ -189,10 +189,11 @@ def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> 
 
 
 def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -> NDArray[np.uint16]:
-    """Return how far texels are connected to the left and right of each texel, and up and down.
+    """Return the number of connected texels in each direction from each texel, (h, w, 4).
 
-    The result is an array (h, w, 4) [texel]. Adjacent texels are connected if both belong to the same chart
-    piece or its gutter, and if there is no gap on the surface between the points that they represent.
+    The last axis is for the directions left, right, up and down. Adjacent texels are connected if both belong
+    to the same chart piece or its gutter, and if there is no gap on the surface between the points that they
+    represent.
 
     packing : positions of the triangles on the texel grid
     coverage : surface points that the texels represent

@@ -13,7 +13,7 @@ from dermis.base.arrays import Doubles, Index, Ints, Mask
 Complex = NDArray[np.complex128]
 
 START_SHIFT_FRACTION = 1e-3
-"""Fraction of the way to an inner point of the triangle by which start points move, to avoid corners."""
+"""Fraction of the way that start points move towards an inner point of their triangle, to avoid corners."""
 
 INNER_POINT_WEIGHTS = 0.3547, 0.3141, 0.3312
 """Barycentric weights of the inner point to which start points move.
@@ -46,7 +46,7 @@ class Geodesics(NamedTuple):
     orientation: Doubles
 
     def select(self, mask: Mask) -> Geodesics:
-        """Return only those of the n geodesics for which a mask (n,) is true."""
+        """Return the geodesics that a mask (n,) selects."""
         return Geodesics._make(part[mask] for part in self)
 
 

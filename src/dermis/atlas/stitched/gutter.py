@@ -173,8 +173,8 @@ def trace_from_border(
 ) -> tuple[GeodesicEnds, Doubles]:
     """Trace a geodesic from the nearest border point of each texel to the surface point that the texel shows.
 
-    Returns the ends of the geodesics, and the barycentric weights (n, 2) of their starting points: those of
-    the second and third corner of the border triangle.
+    Returns the ends of the geodesics. Also returns the barycentric weights (n, 2) of the border triangle's
+    second and third corner at the start of each geodesic.
 
     sides : border sides on the texel grid
     nearest_points : nearest border point of each texel
@@ -199,9 +199,10 @@ def border_points(sides: BorderSides, nearest_points: NearestPoints) -> Doubles:
 
 
 def border_texel_steps(sides: BorderSides, nearest_points: NearestPoints) -> Doubles:
-    """Return the surface vectors (n, 2, 2) [mm] of a step by one texel at each of n border points.
+    """Return the surface vectors of steps by one texel at n border points, (n, 2, 2) [mm].
 
-    The first vector belongs to a step to the right, the second to a step down.
+    The second axis is for the step, to the right or down. The third axis has the two components of the vector
+    in the plane of the border triangle.
     """
     first, second = np.moveaxis(sides.steps[nearest_points.side], 1, 0)
     return _interpolate_linearly(first, second, nearest_points.fraction[:, None, None])

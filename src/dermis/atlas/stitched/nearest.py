@@ -16,8 +16,9 @@ class BorderSides(NamedTuple):
     """Triangle sides (k,) on the borders of chart pieces, placed on the texel grid, with the gutter width.
 
     ends : (k, 2, 2) positions of both end points [texel]
-    steps : (k, 2, 2, 2) at both end points, the two vectors on the surface that correspond to a step by one
-        texel to the right and to a step by one texel down, in the plane of the triangle [mm]
+    steps : (k, 2, 2, 2) surface vectors of steps by one texel [mm]. The second axis is for the two end
+        points, the third for the step (to the right, down), and the last for the components of the vector in
+        the plane of the triangle
     gutter_mm : (k,) width of the gutter on the surface [mm]
     max_texels : (k,) largest width of the gutter on the grid [texel]
     """

@@ -311,7 +311,7 @@ def _conflict_strip(
     """Return the mask (t,) of the triangles to cut off from a piece so that two of its gutters are separated.
 
     These are the triangles that lie near conflicts between the gutters and on one side of a line that
-    separates the conflicts. The side is chosen where the total area of these triangles is smaller.
+    separates the conflicts. Of the two sides, the one with the smaller area of such triangles is chosen.
 
     member_triangles : (t,) indices of the piece's triangles
     conflicts : conflicts that the line separates
@@ -366,12 +366,12 @@ def _best_cut_line(conflicts: Conflicts, gutter_width_texels: float) -> tuple[Do
 def _connected_parts(
     surface: FlatSurface, member_triangles: Index, part_of_triangle: Index, gutter_mm: float
 ) -> Index | None:
-    """Divide the parts into which a piece was cut so that each is connected, and merge small parts.
+    """Split the parts of a cut piece into connected parts, and merge small parts into neighbours.
 
     A small part is merged into its largest neighbour. Returns the index of each triangle's part (t,), or None
     if only one part remains.
 
-    member_triangles : (t,) indices of the triangles of the piece that was cut
+    member_triangles : (t,) indices of the triangles of the cut piece
     part_of_triangle : (t,) index of the part to which the cut assigns each of these triangles
     gutter_mm : width of the gutters [mm]
     """

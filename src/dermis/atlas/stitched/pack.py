@@ -145,7 +145,7 @@ def pack_pieces(
         density
     map_side : texels along each side of the map
     gutter_width : width of the gutters
-    layout : result of `find_piece_layout` if it is known; None to call this slow function
+    layout : result of `find_piece_layout`, if it is known; None to search for a layout, which is slow
     """
     groups, pieces = _prepare_pieces(surface, triangle_piece, uv_scale)
     packing = Packing(np.zeros(surface.uv.shape), *np.zeros((2, len(triangle_piece))))
@@ -317,7 +317,7 @@ def _layout_at_scale(
 
 
 def _scaled_mask(piece_mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
-    """Return the mask (h, w) of all cells that a chart piece touches after scaling, and its scaled margin.
+    """Return the mask (h, w) of all cells that a scaled chart piece touches, and its scaled margin (2,).
 
     scale : factor from the scale of `piece_mask` to the new scale
     """

@@ -52,8 +52,8 @@ class FlatSurface:
     valid : (f,) mask of skin triangles with an area in space and in uv
     adjacency : neighbours in space, for geodesics
     uv_neighbour : (f, 3) index of the triangle across each side in uv; the triangle itself at a seam
-    uv_tangents : (f, 3, 2, 2) surface vectors per unit of u and of v at each corner, in the triangle's plane
-        [mm]
+    uv_tangents : (f, 3, 2, 2) surface vectors per unit of uv at each corner [mm]. The third axis is for u and
+        v, the last for the components of the vector in the triangle's plane
     uv_metric : (f, 3, 3) lengths of the two vectors in `uv_tangents` [mm], and the cosine of the angle
         between these vectors [-]
     """

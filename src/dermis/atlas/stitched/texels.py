@@ -73,9 +73,11 @@ class AnchoredTexels(NamedTuple):
 
 
 def unconnected_pairs(surface: FlatSurface, texel_triangle: Ints, axis: int) -> tuple[Index, Index]:
-    """Find pairs of adjacent texels whose triangles share no side in uv, or of which one is a gutter texel.
+    """Find pairs of adjacent texels that the uv layout does not connect.
 
-    Returns the flat indices (n,) of the first texels of the pairs, and those (n,) of the second texels.
+    In such a pair, a texel is in a gutter, or the triangles of the two texels share no side in uv.
+
+    Returns two arrays (n,): the flat indices of the first texels, and of the second texels of the pairs.
 
     texel_triangle : (h, w) triangle to which each texel belongs, -1 in gutters, -2 elsewhere
     axis : 0 for texels adjacent along x, 1 along y
@@ -117,7 +119,6 @@ def gap_limit_mm(first_texels: AnchoredTexels, second_texels: AnchoredTexels, ax
     If the points are farther apart, the surface does not continue from one texel to the other.
 
     first_texels, second_texels : first and second texel of each of n adjacent pairs
-
     axis : 0 for texels adjacent along x, 1 along y
     """
     return (

@@ -1,4 +1,4 @@
-"""Division of an atlas into coarse cells, and of the cells into tiles, to compute translucency."""
+"""Division of an atlas into coarse cells, which are grouped into tiles, to compute translucency."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ CELLS_PER_TILE_SIDE = 4
 """Number of cells along each side of a tile."""
 
 TILE_MARGIN_TEXELS = 0.7
-"""Margin around a tile in which triangles count as overlapping, as interpolation reads beyond it [texel]."""
+"""Margin around a tile [texel].
+
+Triangles in the margin count as overlapping the tile, because interpolation reads beyond the tile.
+"""
 
 # In standard deviations of the widest Gaussian: largest distance between an entry and an exit cell; and side
 # of a cell, so small that light interpolated between cells is smooth.
@@ -30,7 +33,7 @@ _SAME_POINT_TEXELS = 0.1  # largest distance in the atlas at which a texel and a
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Division of an atlas into side x side cells, and of the cells into tiles, to compute translucency.
+    """Division of an atlas into side x side cells, which are grouped into tiles, to compute translucency.
 
     Translucency is light that enters the skin in one cell and leaves it in another, for example on the other
     side of an ear.
@@ -73,7 +76,7 @@ class Cells:
 
     @property
     def radius_mm(self) -> float:
-        """Return the largest distance from a cell in which light enters to the cell where it leaves [mm]."""
+        """Return the largest distance between a cell where light enters and the cell where it leaves [mm]."""
         return _PAIR_RADIUS_SIGMAS * self.max_sigma_mm
 
     @property
@@ -83,7 +86,7 @@ class Cells:
 
 
 def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: float = 1.0) -> Cells:
-    """Divide an atlas into cells, between which light passes through ears, lips and other thin parts.
+    """Divide an atlas into cells for translucency, see `Cells`.
 
     max_sigma_mm : standard deviation of the widest Gaussian of the diffusion profiles; 10 mm is used for
         larger values [mm]
@@ -174,7 +177,7 @@ def _tiles_of_points(atlas: Atlas, points: Words, cells_per_side: int, tiles_per
     """Return the index (m,) of the tile of the atlas in which each surface point lies.
 
     A point may appear twice in the atlas: in the chart of its triangle, and in the gutter of another chart.
-    The tile is that of the position in the chart.
+    The position in the chart determines the tile.
 
     points : (m, 2) triangle index, and packed barycentric weights
     cells_per_side, tiles_per_side : cells and tiles along each side of the atlas
@@ -213,10 +216,10 @@ def _tile_triangles(atlas: Atlas, cells_per_side: int, tiles_per_side: int) -> t
 
 
 def _gutter_copies(atlas: Atlas, cells_per_side: int) -> tuple[Index, Words]:
-    """Return the texels that copy light from another texel, sorted by the cell that contains the other texel.
+    """Return the texels that copy the light of another texel, each with the texel that it copies.
 
-    The results are the fields `gutter_copy_first` (index of the first entry of each cell) and `gutter_copies`
-    (pairs of texels) of `Cells`.
+    The pairs are sorted by the cell of the copied texel. The results are the fields `gutter_copy_first`
+    (index of the first pair of each cell) and `gutter_copies` (the pairs) of `Cells`.
     """
     rim, uv = _rim_texels(atlas)
     texel = np.concatenate([atlas.gutter, rim])
@@ -228,7 +231,7 @@ def _gutter_copies(atlas: Atlas, cells_per_side: int) -> tuple[Index, Words]:
 
 
 def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], Floats]:
-    """Return the rim texels, and the positions inside charts at which the atlas contains the same points.
+    """Return the rim texels, and the positions inside charts that show the same surface points.
 
     Rim texels lie just outside a chart and are read by bilinear interpolation inside it. Their light is
     computed, not copied. Each represents a surface point that is also inside the chart of its triangle.

@@ -69,7 +69,7 @@ def merge_stray_pieces(triangle_chart: Index, triangles: Index) -> Index:
 def _smooth_chart_borders(triangle_chart: Index, triangles: Index) -> Index:
     """Return for each triangle the most frequent chart (f,) in its neighbourhood, which smooths borders.
 
-    The neighbourhood grows in a few steps, in each of which a triangle averages the triangles that share a
+    The neighbourhood grows in a few steps. In each step, a triangle averages the triangles that share a
     corner with it.
 
     triangle_chart : (f,) chart of each triangle
@@ -141,7 +141,7 @@ def _seed_triangles(corners: Doubles, connected_piece: Index, chart_count: int, 
     corners : (f, 3, 3) positions of the corners [mm]
     connected_piece : (f,) connected piece to which each triangle belongs
     chart_count : number of triangles to draw at random; one triangle is then added for each connected piece
-        in which none was drawn
+        without a drawn triangle
     seed : seed of the random choice
     """
     area = triangle_areas(corners)

@@ -188,7 +188,7 @@ def _conformal_map(
 
 
 def _extreme_points(points: Doubles, vertex_component: Index) -> tuple[Index, Index]:
-    """Return the first and last point (c,) of each component along the axis on which it is longest.
+    """Return the first and last point (c,) of each component along x, y or z, whichever is its longest axis.
 
     vertex_component : (n,) index of the connected component of each vertex
     """

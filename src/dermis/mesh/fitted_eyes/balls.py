@@ -12,16 +12,16 @@ from dermis.mesh.geometry import label_components, triangle_areas
 from dermis.mesh.mesh import Mesh
 
 EYEBALL_RADIUS_RANGE_MM = 8.0, 20.0
-"""Range of the radius of an eyeball, which is 12 mm in reality but varies between artists [mm]."""
+"""Accepted radii of the eyeballs in a file; real eyeballs have about 12 mm, but artists' models vary [mm]."""
 MAX_SPHERE_DEVIATION = 0.06
-"""Largest deviation of most of an eyeball from a sphere, as a fraction of its radius."""
+"""Largest accepted `Sphere.deviation` of an eyeball [-]."""
 _MIN_EYEBALL_POINTS = 20
 _MIN_COVERED_FRACTION = 0.25  # fraction of the sphere that an eyeball covers
 _MAX_PART_DISTANCE_RADII = 1.2  # distance from the centre within which cornea, iris and pupil are, in radii
 _GAZE_TARGET_DISTANCE_MM = 1000.0  # distance of the point that eyes without a cornea look at
 _FIT_ITERATIONS = 12
 _MIN_BULGE_RADII, _MIN_CORNEA_RADII = 0.025, 0.045
-"""Least height above the sphere of points that may belong to a cornea, and of a cornea's apex, in radii."""
+"""Least heights above the sphere, in radii: of points that may be on a cornea, and of a cornea's apex."""
 _MIN_CORNEA_COSINE = 0.7  # cosine of the largest angle between a cornea's points and its axis
 _DEVIATION_QUANTILE = 0.85  # fraction of the area that is closer to the sphere than its `deviation`
 

@@ -14,7 +14,10 @@ from dermis.mesh.rotations import matrix_angles, rigid_motion
 
 _ROOT_BONE_NAME, _EYE_BONE_NAMES = "scene", ("eye.L", "eye.R")
 _MAX_NON_EYE_FOLLOWER_RATIO = 0.05
-"""Largest fraction of points outside the eye among the followers of an eye bone; a head bone has more."""
+"""Largest sum of an eye bone's weights outside the eye, relative to their sum in the eye.
+
+The bone of a whole head exceeds this ratio.
+"""
 _MIN_ROTATION_DEGREES, _MIN_SHIFT_MM = 0.5, 0.02  # smaller motions of a target are ignored
 
 
@@ -101,7 +104,7 @@ def _single_bone_skeleton(point_count: int) -> Skeleton:
 
 
 def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[FittedEyeball]) -> list[int]:
-    """Return for each eyeball the index of the bone that moves nothing else; -1 if there is no such bone."""
+    """Return for each eyeball the index of a bone that moves only this eyeball; -1 if there is none."""
     count, bones = len(skeleton.names), list[int]()
     total = np.bincount(skeleton.bone.ravel(), skeleton.weight.ravel(), minlength=count)
     for eyeball in eyeballs:
@@ -141,8 +144,8 @@ def _rigid_target_motions(
 ) -> tuple[list[BoneRotation], dict[int, Doubles]]:
     """Return the rotation and translation that best fit how each morph target moves the file's eyeball.
 
-    The rotations are those of the eyeball's bone. The translations are a dictionary from target index to
-    vector (3,) [mm]. Targets that do not move the eyeball are left out.
+    The first result lists rotations of the eyeball's bone. The second result is a dictionary from target
+    index to translation (3,) [mm]. Targets that do not move the eyeball are left out.
 
     bone_name : name of the eyeball's bone
     origin_mm : (3,) position of the bone's joint [mm]

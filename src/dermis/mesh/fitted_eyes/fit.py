@@ -115,7 +115,7 @@ def _eye_shapes(
 
     If an eyeball of the file has no cornea, its axis points through the opening of the lids.
 
-    corners_mm : (f, 3, 3) corners of all triangles except those of eyeballs [mm]
+    corners_mm : (f, 3, 3) corners of all triangles except the triangles of eyeballs [mm]
     detected_eyeballs : left and right eyeball of the file
     """
     lids = [lids_in_front(corners_mm, ball.sphere, ball.gaze) for ball in detected_eyeballs]

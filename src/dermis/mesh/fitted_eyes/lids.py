@@ -16,13 +16,13 @@ from dermis.mesh.fitted_eyes.balls import Sphere
 from dermis.mesh.geometry import cross_2d, expand_runs
 
 _RAYS_PER_SIDE, _HALF_SIDE_RADII = 49, 0.9
-"""Rays along each side of the square before the eye, and half its side in radii of the ball."""
+"""Number of rays along each side of a square in front of the eye, and half this side in radii of the ball."""
 _IRIS_HALF_WIDTH_RADII = 0.25  # half the width of the iris in radii of the ball
 _IRIS_RISE_FRACTION = 0.08  # height of the iris above the middle of the lids, in heights of their opening
 _MAX_OPEN_RAY_FRACTION = 0.3  # largest fraction of rays at an end of the opening that meet no lid
 _MAX_GAZE_ANGLE_RADIANS = np.radians(15.0)
 _MAX_PROTRUSION_MM, _MIN_BULGE_MM = 0.3, 0.5
-"""Largest height of a cornea above a lid that touches the ball, and least height above the ball."""
+"""Largest height of a cornea above the lids, and least height of its apex above the ball [mm]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -105,8 +105,8 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         """Encode a frame in a thread, and send the result to the pages.
 
         pixels : (h, w, 4) image of the frame
-        is_lossless_redraw : whether to encode the frame as PNG, because the picture has stopped changing,
-            instead of as JPEG
+        is_lossless_redraw : True encodes the frame as PNG, because the picture has stopped changing; False
+            encodes it as JPEG
         """
         self._cancel_lossless_draw()
         self._drawn_number += 1

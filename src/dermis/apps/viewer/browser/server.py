@@ -142,7 +142,7 @@ RESPONSE_HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
-"""Headers of every response: only the page's own files run, not in a frame, and nothing is cached."""
+"""Headers of every response. They forbid scripts of other sites, display in frames, and caching."""
 
 _ALL_INTERFACES = "0.0.0.0", "::"
 

@@ -250,7 +250,7 @@ def apply_edited_value(
 ) -> None:
     """Apply the new value of a control to the state; all changes of one drag are undone together.
 
-    label : label of the control, by which changes are attributed to one drag
+    label : label of the control; it identifies the changes that belong to one drag
     change_and_value : whether the control has changed, and its value
     state_with_value : function that returns a state, given the new value
     """
@@ -385,7 +385,7 @@ SURFACE_STYLES = {
 ALBEDO_STYLES = {
     "albedo": FieldStyle("colour by###colour from", names={"map": "albedo map", "profile": "profile"})
 }
-"""Presentation of the profile fields of `Skin`."""
+"""Presentation of the field `albedo` of `Skin`."""
 
 TECHNIQUE_STYLES = {
     "technique": FieldStyle(

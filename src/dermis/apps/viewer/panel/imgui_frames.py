@@ -121,7 +121,7 @@ class ImguiFrames:
 
 @contextmanager
 def recover_imgui(report_error: ReportError) -> Iterator[None]:
-    """Catch an exception of the with block, and close the windows, tables, styles and ids left open by it.
+    """Catch an exception of the with block; close the windows, tables, styles and ids that it left open.
 
     report_error : function called with the exception
     """

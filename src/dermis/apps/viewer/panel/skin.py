@@ -136,7 +136,7 @@ def _draw_pigments(session: Session, skin: Skin) -> None:
 def _plot_profile(session: Session) -> None:
     """Plot r R(r), the diffusion profile R times the radius r, for red, green and blue.
 
-    The curve is the sum of Gaussians with which the renderer blurs light.
+    The plotted profile is the sum of Gaussians that the renderer uses to blur light.
     """
     try:
         profile = session.view_renderer.renderer.skin_profile(session.state.scene.skin)
