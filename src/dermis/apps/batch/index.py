@@ -70,9 +70,9 @@ def open_index(dataset_folder: Path, purpose: str) -> pyarrow.parquet.ParquetFil
 
 
 def parameter_summaries(dataset_folder: Path) -> Iterator[tuple[str, int, str]]:
-    """Yield the name, the number of values and a text summary of the values of each parameter in the index.
+    """Yield (name, number of values, text that summarises the values) for each parameter in the index.
 
-    Only images that use a parameter have a value of it.
+    An image that does not use a parameter has no value of this parameter.
 
     Raises DermisError if there is no index.
     """

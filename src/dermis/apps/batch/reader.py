@@ -163,7 +163,7 @@ def read_record(json_bytes: bytes, error_subject: object) -> Record:
 
 @contextmanager
 def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
-    """Open a shard as a context manager, which returns its images by key (the image number with 9 digits).
+    """Open a shard, and yield a dictionary from image key (the image number with 9 digits) to image.
 
     Each image is a dictionary from file suffix to a function that reads the file. The functions can only be
     called inside the with block.

@@ -119,7 +119,7 @@ class Target(ABC):
     part_limitations: ClassVar[str] = (
         "Only skin is exported; an export to gltf contains the other parts with their pictures."
     )
-    """Limitations of eyes and other parts that are not skin, for the report on heads with their pictures."""
+    """Limitations of eyes and other parts that are not skin; reported if these parts have texture images."""
     untested: ClassVar[bool] = False
     """Whether the exported files have not been tested in the program."""
 
@@ -206,7 +206,7 @@ class Target(ABC):
     def main_file(self, output: Path, subject: Subject, suffix: str = "") -> Path:
         """Return the path of the main file, which is the file that the user opens in the program.
 
-        The path is `output` or, if `output` is a folder, that of a file inside this folder.
+        If `output` is a folder, the main file is inside this folder; otherwise, `output` is the main file.
 
         Parameters
         ----------

@@ -145,7 +145,8 @@ def _diffuse_transmission_parameters(
 def _ear_transmission(subject: Subject) -> tuple[float, Floats]:
     """Return the fraction [-] and the colour (3,) of the light that an ear transmits to its unlit side.
 
-    The fraction is relative to the light that leaves the ear on both sides.
+    The fraction is computed for the channel with the most transmitted light. It is relative to the light that
+    leaves the ear on both sides in this channel. The colour is 1 in this channel.
 
     Source: [ChristensenBurley2015], integrated over the plane of the unlit side.
     """

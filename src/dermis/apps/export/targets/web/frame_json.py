@@ -64,8 +64,8 @@ def frames_json(
     Data that is all zero is not stored, as the page creates resources filled with zeros.
 
     picture_maps : dictionary from resource index to map, for the maps that are stored as WebP images
-    quantisation_steps : for each buffer of rounded vectors, by resource index, the rounding step of each
-        vector component
+    quantisation_steps : dictionary from resource index to rounding steps, for the buffers that hold rounded
+        vectors; one step per vector component
     byte_runs : collector of buffer and texture data, to which the JSON refers by index
     """
     pictures = [
