@@ -1,4 +1,4 @@
-"""Atomic writes of files and folders to which several processes may write at once."""
+"""Atomic writes of files and folders, also when several processes write the same one at once."""
 
 from __future__ import annotations
 

@@ -237,7 +237,7 @@ class FileChoice(Distribution):
         return self.names
 
     def quantile(self, probability: float) -> str:
-        """Return the path to which a probability belongs; the paths share the range 0 to 1 equally."""
+        """Return the path for a probability; each path has an interval of equal length between 0 and 1."""
         return self.names[min(int(probability * len(self.names)), len(self.names) - 1)]
 
     def spec_value(self) -> SpecValue:

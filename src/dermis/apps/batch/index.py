@@ -54,7 +54,7 @@ def write_index(dataset_folder: Path, spec: Spec) -> Path:
 def open_index(dataset_folder: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
     """Open the index of a data set and return its Parquet file, from which single columns can be read.
 
-    purpose : purpose for which pyarrow is needed; shown in the error message if pyarrow is missing
+    purpose : task that needs the index, as a noun phrase for the error message if pyarrow is missing
 
     Raises DermisError if there is no index.
     """

@@ -210,7 +210,7 @@ class Sampler:
         return value if isinstance(value, str) else round_significant(value)
 
     def _random_probability(self, image_number: int, parameter: str) -> float:
-        """Return the random cumulative probability in (0, 1) at which a parameter is sampled.
+        """Return the random probability in (0, 1) for the `quantile` of a parameter's distribution.
 
         image_number : number of the image
         """

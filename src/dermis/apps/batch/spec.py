@@ -75,7 +75,7 @@ class Spec(FrozenModel):
     outputs: tuple[str, ...] = ()
     """Outputs written for each image beside the picture, as in `dermis render --outputs`."""
     landmarks: tuple[str, ...] = ("ibug-68",)
-    """Landmark sets; for your own meshes, .csv files in the spec's folder with the columns name and vertex."""
+    """Landmark sets; for your own meshes, .csv files in the spec's folder with the columns name,vertex."""
     shard_size: Annotated[int, Field(ge=1, le=10**6), BoundsReason("a million in a file")] = 1000
     """Images per shard."""
     format: Literal["webdataset", "folder"] = "webdataset"
@@ -91,7 +91,7 @@ class Spec(FrozenModel):
     expressions: dict[str, dict[str, _TargetWeight]] = Field(default_factory=dict)
     """Expressions of this spec: weights of morph targets; a name without Left or Right sets both sides."""
     pose: dict[str, Annotated[Distribution, tables.DistributionField()]] = Field(default_factory=dict)
-    """Weights of morph targets, in place of expression weights; a name without Left or Right sets both sides."""
+    """Weights of morph targets, replacing the expression's; a name without Left or Right sets both sides."""
     head: tables.HeadRotationTable = tables.HeadRotationTable()
     """Rotation of the head."""
     gaze: tables.GazeTable = tables.GazeTable()
@@ -160,7 +160,7 @@ class Spec(FrozenModel):
         return self._sampler.parameters(checked_integer("image", image_number, 0, self.count - 1))
 
     def to_toml(self) -> str:
-        """Return the spec as canonical TOML with all values, from which `parse_spec` makes an equal spec."""
+        """Return the spec as canonical TOML with all values; `parse_spec` converts it to an equal spec."""
         values = fields_except_none(self)
         values = {"count": values.pop("count"), "seed": values.pop("seed"), "size": self.size} | values
         values["render"] = self.render.model_dump(exclude=set(NON_RENDER_SETTINGS), exclude_none=True)

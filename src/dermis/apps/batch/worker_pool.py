@@ -98,7 +98,7 @@ class ProcessPool:
 class _WorkerProcess:
     """Worker process, and the tasks that were sent to it.
 
-    slot : graphics adapter and number of threads with which this worker renders
+    slot : graphics adapter and number of threads of this worker
     tasks : the task in progress, and at most one task to do next
     """
 

@@ -28,8 +28,8 @@ BURLEY_CUTOFF, BURLEY_CUTOFF_CDF = 16.0, 0.9963790093708328
 """Radius at which Cycles truncates Burley's profile, in units of the profile's width d, and the fraction of
 light within this radius [-]."""
 MIN_ALBEDO, MAX_ALBEDO = 0.2, 0.999999
-"""Range of single-scattering albedos in random walks. For a smaller albedo, Cycles scales the result of a walk
-with `MIN_ALBEDO`."""
+"""Range of single-scattering albedos in random walks. For a smaller albedo, Cycles scales the result of a
+walk with `MIN_ALBEDO`."""
 _DIPOLE_BISECTION_STEPS = 12
 _MIN_BASE_COLOUR, _MAX_BASE_COLOUR = 1e-4, 0.995  # range in which Cycles inverts the dipole
 Cdf = Callable[[Floats], Floats]

@@ -59,7 +59,7 @@ class Gltf(Target):
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return parameters in which each colour is the skin's colour, and the other values are guesses."""
+        """Return parameters with the skin's colour for every colour, and with guesses for other values."""
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_transmission_parameters(subject, _NAIVE_TRANSMISSION_FACTOR, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())

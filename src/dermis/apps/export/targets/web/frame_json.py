@@ -139,9 +139,7 @@ def _frame_json(named_frame: NamedFrame, picture_entry: list[int], byte_runs: By
 
 
 def _view_record_index(captured_frame: CapturedFrame, stage_name: str) -> int:
-    """Return the index of the uniform record with a stage's view matrices; -1 if there are none.
-
-    It is an index in `captured_frame.records`.
+    """Return the index, in `captured_frame.records`, of a stage's view matrices; -1 if there are none.
 
     stage_name : "visibility" or "shadows"
     """
