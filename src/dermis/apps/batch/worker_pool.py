@@ -25,7 +25,7 @@ class SlotRequest:
     """Requested number of workers, and their graphics adapters; None selects a default for this machine.
 
     adapter : "auto", "cpu", a number such as "#1", or a part of an adapter's name. If several adapters match,
-        the best adapter is used, and with it all GPUs that have its device type and its graphics API
+        the best match is used, together with the other matches of the same device type and graphics API
     numbers : numbers of the adapters to use, in place of `adapter`
     workers : total number of workers
     workers_per_gpu : workers on each adapter, if `workers` is None
