@@ -65,8 +65,8 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
 def atomic_folder(path: str | Path, marker_name: str) -> Iterator[Path]:
     """Yield a new empty folder, which replaces `path` on success and is deleted after an error.
 
-    marker_name : name of a file by which an existing folder is recognised as output of this package; only a
-        folder with this file, or an empty folder, is replaced
+    marker_name : name of a file that marks a folder as output of this package; an existing folder is replaced
+        only if it contains this file or is empty
 
     Raises DermisError for any other existing folder, and for paths that cannot be written.
     """

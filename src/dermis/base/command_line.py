@@ -96,7 +96,7 @@ def run_script(
 def add_command(app: App, command_name: str, function_path: str, summary: str) -> None:
     """Add a command to an app; the module of the command is imported only when a user runs the command.
 
-    command_name : name of the command
+    command_name : word that selects the command on the command line
     function_path : function of the command, as "module:function"
     summary : text in the list of commands
     """
@@ -132,7 +132,7 @@ def _show_warnings_as_notes() -> None:
 def usage_message(error: CycloptsError, program_name: str) -> str:
     """Return the error message for an invalid command line: what was expected and given, and how to get help.
 
-    program_name : name of the program
+    program_name : name of the program, for the advice "See PROGRAM_NAME --help"
     """
     command = " ".join((program_name, *(error.command_chain or ())))
     error_subject, expected, actual = (

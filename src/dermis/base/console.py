@@ -101,7 +101,7 @@ class _SpinnerText(logging.Handler):
         self._task, self._step, self._began = task, "", 0.0
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Set the current step from a log record of the start or end of a step, see `logged_step`."""
+        """Update the current step from a record that `logged_step` logged at the start or end of a step."""
         begins = record.levelno >= logging.INFO
         self._step, self._began = record.getMessage() if begins else "", time.monotonic()
 

@@ -249,7 +249,7 @@ def _map_threaded(
 ) -> list[str]:
     """Apply a function to each block, and return the results; several threads are used for large data.
 
-    further_arguments : sequences of further arguments, one value for each block
+    further_arguments : sequences with one value per block; each call gets the values for its block
     """
     if sum(map(len, blocks)) < _MIN_THREADED_BYTES:
         return list(map(function, blocks, *further_arguments))

@@ -1,4 +1,4 @@
-"""Declarations of what file readers do with each property of a file; docs/formats.md is built from them."""
+"""Records of how file readers treat each property of a file; docs/formats.md is built from these records."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _file_property(
     *keys: str,
     other_parts: Treatment | None = None,
 ) -> FileProperty:
-    """Return a `FileProperty`; callers use `drawn_property` and others, which pass their treatment to it.
+    """Return a `FileProperty`; `drawn_property` and similar functions call this one with their treatment.
 
     keys : words by which the reader recognises the property
     other_parts : treatment in the materials of parts that are not skin; None if it is the same

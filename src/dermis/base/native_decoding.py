@@ -23,7 +23,8 @@ from dermis.base.disk import Arrays
 from dermis.base.errors import DermisError, refuse, shorten
 
 _BASE_CPU_LIMIT_S, _BASE_CPU_LIMIT_BYTES = 8.0, 64 << 20
-"""Limit of CPU time [s] up to `_BASE_CPU_LIMIT_BYTES`; for larger files proportional to their size."""
+"""Limit of CPU time [s] for data of up to `_BASE_CPU_LIMIT_BYTES` bytes. For larger data, the limit is
+proportional to the size."""
 # limit of elapsed time, as a multiple of the limit of CPU time: the machine may be busy
 _MAX_WAIT_PER_CPU_TIME = 3.0
 _MAX_MEMORY_BYTES = 2 << 30  # limit of the address space; the libraries of USD use a third of it
@@ -107,7 +108,7 @@ def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
 
 
 def text_from_array(array: Bytes) -> str:
-    """Decode UTF-8 text from an array of a request to a decoder, or of the decoder's answer."""
+    """Decode the text in a UTF-8 array, which belongs to the request to a decoder or to its answer."""
     return array.tobytes().decode("utf-8", "replace")
 
 

@@ -20,7 +20,7 @@ _WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 def cache_folder() -> Path:
     """Return the folder of the disk cache: the environment variable DERMIS_CACHE, or a default for the user.
 
-    For a user without a home folder, a path is returned at which nothing can be stored.
+    For a user without a home folder, the returned path is the null device, where nothing can be stored.
     """
     import platformdirs
 
@@ -85,7 +85,7 @@ def open_private_file(path: Path) -> io.FileIO:
 
 
 def _path_components(path: Path) -> Iterator[Path]:
-    """Yield all folders and symbolic links through which a path is resolved, and the path itself."""
+    """Yield a path, and every folder and symbolic link that is followed to resolve it."""
     absolute = path.absolute()
     names, current, links = list(reversed(absolute.parts[1:])), Path(absolute.anchor), 0
     yield current

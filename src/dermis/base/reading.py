@@ -1,4 +1,4 @@
-"""Safe reading of files that users name, and of further files to which these files refer.
+"""Safe reading of files that users name, and of the further files that these files reference.
 
 Only regular files are read, with a limit on their size, and errors of parsers become messages that name the
 file.

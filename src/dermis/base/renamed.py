@@ -26,7 +26,7 @@ RENAMED_OBJECTS: Mapping[str, str] = {
     "apps.inverse.unmixing.unmix.Share": "apps.inverse.unmixing.unmix.FractionChange",
     "scene.smoothness.SmoothIn": "scene.smoothness.SmoothOutlineLevels",
 }
-"""Old to new names of objects, both without the package's name."""
+"""Dictionary from the old to the new name of each renamed object, without the package's name."""
 
 RENAMED_MODULES: Mapping[str, str] = {
     "batch": "apps.batch",
@@ -45,7 +45,7 @@ RENAMED_MODULES: Mapping[str, str] = {
     "unmixing.change": "apps.inverse.unmixing.unmix",
     "viewer": "apps.viewer",
 }
-"""Old to new paths of modules and packages, both without the package's name."""
+"""Dictionary from the old to the new path of each renamed module or package, without the package's name."""
 
 P = ParamSpec("P")
 R = TypeVar("R")

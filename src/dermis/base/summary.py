@@ -13,7 +13,7 @@ _MAX_REPR_LENGTH = 60  # characters of a value
 
 
 class ShortRepr:
-    """Mixin for dataclasses with `repr=False` whose repr shows types and shapes instead of large arrays."""
+    """Mixin that gives dataclasses with `repr=False` a repr with types and shapes instead of large arrays."""
 
     def __repr__(self) -> str:
         """Return the class name and the fields, each abbreviated by `short_repr`."""

@@ -10,7 +10,7 @@ _PROJECT_FILE = Path(__file__).parents[3] / "pyproject.toml"
 
 
 def version() -> str:
-    """Return the version of the installed package, or the version in pyproject.toml in a checkout."""
+    """Return the version of the installed package; if it is not installed, the version in pyproject.toml."""
     try:
         return metadata.version("dermis")
     except metadata.PackageNotFoundError:

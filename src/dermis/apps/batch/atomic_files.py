@@ -1,4 +1,4 @@
-"""Atomic writes of files and folders to which several processes may write at once."""
+"""Atomic writes of files and folders, also when several processes write the same one at once."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _UNFINISHED_NAME_PATTERN = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
 
 
 def temporary_path(final_path: Path) -> Path:
-    """Return an unused hidden path beside `final_path`, at which to write content before renaming it."""
+    """Return an unused hidden path beside `final_path`, for a file or folder to be renamed when complete."""
     return final_path.with_name(f".{final_path.name}-{secrets.token_hex(6)}.unfinished")
 
 

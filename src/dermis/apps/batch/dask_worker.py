@@ -25,8 +25,8 @@ from dermis.base.private import cache_folder, make_private_folder
 from dermis.gpu.adapters import adapters_like_best_match
 
 _MALLOC_TRIM_VARIABLE = "MALLOC_TRIM_THRESHOLD_"
-"""Environment variable by which dask's nannies make workers return freed memory to the system at once; large
-arrays are then slow to allocate."""
+"""Environment variable that dask's nannies set, so that workers return freed memory to the system at once.
+Large arrays are then slow to allocate."""
 
 
 @dataclass

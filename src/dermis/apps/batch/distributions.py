@@ -203,8 +203,9 @@ class Choice(Distribution):
     def quantile(self, probability: float) -> SampleValue:
         """Return the sample that belongs to a probability between 0 and 1.
 
-        Each of the `values` has an interval of probabilities, whose length is proportional to its weight. The
-        relative position in the interval is passed to the `quantile` of the chosen value.
+        The range from 0 to 1 is divided into one interval per alternative, with a length proportional to the
+        weight of the alternative. The interval that contains `probability` selects an alternative. The
+        relative position of `probability` in this interval is passed to the `quantile` of the alternative.
         """
         cumulative = list(accumulate(self.weights))
         position = probability * cumulative[-1]
@@ -236,7 +237,7 @@ class FileChoice(Distribution):
         return self.names
 
     def quantile(self, probability: float) -> str:
-        """Return the path to which a probability belongs; the paths share the range 0 to 1 equally."""
+        """Return the path for a probability; each path has an interval of equal length between 0 and 1."""
         return self.names[min(int(probability * len(self.names)), len(self.names) - 1)]
 
     def spec_value(self) -> SpecValue:

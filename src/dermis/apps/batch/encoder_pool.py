@@ -76,11 +76,12 @@ class EncoderPool:
 class _EncoderProcess:
     """Encoder process that receives jobs through shared memory.
 
-    A job is the tuple of arguments with which one image is encoded. The pipe only carries the offsets of the
-    jobs in the shared memory. If the pipe carried the jobs, parent and child could block, each waiting for
-    the other process to read.
+    A job is the tuple of arguments with which one image is encoded. The pipe carries only the offsets of the
+    jobs in the shared memory, and the encoded images in return. If the pipe carried the jobs, parent and
+    child could block, each waiting for the other process to read.
 
-    size : largest size of a job [bytes]
+    memory_bytes : largest size of a job [bytes]
+    encode : function that encodes an image, see `EncoderPool`
     """
 
     def __init__(self, memory_bytes: int, encode: Callable[..., EncodedImage]) -> None:

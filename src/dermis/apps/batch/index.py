@@ -54,7 +54,7 @@ def write_index(dataset_folder: Path, spec: Spec) -> Path:
 def open_index(dataset_folder: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
     """Open the index of a data set and return its Parquet file, from which single columns can be read.
 
-    purpose : purpose for which pyarrow is needed; shown in the error message if pyarrow is missing
+    purpose : task that needs the index, as a noun phrase for the error message if pyarrow is missing
 
     Raises DermisError if there is no index.
     """
@@ -70,9 +70,9 @@ def open_index(dataset_folder: Path, purpose: str) -> pyarrow.parquet.ParquetFil
 
 
 def parameter_summaries(dataset_folder: Path) -> Iterator[tuple[str, int, str]]:
-    """Yield the name, the number of values and a text summary of the values of each parameter in the index.
+    """Yield (name, number of values, text that summarises the values) for each parameter in the index.
 
-    Only images that use a parameter have a value of it.
+    An image that does not use a parameter has no value of this parameter.
 
     Raises DermisError if there is no index.
     """

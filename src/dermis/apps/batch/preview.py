@@ -25,7 +25,7 @@ from dermis.scene.toml_text import value_text
 SHEET_IMAGE_COUNT = 16
 """Number of images on the contact sheet."""
 MAX_COUNTED_IMAGES = 20_000
-"""Largest number of images from which the statistics of the parameter table are computed."""
+"""Largest number of images that the statistics of the parameter table cover."""
 _SHEET_COLUMNS, _SHEET_IMAGE_SIDE, _SHEET_GAP = 4, 192, 4  # of the contact sheet; lengths in pixels
 _MAX_PREVIEW_SIDES = {"atlas": 512, "shadow_size": 1024}  # upper limits of settings for the contact sheet
 _MAX_COLUMN_CHARACTERS = 60  # characters

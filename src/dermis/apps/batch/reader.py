@@ -76,8 +76,10 @@ def read_dataset(
     iterator of dict
         Each image has one key for each output of the data set, such as "depth" or "normal", and these keys:
         "number"; "picture", sRGB bytes (h, w, 3 or 4); "parameters", by name; "camera", with K, R and t in
-        OpenCV's convention; "head_pose" (3, 4); "gaze" (2, 3) or None; "landmarks", `LandmarkPoints` by the
-        name of the set; and "skin_tone", numbers that describe the colour of the skin, or None.
+        OpenCV's convention; "head_pose" (3, 4), rotation and translation [mm] from the head at rest to the
+        camera; "gaze" (2, 3), unit vectors of the left and the right eye in camera axes, or None;
+        "landmarks", `LandmarkPoints` by the name of the set; and "skin_tone", a dictionary that describes the
+        colour of the skin, or None.
 
     Raises
     ------
@@ -163,7 +165,7 @@ def read_record(json_bytes: bytes, error_subject: object) -> Record:
 
 @contextmanager
 def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
-    """Open a shard as a context manager, which returns its images by key (the image number with 9 digits).
+    """Open a shard, and yield a dictionary from image key (the image number with 9 digits) to image.
 
     Each image is a dictionary from file suffix to a function that reads the file. The functions can only be
     called inside the with block.

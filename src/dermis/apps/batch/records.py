@@ -41,7 +41,10 @@ class LandmarksRecord(TypedDict):
 
 
 class Record(TypedDict):
-    """Description of one image as stored in its JSON file: parameters, skin tone, camera, pose, landmarks."""
+    """Description of one image as stored in its JSON file: parameters, skin tone, camera, pose, landmarks.
+
+    For `head_pose` and `gaze`, see `Observation`.
+    """
 
     number: int
     parameters: Parameters

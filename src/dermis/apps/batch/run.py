@@ -30,7 +30,7 @@ from dermis.base.extras import import_extra
 from dermis.base.reading import read_text
 
 SPEC_FILE = "spec.toml"
-"""Name of the copy of the spec in the folder of its data set, where runs with other specs are refused."""
+"""Name of the copy of the spec in the folder of a data set; a run with another spec refuses this folder."""
 
 
 class WorkerPool(Protocol):

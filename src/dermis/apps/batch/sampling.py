@@ -43,7 +43,7 @@ _CONDITIONAL_PARAMETERS: tuple[tuple[str | tuple[str, ...], Callable[[Parameters
     ("background.blur", lambda sampled: sampled["background.kind"] == "environment"),
     ("camera.frame_mm", lambda sampled: "camera.focal_mm" not in sampled),
 )
-"""Prefixes of parameters that only some images have, with the condition for having them."""
+"""Prefixes of parameters that only some images have, and the condition under which an image has them."""
 
 
 def table_numbers(parameters: Mapping[str, float | int | str], table_name: str) -> dict[str, float]:
@@ -141,7 +141,7 @@ def expression_weights(
     target_weights : weights of the expression by name of the morph target; a name without Left or Right
         moves both sides
     intensity : factor of all weights [-]
-    asymmetry : relative increase of the weights on the left side, and decrease of those on the right [-]
+    asymmetry : relative increase of the weights on the left side, and relative decrease on the right side [-]
     variation : standard deviation of the logarithm of each weight [-]
     sample_normal : function that returns a standard normal random number for a target name
     """
@@ -210,7 +210,7 @@ class Sampler:
         return value if isinstance(value, str) else round_significant(value)
 
     def _random_probability(self, image_number: int, parameter: str) -> float:
-        """Return the random cumulative probability in (0, 1) at which a parameter is sampled.
+        """Return the random probability in (0, 1) for the `quantile` of a parameter's distribution.
 
         image_number : number of the image
         """

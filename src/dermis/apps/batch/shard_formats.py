@@ -1,4 +1,4 @@
-"""File formats of shards: tar files and folders, into which a manifest is written last."""
+"""File formats of shards: tar files, and folders. In both, the last file is a manifest."""
 
 from __future__ import annotations
 

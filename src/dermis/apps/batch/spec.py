@@ -30,14 +30,15 @@ from dermis.scene.toml_text import key_text, table_text
 
 MAX_IMAGES = 10**9
 GENERATOR_VERSION = 3
-"""Number of the rules by which seeds become people and pictures: other rules make other people of a seed.
+"""Number of the rules that turn seeds into people and pictures; with other rules, a seed gives other people.
 
-Number 1 stands for the people of version 0.1, number 2 for people with the skin of measured people.
+Number 1 stands for the people of version 0.1, number 2 for people with the skin of measured people, and
+number 3 for people whose hair has also changed.
 """
 COUNT_LINE_PATTERN = re.compile(r"(?m)^count = (\d+)\n")
 """Line of a canonical spec with the number of images, which may be raised to let a data set grow."""
 GENERATOR_LINE_PATTERN = re.compile(r"(?m)^generator = (\d+)\n")
-"""Line of a canonical spec with the generator number; earlier versions wrote none."""
+"""Line of a canonical spec with the generator number; specs of number 1 have no such line."""
 RENDER_DEFAULTS: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
 """Render settings of a spec without [render]."""
 _BACKGROUND_TABLE = "[background]"
@@ -68,13 +69,13 @@ class Spec(FrozenModel):
         Field(ge=GENERATOR_VERSION, le=GENERATOR_VERSION),
         BoundsReason("this version makes other images from a spec"),
     ] = GENERATOR_VERSION
-    """Number of the rules by which seeds become pictures; data sets of another number are not continued."""
+    """Number of the rules that turn seeds into pictures; a data set with another number is not continued."""
     images_per_person: Annotated[int, Field(ge=1, le=10**6), BoundsReason("a million of each")] = 1
     """Number of consecutive images that show the same person."""
     outputs: tuple[str, ...] = ()
     """Outputs written for each image beside the picture, as in `dermis render --outputs`."""
     landmarks: tuple[str, ...] = ("ibug-68",)
-    """Landmark sets, or tables of name,vertex for your own meshes (.csv, in the spec's folder)."""
+    """Landmark sets; for your own meshes, .csv files in the spec's folder with the columns name,vertex."""
     shard_size: Annotated[int, Field(ge=1, le=10**6), BoundsReason("a million in a file")] = 1000
     """Images per shard."""
     format: Literal["webdataset", "folder"] = "webdataset"
@@ -90,7 +91,7 @@ class Spec(FrozenModel):
     expressions: dict[str, dict[str, _TargetWeight]] = Field(default_factory=dict)
     """Expressions of this spec: weights of morph targets; a name without Left or Right sets both sides."""
     pose: dict[str, Annotated[Distribution, tables.DistributionField()]] = Field(default_factory=dict)
-    """Weights of morph targets, or of left and right pairs, that replace those of the expression."""
+    """Weights of morph targets, replacing the expression's; a name without Left or Right sets both sides."""
     head: tables.HeadRotationTable = tables.HeadRotationTable()
     """Rotation of the head."""
     gaze: tables.GazeTable = tables.GazeTable()
@@ -159,7 +160,7 @@ class Spec(FrozenModel):
         return self._sampler.parameters(checked_integer("image", image_number, 0, self.count - 1))
 
     def to_toml(self) -> str:
-        """Return the spec as canonical TOML with all values, from which `parse_spec` makes an equal spec."""
+        """Return the spec as canonical TOML with all values; `parse_spec` converts it to an equal spec."""
         values = fields_except_none(self)
         values = {"count": values.pop("count"), "seed": values.pop("seed"), "size": self.size} | values
         values["render"] = self.render.model_dump(exclude=set(NON_RENDER_SETTINGS), exclude_none=True)

@@ -145,7 +145,7 @@ def _check_heads_and_environments(distributions: Mapping[str, Distribution], fol
 def _check_looks(distributions: Mapping[str, Distribution]) -> None:
     """Raise DermisError for unknown names or invalid values in the tables of looks, skin and morph targets.
 
-    The tables of looks are person.skin, person.eyes and person.hair; those of morph targets are
+    The tables of looks are person.skin, person.eyes and person.hair; the tables of morph targets are
     person.targets and pose.
 
     distributions : distribution of each parameter by its dotted name

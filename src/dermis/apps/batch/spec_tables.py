@@ -24,7 +24,7 @@ _DISTRIBUTION_RANGE_NOTE = "; normal extends 6 sd to both sides, truncated to it
 
 
 class DistributionField:
-    """Annotation with which pydantic parses a field of a table of the spec as a distribution."""
+    """Annotation that makes pydantic parse a field of a spec's table as a distribution."""
 
     def check(self, spec_value: object) -> Distribution | None:
         """Return the distribution that a value describes; None for an omitted field.
@@ -54,7 +54,7 @@ class DistributionField:
 class NumberField(DistributionField):
     """Annotation of a field whose samples are numbers between two bounds.
 
-    low, high : bounds of the samples
+    lower_bound, upper_bound : smallest and largest valid sample
     reason : unit or explanation of the bounds, shown in error messages
     """
 
@@ -101,7 +101,7 @@ class CorrelationGroup(FrozenModel):
     """
 
     of: tuple[str, ...]
-    """Names of parameters, such as ["camera.yaw_deg", "head.yaw_deg"]; those of [person] first."""
+    """Names of parameters, such as ["camera.yaw_deg", "head.yaw_deg"]; names of [person] come first."""
     correlation: _CorrelationCoefficient | tuple[tuple[_CorrelationCoefficient, ...], ...]
     """Correlation of all pairs, or a symmetric matrix with one row per name."""
 
@@ -131,7 +131,7 @@ class CorrelationGroup(FrozenModel):
         return np.full((count, count), self.correlation) + (1.0 - self.correlation) * np.eye(count)
 
     def cholesky_rows(self) -> dict[str, dict[str, float]]:
-        """Return weights that turn independent normal numbers into correlated ones, for each parameter.
+        """Return, for each parameter, the weights that turn independent normal numbers into correlated ones.
 
         The correlated number of a parameter is the weighted sum of the independent numbers of all parameters.
         The weights of one parameter, by parameter name, are a row of the correlation matrix's Cholesky
@@ -255,9 +255,9 @@ class CameraTable(FrozenModel):
     distance_mm: Annotated[Distribution, _CAMERA_DISTANCE_FIELD] = Constant(1100.0)
     """Distance to the centre of the face [mm]."""
     yaw_deg: Annotated[Distribution, _ANGLE_FIELD] = Constant(0.0)
-    """Angle around the head, to its left [degrees]."""
+    """Angle around the head, from its front to its left [degrees]."""
     pitch_deg: Annotated[Distribution, _ELEVATION_FIELD] = Constant(0.0)
-    """Angle above the head [degrees]."""
+    """Elevation above the level of the head [degrees]."""
     roll_deg: Annotated[Distribution, _ANGLE_FIELD] = Constant(0.0)
     """Rotation of the camera about its axis, clockwise as seen from behind it [degrees]."""
     frame_mm: Annotated[Distribution, NumberField(50, 10_000, "mm: from a nose to a crowd")] = Constant(340.0)
@@ -276,7 +276,7 @@ class LampTable(FrozenModel):
     yaw_deg: Annotated[Distribution, _ANGLE_FIELD] = Constant(0.0)
     """Angle around the head, from its front to its left [degrees]."""
     pitch_deg: Annotated[Distribution, _ELEVATION_FIELD] = Constant(0.0)
-    """Angle above the head [degrees]."""
+    """Elevation above the level of the head [degrees]."""
     distance_mm: Annotated[Distribution, NumberField(400, 20_000, "mm: outside the face")] = Constant(1300.0)
     """Distance to the centre of the head [mm]."""
     size_mm: Annotated[Distribution, NumberField(10, 3000, "mm: from a torch to a wall")] = Constant(500.0)
@@ -295,7 +295,7 @@ class LightTable(FrozenModel):
     turn_deg: Annotated[Distribution, _ANGLE_FIELD] = Constant(0.0)
     """Rotation of all lamps about the upward axis, to the head's left [degrees]."""
     strength: Annotated[Distribution, _LIGHT_STRENGTH_FIELD] = Constant(1.0)
-    """Factor of all lamps' irradiance."""
+    """Factor of the irradiance of all lamps [-]."""
     key: LampTable = LampTable(yaw_deg=Uniform(-70, 70), pitch_deg=Uniform(-5, 60))
     """Key lamp, the main light."""
     fill: LampTable = LampTable(yaw_deg=Uniform(-60, 60), size_mm=Constant(900), strength=Constant(0.2))
@@ -313,14 +313,14 @@ class EnvironmentTable(FrozenModel):
     turn_deg: Annotated[Distribution, _ANGLE_FIELD] = Uniform(-180, 180)
     """Rotation about the upward axis, counter-clockwise as seen from above [degrees]."""
     strength: Annotated[Distribution, _LIGHT_STRENGTH_FIELD] = Constant(1.0)
-    """Factor of its radiance."""
+    """Factor of the environment's radiance [-]."""
 
 
 class BackgroundTable(FrozenModel):
     """TOML table of a data set's spec with the picture's background, which emits no light."""
 
     kind: Annotated[Distribution, NameField(lambda: BACKGROUND_KINDS)] = Constant("gradient")
-    """"none" for alpha, "gradient", "colour", or "environment", which is a gradient if the image has none."""
+    """"none" for alpha, "gradient", "colour", or "environment" (a gradient if there is no environment)."""
     red: Annotated[Distribution, _FRACTION_FIELD] = Uniform(0, 0.6)
     """Red of the colour, linear Rec. 709."""
     green: Annotated[Distribution, _FRACTION_FIELD] = Uniform(0, 0.6)
@@ -328,4 +328,4 @@ class BackgroundTable(FrozenModel):
     blue: Annotated[Distribution, _FRACTION_FIELD] = Uniform(0, 0.6)
     """Blue of the colour, linear Rec. 709."""
     blur: Annotated[Distribution, _FRACTION_FIELD] = Constant(0.0)
-    """Roughness with which the environment behind the head is blurred."""
+    """Blur of the environment behind the head: the roughness of a mirror that blurs it as much [-]."""

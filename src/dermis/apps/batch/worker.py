@@ -70,7 +70,7 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class WorkerSlot:
-    """Graphics adapter and number of threads with which one worker renders.
+    """Graphics adapter and number of threads of one worker.
 
     adapter : name or number of the graphics adapter, as for `Renderer`
     threads : number of threads if the adapter is a software renderer; 0 for the adapter's default

@@ -25,7 +25,7 @@ class SlotRequest:
     """Requested number of workers, and their graphics adapters; None selects a default for this machine.
 
     adapter : "auto", "cpu", a number such as "#1", or a part of an adapter's name. If several adapters match,
-        the best adapter is used, and with it all GPUs that have its device type and its graphics API
+        the best match is used, together with the other matches of the same device type and graphics API
     numbers : numbers of the adapters to use, in place of `adapter`
     workers : total number of workers
     workers_per_gpu : workers on each adapter, if `workers` is None
@@ -98,7 +98,7 @@ class ProcessPool:
 class _WorkerProcess:
     """Worker process, and the tasks that were sent to it.
 
-    slot : graphics adapter and number of threads with which this worker renders
+    slot : graphics adapter and number of threads of this worker
     tasks : the task in progress, and at most one task to do next
     """
 

@@ -172,8 +172,9 @@ def _bisect_minimax(
 ) -> Floats:
     """Return the lengths (3,) by which a profile's radii are multiplied to match a reference profile.
 
-    In each channel, the length that minimises the largest absolute difference between the cumulative profiles
-    is found by bisection. At this length, the largest positive and negative differences have equal magnitude.
+    In each channel, the returned length minimises the largest absolute difference between the two cumulative
+    profiles. At this length, the largest positive and the largest negative difference have the same
+    magnitude. Bisection finds this length.
 
     cdf_difference : function that takes the logarithms of the lengths (3,) and returns the differences (n, 3)
         between the scaled and the reference cumulative profile, at n radii
@@ -200,8 +201,8 @@ def fit_length_scale(
     taken at radii that are spaced evenly on a logarithmic scale.
 
     colour_channel : channel of the reference profile that is matched, 0 for red
-    unit_cdf : cumulative profile to scale, for a length of 1: a function that takes radii (n,) and returns
-        the fraction of light (n,) within each radius
+    unit_cdf : cumulative profile to scale, as a function: it takes radii (n,) in units of the returned
+        length, and returns the fraction of light (n,) within each radius
     """
     from scipy.optimize import minimize_scalar
 
@@ -225,7 +226,8 @@ class ProfileError:
     """Errors of the profile that a program renders, relative to the reference profile, by colour channel.
 
     cdf : (3,) largest difference between the two profiles in the fraction of light within a radius [-]
-    edge : (3,) largest difference in brightness across a straight shadow edge blurred by the profile [-]
+    edge : (3,) largest difference between the two profiles in the brightness beside a straight shadow edge,
+        which each profile blurs [-]
     energy : (3,) relative error of the total energy [-]
     """
 

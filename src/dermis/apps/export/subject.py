@@ -119,7 +119,7 @@ class Subject:
         return None if eyes is None else run_on_device("auto", lambda device: paint_eye(device, eyes.look))
 
     def with_painted_maps(self, map_side: int, adapter: str) -> Subject:
-        """Return a copy of the subject in which the head's procedural maps are replaced by arrays of texels.
+        """Return a copy of the subject with the head's procedural maps replaced by arrays of texels.
 
         If the head has no procedural maps, the subject itself is returned.
 

@@ -27,7 +27,7 @@ class Parameter:
     name : name in the program
     value : number, tuple of red, green and blue, Boolean, or text
     unit : "mm", "m", "cm", "-" ...
-    meaning : short description of its meaning in the program
+    meaning : short description of what the parameter does in the program
     """
 
     name: str
@@ -72,7 +72,7 @@ def write_files(output_folder: Path, names_and_contents: Iterable[tuple[str, byt
 
 @dataclass(frozen=True)
 class Target(ABC):
-    """Export target: a program for which skins and heads are written.
+    """Export target: another program, and the conversion of skins and heads to files for this program.
 
     Subclasses are registered in `dermis.apps.export.registry.TARGETS`. A subclass converts a skin to
     parameters of the program, predicts the profile that the program renders with these parameters, and writes
@@ -119,7 +119,7 @@ class Target(ABC):
     part_limitations: ClassVar[str] = (
         "Only skin is exported; an export to gltf contains the other parts with their pictures."
     )
-    """Limitations of eyes and other parts that are not skin, for the report on heads with their pictures."""
+    """Limitations of eyes and other parts that are not skin; reported if these parts have texture images."""
     untested: ClassVar[bool] = False
     """Whether the exported files have not been tested in the program."""
 
@@ -206,7 +206,7 @@ class Target(ABC):
     def main_file(self, output: Path, subject: Subject, suffix: str = "") -> Path:
         """Return the path of the main file, which is the file that the user opens in the program.
 
-        The path is `output` or, if `output` is a folder, that of a file inside this folder.
+        If `output` is a folder, the main file is inside this folder; otherwise, `output` is the main file.
 
         Parameters
         ----------
@@ -291,8 +291,8 @@ class Target(ABC):
         parameters : tuple of Parameter
             Result of the method `parameters`.
         output : Path
-            Path of an empty folder if the name has no suffix; otherwise path of a new file in an empty
-            folder, into which further files may be written. The caller moves all files to the final output.
+            If the name has no suffix, an empty folder for all files. Otherwise, a new file in an empty
+            folder, where further files may be written too. The caller moves all files to the final output.
         version : str
             Version of the program.
 
@@ -306,7 +306,7 @@ class Target(ABC):
 class JsonTarget(Target):
     """Base class of targets that only write a JSON file of parameters.
 
-    The files have not been tested in the programs for which they are written.
+    The files have not been tested in the target programs.
     """
 
     suffixes = (".json", "")

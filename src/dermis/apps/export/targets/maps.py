@@ -113,7 +113,7 @@ class MapFolder(Target):
         return replace_values(self.parameters(subject, version), {_SCATTERING_PARAMETER_NAME: False})
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile of the sum of Gaussians with which the renderer diffuses light.
+        """Return the cumulative profile of the sum of Gaussians that the renderer uses to diffuse light.
 
         Without diffusion, all light leaves where it enters, so the cumulative profile is 1 at all radii
         above 0.
@@ -206,8 +206,8 @@ def check_map_side(map_side: object) -> int:
 def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) -> BakedMaps:
     """Return the maps of a skin, baked from the skin's material and from the light of the scene.
 
-    They are material properties such as albedo, normal and roughness, the irradiance of the skin, and the
-    height if the head has a height map.
+    The maps contain material properties such as albedo, normal and roughness, and the irradiance of the skin.
+    If the head has a height map, there is also a map of the height.
 
     map_side : side of the maps [texel]
     """

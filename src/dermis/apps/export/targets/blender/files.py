@@ -32,7 +32,8 @@ from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
 VersionRange = tuple[list[int], list[int] | None]
-"""First version of Blender with valid parameters, and first later version with invalid parameters or None."""
+"""First version of Blender for which parameters are valid, and first later version for which they are
+invalid; the latter is None if they are valid for all later versions."""
 SCRIPT_FILE, HEAD_FILE, PANORAMA_FILE = "skin.py", "head.glb", "panorama.npy"
 """Names of the files in an output folder."""
 METRES_PER_MM = 1e-3
@@ -177,7 +178,8 @@ def _ball_scene(ball: Head) -> Scene:
 def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArray[np.float32] | None]:
     """Return the lights, camera and world for the script, and the environment's panorama if there is one.
 
-    centre_mm : (3,) point that becomes the origin of the exported scene [mm]
+    centre_mm : (3,) position of the head's centre in the exported scene; positions in `scene` are relative to
+        this centre [mm]
 
     Raises DermisError for lights and cameras that Blender does not support.
     """
@@ -196,7 +198,7 @@ def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArr
 def _convert_transform(to_world: ArrayLike, origin_m: Floats) -> list[list[float]]:
     """Convert a transformation from Y up, with lengths in `CYCLES_UNIT_MM`, to Blender's Z up, in metres.
 
-    origin_m : (3,) position of the input's origin in the exported scene, with Y up [m]
+    origin_m : (3,) position of the input's origin in the exported scene, in coordinates with Y up [m]
     """
     matrix = np.array(to_world, np.float64)
     matrix[:3, 3] = matrix[:3, 3] * _CYCLES_UNIT_M + origin_m
@@ -206,7 +208,7 @@ def _convert_transform(to_world: ArrayLike, origin_m: Floats) -> list[list[float
 def _convert_lamp(lamp: SceneDict, origin_m: Floats) -> SceneDict:
     """Convert a lamp's description from Y up, with lengths in `CYCLES_UNIT_MM`, to Blender's Z up, in metres.
 
-    origin_m : (3,) position of the input's origin in the exported scene, with Y up [m]
+    origin_m : (3,) position of the input's origin in the exported scene, in coordinates with Y up [m]
     """
     fields = dict(lamp["set"])
     fields |= {name: fields[name] * _CYCLES_UNIT_M for name in _LAMP_LENGTH_FIELDS if name in fields}

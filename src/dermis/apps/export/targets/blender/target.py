@@ -25,9 +25,11 @@ Floats = NDArray[np.float64]
 WalkEntry = Literal["straight", "skin"]
 
 BURLEY_CUTOFF, BURLEY_CUTOFF_CDF = 16.0, 0.9963790093708328
-"""Radius at which Cycles truncates Burley's profile [d], and the fraction of light within it [-]."""
+"""Radius at which Cycles truncates Burley's profile, in units of the profile's width d, and the fraction of
+light within this radius [-]."""
 MIN_ALBEDO, MAX_ALBEDO = 0.2, 0.999999
-"""Range of single-scattering albedos in random walks; below, Cycles scales the result instead."""
+"""Range of single-scattering albedos in random walks. For a smaller albedo, Cycles scales the result of a
+walk with `MIN_ALBEDO`."""
 _DIPOLE_BISECTION_STEPS = 12
 _MIN_BASE_COLOUR, _MAX_BASE_COLOUR = 1e-4, 0.995  # range in which Cycles inverts the dipole
 Cdf = Callable[[Floats], Floats]
@@ -134,7 +136,7 @@ def random_walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> 
 def _interpolate_random_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Floats, Floats]:
     """Return radii [mean free paths] and the fraction of light within each radius [-], for one albedo.
 
-    The fractions are interpolated from a table that has an eighth of the returned number of radii.
+    The table has an eighth of the returned number of radii; values at the other radii are interpolated.
     """
     from scipy.interpolate import PchipInterpolator
 

@@ -59,7 +59,7 @@ class Gltf(Target):
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return parameters in which each colour is the skin's colour, and the other values are guesses."""
+        """Return parameters with the skin's colour for every colour, and with guesses for other values."""
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_transmission_parameters(subject, _NAIVE_TRANSMISSION_FACTOR, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())
@@ -145,7 +145,8 @@ def _diffuse_transmission_parameters(
 def _ear_transmission(subject: Subject) -> tuple[float, Floats]:
     """Return the fraction [-] and the colour (3,) of the light that an ear transmits to its unlit side.
 
-    The fraction is relative to the light that leaves the ear on both sides.
+    The fraction is computed for the channel with the most transmitted light. It is relative to the light that
+    leaves the ear on both sides in this channel. The colour is 1 in this channel.
 
     Source: [ChristensenBurley2015], integrated over the plane of the unlit side.
     """

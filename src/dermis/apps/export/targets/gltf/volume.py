@@ -67,7 +67,7 @@ def multiscatter_colour(albedo: ArrayLike) -> Floats:
 
 
 def multiscatter_for_reflectance(reflectance: ArrayLike) -> Floats:
-    """Return the multiscatter colour with which skin reflects a given fraction of the incident light [-].
+    """Return the multiscatter colour of skin that reflects a given fraction of the incident light [-].
 
     reflectance : diffusely reflected light per incident light [-]
     """

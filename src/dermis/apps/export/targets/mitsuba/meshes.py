@@ -69,7 +69,7 @@ def subdivide_triangles(
     Neighbouring original triangles share no new vertices.
 
     triangles : (t,) indices of the original triangles
-    segments_per_edge : number of segments into which each edge is divided
+    segments_per_edge : number of segments per edge of an original triangle after the division
     """
     grid = [(i, j) for i in range(segments_per_edge + 1) for j in range(segments_per_edge + 1 - i)]
     at = {point: index for index, point in enumerate(grid)}

@@ -55,8 +55,8 @@ class SkinAppearance(NamedTuple):
 
     media : dictionary from each surface model in `IOR_BY_SURFACE_MODEL` to the medium of the skin
     roughness : Beckmann m, a number or a map (n, n)
-    transmittance : (n, n, 3) map by which a refracting surface scales light on entry and again on exit; None
-        for uniform skin
+    transmittance : (n, n, 3) map of a factor; a refracting surface multiplies light by this factor on entry
+        and again on exit; None for uniform skin
     dimming : (n, n) fraction of the emerging light that an index-matched surface absorbs; None for uniform
         skin
     opaque : dictionary from material index to the PLY file of a mesh, for all materials except skin

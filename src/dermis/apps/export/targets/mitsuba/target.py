@@ -201,8 +201,9 @@ class SkinColours:
     All skin is one medium, which is as light as the brightest texels of the map. Where the map is darker,
     textures absorb part of the light that enters or leaves the medium.
 
-    mean, brightest : (3,) mean and brightest colour, linear Rec. 709; equal for uniform skin
-    lightness_ratio : luminance of the lightest texels divided by the mean luminance [-]
+    mean, brightest : (3,) mean and brightest colour, linear Rec. 709; equal for uniform skin. The brightest
+        colour is a high percentile of each channel, so that a few outliers do not matter
+    lightness_ratio : high percentile of the texels' luminance, divided by the luminance of `mean` [-]
     """
 
     mean: Floats

@@ -137,7 +137,7 @@ def scene_document(xml_elements: list[ET.Element]) -> bytes:
 
 
 def default_property_element(parameter_name: str, default_value: str) -> ET.Element:
-    """Return the element that sets the default of a parameter for `mitsuba -D`."""
+    """Return the element that sets the default value of a parameter, which `mitsuba -D` can override."""
     return ET.Element("default", {"name": parameter_name, "value": default_value})
 
 

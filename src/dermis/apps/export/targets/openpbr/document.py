@@ -76,7 +76,7 @@ def _add_material(
 def _add_map(
     node_graph: MaterialX.NodeGraph, map_role: str, map_path: str, shader_category: str
 ) -> MaterialX.Output:
-    """Add the nodes that read a map file to a graph, and return their output.
+    """Extend a node graph by the nodes that read a map file, and return the output of these nodes.
 
     map_role : role of the map, such as "colour"; determines the type and colour space of the map's node
     map_path : path of the map

@@ -51,7 +51,7 @@ _ROUGHNESS_BY_KIND = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a part of t
 _DEFAULT_PART_ROUGHNESS = 0.8
 _PART_IOR = 1.5  # of the metallic-roughness model
 PART_PREFIX = "parts_"
-"""Prefix of the roles of pictures of parts that are not skin."""
+"""Prefix of a map's role if the map belongs to a part of the head that is not skin."""
 MAP_INPUTS: Mapping[str, str] = {
     "colour": "subsurface_color",
     "roughness": "specular_roughness",

@@ -90,8 +90,8 @@ class OpenPbr(Target):
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the parameters of a user who enters published diffuse mean free paths as mean free paths.
 
-        The entered values are those of `published_mean_free_path_mm`. OpenPBR expects mean free paths, which
-        have other values.
+        `published_mean_free_path_mm` returns the entered values. OpenPBR expects mean free paths, which have
+        other values.
         """
         meaning = "diffuse mean free path, as published"
         return surface_parameters(subject, self.shader, published_mean_free_path_mm(subject), meaning)

@@ -151,10 +151,10 @@ def html_safe_json(json_value: Json) -> str:
 
 
 def module_url(module_text: str, import_names: Mapping[str, str]) -> str:
-    """Return a JavaScript module as a data URL; its import statements use names of the page's import map.
+    """Return a JavaScript module as a data URL, with the names in its import statements replaced.
 
     module_text : source of the module
-    import_names : dictionary from each name that the module's source imports to the name in the import map
+    import_names : dictionary from a name in the import statements to the name in the page's import map
     """
     for old, new in import_names.items():
         module_text = re.sub(rf"(\bfrom\s*)(['\"]){re.escape(old)}\2", rf"\1\2{new}\2", module_text)
@@ -172,7 +172,8 @@ def material_parameters(subject: Subject) -> Parameters:
 def page_camera_json(scene: Scene, centre_mm: Sequence[float]) -> Json:
     """Return the scene's camera as JSON, with positions in the page's scene [m] and angle of view [rad].
 
-    centre_mm : (3,) point of the scene that is the origin of the page's scene [mm]
+    centre_mm : (3,) position of the head's centre in the page's scene; positions in `scene` are relative to
+        this centre [mm]
     """
     camera, centre = scene.camera, np.array(centre_mm)
     position, target = (_METRES_PER_MM * (centre + one) for one in (camera.position, camera.target))
@@ -186,9 +187,10 @@ def page_camera_json(scene: Scene, centre_mm: Sequence[float]) -> Json:
 
 
 def page_light_json(light: Light) -> Json:
-    """Return a light as JSON of a directional light.
+    """Return the JSON of a directional light that replaces a light.
 
-    Its direction and irradiance are those of the given light at the point at which this light is aimed.
+    A light with a position becomes parallel light in the direction from this position to the light's target,
+    with the same irradiance at the target.
     """
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction, np.float64)

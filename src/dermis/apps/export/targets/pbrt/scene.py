@@ -166,4 +166,4 @@ PBRT_LIGHTS: Registry[Callable[[Any], Lines]] = Registry(
         "stripe": _omit_unsupported_light,
     },
 )
-"""Functions that return the directives of a light, by its kind."""
+"""Functions that return the directives of a light, by the kind of light."""

@@ -65,8 +65,8 @@ class Unreal(Target):
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the parameters of a user who enters the tissue's reduced mean free path.
 
-        It differs from the fitted value, as the engine derives the width of a Burley profile from its field
-        "mean free path".
+        The reduced mean free path differs from the fitted value, because the engine converts its field "mean
+        free path" to the width of a Burley profile.
         """
         path = fit_homogeneous_medium(subject.curve, subject.curve.energy).mfp_mm
         if subject.tissue is not None and subject.tissue.rgb is None:

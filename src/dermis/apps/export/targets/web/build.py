@@ -123,9 +123,9 @@ def build_page_content(
 ) -> PageContent:
     """Capture the frames for every requested kind of adapter, and return the data that the page embeds.
 
-    on_frames_captured : function called after the frames for a kind of adapter were captured; its arguments
-        are the renderer, whose textures then hold the maps as the page decodes them, the scene and the
-        settings
+    on_frames_captured : function called after the frames for a kind of adapter were captured, with the
+        arguments renderer, scene and settings. The textures of the renderer then hold the maps as the page
+        decodes them
     """
     content = PageContent()
     for adapter_kind in (one for one in ADAPTER_KINDS if page_request.sizes.get(one)):
@@ -219,8 +219,9 @@ def _colour_maps(
 ) -> Json:
     """Return the JSON of the colour maps that replace the head's colour map when a slider is moved.
 
-    The JSON contains the resource index of the head's colour map. For each slider, it contains one entry of
-    `PageContent.picture_entries` per captured value.
+    The JSON contains the resource index of the head's colour map. For each slider that changes this map, it
+    contains one entry of `PageContent.picture_entries` per captured value, or null if the map is unchanged at
+    this value.
     """
     map_index = next((k for k, one in picture_maps.items() if one.role == "colour_map"), None)
     if map_index is None:

@@ -64,8 +64,8 @@ def frames_json(
     Data that is all zero is not stored, as the page creates resources filled with zeros.
 
     picture_maps : dictionary from resource index to map, for the maps that are stored as WebP images
-    quantisation_steps : for each buffer of rounded vectors, by resource index, the rounding step of each
-        vector component
+    quantisation_steps : dictionary from resource index to rounding steps, for the buffers that hold rounded
+        vectors; one step per vector component
     byte_runs : collector of buffer and texture data, to which the JSON refers by index
     """
     pictures = [
@@ -139,9 +139,7 @@ def _frame_json(named_frame: NamedFrame, picture_entry: list[int], byte_runs: By
 
 
 def _view_record_index(captured_frame: CapturedFrame, stage_name: str) -> int:
-    """Return the index of the uniform record with a stage's view matrices; -1 if there are none.
-
-    It is an index in `captured_frame.records`.
+    """Return the index, in `captured_frame.records`, of a stage's view matrices; -1 if there are none.
 
     stage_name : "visibility" or "shadows"
     """

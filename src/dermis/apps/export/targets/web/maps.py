@@ -34,7 +34,7 @@ class EncodedMapLayer:
 
     data : WebP file: a colour image for a colour map, otherwise a grey image of the channels, stacked
         vertically
-    curves : (c, 256) values to which the 8-bit values of each channel are decoded
+    curves : (c, 256) decoded values: one row per channel, indexed by the 8-bit value in the image
     texels : (h, w, c) texels decoded from the image
     """
 
@@ -124,7 +124,7 @@ class MapPictures:
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, map_role: str, texels: NDArray[np.float16]) -> bool:
-        """Return whether texels equal those from which the first picture of a map was encoded.
+        """Return whether texels equal the original texels of the first picture of a map.
 
         That picture shows layer 0 of the map at mip level 0.
 

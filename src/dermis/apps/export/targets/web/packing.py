@@ -141,7 +141,7 @@ def _possible_layouts(byte_count: int) -> Iterable[tuple[int, int, int]]:
 
 
 def _best_layout(raw_bytes: Bytes, candidate_layouts: list[tuple[int, int, int]]) -> tuple[int, int, int]:
-    """Return the layout with which a sample of the bytes compresses best.
+    """Return the layout that compresses a sample of the bytes best.
 
     candidate_layouts : layouts to try: bytes per word, words per row, and how many times each row is replaced
         by its difference from the previous row

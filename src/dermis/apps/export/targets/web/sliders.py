@@ -25,7 +25,7 @@ _SLIDER_EXPRESSIONS = {"smile": "full-smile", "open mouth": "open-jaw", "frown":
 """Expression at the upper end of a slider, by the slider's name."""
 _ROUGHNESS_FACTORS = (0.5, 1.0, 1.7)
 PIGMENT_FACTORS = (0.4, 1.0, 3.0)
-"""Factors of a person's melanin and blood at the captured values of their sliders."""
+"""Captured values of the melanin and blood sliders, as factors of the person's own melanin or blood."""
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,7 @@ class Web(Target):
     part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the side of the atlas, and the Gaussians with which the page diffuses light."""
+        """Return the side of the atlas, and the Gaussians that the page uses to diffuse light."""
         profile = self._diffusion_profile(subject)
         return (
             Parameter("atlas", _ATLAS_SIDE, "texel", "side of the map in which light is diffused"),
@@ -119,7 +119,7 @@ class Web(Target):
         return self.parameters(subject, version)
 
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile of the Gaussians with which the page diffuses light."""
+        """Return the cumulative profile of the Gaussians that the page uses to diffuse light."""
         _, variance, *weight = (np.array(get_numbers(parameters, one.name)) for one in parameters)
         return cumulative_gaussian_profile(variance, np.stack(weight, axis=1), subject.curve.energy)
 
