@@ -76,7 +76,7 @@ class Pose(ShortRepr):
             refuse("pose", expected, f"got {format_value(value)}", "Correct it")
         return cls(weights=value)
 
-    @renamed_keywords(error_subject="error_subject")
+    @renamed_keywords(culprit="error_subject")
     def to_arrays(self, rig: Rig, error_subject: object = "pose") -> PoseArrays:
         """Return the pose as arrays for a rig: target weights, bone matrices and rest positions of points.
 

@@ -109,7 +109,7 @@ def read_dataset(
     return _iterate_images(_select_shards(checked_path(path, "a data set"), shards), random)
 
 
-@renamed_keywords(error_subject="error_subject")
+@renamed_keywords(culprit="error_subject")
 def decode_image(files: Mapping[str, object], error_subject: object = "") -> ImageFields:
     """Return an image of a data set from the files of the image, with the keys that `read_dataset` lists.
 
