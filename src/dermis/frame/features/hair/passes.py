@@ -63,9 +63,11 @@ def draw_shadows(
 
     geometry : current shape of the head, and its vertices and triangles
     """
-    graph.add_replayable(pose_guides, strands.tables, geometry[0])
+    tables = strands.tables
+    graph.add_replayable(pose_guides, tables, geometry[0])
+    pose_strands(graph, tables, geometry[0], tables.buffers.casters, tables.casters)
     if len(shadow_views.clips) or has_environment:
-        _draw_deep_opacity(graph, strands, geometry[0], lighting_bindings)
+        _draw_deep_opacity(graph, strands, lighting_bindings)
     if has_environment:
         _draw_sky_transmittance(graph, strands, geometry[1], lighting_bindings)
 
@@ -114,12 +116,9 @@ def pose_strands(
         )
 
 
-def _draw_deep_opacity(
-    graph: Recorder, strands: Resources, shape: Shape, lighting_bindings: Bindings
-) -> None:
+def _draw_deep_opacity(graph: Recorder, strands: Resources, lighting_bindings: Bindings) -> None:
     """Declare the passes that fill the deep opacity maps of all lights that cast shadows."""
     tables, posed = strands.tables, strands.tables.buffers.casters
-    pose_strands(graph, tables, shape, posed, tables.casters)
     segments = tables.fine.total_segment_count() + tables.casters.total_segment_count()
     knots = tables.fine.total_knot_count() + tables.casters.total_knot_count()
     bindings: MutableBindings = {
@@ -183,7 +182,10 @@ def draw(
     record = _strand_view_record(light, strands, view, coarse.hairs)
     hairs = tables.hairs_record(coarse)
     shared: Bindings = {"strand_view": record, "projected": tables.buffers.projected, "hairs": hairs}
-    graph.dispatch("strands", light, {**lighting, **shared, "posed": posed}, workgroup_grid(knots))
+    _draw_view_map(graph, tables, picture.view_map, record)
+    knot_bindings: Bindings = {**shared, "posed": posed, "view_map": picture.view_map}
+    _dispatch_hair(graph, "hair/strands_hide.wgsl", knot_bindings, knots)
+    graph.dispatch("strands", light, {**lighting, **knot_bindings}, workgroup_grid(knots))
     lists: Bindings = {"list_heads": picture.list_heads, "links": picture.links}
     _dispatch_hair(graph, "hair/strands_empty.wgsl", lists, picture.list_heads.size // 4)
     list_heads = (("SEGMENT_LISTS", picture.segment_lists_per_tile),)
@@ -202,6 +204,26 @@ def draw(
     )
     graph.compute("strands", shader, bindings, (width, -(-height // rows)))
     return picture.result
+
+
+def _draw_view_map(
+    graph: Recorder, strand_tables: StrandTables, view_map: Buffer, strand_view: UniformRecord
+) -> None:
+    """Declare the passes that fill the deep opacity map of the picture, by which hidden strands are left out.
+
+    strand_view : result of `_strand_view_record`
+    """
+    casters = strand_tables.casters
+    bindings: Bindings = {
+        "opacity": view_map,
+        "posed": strand_tables.buffers.casters,
+        "hairs": strand_tables.hairs_record(casters),
+        "strand_view": strand_view,
+    }
+    _dispatch_hair(graph, "hair/view_map_clear.wgsl", bindings, view_map.size // 4)
+    segments = strand_tables.fine.total_segment_count() + casters.total_segment_count()
+    for adds_cover in (0, 1):
+        _dispatch_hair(graph, "hair/view_map_fill.wgsl", bindings, segments, (("ADDS_COVER", adds_cover),))
 
 
 def _strand_view_record(

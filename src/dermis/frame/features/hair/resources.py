@@ -34,6 +34,7 @@ DEEP_OPACITY_HEADER_WORDS = 8
 SKY_CELLS = 24, 32, 24
 """Number of cells of the grid of sky transmittance, along x, y and z, see strand_sky.wgsl."""
 _SKY_HEADER_WORDS, _SKY_CELL_WORDS = 6, 5
+_VIEW_TEXEL_PIXELS = 4  # side of a texel of the deep opacity map of the picture, see view_map.wgsl
 _SEGMENT_LINKS_PER_KNOT = 4
 _MAX_SEGMENT_LINKS = 1 << 22
 # Steps to which capacities for fine strands and for knots are rounded up, so that most heads share them.
@@ -134,6 +135,7 @@ class StrandPicture:
 
     list_heads : buffer of the first link of each linked list of segments, see strands_bin.wgsl
     links : buffer of the links of these lists; a link consists of a segment and the index of the next link
+    view_map : buffer of the deep opacity map of the picture, see view_map.wgsl
     result : texture of the picture with hair
     segment_lists_per_tile : number of linked lists per tile; the lists of a tile are filled and drawn in
         parallel
@@ -141,6 +143,7 @@ class StrandPicture:
 
     list_heads: Buffer
     links: Buffer
+    view_map: Buffer
     result: Texture
     segment_lists_per_tile: int
 
@@ -218,7 +221,9 @@ def make_strand_picture(
     per_tile = segment_lists_per_tile(device, across * down)
     list_heads = _make_word_buffer(device, 1 + per_tile * across * down)
     result = make_texture(device, picture_size, "rgba32float")
-    return StrandPicture(list_heads, _make_word_buffer(device, 2 * links), result, per_tile)
+    texels = int(np.prod([-(-side // _VIEW_TEXEL_PIXELS) for side in picture_size]))
+    view_map = _make_word_buffer(device, (1 + DEEP_OPACITY_LAYERS) * texels)
+    return StrandPicture(list_heads, _make_word_buffer(device, 2 * links), view_map, result, per_tile)
 
 
 def segment_lists_per_tile(device: Device, tile_count: int) -> int:

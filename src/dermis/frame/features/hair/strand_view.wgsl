@@ -20,6 +20,7 @@ struct ProjectedKnot {
     depth: f32, // along the view [mm]
     width: f32, // [pixel], negative behind the eye
     radiance: vec3f,
+    covered: u32, // whether other hair hides the segment that begins here
 }
 
 @group(0) @binding(40) var<uniform> strand_view: StrandView;
@@ -32,5 +33,5 @@ fn project_knot(p: vec3f, radius: f32) -> ProjectedKnot {
     let ndc = vec2f(dot(offset, right) / dot(right, right), dot(offset, up) / dot(up, up)) / max(depth, 1e-3);
     let position = (0.5 + vec2f(0.5, -0.5) * (ndc - strand_view.shift)) * strand_view.size;
     let width = radius * strand_view.size.y / (length(up) * max(depth, 1e-3));
-    return ProjectedKnot(position, depth, select(-1.0, width, depth > 1.0), vec3f(0.0));
+    return ProjectedKnot(position, depth, select(-1.0, width, depth > 1.0), vec3f(0.0), 0u);
 }

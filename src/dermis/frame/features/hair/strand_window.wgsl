@@ -1,17 +1,11 @@
 // Deep opacity map of each light: the cover by strands in several layers of depth, within the window of the light's shadow map
-// that contains all strands. Source: [YukselKeyser2008].
+// that contains all strands.
 //#include "lights.wgsl"
 //#include "strand_sky.wgsl"
+//#include "opacity_layers.wgsl"
 
 //#fill const STRAND_WINDOW: u32 = {strand_window}; // texels across, half as many down
 //#fill const WINDOW_HEAD: u32 = {strand_window_words}; // words of a light before its texels: bounds of the strands
-//#fill const HAIR_LAYERS: u32 = {strand_layers}; // layers of depth behind the nearest strand of a texel
-const TEXEL_WORDS: u32 = 1u + HAIR_LAYERS; // depth of the nearest strand, then the cover of each layer
-const FIRST_LAYER_MM: f32 = 1.0; // thickness of the first layer; each further one is twice as thick
-const COVER_SCALE: f32 = 4096.0; // integer of a cover of 1
-const DEPTH_SCALE: f32 = 256.0; // integer steps of depth per millimetre
-const NO_HAIR: u32 = 0xffffffffu; // depth of the nearest strand where there is none
-
 const NARROWEST: f32 = 0.2; // least ratio of the width of a window to its length
 const BORDER: f32 = 3.0; // empty texels around all strands
 const SIGN: u32 = 0x80000000u;
@@ -54,11 +48,6 @@ fn first_word(layer: i32) -> u32 {
 
 fn texel_word(layer: i32, texel: vec2u) -> u32 {
     return first_word(layer) + WINDOW_HEAD + TEXEL_WORDS * (texel.y * STRAND_WINDOW + texel.x);
-}
-
-// Layer at a depth behind the nearest strand of a texel, with its fraction.
-fn layer_at(behind_mm: f32) -> f32 {
-    return log2(1.0 + max(behind_mm, 0.0) / FIRST_LAYER_MM);
 }
 
 // Position on the map of a light in clip space, and depth [mm].

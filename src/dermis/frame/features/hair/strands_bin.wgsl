@@ -41,7 +41,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let begin = segment + hair;
     let a = projected[begin];
     let b = projected[begin + 1u];
-    if (a.width < 0.0 || b.width < 0.0) {
+    if (a.width < 0.0 || b.width < 0.0 || a.covered != 0u) {
         return;
     }
     let one = tiled_segment(a, b);

@@ -164,11 +164,13 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let hair = hair_of_knot(index);
     let here = posed[row_of_knot(index, hair)];
     var knot = project_knot(here.xyz, here.w);
+    let inside = all(knot.position > vec2f(-PICTURE_MARGIN)) && all(knot.position < strand_view.size + PICTURE_MARGIN);
     if (is_hidden(hair)) {
         knot.width = -1.0;
     }
-    let inside = all(knot.position > vec2f(-PICTURE_MARGIN)) && all(knot.position < strand_view.size + PICTURE_MARGIN);
-    if (inside && knot.width >= 0.0) {
+    knot.covered = projected[index].covered;
+    let is_covered = knot.covered != 0u && (index == first_knot(hair) || projected[index - 1u].covered != 0u);
+    if (inside && knot.width >= 0.0 && !is_covered) {
         knot.radiance = strand_view.light_factors.y * radiance_of(knot_at(hair, index - first_knot(hair)));
     }
     projected[index] = knot;

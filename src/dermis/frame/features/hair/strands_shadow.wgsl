@@ -1,15 +1,13 @@
-// Fills the deep opacity maps: first the depth of the nearest strand in each texel, then the cover of each layer behind this
-// depth. Integers are summed, so that the result does not depend on the order of strands.
+// Fills the deep opacity maps of lights: first the depth of the nearest strand in each texel, then the cover of each layer behind
+// this depth.
 //#include "each.wgsl"
 //#include "shape/geometry.wgsl"
 //#include "surface/surface.wgsl"
 //#include "strand_knots.wgsl"
 //#include "strand_window.wgsl"
+//#include "opacity_cover.wgsl"
 
 @group(0) @binding(30) var<storage, read> posed: array<vec4f>;
-@group(0) @binding(31) var<storage, read_write> opacity: array<atomic<u32>>; // see strand_window.wgsl
-
-override ADDS_COVER: bool = false; // whether to add cover; else to find the depth of the nearest strand
 
 override SPLAT_STEP: f32 = 1.0; // largest step along a strand [texel]; longer on software adapters
 
@@ -24,19 +22,7 @@ fn add_cover(layer: i32, texel: vec2i, cover: f32, depth: f32) {
     if (any(texel < vec2i(0)) || any(texel >= vec2i(window_size()))) {
         return;
     }
-    let word = texel_word(layer, vec2u(texel));
-    if (!ADDS_COVER) {
-        let integer_depth = u32(DEPTH_SCALE * max(depth, 0.0));
-        if (integer_depth < atomicLoad(&opacity[word])) { // few are nearer, and atomic writes are slow
-            atomicMin(&opacity[word], integer_depth);
-        }
-        return;
-    }
-    let behind = depth - f32(atomicLoad(&opacity[word])) / DEPTH_SCALE;
-    let layer_index = u32(layer_at(behind));
-    if (layer_index < HAIR_LAYERS) { // strands behind all layers are on the other side of the head
-        atomicAdd(&opacity[word + 1u + layer_index], u32(cover * COVER_SCALE + 0.5));
-    }
+    add_cover_to(texel_word(layer, vec2u(texel)), cover, depth);
 }
 
 fn splat(light: Light, a: vec4f, b: vec4f) {
