@@ -95,7 +95,7 @@ def test_tiles_of_a_workgroup_label_the_same(renderer: Renderer, monkeypatch: py
     small = Settings(size=(75, 93), atlas=128, shadow_size=64, samples=4)  # no whole tiles
     names = "label", "label_face_synthetics"
     for ways in (1, 64):
-        monkeypatch.setattr(strand_space, "segment_lists_per_tile", lambda device, tiles, ways=ways: ways)
+        monkeypatch.setattr(strand_space, "segment_lists_per_tile", lambda device, size, ways=ways: ways)
         renderer.clear_cache()
         drawn = renderer.draw(Scene(head, camera=around(head)), small, outputs=names)
         shown.append([drawn.output(name) for name in names])

@@ -239,7 +239,7 @@ def test_tiles_of_a_workgroup_draw_the_same(
     """Many linked lists per tile, as on GPUs, give the same picture."""
     scene, shown = lit(tangle(700, absorption=0.4)), []
     for ways in (1, 64):
-        monkeypatch.setattr(strand_space, "segment_lists_per_tile", lambda device, tiles, ways=ways: ways)
+        monkeypatch.setattr(strand_space, "segment_lists_per_tile", lambda device, size, ways=ways: ways)
         renderer.clear_cache()
         shown.append(picture(renderer, scene, size=size))
     renderer.clear_cache()

@@ -11,7 +11,6 @@ import numpy as np
 from dermis.frame.features.hair.resources import (
     KNOTS_PER_BOUNDS_WORKGROUP,
     SKY_CELLS,
-    TILE_SIDE_PIXELS,
     Resources,
     StrandCounts,
     StrandTables,
@@ -189,7 +188,8 @@ def draw(
     lists: Bindings = {"list_heads": picture.list_heads, "links": picture.links}
     _dispatch_hair(graph, "hair/strands_empty.wgsl", lists, picture.list_heads.size // 4)
     list_heads = (("SEGMENT_LISTS", picture.segment_lists_per_tile),)
-    _dispatch_hair(graph, "hair/strands_bin.wgsl", {**shared, **lists}, segments, list_heads)
+    tile_side = (("STRAND_TILE", picture.tile_side),)
+    _dispatch_hair(graph, "hair/strands_bin.wgsl", {**shared, **lists}, segments, list_heads + tile_side)
     images: Bindings = {"visibility_buffer": visibility_buffer, "behind": radiance, "image": picture.result}
     bindings = {**head.resources, **shared, **lists, **images, **(labels or {})}
     if picture.segment_lists_per_tile > 1:
@@ -198,9 +198,14 @@ def draw(
         )
         graph.compute("strands", shader, bindings, (width, height))
         return picture.result
-    rows = rows_per_invocation(graph.device, _max_segments_in_tile(tables, segments, pixel_mm))
+    rows = rows_per_invocation(
+        graph.device, _max_segments_in_tile(tables, segments, pixel_mm * picture.tile_side)
+    )
     shader = program(
-        graph.device, "hair/strands_draw.wgsl", (("ROWS", rows),), stores_hair_labels=labels is not None
+        graph.device,
+        "hair/strands_draw.wgsl",
+        (("ROWS", rows), *tile_side),
+        stores_hair_labels=labels is not None,
     )
     graph.compute("strands", shader, bindings, (width, -(-height // rows)))
     return picture.result
@@ -253,16 +258,16 @@ def _pixel_footprint_mm(
     return 2.0 * float(np.linalg.norm(shade_record["up"])) * max(depth, 1.0) / picture_height
 
 
-def _max_segments_in_tile(strand_tables: StrandTables, segment_count: int, pixel_mm: float) -> int:
+def _max_segments_in_tile(strand_tables: StrandTables, segment_count: int, tile_mm: float) -> int:
     """Estimate the number of strand segments in a crowded tile of the picture.
 
     The tile is assumed to contain all segments of brows and lashes, and several times as many segments of
     scalp hair and beard as the average tile.
 
     segment_count : number of segments of all strands that are drawn
-    pixel_mm : side of the square that a pixel covers at the depth of the strands [mm]
+    tile_mm : side of the square that a tile covers at the depth of the strands [mm]
     """
-    tiles = max(1.0, (_HAIR_EXTENT_MM / (TILE_SIDE_PIXELS * pixel_mm)) ** 2)
+    tiles = max(1.0, (_HAIR_EXTENT_MM / tile_mm) ** 2)
     fine = strand_tables.fine.total_segment_count()
     return int(fine + min(1.0, _CROWDED_TILE_SEGMENT_RATIO / tiles) * (segment_count - fine))
 

@@ -20,8 +20,7 @@ from dermis.mesh.strands import Strands, quad_corners, quad_weights
 from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_constants
 
-TILE_SIDE_PIXELS = 8
-"""Side of a square tile of the picture; each tile has its own lists of strand segments [pixels]."""
+_TEAM_TILE_PIXELS, _SMALL_TILE_PIXELS = 8, 2  # sides of tiles that workgroups draw, and of all others
 _GPU_SEGMENT_LISTS_PER_TILE = (
     64  # linked lists of a tile on GPUs: one for each invocation of the tile's workgroup
 )
@@ -35,8 +34,8 @@ SKY_CELLS = 24, 32, 24
 """Number of cells of the grid of sky transmittance, along x, y and z, see strand_sky.wgsl."""
 _SKY_HEADER_WORDS, _SKY_CELL_WORDS = 6, 5
 _VIEW_TEXEL_PIXELS = 4  # side of a texel of the deep opacity map of the picture, see view_map.wgsl
-_SEGMENT_LINKS_PER_KNOT = 4
-_MAX_SEGMENT_LINKS = 1 << 22
+_SEGMENT_LINKS_PER_KNOT = 8
+_MAX_SEGMENT_LINKS = 1 << 24
 # Steps to which capacities for fine strands and for knots are rounded up, so that most heads share them.
 _FINE_CAPACITY_STEP, _KNOT_CAPACITY_STEP = 1 << 12, 1 << 19
 _PROJECTED_KNOT_BYTES = 32
@@ -139,6 +138,7 @@ class StrandPicture:
     result : texture of the picture with hair
     segment_lists_per_tile : number of linked lists per tile; the lists of a tile are filled and drawn in
         parallel
+    tile_side : side of a tile [pixel]
     """
 
     list_heads: Buffer
@@ -146,6 +146,7 @@ class StrandPicture:
     view_map: Buffer
     result: Texture
     segment_lists_per_tile: int
+    tile_side: int
 
 
 def strand_counts(strands: Strands | None) -> StrandCounts:
@@ -215,26 +216,34 @@ def make_strand_picture(
     device: Device, capacity: StrandCapacity, picture_size: tuple[int, int]
 ) -> StrandPicture:
     """Allocate the segment lists and the texture with hair for a picture of size (width, height)."""
-    across, down = (-(-side // TILE_SIDE_PIXELS) for side in picture_size)
+    per_tile = segment_lists_per_tile(device, picture_size)
+    tile_side = _TEAM_TILE_PIXELS if per_tile > 1 else _SMALL_TILE_PIXELS
+    across, down = _tile_counts(picture_size, tile_side)
     links = _SEGMENT_LINKS_PER_KNOT * capacity.knots + capacity.fine * (across + down)
     links = min(links, _MAX_SEGMENT_LINKS, device.max_storage_bytes // 8)
-    per_tile = segment_lists_per_tile(device, across * down)
     list_heads = _make_word_buffer(device, 1 + per_tile * across * down)
     result = make_texture(device, picture_size, "rgba32float")
     texels = int(np.prod([-(-side // _VIEW_TEXEL_PIXELS) for side in picture_size]))
     view_map = _make_word_buffer(device, (1 + DEEP_OPACITY_LAYERS) * texels)
-    return StrandPicture(list_heads, _make_word_buffer(device, 2 * links), view_map, result, per_tile)
+    return StrandPicture(
+        list_heads, _make_word_buffer(device, 2 * links), view_map, result, per_tile, tile_side
+    )
 
 
-def segment_lists_per_tile(device: Device, tile_count: int) -> int:
-    """Return the number of linked lists of segments per tile of the picture.
+def segment_lists_per_tile(device: Device, picture_size: tuple[int, int]) -> int:
+    """Return the number of linked lists of segments per tile of a picture of size (width, height).
 
-    The number is 1 on software adapters, and if a buffer cannot hold more lists.
-
-    tile_count : number of tiles of the picture
+    The number is 1 on software adapters, and if a buffer cannot hold more lists. Tiles are small then.
     """
+    tile_count = int(np.prod(_tile_counts(picture_size, _TEAM_TILE_PIXELS)))
     fits = 4 * (1 + _GPU_SEGMENT_LISTS_PER_TILE * tile_count) <= device.max_storage_bytes
     return _GPU_SEGMENT_LISTS_PER_TILE if fits and device.adapter.kind != "CPU" else 1
+
+
+def _tile_counts(picture_size: tuple[int, int], tile_side: int) -> tuple[int, int]:
+    """Return the number of tiles across and down a picture of size (width, height)."""
+    width, height = picture_size
+    return -(-width // tile_side), -(-height // tile_side)
 
 
 def make_deep_opacity_maps(device: Device, light_count: int) -> Buffer:
@@ -367,7 +376,7 @@ def shader_constants() -> dict[str, float]:
     sky: dict[str, float] = {f"sky_cells_{axis}": n for axis, n in zip("xyz", SKY_CELLS, strict=True)}
     sky |= {"sky_head_words": _SKY_HEADER_WORDS, "sky_cell_words": _SKY_CELL_WORDS}
     guides = {"anchors_per_guide_knot": ANCHORS_PER_GUIDE_KNOT, "knots_per_guide": KNOTS_PER_GUIDE}
-    return {"strand_tile": TILE_SIDE_PIXELS, **opacity, **words, **sky, **guides, **hair_constants()}
+    return {"strand_tile": _TEAM_TILE_PIXELS, **opacity, **words, **sky, **guides, **hair_constants()}
 
 
 def has_strands(head: Head, settings: Settings) -> bool:

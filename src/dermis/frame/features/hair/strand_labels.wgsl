@@ -81,7 +81,7 @@ fn label_fragment(one: Fragment) {
     }
 }
 
-var<workgroup> partial_labels: array<ClassSums, STRAND_TILE * STRAND_TILE>; // sums of one layer of the workgroup, see strand_team.wgsl
+var<workgroup> partial_labels: array<ClassSums, TEAM_TILE * TEAM_TILE>; // sums of one layer of the workgroup, see strand_team.wgsl
 
 fn store_partial_labels(lane: u32) {
     partial_labels[lane] = class_sums;

@@ -4,7 +4,7 @@
 // `begin_pixel`, which is called before the first segment and returns the largest depth of the surface at the pixel.
 //#include "strand_fragments.wgsl"
 
-const LANES: u32 = STRAND_TILE * STRAND_TILE; // invocations of a layer: the pixels of a tile
+const LANES: u32 = TEAM_TILE * TEAM_TILE; // invocations of a layer: the pixels of a tile
 const LAYERS: u32 = 4u; // more layers speed up tiles with many segments
 
 @group(0) @binding(31) var<storage, read> list_heads: array<u32>; // see strands_bin.wgsl

@@ -13,17 +13,17 @@ struct TiledSegment {
     across: vec2f, // unit vector across it
     low: vec2f, // first and last tile of its bounding box
     high: vec2f,
-    far: f32, // largest distance from the middle of a tile to its line at which it may cover the tile [pixel]
+    far: f32, // largest distance from the middle of a tile to its line at which it may cover the middle of a pixel of the tile [pixel]
 }
 
 fn tiled_segment(a: ProjectedKnot, b: ProjectedKnot) -> TiledSegment {
     let side = f32(STRAND_TILE);
-    let reach = 0.5 * max(max(a.width, b.width), 1.0) + 1.0;
+    let reach = 0.5 * max(max(a.width, b.width), 1.0) + 0.5; // as in `fragment_of`
     let low = max(floor((min(a.position, b.position) - reach) / side), vec2f(0.0));
     let high = min(floor((max(a.position, b.position) + reach) / side), ceil(strand_view.size / side) - 1.0);
     let direction = b.position - a.position;
     let across = vec2f(-direction.y, direction.x) / max(length(direction), 1e-6);
-    return TiledSegment(a.position, across, low, high, reach + 0.5 * side * (abs(across.x) + abs(across.y)));
+    return TiledSegment(a.position, across, low, high, reach + 0.5 * (side - 1.0) * (abs(across.x) + abs(across.y)));
 }
 
 // Whether the segment may cover a tile of its bounding box.

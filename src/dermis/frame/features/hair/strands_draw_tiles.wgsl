@@ -55,7 +55,7 @@ fn merge_partial(lane: u32) {
     merge_partial_labels(lane);
 }
 
-@compute @workgroup_size(STRAND_TILE, STRAND_TILE, LAYERS)
+@compute @workgroup_size(TEAM_TILE, TEAM_TILE, LAYERS)
 fn main(
     @builtin(global_invocation_id) id: vec3u,
     @builtin(workgroup_id) tile: vec3u,
