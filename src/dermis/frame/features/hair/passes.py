@@ -11,6 +11,7 @@ import numpy as np
 from dermis.frame.features.hair.resources import (
     KNOTS_PER_BOUNDS_WORKGROUP,
     SKY_CELLS,
+    TILE_SIDE_PIXELS,
     Resources,
     StrandCounts,
     StrandTables,
@@ -187,24 +188,16 @@ def draw(
     graph.dispatch("strands", light, {**lighting, **knot_bindings}, workgroup_grid(knots))
     lists: Bindings = {"list_heads": picture.list_heads, "links": picture.links}
     _dispatch_hair(graph, "hair/strands_empty.wgsl", lists, picture.list_heads.size // 4)
-    list_heads = (("SEGMENT_LISTS", picture.segment_lists_per_tile),)
-    tile_side = (("STRAND_TILE", picture.tile_side),)
-    _dispatch_hair(graph, "hair/strands_bin.wgsl", {**shared, **lists}, segments, list_heads + tile_side)
+    _dispatch_hair(graph, "hair/strands_bin.wgsl", {**shared, **lists}, segments)
     images: Bindings = {"visibility_buffer": visibility_buffer, "behind": radiance, "image": picture.result}
     bindings = {**head.resources, **shared, **lists, **images, **(labels or {})}
-    if picture.segment_lists_per_tile > 1:
-        shader = program(
-            graph.device, "hair/strands_draw_tiles.wgsl", list_heads, stores_hair_labels=labels is not None
-        )
-        graph.compute("strands", shader, bindings, (width, height))
-        return picture.result
     rows = rows_per_invocation(
-        graph.device, _max_segments_in_tile(tables, segments, pixel_mm * picture.tile_side)
+        graph.device, _max_segments_in_tile(tables, segments, pixel_mm * TILE_SIDE_PIXELS)
     )
     shader = program(
         graph.device,
         "hair/strands_draw.wgsl",
-        (("ROWS", rows), *tile_side),
+        (("ROWS", rows),),
         stores_hair_labels=labels is not None,
     )
     graph.compute("strands", shader, bindings, (width, -(-height // rows)))

@@ -20,10 +20,8 @@ from dermis.mesh.strands import Strands, quad_corners, quad_weights
 from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_constants
 
-_TEAM_TILE_PIXELS, _SMALL_TILE_PIXELS = 8, 2  # sides of tiles that workgroups draw, and of all others
-_GPU_SEGMENT_LISTS_PER_TILE = (
-    64  # linked lists of a tile on GPUs: one for each invocation of the tile's workgroup
-)
+TILE_SIDE_PIXELS = 2
+"""Side of a tile of the picture, which has a list of strand segments [pixel]."""
 DEEP_OPACITY_WIDTH = 256
 """Width of a deep opacity map, twice its height [texels]."""
 DEEP_OPACITY_LAYERS = 6
@@ -136,17 +134,12 @@ class StrandPicture:
     links : buffer of the links of these lists; a link consists of a segment and the index of the next link
     view_map : buffer of the deep opacity map of the picture, see view_map.wgsl
     result : texture of the picture with hair
-    segment_lists_per_tile : number of linked lists per tile; the lists of a tile are filled and drawn in
-        parallel
-    tile_side : side of a tile [pixel]
     """
 
     list_heads: Buffer
     links: Buffer
     view_map: Buffer
     result: Texture
-    segment_lists_per_tile: int
-    tile_side: int
 
 
 def strand_counts(strands: Strands | None) -> StrandCounts:
@@ -216,34 +209,14 @@ def make_strand_picture(
     device: Device, capacity: StrandCapacity, picture_size: tuple[int, int]
 ) -> StrandPicture:
     """Allocate the segment lists and the texture with hair for a picture of size (width, height)."""
-    per_tile = segment_lists_per_tile(device, picture_size)
-    tile_side = _TEAM_TILE_PIXELS if per_tile > 1 else _SMALL_TILE_PIXELS
-    across, down = _tile_counts(picture_size, tile_side)
+    across, down = (-(-side // TILE_SIDE_PIXELS) for side in picture_size)
     links = _SEGMENT_LINKS_PER_KNOT * capacity.knots + capacity.fine * (across + down)
     links = min(links, _MAX_SEGMENT_LINKS, device.max_storage_bytes // 8)
-    list_heads = _make_word_buffer(device, 1 + per_tile * across * down)
+    list_heads = _make_word_buffer(device, 1 + across * down)
     result = make_texture(device, picture_size, "rgba32float")
     texels = int(np.prod([-(-side // _VIEW_TEXEL_PIXELS) for side in picture_size]))
     view_map = _make_word_buffer(device, (1 + DEEP_OPACITY_LAYERS) * texels)
-    return StrandPicture(
-        list_heads, _make_word_buffer(device, 2 * links), view_map, result, per_tile, tile_side
-    )
-
-
-def segment_lists_per_tile(device: Device, picture_size: tuple[int, int]) -> int:
-    """Return the number of linked lists of segments per tile of a picture of size (width, height).
-
-    The number is 1 on software adapters, and if a buffer cannot hold more lists. Tiles are small then.
-    """
-    tile_count = int(np.prod(_tile_counts(picture_size, _TEAM_TILE_PIXELS)))
-    fits = 4 * (1 + _GPU_SEGMENT_LISTS_PER_TILE * tile_count) <= device.max_storage_bytes
-    return _GPU_SEGMENT_LISTS_PER_TILE if fits and device.adapter.kind != "CPU" else 1
-
-
-def _tile_counts(picture_size: tuple[int, int], tile_side: int) -> tuple[int, int]:
-    """Return the number of tiles across and down a picture of size (width, height)."""
-    width, height = picture_size
-    return -(-width // tile_side), -(-height // tile_side)
+    return StrandPicture(list_heads, _make_word_buffer(device, 2 * links), view_map, result)
 
 
 def make_deep_opacity_maps(device: Device, light_count: int) -> Buffer:
@@ -376,7 +349,7 @@ def shader_constants() -> dict[str, float]:
     sky: dict[str, float] = {f"sky_cells_{axis}": n for axis, n in zip("xyz", SKY_CELLS, strict=True)}
     sky |= {"sky_head_words": _SKY_HEADER_WORDS, "sky_cell_words": _SKY_CELL_WORDS}
     guides = {"anchors_per_guide_knot": ANCHORS_PER_GUIDE_KNOT, "knots_per_guide": KNOTS_PER_GUIDE}
-    return {"strand_tile": _TEAM_TILE_PIXELS, **opacity, **words, **sky, **guides, **hair_constants()}
+    return {"strand_tile": TILE_SIDE_PIXELS, **opacity, **words, **sky, **guides, **hair_constants()}
 
 
 def has_strands(head: Head, settings: Settings) -> bool:

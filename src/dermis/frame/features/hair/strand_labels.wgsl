@@ -81,20 +81,6 @@ fn label_fragment(one: Fragment) {
     }
 }
 
-var<workgroup> partial_labels: array<ClassSums, TEAM_TILE * TEAM_TILE>; // sums of one layer of the workgroup, see strand_team.wgsl
-
-fn store_partial_labels(lane: u32) {
-    partial_labels[lane] = class_sums;
-}
-
-fn merge_partial_labels(lane: u32) {
-    let other = partial_labels[lane];
-    class_sums.brows += other.brows;
-    class_sums.hair += other.hair;
-    class_sums.beard += other.beard;
-    class_sums.lashes += other.lashes;
-}
-
 fn store_label(pixel: vec2u) {
     hair_labels[pixel.y * u32(strand_view.size.x) + pixel.x] = labels_of(class_sums);
     class_sums = NO_HAIRS; // for the next pixel
@@ -107,8 +93,4 @@ fn begin_labels(pixel: vec2u) {}
 fn label_fragment(one: Fragment) {}
 
 fn store_label(pixel: vec2u) {}
-
-fn store_partial_labels(lane: u32) {}
-
-fn merge_partial_labels(lane: u32) {}
 //#end

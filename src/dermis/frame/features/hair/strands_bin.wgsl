@@ -59,7 +59,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         for (var x = one.low.x; x <= one.high.x; x += 1.0) {
             if (link < arrayLength(&links) && covers(one, vec2f(x, y))) {
                 let tile = u32(y) * tiles_across(strand_view.size) + u32(x);
-                links[link] = vec2u(pack_segment(begin, hair), atomicExchange(&list_heads[1u + tile * SEGMENT_LISTS + segment % SEGMENT_LISTS], link + 1u));
+                links[link] = vec2u(pack_segment(begin, hair), atomicExchange(&list_heads[1u + tile], link + 1u));
                 link += 1u;
             }
         }
