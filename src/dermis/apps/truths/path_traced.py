@@ -36,6 +36,8 @@ ProgressCallback = Callable[[int, int], None]
 MitsubaVariant = Literal["scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb"]
 
 SAMPLES_PER_PASS = 4
+"""Paths per pixel in each pass on a CPU."""
+_GPU_SAMPLES_PER_PASS = 16  # small pictures do not occupy a GPU
 _MIN_PASS_COUNT = 2
 _MAX_SAMPLES_PER_PIXEL = 2**20
 _COVERAGE_SAMPLES_PER_PIXEL = 64
@@ -82,8 +84,8 @@ def path_trace(
     medium : index-matched (eta 1), isotropically scattering medium with three channels; the interfaces
         between its layers are copies of the skin, offset inwards by the depths of the layers. A
         `Lambertian` gives directly lit skin without subsurface scattering
-    samples : smallest number of paths per pixel; each pass traces 4. Passes are cached on disk under a hash
-        of the scene, so a later call with more samples only adds the missing passes
+    samples : smallest number of paths per pixel; each pass traces 4, or 16 on a GPU. Passes are cached on
+        disk under a hash of the scene, so a later call with more samples only adds the missing passes
     settings : settings of the frame, of which only the size is used
     variant : variant of Mitsuba; "llvm_ad_rgb" takes half the time for many samples but needs a recent LLVM
         (versions 14 and 15 crash), and "cuda_ad_rgb" needs an NVIDIA GPU
@@ -96,10 +98,10 @@ def path_trace(
 
     Sources: [Jakob2022], [Miller2019].
     """
-    target_count = pass_count(samples)
+    target_count = pass_count(samples, variant)
     check_traceable(medium)
     mi, size = load_mitsuba(), (settings or Settings()).size
-    trace_settings = f"{mi.__version__} {variant} {SAMPLES_PER_PASS} {RUSSIAN_ROULETTE_DEPTH}"
+    trace_settings = f"{mi.__version__} {variant} {samples_per_pass(variant)} {RUSSIAN_ROULETTE_DEPTH}"
     key = scene_cache_key(scene, medium, size, trace_settings) if use_cache else None
     return render_passes(
         mi,
@@ -140,18 +142,25 @@ def render_passes(
                     mi.render(build_coverage_scene(), spp=_COVERAGE_SAMPLES_PER_PIXEL), np.float32
                 )[..., 0]
                 passes = PassStatistics.empty(picture_size, np.clip(mask, 0.0, 1.0), notes)
-            add_passes(mi, built_scene, passes, min_pass_count, cache_key, progress)
+            add_passes(
+                mi, built_scene, passes, min_pass_count, samples_per_pass(variant), cache_key, progress
+            )
     return PathTraced(
         passes.mean.astype(np.float32),
         passes.variance.astype(np.float32),
         passes.mask,
-        passes.count * SAMPLES_PER_PASS,
+        passes.count * samples_per_pass(variant),
         passes.seconds,
         passes.notes,
     )
 
 
-def pass_count(samples_per_pixel: int) -> int:
+def samples_per_pass(variant: MitsubaVariant) -> int:
+    """Return the number of paths per pixel in each pass."""
+    return _GPU_SAMPLES_PER_PASS if variant == "cuda_ad_rgb" else SAMPLES_PER_PASS
+
+
+def pass_count(samples_per_pixel: int, variant: MitsubaVariant) -> int:
     """Return the number of passes needed for at least `samples_per_pixel` paths per pixel in total.
 
     Raises DermisError when `samples_per_pixel` is below 1 or too large.
@@ -165,7 +174,7 @@ def pass_count(samples_per_pixel: int) -> int:
             f"got {samples_per_pixel}",
             "Correct it",
         )
-    return max(_MIN_PASS_COUNT, -(-samples_per_pixel // SAMPLES_PER_PASS))
+    return max(_MIN_PASS_COUNT, -(-samples_per_pixel // samples_per_pass(variant)))
 
 
 def add_passes(
@@ -173,18 +182,20 @@ def add_passes(
     loaded_scene: MitsubaObject,
     passes: PassStatistics,
     min_pass_count: int,
+    paths_per_pixel: int,
     cache_key: str | None,
     progress: ProgressCallback | None,
 ) -> None:
     """Render passes of a Mitsuba scene until there are `min_pass_count`, and cache them.
 
+    paths_per_pixel : number of paths per pixel in each pass
     cache_key : name of the cached passes; None for no cache
     """
     last_save = time.perf_counter()
     try:
         while passes.count < min_pass_count:
             started = time.perf_counter()
-            image = np.array(mi.render(loaded_scene, spp=SAMPLES_PER_PASS, seed=passes.count), np.float64)
+            image = np.array(mi.render(loaded_scene, spp=paths_per_pixel, seed=passes.count), np.float64)
             ended = time.perf_counter()
             passes.add_pass(image, ended - started)
             if progress is not None:

@@ -14,7 +14,6 @@ from dermis.apps.truths.mitsuba_scene import (
     mitsuba_scene,
 )
 from dermis.apps.truths.path_traced import (
-    SAMPLES_PER_PASS,
     MitsubaVariant,
     PathTraced,
     ProgressCallback,
@@ -22,6 +21,7 @@ from dermis.apps.truths.path_traced import (
     hash_medium,
     pass_count,
     render_passes,
+    samples_per_pass,
 )
 from dermis.apps.truths.person.medium import ALBEDO_GRID_SIDE_VOXELS, COAT_TRANSMITTANCE, skin_media
 from dermis.apps.truths.person.person import Person, SkinTextures, posed_person
@@ -73,10 +73,12 @@ def path_trace_person(
 
     Sources: [Jakob2022], [Miller2019], [Chiang2016].
     """
-    target_count, mi = pass_count(samples), load_mitsuba()
+    target_count, mi = pass_count(samples, variant), load_mitsuba()
     person = posed_person(scene, textures)
     voxels = ALBEDO_GRID_SIDE_VOXELS
-    constants = f"{SAMPLES_PER_PASS} {RUSSIAN_ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {voxels} {max_depth}"
+    constants = (
+        f"{samples_per_pass(variant)} {RUSSIAN_ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {voxels} {max_depth}"
+    )
     trace_settings = f"{_CACHE_VERSION} {mi.__version__} {variant} {constants} {size}"
     key = person_cache_key(scene, person, medium, trace_settings) if use_cache else None
     return render_passes(

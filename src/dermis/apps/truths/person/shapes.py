@@ -347,8 +347,8 @@ def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating])
     points = bspline_control_points(rows)
     points[..., 3] = np.maximum(points[..., 3], _MIN_HAIR_RADIUS_MM)
     with path.open("w", encoding="ascii") as file:
-        for curve in points:
-            np.savetxt(file, curve, "%.5f")
+        for curve in points.tolist():
+            file.writelines("%.5f %.5f %.5f %.5f\n" % tuple(row) for row in curve)
             file.write("\n")
 
 

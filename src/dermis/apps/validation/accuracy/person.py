@@ -381,8 +381,14 @@ def _comparison_jobs(runner: ComparisonRunner) -> list[_ComparisonJob]:
         for name in _HEAD_FILES
         for light in _HEAD_LIGHTS
     ]
-    first = len(ALL_VIEWS) + len(VIEWS)
-    return [*people[:first], *heads, *people[first:]]
+    views, most_important = len(ALL_VIEWS), len(_HEAD_LIGHTS)
+    return [
+        *people[:views],
+        *heads[:most_important],
+        *people[views : 2 * views],
+        *heads,
+        *people[2 * views :],
+    ]
 
 
 def write_path_traced_page() -> None:
