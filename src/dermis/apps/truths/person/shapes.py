@@ -348,7 +348,7 @@ def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating])
     points[..., 3] = np.maximum(points[..., 3], _MIN_HAIR_RADIUS_MM)
     with path.open("w", encoding="ascii") as file:
         for curve in points.tolist():
-            file.writelines("%.5f %.5f %.5f %.5f\n" % tuple(row) for row in curve)
+            file.writelines(f"{x:.5f} {y:.5f} {z:.5f} {r:.5f}\n" for x, y, z, r in curve)
             file.write("\n")
 
 

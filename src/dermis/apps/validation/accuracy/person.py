@@ -381,13 +381,14 @@ def _comparison_jobs(runner: ComparisonRunner) -> list[_ComparisonJob]:
         for name in _HEAD_FILES
         for light in _HEAD_LIGHTS
     ]
-    views, most_important = len(ALL_VIEWS), len(_HEAD_LIGHTS)
+    views, important = len(ALL_VIEWS), len(_HEAD_LIGHTS)
+    layered = views + len(VIEWS)
     return [
         *people[:views],
-        *heads[:most_important],
-        *people[views : 2 * views],
-        *heads,
-        *people[2 * views :],
+        *heads[:important],
+        *people[views:layered],
+        *heads[important:],
+        *people[layered:],
     ]
 
 
