@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.optics.diffusion.boundary import boundary_mismatch, normal_reflectance
-from dermis.optics.diffusion.layered_diffusion import solve_two_layers
-from dermis.optics.media import SKIN_ETA, Floats, Layer
+from dermis.optics.diffusion.layered_diffusion import two_layer_table
+from dermis.optics.media import SKIN_ETA, Floats
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.pigments.skin import dj2006_layers
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 _COLOUR_TABLE_NODES = 65
-_TABLE_ROWS_PER_BATCH = 13  # rows of the table that are computed together and fit into the processor's cache
 
 
 @dataclass(frozen=True)
@@ -78,23 +77,6 @@ def spectral_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_N
     The wavelengths are `WAVELENGTHS_NM`. The parameters and the grid are those of `colour_table`.
     """
     epidermis, dermis = dj2006_layers(parameters, np.linspace(0.0, 1.0, node_count) ** 2)
-    dermis, thickness_mm = _with_axis(dermis, 0), parameters.epidermis_mm
     mismatch = boundary_mismatch(SKIN_ETA, "exact")
-    spectra = [
-        solve_two_layers(_with_axis(epidermis, 1, rows), thickness_mm, dermis, mismatch)
-        for rows in np.array_split(np.arange(node_count), -(-node_count // _TABLE_ROWS_PER_BATCH))
-    ]
-    return np.asarray((1.0 - normal_reflectance(SKIN_ETA)) * np.concatenate(spectra))
-
-
-def _with_axis(layer: Layer, axis: int, rows: NDArray[np.int64] | None = None) -> Layer:
-    """Return a layer with an axis of length 1 added to its coefficients (n, c), or to some of their rows.
-
-    axis : position of the new axis
-    rows : indices of the rows; None for all rows
-    """
-    chosen = slice(None) if rows is None else rows
-    absorption, scattering = (
-        np.expand_dims(one[chosen], axis) for one in (layer.sigma_a, layer.sigma_s_prime)
-    )
-    return Layer(absorption, scattering, layer.thickness_mm, layer.name)
+    spectra = two_layer_table(epidermis, parameters.epidermis_mm, dermis, mismatch)
+    return (1.0 - normal_reflectance(SKIN_ETA)) * spectra
