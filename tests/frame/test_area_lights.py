@@ -67,7 +67,7 @@ def test_irradiance_on_the_axis_matches_lambert() -> None:
 @pytest.mark.parametrize("size", [(40, 40), (300, 200), (100, 900)])
 def test_parts_of_a_rectangle_add_up(size: tuple[float, float]) -> None:
     light = RectangleLight(position=(200, 300, 400), target=(0, 10, 0), width_mm=size[0], height_mm=size[1])
-    parts = KIND.divide_light(light)
+    parts = KIND.light_parts(light)
     assert all(isinstance(part, RectangleLight) for part in parts)
     area = sum(part.width_mm * part.height_mm for part in parts if isinstance(part, RectangleLight))
     assert area == pytest.approx(size[0] * size[1])

@@ -75,8 +75,8 @@ def compare(
 ) -> int:
     """Compare scattering techniques with a reference solution, or the specular models with each other.
 
-    For the comparison of techniques, the skin has the colour of the diffusion profile, and no maps, surface
-    reflection or energy conservation.
+    When techniques are compared, the skin has the uniform colour of the diffusion profile, without maps or
+    surface reflection.
 
     Examples:
 

@@ -153,8 +153,8 @@ class DeclaredPass:
     stages : names of the stages of the pass or passes
     run : function that adds the pass, or the passes, to a command list
     key : everything that the output depends on besides the resources that are read
-    access : number of the combination of program and resources (`Access.id`), and the states of the resources
-        that are read and written
+    access : `Access.id`, which identifies the combination of program and resources; and the states of the
+        resources that are read and written
     """
 
     stages: tuple[str, ...]

@@ -1,6 +1,7 @@
 """Diffusion profiles of homogeneous half-spaces, from tables of Monte Carlo results.
 
-The tables hold the fractions of simulated photons that leave the half-space within several radii.
+For each of several radii, the tables hold the fraction of simulated photons that leave the half-space
+within this radius.
 """
 
 from __future__ import annotations

@@ -183,12 +183,12 @@ def fibre_scattering(
     return total
 
 
-def tilted_sine(sin_o: ArrayLike, pass_count: int) -> Floats:
+def tilted_sine(sin_o: ArrayLike, crossing_count: int) -> Floats:
     """Return the sine of the viewer's inclination for one lobe, corrected for the tilt of the cuticle scales.
 
     sin_o : sine of the angle by which the direction to the viewer is inclined towards the tip of the fibre
-    pass_count : number of passes of the light through the fibre: 0 for the lobe R, 1 for TT, 2 for TRT; 3
+    crossing_count : number of times that light crosses the fibre: 0 for the lobe R, 1 for TT, 2 for TRT; 3
         stands for all further lobes
     """
     angle = np.arcsin(np.clip(np.asarray(sin_o, float), -1, 1))
-    return np.asarray(np.sin(angle + (-2.0, 1.0, 4.0, 0.0)[pass_count] * CUTICLE_TILT))
+    return np.asarray(np.sin(angle + (-2.0, 1.0, 4.0, 0.0)[crossing_count] * CUTICLE_TILT))

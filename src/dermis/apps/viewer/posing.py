@@ -73,7 +73,10 @@ def reset_pose(scene: Scene) -> Pose | None:
 def poses_equal(
     first_pose: Pose | Mapping[str, float] | None, second_pose: Pose | Mapping[str, float] | None
 ) -> bool:
-    """Return whether two poses are equal; their arrays of vertex positions must be the same object."""
+    """Return whether two poses are equal.
+
+    Arrays of vertex positions count as equal only if they are the same object.
+    """
     if first_pose is second_pose:
         return True
     first, second = Pose.coerce(first_pose) or REST_POSE, Pose.coerce(second_pose) or REST_POSE

@@ -134,7 +134,9 @@ def layout_table_name(gutter_mm: float) -> str:
 
 
 def find_stitched_layout(mesh: Mesh, gutter_mm: float) -> dict[str, NDArray[Any]]:
-    """Compute the stitched layout of a mesh as arrays, which the package stores for its own head.
+    """Compute the stitched layout of a mesh as arrays.
+
+    For the head that comes with the package, these arrays are computed in advance and stored in a file.
 
     Returns three arrays: the piece index (f,) of each triangle, and scale and origins of the `PieceLayout`.
 

@@ -121,7 +121,7 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: flo
 
 
 def _median_texel_mm(atlas: Atlas) -> float:
-    """Return the median side length on the surface of texels in `Atlas.lit_mask` [mm]."""
+    """Return the median side length of the texels in `Atlas.lit_mask`, measured on the surface [mm]."""
     step = max(1, atlas.size // _MAX_AVERAGED_TEXELS_PER_SIDE)
     lit, stretch = atlas.lit_mask[::step, ::step], atlas.stretch[::step, ::step].astype(np.float32)
     density = stretch[..., 0][lit] * stretch[..., 1][lit]

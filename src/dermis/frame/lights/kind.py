@@ -28,7 +28,7 @@ class LightKind(Generic[LightT]):
 
         fn NAME_incident(light: Light, p: vec3f, part: u32) -> Incident
 
-    The function returns the light that arrives at the point p from one part of the light, see `divide_light`.
+    The function returns the light that arrives at the point p from one part of the light, see `light_parts`.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class LightKind(Generic[LightT]):
         """
         return not self.punctual
 
-    def divide_light(self, light: LightT) -> list[Light]:
+    def light_parts(self, light: LightT) -> list[Light]:
         """Divide a light into parts that together equal the light; each part gets a shadow map of its own.
 
         Parameters

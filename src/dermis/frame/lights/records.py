@@ -91,7 +91,7 @@ def light_part_counts(scene: Scene) -> tuple[int, ...]:
     Large rectangular lights are divided into several parts, each with its own shadow map; for all other
     lights the number is 1.
     """
-    return tuple(len(KINDS[light.kind].divide_light(light)) for light in scene.lights)
+    return tuple(len(KINDS[light.kind].light_parts(light)) for light in scene.lights)
 
 
 def light_shadow_views(scene: Scene, outline: Outline, map_side: int) -> list[ShadowView | None]:
@@ -106,7 +106,7 @@ def light_shadow_views(scene: Scene, outline: Outline, map_side: int) -> list[Sh
     numbered = [
         (f"light {number}", part)
         for number, light in enumerate(scene.lights, start=1)
-        for part in KINDS[light.kind].divide_light(light)
+        for part in KINDS[light.kind].light_parts(light)
     ]
     if len(numbered) > _MAX_LIGHTS:
         actual = f"there are {len(numbered)}, with the environment's suns and each part of a large rectangle"
@@ -138,7 +138,7 @@ def light_records(
     """
     record = shading_program.make_record("Lights", sample_points=light_sample_points())
     lights = record["light"]
-    each = [KINDS[light.kind].divide_light(light) for light in scene.lights]
+    each = [KINDS[light.kind].light_parts(light) for light in scene.lights]
     divided = [(part, len(parts)) for parts in each for part in parts]
     none, layers = dict.fromkeys(lights.dtype.names or (), 0), count()
     rows = []

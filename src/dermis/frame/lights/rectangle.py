@@ -18,7 +18,7 @@ class _RectangleLightKind(LightKind[RectangleLight]):
     punctual = False
     round = False
 
-    def divide_light(self, light: RectangleLight) -> list[Light]:
+    def light_parts(self, light: RectangleLight) -> list[Light]:
         """Divide the rectangle into parts whose sides are at most 0.35 of the distance from light to target.
 
         There are at most 3 parts along each side, even if their sides then exceed this limit.

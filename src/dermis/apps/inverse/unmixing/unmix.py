@@ -244,13 +244,14 @@ def unmix(
     picture : str, Path, EmbeddedPicture or array_like
         File (PNG, JPEG, HEIC, EXR and others), or (h, w, 3) diffuse reflectance in linear Rec. 709 [-].
     skin : SkinParameters
-        Epidermal thickness, eumelanin and oxygen of the model's skins; melanin and blood are ignored.
+        Epidermal thickness, eumelanin fraction and oxygenation that are assumed for all texels. Its melanin
+        and blood are ignored, because they are estimated.
     extra_unknown : {"none", "oxygen"}
         "oxygen" also estimates the oxygenated fraction of haemoglobin; the mean of its prior is the fraction
         in `skin`, and the standard deviation is that among measured people. "none" keeps the fraction in
         `skin`.
     noise : float
-        Relative standard deviation of a channel [-].
+        Standard deviation of the noise in each colour channel, relative to its value [-].
     shading : bool
         Whether to estimate low-frequency shading, and to divide the picture by this shading.
     adapter : str

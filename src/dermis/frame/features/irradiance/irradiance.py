@@ -24,7 +24,9 @@ def subtexel_light_constants() -> dict[str, float]:
 def subtexel_light_members(
     variance_mm2: NDArray[np.float64], weight: NDArray[np.float64], unblurred_mm2: float
 ) -> dict[str, float | NDArray[np.floating]]:
-    """Return the members of the shader struct `Fine`, which corrects light that varies within a texel.
+    """Return the members of the shader struct `Fine`.
+
+    From these, shaders compute how light varies within a texel, which the atlas cannot resolve.
 
     variance_mm2 : (k,) variances of the Gaussians that blur light over the atlas [mm^2]
     weight : (k, 3) weights of these Gaussians for red, green and blue [-]
