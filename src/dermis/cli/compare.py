@@ -111,8 +111,8 @@ def compare(
     medium:
         skin1, skin2 or another named medium, with an index-matched surface. [default: skin1]
     model:
-        Model of the diffusion profile: counted (stored tables of photon counts), layered (layered diffusion) or montecarlo
-        (photons traced now). [default: counted for one semi-infinite layer, else layered]
+        Model of the diffusion profile: counted (stored tables of photon counts), layered (layered diffusion)
+        or montecarlo (photons traced now). [default: counted for one semi-infinite layer, else layered]
     samples:
         Paths per pixel, for path-traced and cycles. [default: 64]
     output:

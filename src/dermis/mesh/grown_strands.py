@@ -22,7 +22,6 @@ _HAIRLINE_FADE_MM, _SHORT_HAIR_HEIGHTS_MM = (-3.0, 11.0), (-2.0, 14.0)
 _HAIRLINE_STEP_DEGREES = 2.0
 _TIP_FRACTION, _TIP_WIDTH_RATIO = 0.12, 0.35
 _HAIRS_SAMPLED_PER_STRAND = 5
-_COVERING_LENGTH_MM = 60.0  # length from the root along which hair covers the skin around it
 _HEAD_RADIUS_MM, _LIFTED_HEIGHT_MM = 80.0, 20.0
 _STRANDS_PER_CHUNK = 4_000  # strands that are grown at once
 _FALLBACK_AXIS = np.array([0.31, 0.2, 0.93])
@@ -73,12 +72,13 @@ def hair_strands(head: Head, points_mm: NDArray[np.floating] | None = None) -> S
 def mean_hair_absorptance(groom: Groom) -> float:
     """Return the mean fraction of diffuse light that a single hair absorbs [-].
 
-    The mean is over the colour channels, and over scalp hair and beard.
+    The mean is over the colour channels, and over scalp hair and beard by the area that they cover.
     """
     parts = groom.parameters
     chord = 0.5 * np.pi * (parts["radius_mm"] / parts["hairs_per_strand"])[:, None]
     absorption = np.maximum((1.0 - parts["grey"][:, None]) * parts["dark"], parts["white"])
-    return float((1.0 - np.exp(-absorption * chord)).mean())
+    weights = np.maximum(parts["density"] * parts["cover"], 1e-6)
+    return float(np.average((1.0 - np.exp(-absorption * chord)).mean(axis=1), weights=weights))
 
 
 class _Curves(NamedTuple):

@@ -137,16 +137,18 @@ def solve_two_layers(
     )
 
 
-def two_layer_table(upper_layers: Layer, thickness_mm: float, lower_layers: Layer, mismatch: float) -> Floats:
+def two_layer_table(
+    upper_layers: Layer, thickness_mm: float, lower_layers: Layer, boundary_mismatch: float
+) -> Floats:
     """Return the total reflectance (n, m, c) of skins for each pair of n upper and m lower layers [-].
 
     The result is relative to the entering power, and the same as that of `solve_two_layers`. This function is
     several times faster for tables, because it computes exponentials only once per layer.
 
-    upper_layers : upper layers, with coefficients (n, c)
+    upper_layers : upper layers, with coefficients (n, c); their absorption must not be 0
     thickness_mm : thickness of all upper layers [mm]
     lower_layers : semi-infinite lower layers, with coefficients (m, c)
-    mismatch : boundary mismatch with air [-]
+    boundary_mismatch : boundary mismatch with air [-]
     """
     zero, ones = np.zeros(()), np.ones(upper_layers.sigma_a.shape[-1])
     below, _ = _propagate_up(zero, _Sublayer(lower_layers, np.inf, ones, 0.0 * ones), _NO_LIGHT)
@@ -162,8 +164,8 @@ def two_layer_table(upper_layers: Layer, thickness_mm: float, lower_layers: Laye
     numerator = D * slope * flux * (1.0 + E**2) - 2.0 * flux * E * D * lower_slope
     numerator_by_Z = D * slope * (1.0 - E**2) - 2.0 * flux * E * lower
     numerator_by_W = 2.0 * flux * E * beam
-    denominator = flux * (1.0 + E**2) + 2.0 * mismatch * flux**2 * (1.0 - E**2)
-    denominator_by_Z = (1.0 - E**2) + 2.0 * mismatch * flux * (1.0 + E**2)
+    denominator = flux * (1.0 + E**2) + 2.0 * boundary_mismatch * flux**2 * (1.0 - E**2)
+    denominator_by_Z = (1.0 - E**2) + 2.0 * boundary_mismatch * flux * (1.0 + E**2)
     result = numerator_by_Z[:, None] * below.Z
     result += numerator_by_W[:, None] * below.W
     result += numerator[:, None]

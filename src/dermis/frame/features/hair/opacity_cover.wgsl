@@ -1,4 +1,4 @@
-// Adds hair to a texel of a deep opacity map, which has the layout of strand_window.wgsl. Integers are summed, so that the result
+// Adds hair to a texel of a deep opacity map, whose texels have the layout of opacity_layers.wgsl. Integers are summed, so that the result
 // does not depend on the order of strands.
 
 @group(0) @binding(31) var<storage, read_write> opacity: array<atomic<u32>>;

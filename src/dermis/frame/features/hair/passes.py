@@ -11,7 +11,7 @@ import numpy as np
 from dermis.frame.features.hair.resources import (
     KNOTS_PER_BOUNDS_WORKGROUP,
     SKY_CELLS,
-    TILE_SIDE_PIXELS,
+    VIEW_TEXEL_PIXELS,
     Resources,
     StrandCounts,
     StrandTables,
@@ -39,7 +39,7 @@ ShadingInputs = tuple[Bindings, UniformRecord, Constants]
 """Resources of the lighting, uniform record of the shading pass, and pipeline constants of the lights."""
 
 _MAX_ROWS_PER_INVOCATION, _MAX_LOOP_ITERATIONS = 8, 60_000
-_HAIR_EXTENT_MM = 100.0  # side of a square in the picture that holds all hair of a head
+_HAIR_EXTENT_MM = 100.0  # side of a square that holds most hair of a head
 _CROWDED_TILE_SEGMENT_RATIO = (
     14.0  # ratio of the number of segments in a crowded tile to the mean of all tiles
 )
@@ -68,7 +68,7 @@ def draw_shadows(
     pose_strands(graph, tables, geometry[0], tables.buffers.casters, tables.casters)
     if len(shadow_views.clips) or has_environment:
         _draw_deep_opacity(graph, strands, lighting_bindings)
-    if has_environment:
+    if has_environment and tables.casters.hairs:
         _draw_sky_transmittance(graph, strands, geometry[1], lighting_bindings)
 
 
@@ -181,23 +181,24 @@ def draw(
     light = program(graph.device, "hair/strands_light.wgsl", light_constants)
     record = _strand_view_record(light, strands, view, coarse.hairs)
     hairs = tables.hairs_record(coarse)
-    shared: Bindings = {"strand_view": record, "projected": tables.buffers.projected, "hairs": hairs}
-    _draw_view_map(graph, tables, picture.view_map, record)
-    knot_bindings: Bindings = {**shared, "posed": posed, "view_map": picture.view_map}
-    _dispatch_hair(graph, "hair/strands_hide.wgsl", knot_bindings, knots)
-    graph.dispatch("strands", light, {**lighting, **knot_bindings}, workgroup_grid(knots))
+    shared: MutableBindings = {"strand_view": record, "projected": tables.buffers.projected, "hairs": hairs}
+    _draw_view_map(graph, tables, picture.view_map, record, pixel_mm)
+    shared["posed"] = posed
+    _dispatch_hair(graph, "hair/strands_hide.wgsl", {**shared, "view_map": picture.view_map}, knots)
+    graph.dispatch("strands", light, {**lighting, **shared}, workgroup_grid(knots))
     lists: Bindings = {"list_heads": picture.list_heads, "links": picture.links}
     _dispatch_hair(graph, "hair/strands_empty.wgsl", lists, picture.list_heads.size // 4)
-    _dispatch_hair(graph, "hair/strands_bin.wgsl", {**shared, **lists}, segments)
+    tile_side = (("STRAND_TILE", picture.tile_side),)
+    _dispatch_hair(graph, "hair/strands_bin.wgsl", {**shared, **lists}, segments, tile_side)
     images: Bindings = {"visibility_buffer": visibility_buffer, "behind": radiance, "image": picture.result}
     bindings = {**head.resources, **shared, **lists, **images, **(labels or {})}
     rows = rows_per_invocation(
-        graph.device, _max_segments_in_tile(tables, segments, pixel_mm * TILE_SIDE_PIXELS)
+        graph.device, _max_segments_in_tile(tables, segments, pixel_mm * picture.tile_side)
     )
     shader = program(
         graph.device,
         "hair/strands_draw.wgsl",
-        (("ROWS", rows),),
+        (("ROWS", rows), *tile_side),
         stores_hair_labels=labels is not None,
     )
     graph.compute("strands", shader, bindings, (width, -(-height // rows)))
@@ -205,11 +206,19 @@ def draw(
 
 
 def _draw_view_map(
-    graph: Recorder, strand_tables: StrandTables, view_map: Buffer, strand_view: UniformRecord
+    graph: Recorder,
+    strand_tables: StrandTables,
+    view_map: Buffer,
+    strand_view: UniformRecord,
+    pixel_mm: float,
 ) -> None:
     """Declare the passes that fill the deep opacity map of the picture, by which hidden strands are left out.
 
+    The map remains empty, so that no strand is left out, if the strands that stand for all others are wider
+    than two of its texels.
+
     strand_view : result of `_strand_view_record`
+    pixel_mm : side of the square that a pixel covers at the depth of scalp hair and beard [mm]
     """
     casters = strand_tables.casters
     bindings: Bindings = {
@@ -219,6 +228,9 @@ def _draw_view_map(
         "strand_view": strand_view,
     }
     _dispatch_hair(graph, "hair/view_map_clear.wgsl", bindings, view_map.size // 4)
+    caster_mm = strand_tables.width_mm * strand_tables.possible / max(1, casters.hairs)
+    if not casters.hairs or caster_mm > 2.0 * VIEW_TEXEL_PIXELS * pixel_mm:
+        return
     segments = strand_tables.fine.total_segment_count() + casters.total_segment_count()
     for adds_cover in (0, 1):
         _dispatch_hair(graph, "hair/view_map_fill.wgsl", bindings, segments, (("ADDS_COVER", adds_cover),))
@@ -254,15 +266,15 @@ def _pixel_footprint_mm(
 def _max_segments_in_tile(strand_tables: StrandTables, segment_count: int, tile_mm: float) -> int:
     """Estimate the number of strand segments in a crowded tile of the picture.
 
-    The tile is assumed to contain all segments of brows and lashes, and several times as many segments of
-    scalp hair and beard as the average tile.
+    The tile is assumed to contain a tenth of the segments of brows and lashes, and several times as many
+    segments of scalp hair and beard as the average tile.
 
     segment_count : number of segments of all strands that are drawn
     tile_mm : side of the square that a tile covers at the depth of the strands [mm]
     """
     tiles = max(1.0, (_HAIR_EXTENT_MM / tile_mm) ** 2)
     fine = strand_tables.fine.total_segment_count()
-    return int(fine + min(1.0, _CROWDED_TILE_SEGMENT_RATIO / tiles) * (segment_count - fine))
+    return int(fine // 10 + min(1.0, _CROWDED_TILE_SEGMENT_RATIO / tiles) * (segment_count - fine))
 
 
 def rows_per_invocation(device: Device, segment_count: int) -> int:

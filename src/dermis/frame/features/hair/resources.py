@@ -20,8 +20,8 @@ from dermis.mesh.strands import Strands, quad_corners, quad_weights
 from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_constants
 
-TILE_SIDE_PIXELS = 2
-"""Side of a tile of the picture, which has a list of strand segments [pixel]."""
+_TILE_SIDES_BY_PICTURE_PIXELS = ((2_200_000, 2), (9_000_000, 4))  # larger tiles need fewer links
+_LARGEST_TILE_SIDE = 8
 DEEP_OPACITY_WIDTH = 256
 """Width of a deep opacity map, twice its height [texels]."""
 DEEP_OPACITY_LAYERS = 6
@@ -31,7 +31,8 @@ DEEP_OPACITY_HEADER_WORDS = 8
 SKY_CELLS = 24, 32, 24
 """Number of cells of the grid of sky transmittance, along x, y and z, see strand_sky.wgsl."""
 _SKY_HEADER_WORDS, _SKY_CELL_WORDS = 6, 5
-_VIEW_TEXEL_PIXELS = 4  # side of a texel of the deep opacity map of the picture, see view_map.wgsl
+VIEW_TEXEL_PIXELS = 4
+"""Side of a texel of the deep opacity map of the picture, see view_map.wgsl [pixel]."""
 _SEGMENT_LINKS_PER_KNOT = 8
 _MAX_SEGMENT_LINKS = 1 << 24
 # Steps to which capacities for fine strands and for knots are rounded up, so that most heads share them.
@@ -40,12 +41,14 @@ _PROJECTED_KNOT_BYTES = 32
 _MIN_DRAWN_STRANDS, _MIN_KNOTS = 5_000, 4
 # Width added per unit of cover: where hair hides hair, fewer strands suffice.
 _WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = 0.2, 1.0
-_KEPT_STYLE_COUNT = 12  # hair styles whose buffers, of at most 8 MB each, are kept for the next person
+_KEPT_STYLE_COUNT = 12  # hair styles whose buffers, of about 10 MB each, are kept for the next person
 _MIN_STRANDS_PER_PIXEL = 2.0  # where all strands are short; fewer would look like dots
 _HAIRY_SKIN_AREA_MM2 = 6e4  # approximate area of the skin on which scalp hair and beard grow
 _MAX_KNOT_FRACTION_FOR_SHORT_HAIR = 0.4  # largest fraction of `Detail.drawn_knots` that is spent against dots
 _MAX_BEND_MM = 20.0  # radius of curvature of the guides near the skin
-_ROPE_PITCH_RATIO = 7.0  # pitch of twists and braids relative to their radius, see strands_grow.wgsl
+_ROPE_PITCH_RATIO = (
+    7.0  # pitch of twists relative to their radius; that of braids is 8, see strands_grow.wgsl
+)
 _DETAIL_LEVELS_PER_OCTAVE = 4  # levels of detail for each doubling of the size of a pixel
 KNOTS_PER_BOUNDS_WORKGROUP = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
@@ -134,12 +137,14 @@ class StrandPicture:
     links : buffer of the links of these lists; a link consists of a segment and the index of the next link
     view_map : buffer of the deep opacity map of the picture, see view_map.wgsl
     result : texture of the picture with hair
+    tile_side : side of a tile [pixel]
     """
 
     list_heads: Buffer
     links: Buffer
     view_map: Buffer
     result: Texture
+    tile_side: int
 
 
 def strand_counts(strands: Strands | None) -> StrandCounts:
@@ -209,14 +214,22 @@ def make_strand_picture(
     device: Device, capacity: StrandCapacity, picture_size: tuple[int, int]
 ) -> StrandPicture:
     """Allocate the segment lists and the texture with hair for a picture of size (width, height)."""
-    across, down = (-(-side // TILE_SIDE_PIXELS) for side in picture_size)
-    links = _SEGMENT_LINKS_PER_KNOT * capacity.knots + capacity.fine * (across + down)
+    tile_side = _tile_side(picture_size)
+    across, down = (-(-side // tile_side) for side in picture_size)
+    links = _SEGMENT_LINKS_PER_KNOT * capacity.knots + capacity.fine * (across + down) // 4
     links = min(links, _MAX_SEGMENT_LINKS, device.max_storage_bytes // 8)
     list_heads = _make_word_buffer(device, 1 + across * down)
     result = make_texture(device, picture_size, "rgba32float")
-    texels = int(np.prod([-(-side // _VIEW_TEXEL_PIXELS) for side in picture_size]))
+    texels = int(np.prod([-(-side // VIEW_TEXEL_PIXELS) for side in picture_size]))
     view_map = _make_word_buffer(device, (1 + DEEP_OPACITY_LAYERS) * texels)
-    return StrandPicture(list_heads, _make_word_buffer(device, 2 * links), view_map, result)
+    return StrandPicture(list_heads, _make_word_buffer(device, 2 * links), view_map, result, tile_side)
+
+
+def _tile_side(picture_size: tuple[int, int]) -> int:
+    """Return the side of tiles for a picture of size (width, height) [pixel]."""
+    pixels = picture_size[0] * picture_size[1]
+    sides = (side for most, side in _TILE_SIDES_BY_PICTURE_PIXELS if pixels <= most)
+    return next(sides, _LARGEST_TILE_SIDE)
 
 
 def make_deep_opacity_maps(device: Device, light_count: int) -> Buffer:
@@ -349,7 +362,7 @@ def shader_constants() -> dict[str, float]:
     sky: dict[str, float] = {f"sky_cells_{axis}": n for axis, n in zip("xyz", SKY_CELLS, strict=True)}
     sky |= {"sky_head_words": _SKY_HEADER_WORDS, "sky_cell_words": _SKY_CELL_WORDS}
     guides = {"anchors_per_guide_knot": ANCHORS_PER_GUIDE_KNOT, "knots_per_guide": KNOTS_PER_GUIDE}
-    return {"strand_tile": TILE_SIDE_PIXELS, **opacity, **words, **sky, **guides, **hair_constants()}
+    return {**opacity, **words, "view_texel": VIEW_TEXEL_PIXELS, **sky, **guides, **hair_constants()}
 
 
 def has_strands(head: Head, settings: Settings) -> bool:

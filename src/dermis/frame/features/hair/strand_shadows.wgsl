@@ -3,6 +3,7 @@
 
 override STRANDS: bool = false; // whether there are strands
 
+const FADING_MM: f32 = 100.0; // distance from the grid of the sky beyond which hair hides no sky
 const AMONG_MM: f32 = 0.25; // strands that are nearer to a point cast no shadow on it: it lies among them
 
 @group(0) @binding(26) var<storage, read> strand_shadows: array<u32>; // see strand_window.wgsl
@@ -69,10 +70,16 @@ fn sky_grid() -> SkyGrid {
     return make_sky_grid(low, high);
 }
 
-// Transmittances at a point; positions outside the grid are moved to its border.
+// Transmittances at a point; outside the grid, those of its border, which increase to 1 with the distance.
 fn sky_transmittance_at(grid: SkyGrid, p: vec3f) -> SkyTransmittance {
+    let clear = vec4f(vec3f(0.0), 1.0);
+    if (any(grid.cell <= vec3f(0.0))) {
+        return SkyTransmittance(clear, clear);
+    }
     let last = vec3f(SKY_CELLS) - 1.0;
-    let at = clamp((p - grid.low) / grid.cell - 0.5, vec3f(0.0), last);
+    let unclamped = (p - grid.low) / grid.cell - 0.5;
+    let at = clamp(unclamped, vec3f(0.0), last);
+    let outside = saturate(length((unclamped - at) * grid.cell) / FADING_MM);
     let low = min(vec3u(at), SKY_CELLS - 2u);
     let f = at - vec3f(low);
     var sum = SkyTransmittance(vec4f(0.0), vec4f(0.0));
@@ -83,7 +90,7 @@ fn sky_transmittance_at(grid: SkyGrid, p: vec3f) -> SkyTransmittance {
         sum.hair += w.x * w.y * w.z * one.hair;
         sum.all += w.x * w.y * w.z * one.all;
     }
-    return sum;
+    return SkyTransmittance(mix(sum.hair, clear, outside), mix(sum.all, clear, outside));
 }
 
 // Fraction of the light of the sky that hair transmits to a surface. The transmittance is read below the surface, so that
@@ -94,9 +101,6 @@ fn sky_past_hair(p: vec3f, normal: vec3f, mean_direction: vec3f) -> f32 {
         return 1.0;
     }
     let grid = sky_grid();
-    if (any(grid.cell <= vec3f(0.0))) {
-        return 1.0;
-    }
     let hair = sky_transmittance_at(grid, p - grid.cell * normal).hair;
     return clamp(hair.w + dot(hair.xyz, mean_direction), 0.0, 1.0);
 }

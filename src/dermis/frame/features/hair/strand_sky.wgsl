@@ -5,10 +5,10 @@
 //#fill const SKY_HEAD: u32 = {sky_head_words}; // words before the cells: bounds of the strands, as in strand_window.wgsl
 //#fill const SKY_CELL_WORDS: u32 = {sky_cell_words}; // words of a cell: its content, then its transmittances
 
-const HEAD_FLAG: u32 = 0x80000000u; // of the content of a cell through which a triangle passes; the rest is area of strands
-const AREA_SCALE: f32 = 16.0; // integer of an area of 1 mm2
+const HEAD_FLAG: u32 = 0x80000000u; // bit of the content of a cell: whether a triangle passes through it; the rest is area of strands
+const AREA_SCALE: f32 = 1024.0; // integer of an area of 1 mm2
 
-// Box around all strands.
+// Box around all coarse strands.
 struct SkyGrid {
     low: vec3f, // [mm]
     cell: vec3f, // size of a cell [mm], 0 without strands

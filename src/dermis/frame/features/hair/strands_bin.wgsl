@@ -26,9 +26,16 @@ fn tiled_segment(a: ProjectedKnot, b: ProjectedKnot) -> TiledSegment {
     return TiledSegment(a.position, across, low, high, reach + 0.5 * (side - 1.0) * (abs(across.x) + abs(across.y)));
 }
 
-// Whether the segment may cover a tile of its bounding box.
-fn covers(segment: TiledSegment, tile: vec2f) -> bool {
-    return abs(dot((tile + 0.5) * f32(STRAND_TILE) - segment.begin, segment.across)) <= segment.far;
+// First and last tile of a row that the segment may cover; the last is before the first if there is none.
+fn covered_tiles(segment: TiledSegment, y: f32) -> vec2f {
+    let side = f32(STRAND_TILE);
+    let slope = side * segment.across.x;
+    let offset = dot(vec2f(0.5 * side, (y + 0.5) * side) - segment.begin, segment.across); // of the first tile of the row
+    if (abs(slope) < 1e-3 * side) {
+        return select(vec2f(1.0, 0.0), vec2f(segment.low.x, segment.high.x), abs(offset) <= segment.far);
+    }
+    let ends = (vec2f(-segment.far, segment.far) - offset) / slope;
+    return vec2f(max(segment.low.x, ceil(min(ends.x, ends.y))), min(segment.high.x, floor(max(ends.x, ends.y))));
 }
 
 @compute @workgroup_size(64)
@@ -47,21 +54,19 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let one = tiled_segment(a, b);
     var count = 0u; // counted first, for a single atomic operation per segment
     for (var y = one.low.y; y <= one.high.y; y += 1.0) {
-        for (var x = one.low.x; x <= one.high.x; x += 1.0) {
-            count += u32(covers(one, vec2f(x, y)));
-        }
+        let tiles = covered_tiles(one, y);
+        count += u32(max(tiles.y - tiles.x + 1.0, 0.0));
     }
     if (count == 0u) {
         return;
     }
     var link = atomicAdd(&list_heads[0], count);
     for (var y = one.low.y; y <= one.high.y; y += 1.0) {
-        for (var x = one.low.x; x <= one.high.x; x += 1.0) {
-            if (link < arrayLength(&links) && covers(one, vec2f(x, y))) {
-                let tile = u32(y) * tiles_across(strand_view.size) + u32(x);
-                links[link] = vec2u(pack_segment(begin, hair), atomicExchange(&list_heads[1u + tile], link + 1u));
-                link += 1u;
-            }
+        let tiles = covered_tiles(one, y);
+        for (var x = tiles.x; x <= tiles.y && link < arrayLength(&links); x += 1.0) {
+            let tile = u32(y) * tiles_across(strand_view.size) + u32(x);
+            links[link] = vec2u(pack_segment(begin, hair), atomicExchange(&list_heads[1u + tile], link + 1u));
+            link += 1u;
         }
     }
 }

@@ -1,4 +1,4 @@
-// Empties the deep opacity maps of all lights, the grid of the sky, and their bounds.
+// Clears the deep opacity maps of all lights, the grid of the sky, and their bounds.
 //#include "shape/geometry.wgsl"
 //#include "surface/surface.wgsl"
 //#include "strand_window.wgsl"

@@ -4,15 +4,14 @@
 //#include "view_map.wgsl"
 
 const HIDING_COVER: f32 = 9.0; // cover by other hair that hides a strand: it transmits exp(-9) of the light
-const MARGIN_MM: f32 = 1.0; // distance behind other strands that is left out of the test
 const TEST_STEP: f32 = 2.0; // largest distance between tested points of a segment [texel]
-const MAX_TESTS: u32 = 16u; // points of a segment that are tested; longer segments are not hidden
+const MAX_TESTS: u32 = 16u; // parts of a segment whose ends are tested; longer segments are not hidden
 
 @group(0) @binding(30) var<storage, read> posed: array<vec4f>;
 @group(0) @binding(31) var<storage, read_write> projected: array<ProjectedKnot>;
 @group(0) @binding(32) var<storage, read> view_map: array<u32>; // see view_map.wgsl
 
-// Cover by hair in front of a depth, in a texel of the map.
+// Cover by the layers of hair that are all in front of a depth, in a texel of the map.
 fn cover_in_view(texel: vec2i, depth: f32) -> f32 {
     let word = view_map_word(clamp(texel, vec2i(0), view_map_size() - 1));
     let nearest = view_map[word];
@@ -22,7 +21,7 @@ fn cover_in_view(texel: vec2i, depth: f32) -> f32 {
     let before = layer_at(depth - f32(nearest) / DEPTH_SCALE);
     var sum = 0.0;
     for (var k = 0u; k < HAIR_LAYERS; k += 1u) {
-        sum += saturate(before - f32(k)) * f32(view_map[word + 1u + k]);
+        sum += select(0.0, f32(view_map[word + 1u + k]), f32(k + 1u) <= before);
     }
     return sum / COVER_SCALE;
 }
@@ -30,9 +29,8 @@ fn cover_in_view(texel: vec2i, depth: f32) -> f32 {
 // Whether other hair hides a point in all texels around it.
 fn is_covered(position: vec2f, depth: f32) -> bool {
     let corner = vec2i(floor(position / VIEW_TEXEL - 0.5));
-    let behind = depth + VIEW_DEPTH_OFFSET - MARGIN_MM;
     for (var k = 0; k < 4; k += 1) {
-        if (cover_in_view(corner + vec2i(k & 1, k >> 1u), behind) < HIDING_COVER) {
+        if (cover_in_view(corner + vec2i(k & 1, k >> 1u), depth) < HIDING_COVER) {
             return false;
         }
     }
@@ -41,7 +39,7 @@ fn is_covered(position: vec2f, depth: f32) -> bool {
 
 fn is_segment_covered(a: ProjectedKnot, b: ProjectedKnot) -> bool {
     let count = u32(ceil(distance(a.position, b.position) / (TEST_STEP * VIEW_TEXEL))) + 1u;
-    if (count > MAX_TESTS || a.width < 0.0 || b.width < 0.0) {
+    if (count > MAX_TESTS || min(a.width, b.width) < 0.0 || max(a.width, b.width) > VIEW_TEXEL) {
         return false;
     }
     for (var k = 0u; k <= count; k += 1u) {

@@ -15,6 +15,7 @@ const BACKSCATTER_DENSITY: f32 = 0.7; // density factor of backscattering by the
 const WIDE_VARIANCE: f32 = 0.3; // longitudinal variance of light that other strands have scattered
 const HEAD_MM: f32 = 85.0; // radius of a head
 const HORIZON_MARGIN: f32 = 0.15; // margin of the test whether the head hides a strand, as a cosine
+const HORIZON_REACH_MM: vec2f = vec2f(8.0, 30.0); // distances from the root between which the horizon of the skin fades
 const PICTURE_MARGIN: f32 = 64.0; // distance outside the picture beyond which knots are not shaded [pixel]
 
 @group(0) @binding(30) var<storage, read> posed: array<vec4f>;
@@ -28,6 +29,7 @@ struct Knot {
     eye: vec3f, // unit
     depth: vec3f, // optical depth of a radius
     height: f32, // above the skin at the root [mm]
+    from_root: f32, // distance [mm]
     below: f32, // cover by hair nearer to the skin
 }
 
@@ -41,7 +43,7 @@ fn knot_at(hair: u32, k: u32) -> Knot {
     let cover = posed[row + 1u].w;
     let along_strand = f32(k) / f32(knots_of(hair) - 1u);
     let eye = normalize(strand_view.eye - here.xyz);
-    return Knot(here.xyz, posed[row].xyz, along, eye, depth, height, cover * along_strand);
+    return Knot(here.xyz, posed[row].xyz, along, eye, depth, height, distance(here.xyz, posed[first].xyz), cover * along_strand);
 }
 
 // Component of a direction across a fibre, as a unit vector.
@@ -83,12 +85,17 @@ fn tinted(passing: f32, absorbed: vec3f) -> vec3f {
 // Mean radiance around a direction: of the sky through other hair, and of the skin. sky: transmittances at the knot; below:
 // radiance of the skin; absorbed: fraction of light that a hair absorbs
 fn environment_around(direction: vec3f, knot: Knot, sky: SkyTransmittance, below: vec3f, absorbed: vec3f) -> vec3f {
+    let up = smoothstep(-SKY_WIDTH, SKY_WIDTH, dot(direction, knot.normal));
     if (!ENVIRONMENT) {
-        return (1.0 - smoothstep(-SKY_WIDTH, SKY_WIDTH, dot(direction, knot.normal))) * below;
+        return (1.0 - up) * below;
     }
-    let from_sky = sky.all.w + dot(sky.all.xyz, direction);
-    let from_skin = sky.hair.w + dot(sky.hair.xyz, direction) - from_sky;
-    return tinted(from_sky, absorbed) * reflection(direction, REFLECTION_ROUGHNESS) + max(from_skin, 0.0) * below;
+    let past_hair = saturate(sky.hair.w + dot(sky.hair.xyz, direction));
+    let past_all = saturate(sky.all.w + dot(sky.all.xyz, direction));
+    // near its root, the skin around a strand hides the sky below the horizon: cells are too coarse for this
+    let horizon = mix(up, 1.0, smoothstep(HORIZON_REACH_MM.x, HORIZON_REACH_MM.y, knot.from_root));
+    let open = horizon * min(past_all / max(past_hair, 1e-4), 1.0);
+    let seen = mix(below, reflection(direction, REFLECTION_ROUGHNESS), open);
+    return tinted(past_hair, absorbed) * seen;
 }
 
 // Fraction of light that the strands behind a strand scatter back. Source: [Zinke2008] equations 14 to 16.
@@ -133,7 +140,7 @@ fn radiance_of(knot: Knot) -> vec3f {
     var sky = SkyTransmittance(vec4f(0.0), vec4f(0.0));
     if (ENVIRONMENT) {
         sky = sky_transmittance_at(sky_grid(), knot.position);
-        let past_hair = clamp(sky.all.w + COSINE_MEAN * dot(sky.all.xyz, knot.normal), 0.0, 1.0);
+        let past_hair = saturate(sky.hair.w + COSINE_MEAN * dot(sky.hair.xyz, knot.normal));
         skin_irradiance += tinted(past_hair, absorbed) * panorama_at(knot.normal, 0u);
     }
     let below = skin_irradiance / PI * mix(strand_view.skin, dense_hair_reflectance(forth + back), dense);

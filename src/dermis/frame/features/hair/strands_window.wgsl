@@ -22,10 +22,11 @@ fn bounded_position(i: u32, p: vec3f) -> vec3f {
 }
 
 fn find_bounds(i: u32, first: u32, lane: u32) {
+    let begin = select(0u, hairs.fine * hairs.fine_knots, i == skin.light_count); // only coarse strands in space
     var low = vec3f(1e30);
     var high = vec3f(-1e30);
     let end = min(first + KNOTS, total_knot_count(hairs.shadow_casters));
-    for (var k = first + lane; k < end; k += LANES) {
+    for (var k = max(first, begin) + lane; k < end; k += LANES) {
         let at = bounded_position(i, posed[row_of_knot(k, hair_of_knot(k))].xyz);
         low = min(low, at);
         high = max(high, at);

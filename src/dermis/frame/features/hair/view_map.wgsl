@@ -2,8 +2,7 @@
 //#include "opacity_layers.wgsl"
 //#include "strand_view.wgsl"
 
-const VIEW_TEXEL: f32 = 4.0; // side of a texel [pixel]
-const VIEW_DEPTH_OFFSET: f32 = 1000.0; // added to depths, which may be negative behind the eye [mm]
+//#fill const VIEW_TEXEL: f32 = {view_texel}.0; // side of a texel [pixel]
 
 fn view_map_size() -> vec2i {
     return vec2i(ceil(strand_view.size / VIEW_TEXEL));

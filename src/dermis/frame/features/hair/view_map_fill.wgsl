@@ -34,7 +34,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     for (var k = 0u; k < count; k += 1u) {
         let t = (f32(k) + 0.5) / f32(count);
         let position = mix(a.position, b.position, t) / VIEW_TEXEL - 0.5;
-        let depth = mix(a.depth, b.depth, t) + VIEW_DEPTH_OFFSET;
+        let depth = mix(a.depth, b.depth, t);
         let corner = vec2i(floor(position));
         let f = position - floor(position);
         add_cover(corner, cover * (1.0 - f.x) * (1.0 - f.y), depth);
