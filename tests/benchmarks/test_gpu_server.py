@@ -100,7 +100,7 @@ def test_a_hanging_program_ends_with_its_child_processes(
         raise subprocess.TimeoutExpired(program.args, timeout)
 
     monkeypatch.setattr(subprocess.Popen, "wait", wait)
-    monkeypatch.setattr(gpu_server, "note", lambda line: heard.set())
+    monkeypatch.setattr(gpu_server, "print_note", lambda line: heard.set())
     words = ["/bin/sh", "-c", f"sleep 600 & echo $! > {other}; echo still at it >&2; wait"]
     with pytest.raises(DermisError, match=r"-c sleep .*within 5 s.*Last words: still at it"):
         gpu_server.run_time_s(words, 5.0)
