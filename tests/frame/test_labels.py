@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from observed import EDGE, SIDES, SIZE, around, from_edge, labelled, marks
 
+from dermis.frame.features.hair import resources as hair_resources
 from dermis.frame.observation import Observation
 from dermis.frame.renderer import Renderer
 from dermis.human.labels.classes import class_number, label_classes
@@ -86,3 +87,20 @@ def test_hair_is_labelled_where_it_covers_most(renderer: Renderer) -> None:
     bald = small.model_copy(update={"strands": False})
     without = renderer.draw(scene, bald, outputs=("label",)).output("label")
     assert not np.isin(without, [class_number(name) for name in ("hair", "beard", "lashes")]).any()
+
+
+def test_tiles_of_any_size_label_the_same(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Large tiles, as in large pictures, give the same labels."""
+    head, shown = Human.sampled(1).head(subdivide=0), []
+    small = Settings(size=(75, 93), atlas=128, shadow_size=64, samples=4)  # no whole tiles
+    names = "label", "label_face_synthetics"
+    for side in (2, 8):
+        monkeypatch.setattr(hair_resources, "_tile_side", lambda size, side=side: side)
+        renderer.clear_cache()
+        drawn = renderer.draw(Scene(head, camera=around(head)), small, outputs=names)
+        shown.append([drawn.output(name) for name in names])
+    renderer.clear_cache()
+    np.testing.assert_array_equal(shown[1], shown[0])
+    assert (
+        np.isin(shown[0][0], [class_number(name) for name in ("hair", "right_brow", "left_brow")]).sum() > 300
+    )

@@ -13,6 +13,7 @@ from strand_setups import hairy, shuffled
 from tolerances import FURNACE, LOBE_TWIN, TWIN
 
 from dermis.base.errors import DermisError
+from dermis.frame.features.hair import resources as hair_resources
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from_array
@@ -229,3 +230,18 @@ def test_hairs_of_another_mesh_are_refused(renderer: Renderer) -> None:
 
 def test_strands_can_be_switched_off() -> None:
     assert Settings().strands and not Settings(strands=False).strands
+
+
+@pytest.mark.parametrize("size", [(96, 96), (75, 61)])
+def test_tiles_of_any_size_draw_the_same(
+    renderer: Renderer, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Large tiles, as in large pictures, give the same picture."""
+    scene, shown = lit(tangle(700, absorption=0.4)), []
+    for side in (2, 8):
+        monkeypatch.setattr(hair_resources, "_tile_side", lambda size, side=side: side)
+        renderer.clear_cache()
+        shown.append(picture(renderer, scene, size=size))
+    renderer.clear_cache()
+    np.testing.assert_allclose(shown[1], shown[0], rtol=1e-5, atol=1e-6)
+    assert shown[0][..., :3].std() > 0.02

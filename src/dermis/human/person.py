@@ -324,7 +324,7 @@ class Human:
         Look of the hair; by default typical for the person.
     skin_ancestry : str
         Name of a group of measured people, such as "south asian". The person gets the skin, eye and hair
-        colours of this group, whatever the shape; "" for the colours of the shape's ancestries.
+        colours of this group, independently of the shape; "" for the colours of the shape's ancestries.
     ita : float, optional
         Individual typology angle of the cheek, -65 (darkest) to 70 (lightest) [degrees]; the pigments are
         typical of measured people whose skin has this angle. Ignored if `skin` is given.

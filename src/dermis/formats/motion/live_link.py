@@ -165,7 +165,7 @@ def _check_header(error_subject: str, header: Sequence[str]) -> None:
             error_subject,
             "columns of blend shapes",
             "there are none",
-            "Export it from Live Link Face as it is",
+            "Export it from Live Link Face without changes",
         )
 
 

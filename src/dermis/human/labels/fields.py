@@ -233,7 +233,7 @@ def _skin_fields(head: Head) -> dict[str, Doubles]:
     """Return the signed distances (p,) of the head's points to the borders of parts of the skin [mm].
 
     The keys are the label classes of these parts, such as lips, brows and ears. Distances are positive inside
-    a part. All points that are not on the skin get the value -1, whatever their distance, so that they count
+    a part. All points that are not on the skin get the value -1 at any distance, so that they count
     as outside.
     """
     mesh = head.mesh

@@ -11,6 +11,7 @@ import numpy as np
 from dermis.frame.features.hair.resources import (
     KNOTS_PER_BOUNDS_WORKGROUP,
     SKY_CELLS,
+    SKY_CELLS_PER_WORKGROUP,
     VIEW_TEXEL_PIXELS,
     Resources,
     StrandCounts,
@@ -44,7 +45,6 @@ _CROWDED_TILE_SEGMENT_RATIO = (
     14.0  # ratio of the number of segments in a crowded tile to the mean of all tiles
 )
 _CLEARING_WORKGROUP_COUNT = 256
-_SKY_CELLS_PER_WORKGROUP = 2
 _SHADOW_RAY_STRIDE = 4  # one of four rays to an area light is traced: pictures change by 0.0002 at most
 
 
@@ -147,7 +147,7 @@ def _draw_sky_transmittance(
     triangles = (("TRIANGLES", head.triangles),)
     _dispatch_hair(graph, "hair/sky_head.wgsl", bindings, head.triangles, triangles)
     march = program(graph.device, "hair/sky_transmittance.wgsl")
-    rows = -(-sky_cell_count() // (SKY_CELLS[0] * _SKY_CELLS_PER_WORKGROUP))
+    rows = -(-sky_cell_count() // (SKY_CELLS[0] * SKY_CELLS_PER_WORKGROUP))
     graph.dispatch("strands", march, bindings, (SKY_CELLS[0], rows, 1))
 
 

@@ -30,6 +30,8 @@ DEEP_OPACITY_HEADER_WORDS = 8
 """Number of words that precede the texels of each light's deep opacity map."""
 SKY_CELLS = 24, 32, 24
 """Number of cells of the grid of sky transmittance, along x, y and z, see strand_sky.wgsl."""
+SKY_CELLS_PER_WORKGROUP = 2
+"""Number of cells of the grid for which one workgroup computes the transmittance."""
 _SKY_HEADER_WORDS, _SKY_CELL_WORDS = 6, 5
 VIEW_TEXEL_PIXELS = 4
 """Side of a texel of the deep opacity map of the picture, see view_map.wgsl [pixel]."""
@@ -100,13 +102,13 @@ class StrandCounts(NamedTuple):
     hairs: int
     knots: int
 
-    def total_knot_count(self, strand_count: int | None = None) -> int:
-        """Return the total number of knots of the first `strand_count` strands, or of all strands."""
-        return (self.hairs if strand_count is None else strand_count) * self.knots
+    def total_knot_count(self) -> int:
+        """Return the total number of knots of all strands."""
+        return self.hairs * self.knots
 
-    def total_segment_count(self, strand_count: int | None = None) -> int:
-        """Return the total number of segments of the first `strand_count` strands, or of all strands."""
-        return (self.hairs if strand_count is None else strand_count) * (self.knots - 1)
+    def total_segment_count(self) -> int:
+        """Return the total number of segments of all strands."""
+        return self.hairs * (self.knots - 1)
 
 
 class StrandCapacity(NamedTuple):
@@ -360,7 +362,11 @@ def shader_constants() -> dict[str, float]:
         "strand_window_knots": KNOTS_PER_BOUNDS_WORKGROUP,
     }
     sky: dict[str, float] = {f"sky_cells_{axis}": n for axis, n in zip("xyz", SKY_CELLS, strict=True)}
-    sky |= {"sky_head_words": _SKY_HEADER_WORDS, "sky_cell_words": _SKY_CELL_WORDS}
+    sky |= {
+        "sky_cells_per_workgroup": SKY_CELLS_PER_WORKGROUP,
+        "sky_head_words": _SKY_HEADER_WORDS,
+        "sky_cell_words": _SKY_CELL_WORDS,
+    }
     guides = {"anchors_per_guide_knot": ANCHORS_PER_GUIDE_KNOT, "knots_per_guide": KNOTS_PER_GUIDE}
     return {**opacity, **words, "view_texel": VIEW_TEXEL_PIXELS, **sky, **guides, **hair_constants()}
 

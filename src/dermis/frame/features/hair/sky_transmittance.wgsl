@@ -3,7 +3,7 @@
 //#include "sky_grid.wgsl"
 
 const DIRECTIONS: u32 = 32u;
-const CELLS: u32 = 2u; // of a workgroup
+//#fill const CELLS: u32 = {sky_cells_per_workgroup}; // of a workgroup
 const RANDOM_CYLINDER: f32 = 0.7854; // mean extinction of a cylinder in all orientations, relative to its length times width
 
 var<workgroup> of_hair: array<array<vec4f, DIRECTIONS>, CELLS>;
@@ -18,24 +18,24 @@ fn direction_at(k: u32) -> vec3f {
 
 // Transmittance past hair alone, and past hair and head.
 fn march(grid: SkyGrid, cell: vec3u, direction: vec3f) -> vec2f {
-    let step = min(grid.cell.x, min(grid.cell.y, grid.cell.z));
+    let step_mm = min(grid.cell.x, min(grid.cell.y, grid.cell.z));
     let absorption = RANDOM_CYLINDER * hairs.absorptance / (AREA_SCALE * grid.cell.x * grid.cell.y * grid.cell.z);
-    let forward = step * direction / grid.cell;
+    let forward = step_mm * direction / grid.cell;
     var at = vec3f(cell) + 0.5;
     var depth = 0.0;
     var open = 1.0;
-    var length = 0.5; // of the first step, from the middle of the cell
+    var part = 0.5; // of the first step, from the middle of the cell
     var k = 0u;
     loop {
         if (!in_grid(at)) {
             break;
         }
         let content = atomicLoad(&opacity[content_word(sky_cell_index(vec3u(at)))]);
-        depth += length * step * absorption * f32(content & ~HEAD_FLAG);
+        depth += part * step_mm * absorption * f32(content & ~HEAD_FLAG);
         if (k > 1u && (content & HEAD_FLAG) != 0u) {
             open = 0.0;
         }
-        length = 1.0;
+        part = 1.0;
         at += forward;
         k++;
     }
@@ -56,21 +56,21 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     }
     of_hair[id.y][id.x] = passing.x * vec4f(3.0 * direction, 1.0);
     of_all[id.y][id.x] = passing.y * vec4f(3.0 * direction, 1.0);
-    for (var step = DIRECTIONS / 2u; step > 0u; step /= 2u) {
+    for (var offset = DIRECTIONS / 2u; offset > 0u; offset /= 2u) {
         workgroupBarrier();
-        if (id.x < step) {
-            of_hair[id.y][id.x] += of_hair[id.y][id.x + step];
-            of_all[id.y][id.x] += of_all[id.y][id.x + step];
+        if (id.x < offset) {
+            of_hair[id.y][id.x] += of_hair[id.y][id.x + offset];
+            of_all[id.y][id.x] += of_all[id.y][id.x + offset];
         }
     }
     workgroupBarrier();
     if (inside && id.x == 0u) {
         let word = transmittance_word(index);
         let hair = of_hair[id.y][0] / f32(DIRECTIONS);
-        let all = of_all[id.y][0] / f32(DIRECTIONS);
+        let head_and_hair = of_all[id.y][0] / f32(DIRECTIONS);
         atomicStore(&opacity[word], pack2x16float(hair.xy));
         atomicStore(&opacity[word + 1u], pack2x16float(hair.zw));
-        atomicStore(&opacity[word + 2u], pack2x16float(all.xy));
-        atomicStore(&opacity[word + 3u], pack2x16float(all.zw));
+        atomicStore(&opacity[word + 2u], pack2x16float(head_and_hair.xy));
+        atomicStore(&opacity[word + 3u], pack2x16float(head_and_hair.zw));
     }
 }
