@@ -175,6 +175,22 @@ def test_an_environment_adds_to_lights(renderer: Renderer, close: float) -> None
     assert lit["panorama"].size[:2] == lit["occlusion_map"].size[:2] == (1, 1)
 
 
+def test_alternating_environments_are_filtered_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Data sets alternate between scenes with and without an environment."""
+    filtered: list[str] = []
+
+    def counted(name: str) -> Any:
+        filtered.append(name)
+        return prefilter(name)
+
+    monkeypatch.setattr("dermis.frame.lights.environment.prefilter", counted)
+    head, renderer = head_of(plane(100.0)), Renderer("cpu")
+    for _ in range(3):
+        for scene in (around(head, Environment(name="uniform")), scene_of(head, frontal())):
+            run_frame(renderer, scene, occlusion="none")
+    assert filtered == ["uniform"]
+
+
 @pytest.mark.parametrize("model", ["kelemen", "phong"])
 def test_reflections_follow_the_model_in_use(renderer: Renderer, model: str) -> None:
     scene = around(WHITE, Environment(name="uniform"), specular=model)

@@ -46,6 +46,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
 
+_KEPT_ENVIRONMENTS = 4  # environments whose maps, of about 8 MB each, are kept for the next frames
 _OUTLINE_MARGIN_MM = 10.0  # margin around the outline of a posed rig, because that outline is approximate
 Lights = tuple[Light, ...]
 RequestedNames = tuple[str, ...]
@@ -115,8 +116,8 @@ class Preparation:
             scene.environment,
         )
         (profile, *others), blend_weights = self._profiles(scene.skin, technique)
-        name, owner = (environment.name, "") if environment else (None, "none")
-        environment_map = cached(load_environment_map, device, name, caller_name=owner)
+        name = environment.name if environment else None
+        environment_map = cached(load_environment_map, device, name, min_cache_size=_KEPT_ENVIRONMENTS)
         scene = add_suns(self.memo, scene, environment_map)
         state = self._head_state(head, scene.pose_arrays)
         light_inputs = head, tuple(scene.lights), state.outline, settings.shadow_size

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib import resources
+from statistics import NormalDist
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
@@ -191,9 +192,8 @@ class MeasuredTable(NamedTuple):
         sex, age : (n,) sex and age of each person, or one number for all
         normal_scores : (n, 4) standard normal scores of the variables of each person, correlated as measured
         """
-        from scipy.special import ndtri
-
-        nodes, quantiles = ndtri(self.probabilities), self.group_mean("quantiles", weight_of_group)
+        nodes = standard_normal_quantiles(self.probabilities)
+        quantiles = self.group_mean("quantiles", weight_of_group)
         values = np.column_stack([np.interp(normal_scores[:, k], nodes, quantiles[k]) for k in range(4)])
         sexes, terms = np.asarray(sex, np.float64) - 0.5, age_term(age) - self.mean_age_term
         return np.asarray(values + sexes[..., None] * self.sex + terms[..., None] * self.age)
@@ -451,12 +451,16 @@ def _ita_scores(ita: Doubles, quantiles: Doubles) -> Doubles:
     ita : (n,) individual typology angles (ITA) [degrees]
     quantiles : (k,) quantiles of the ITA at `MeasuredTable.probabilities` [degrees]
     """
-    from scipy.special import ndtri
-
-    nodes = ndtri(measured_table().probabilities)
+    nodes = standard_normal_quantiles(measured_table().probabilities)
     slope = (nodes[-1] - nodes[0]) / (quantiles[-1] - quantiles[0])
     beyond = ita - np.clip(ita, quantiles[0], quantiles[-1])
     return np.asarray(np.interp(ita, quantiles, nodes) + slope * beyond)
+
+
+def standard_normal_quantiles(probabilities: Doubles) -> Doubles:
+    """Return quantiles (k,) of the standard normal distribution for probabilities (k,) between 0 and 1."""
+    quantile = NormalDist().inv_cdf  # scipy.special takes half a second to import
+    return np.array([quantile(float(one)) for one in probabilities])
 
 
 def symmetric_square_root(covariance: Doubles) -> Doubles:
