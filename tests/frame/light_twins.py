@@ -120,7 +120,9 @@ def part_of(light: Any, points: Floats, part: int) -> tuple[Floats, Floats]:
 
 
 def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) -> Floats:
-    """Return the (n,) visible fraction of a light above the horizon, by rays through its depth map (s, s).
+    """Return the (n,) fraction of a light's irradiance that arrives, by rays through its depth map (s, s).
+
+    Rays are weighted by the cosine of incidence.
 
     light : the shader's record, points and normals : (n, 3)
     """
@@ -139,7 +141,7 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
             return np.asarray((1 - way) * depth + way * near)
         return np.asarray(1 / ((1 - way) / depth + way / near))
 
-    risen, hidden = [], []
+    heights, hidden = [], []
     for index in range(int(light["rays"])):
         even = (0.5 + index * np.array([0.7548776662, 0.5698402910])) % 1
         turn = 2 * np.pi * even[1]
@@ -148,7 +150,7 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
         lateral = spot * light["extent"].astype(float)
         straight = np.column_stack([lateral - p[:, :2], -depth])
         towards = np.array([*lateral, -1.0]) if parallel else straight
-        risen.append(dot(n, np.broadcast_to(towards, n.shape)) > 0)
+        heights.append(dot(n, np.broadcast_to(towards, n.shape)))
         blocked = np.zeros(len(points), bool)
         for k in range(8):
             d = on_line(k + 0.5)
@@ -164,15 +166,13 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
             behind = d - found
             blocked |= (held > 0) & (behind > 0) & (behind < thick) & (dot(n, blocker) - height > slack)
         hidden.append(blocked)
-    above, blocked = np.array(risen), np.array(hidden)
+    height_above, blocked = np.array(heights), np.array(hidden)
+    above = height_above > 0
     first = above & (np.cumsum(above, axis=0) <= max(len(above) // 4, 8))
-    few, all_ = (_share(blocked, some) for some in (first, above))
-    return np.where(above.any(axis=0), 1 - np.where((few == 0) | (few == 1), few, all_), 0.0)
-
-
-def _share(blocked: Any, among: Any) -> Floats:
-    """Return the fraction of blocked rays, by point."""
-    return np.asarray((blocked & among).sum(axis=0) / np.maximum(among.sum(axis=0), 1))
+    few = (blocked & first).sum(axis=0) / np.maximum(first.sum(axis=0), 1)
+    weight = np.where(above, height_above, 0.0)
+    share = (blocked * weight).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-12)
+    return np.where(above.any(axis=0), 1 - np.where((few == 0) | (few == 1), few, share), 0.0)
 
 
 def halved(picture: Floats) -> Floats:
