@@ -136,23 +136,22 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
     least = np.maximum(float(light["softness"]) / (1.0 if parallel else depth), 1.5 * texel)
 
     def on_line(step: float) -> Floats:
-        way = min(1.0, (step / 8) ** 2)
+        way = min(1.0, (step / 12) ** 2)
         if parallel:
             return np.asarray((1 - way) * depth + way * near)
         return np.asarray(1 / ((1 - way) / depth + way / near))
 
     heights, hidden = [], []
     for index in range(int(light["rays"])):
-        even = (0.5 + index * np.array([0.7548776662, 0.5698402910])) % 1
+        even = (0.5 + (2016 + index // 2) * np.array([0.7548776662, 0.5698402910])) % 1
         turn = 2 * np.pi * even[1]
         disc = np.sqrt(even[0]) * np.array([np.cos(turn), np.sin(turn)])
-        spot = 2 * even - 1 if not light["round"] else disc
+        spot = (-1) ** index * (2 * even - 1 if not light["round"] else disc)
         lateral = spot * light["extent"].astype(float)
-        straight = np.column_stack([lateral - p[:, :2], -depth])
-        towards = np.array([*lateral, -1.0]) if parallel else straight
+        towards = np.array([*lateral, -1.0]) if parallel else np.column_stack([lateral - p[:, :2], -depth])
         heights.append(dot(n, np.broadcast_to(towards, n.shape)))
         blocked = np.zeros(len(points), bool)
-        for k in range(8):
+        for k in range(12):
             d = on_line(k + 0.5)
             lean = depth - d if parallel else 1 / d - 1 / depth
             line = place + lateral * lean[:, None] + spot * np.broadcast_to(least, depth.shape)[:, None]
@@ -170,8 +169,9 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
     above = height_above > 0
     first = above & (np.cumsum(above, axis=0) <= max(len(above) // 4, 8))
     few = (blocked & first).sum(axis=0) / np.maximum(first.sum(axis=0), 1)
-    weight = np.where(above, height_above, 0.0)
-    share = (blocked * weight).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-12)
+    share = (blocked * above * height_above).sum(axis=0) / np.maximum(
+        (above * height_above).sum(axis=0), 1e-12
+    )
     return np.where(above.any(axis=0), 1 - np.where((few == 0) | (few == 1), few, share), 0.0)
 
 

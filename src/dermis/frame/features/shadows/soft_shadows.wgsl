@@ -1,6 +1,6 @@
 // Visibility of an area light from a point, by shadow rays that march through the light's shadow map.
 
-const STEPS: u32 = 8u; // steps of a shadow ray
+const STEPS: u32 = 12u; // steps of a shadow ray
 const NEAR_STEPS: u32 = 2u; // first steps, near the point's own surface
 const MIN_THICKNESS: f32 = 4.0; // least thickness of occluders [mm]
 const CROSSING_STEPS: f32 = 1.5; // number of steps that a ray may be behind a surface that it crosses
