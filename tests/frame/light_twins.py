@@ -120,7 +120,9 @@ def part_of(light: Any, points: Floats, part: int) -> tuple[Floats, Floats]:
 
 
 def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) -> Floats:
-    """Return the (n,) visible fraction of a light above the horizon, by rays through its depth map (s, s).
+    """Return the (n,) fraction of a light's irradiance that arrives, by rays through its depth map (s, s).
+
+    Rays are weighted by the cosine of incidence.
 
     light : the shader's record, points and normals : (n, 3)
     """
@@ -134,23 +136,22 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
     least = np.maximum(float(light["softness"]) / (1.0 if parallel else depth), 1.5 * texel)
 
     def on_line(step: float) -> Floats:
-        way = min(1.0, (step / 8) ** 2)
+        way = min(1.0, (step / 12) ** 2)
         if parallel:
             return np.asarray((1 - way) * depth + way * near)
         return np.asarray(1 / ((1 - way) / depth + way / near))
 
-    risen, hidden = [], []
+    heights, hidden = [], []
     for index in range(int(light["rays"])):
-        even = (0.5 + index * np.array([0.7548776662, 0.5698402910])) % 1
+        even = (0.5 + (2016 + index // 2) * np.array([0.7548776662, 0.5698402910])) % 1
         turn = 2 * np.pi * even[1]
         disc = np.sqrt(even[0]) * np.array([np.cos(turn), np.sin(turn)])
-        spot = 2 * even - 1 if not light["round"] else disc
+        spot = (-1) ** index * (2 * even - 1 if not light["round"] else disc)
         lateral = spot * light["extent"].astype(float)
-        straight = np.column_stack([lateral - p[:, :2], -depth])
-        towards = np.array([*lateral, -1.0]) if parallel else straight
-        risen.append(dot(n, np.broadcast_to(towards, n.shape)) > 0)
+        towards = np.array([*lateral, -1.0]) if parallel else np.column_stack([lateral - p[:, :2], -depth])
+        heights.append(dot(n, np.broadcast_to(towards, n.shape)))
         blocked = np.zeros(len(points), bool)
-        for k in range(8):
+        for k in range(12):
             d = on_line(k + 0.5)
             lean = depth - d if parallel else 1 / d - 1 / depth
             line = place + lateral * lean[:, None] + spot * np.broadcast_to(least, depth.shape)[:, None]
@@ -164,15 +165,14 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
             behind = d - found
             blocked |= (held > 0) & (behind > 0) & (behind < thick) & (dot(n, blocker) - height > slack)
         hidden.append(blocked)
-    above, blocked = np.array(risen), np.array(hidden)
+    height_above, blocked = np.array(heights), np.array(hidden)
+    above = height_above > 0
     first = above & (np.cumsum(above, axis=0) <= max(len(above) // 4, 8))
-    few, all_ = (_share(blocked, some) for some in (first, above))
-    return np.where(above.any(axis=0), 1 - np.where((few == 0) | (few == 1), few, all_), 0.0)
-
-
-def _share(blocked: Any, among: Any) -> Floats:
-    """Return the fraction of blocked rays, by point."""
-    return np.asarray((blocked & among).sum(axis=0) / np.maximum(among.sum(axis=0), 1))
+    few = (blocked & first).sum(axis=0) / np.maximum(first.sum(axis=0), 1)
+    share = (blocked * above * height_above).sum(axis=0) / np.maximum(
+        (above * height_above).sum(axis=0), 1e-12
+    )
+    return np.where(above.any(axis=0), 1 - np.where((few == 0) | (few == 1), few, share), 0.0)
 
 
 def halved(picture: Floats) -> Floats:

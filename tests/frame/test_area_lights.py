@@ -7,7 +7,7 @@ from typing import Any
 import light_twins
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from setups import entered_light, head_of, joined, place, probe, run_frame, scene_of, settings_of
 from tolerances import AREA_LIGHT, LIT, TWIN
 from twins import surface
@@ -16,7 +16,7 @@ from dermis.atlas.build import cached_atlas
 from dermis.base.errors import DermisError
 from dermis.frame.features.irradiance.irradiance import LIGHT_FILTER_SIGMA_TEXELS
 from dermis.frame.features.shading.shade import shade_program
-from dermis.frame.lights.records import light_records, light_shadow_views
+from dermis.frame.lights.records import light_records, light_sample_points, light_shadow_views
 from dermis.frame.lights.rectangle import KIND, facing_irradiance
 from dermis.frame.programs import device_constants, pixel_column_constants
 from dermis.frame.renderer import Renderer
@@ -157,14 +157,16 @@ def test_stripe_has_the_given_width(renderer: Renderer, close: float) -> None:
     assert np.abs(made[..., 0] - exact)[inside].max() < close * 2
 
 
-def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) -> tuple[Floats, Floats]:
+def visibility(
+    renderer: Renderer, head: Any, light: Light, size: int = 1024, normal: ArrayLike = (0, 0, 1)
+) -> tuple[Floats, Floats]:
     """Return positions along the middle of the floor on x, and the visibility of the light at each."""
     scene = scene_of(head, light)
     views = light_shadow_views(scene, scene.head.mesh.outline, size)
     inputs = run_frame(renderer, scene, shadow_size=size)
     x = np.linspace(-55, 55, 4 * SIZE * SIZE // 4).astype(np.float32).reshape(SIZE, SIZE)
     points = np.dstack([x, np.zeros_like(x), np.zeros_like(x), np.ones_like(x)])
-    normals = np.broadcast_to(np.float32([0, 0, 1, 0]), points.shape)
+    normals = np.broadcast_to(np.float32([*np.asarray(normal), 0]), points.shape)
     textures = {
         "points": texture_from_array(renderer.device, points, "rgba32float"),
         "normals": texture_from_array(renderer.device, normals, "rgba32float"),
@@ -258,6 +260,30 @@ def test_shadows_sharpen_towards_their_caster(renderer: Renderer) -> None:
         right = x > -15
         widths.append(np.ptp(x[right][(seen[right] > 0.1) & (seen[right] < 0.9)]))
     assert widths[1] > 4 * widths[0]
+
+
+def test_shadow_on_an_oblique_surface_is_weighted_by_the_cosine(renderer: Renderer) -> None:
+    """The edges of a plate hide the steep half of a light at one point, and its grazing half at another."""
+    light = RectangleLight(**above(PLATE, 300.0, width_mm=100, height_mm=20, softness_mm=0.1))
+    normal = light_twins.unit(np.array([0.94, 0.0, 0.34]))
+    x, seen = visibility(renderer, PLATE, light, normal=normal)
+    u = np.linspace(-50, 50, 2001)[None, :]
+    cosine = np.maximum((u - x[:, None]) * normal[0] + 300 * normal[2], 0.0)
+    crossing = x[:, None] + (u - x[:, None]) * 12 / 300
+    open_ = ~((crossing > -30) & (crossing < 0))
+    exact = (cosine * open_).sum(axis=1) / cosine.sum(axis=1)
+    fading = (exact > 0.2) & (exact < 0.8) & (x < -10)
+    assert np.abs(open_.mean(axis=1) - exact)[fading].mean() > 0.06  # without weights
+    assert np.abs(seen - exact)[fading].mean() < 0.04, np.abs(seen - exact)[fading].mean()
+
+
+@pytest.mark.parametrize("count", [12, 16, 32, 64])
+def test_sample_points_are_balanced(count: int) -> None:
+    """The first n points have the mean of a square and of a disc, and nearly their variances."""
+    points = light_sample_points()[:count]
+    assert np.abs(points.mean(axis=0)).max() < 1e-12
+    assert np.abs((points[:, 2:] ** 2).mean(axis=0) - 1 / 3).max() < 0.04
+    assert count == 12 or np.abs((points[:, :2] ** 2).mean(axis=0) - 1 / 4).max() < 0.04
 
 
 def test_wide_rectangle_is_divided_into_shadow_maps(renderer: Renderer) -> None:

@@ -69,8 +69,8 @@ def seen_from_front(renderer: Renderer, head: Head, parts: str) -> Floats:
     middle = np.array([28.4, 0.0, 14.0]) - head.centre_mm
     near = tuple(float(c) for c in middle)
     camera = Camera(position=(near[0], near[1], near[2] + 400), target=near, frame_mm=12.8)
-    lamp = DirectionalLight(direction=(0, -0.5, -1), irradiance=(3, 3, 3), shadows=False)
-    settings = settings_of(size=(512, 256), atlas=64, samples=4, parts=parts)
+    lamp = DirectionalLight(direction=(0, -0.5, -1), irradiance=(3, 3, 3))
+    settings = settings_of(size=(512, 256), atlas=64, samples=4, parts=parts, shadow_size=2048)
     dark = replace(head, maps=Maps(colour=np.zeros((4, 4, 3), np.float32)))
     return np.asarray(renderer.draw(Scene(dark, lights=(lamp,), camera=camera), settings).linear()[..., 1])
 

@@ -22,7 +22,7 @@ from dermis.frame.features.occlusion.moving import (
     make_vertex_sky_visibility,
 )
 from dermis.frame.features.shading.shade import shade_program
-from dermis.frame.features.shading.view import view_record
+from dermis.frame.features.shading.view import mean_skin_albedo, view_record
 from dermis.frame.features.shadows.shadows import ShadowMaps, make_shadow_maps
 from dermis.frame.features.shape.curvature import placeholder_curvature
 from dermis.frame.features.shape.mesh import HeadGeometry, rest_geometry, upload_geometry
@@ -94,7 +94,7 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
         else None,
         hair=strands,
         visibility=cached(_visibility_layers, device, settings.size, settings.samples),
-        view=_shade_record(device, request, technique, resources),
+        view=_shade_record(memo, device, request, technique, resources),
         constants=surface_constants(request.skin) + _shade_constants(request) + technique.shade_constants,
         post=post.make_resources(memo, device, request),
         outputs=outputs.make_resources(memo, device, request, shapes.tables, thin),
@@ -117,7 +117,11 @@ def _shade_constants(request: FrameRequest) -> Constants:
 
 
 def _shade_record(
-    device: Device, request: FrameRequest, technique: Technique, resources: TechniqueResources | None
+    memo: Memo,
+    device: Device,
+    request: FrameRequest,
+    technique: Technique,
+    resources: TechniqueResources | None,
 ) -> UniformRecord:
     """Return the uniform record of the shading pass, without the members that the camera determines.
 
@@ -125,6 +129,7 @@ def _shade_record(
     """
     program = shade_program(device)
     view = view_record(program, request.head, request.settings, request.profile_split)
+    view["skin_albedo"] = memo.get(mean_skin_albedo, request.head)
     technique.write_view_record(view, program, resources)
     return view
 

@@ -36,6 +36,7 @@ _PART_SAMPLES_PER_SIDE = 2  # each of several parts of a light is sampled by 2 x
 _SHADOW_RAY_COUNT = 64  # shadow rays to an area light that is not divided
 _MIN_SHADOW_RAY_COUNT = 12  # least number of shadow rays to a part of a light
 _SUN_SHADOW_RAY_COUNT = 32  # shadow rays to a sun
+_FIRST_SAMPLE_POINT = 2016  # with it, the first 12, 16, 32 and 64 points have nearly the variance of a square
 
 
 def light_shader_constants() -> dict[str, float]:
@@ -154,12 +155,15 @@ def light_records(
 def light_sample_points() -> Floats:
     """Return (64, 4) evenly spread sample points of area lights [Roberts2018].
 
-    A row holds two points: x and y on the unit disc, then x and y on the square from -1 to 1.
+    A row holds two points: x and y on the unit disc, then x and y on the square from -1 to 1. Points come in
+    opposite pairs, so that the mean of the first n points is the centre of the light for every even n.
     """
-    even = (0.5 + np.arange(_SHADOW_RAY_COUNT)[:, None] * [0.7548776662, 0.5698402910]) % 1.0
+    pairs = _FIRST_SAMPLE_POINT + np.arange(_SHADOW_RAY_COUNT // 2)
+    even = (0.5 + pairs[:, None] * [0.7548776662, 0.5698402910]) % 1.0
     phi = 2.0 * np.pi * even[:, 1]
     disc = np.sqrt(even[:, :1]) * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
-    return np.hstack([disc, 2.0 * even - 1.0])
+    half = np.hstack([disc, 2.0 * even - 1.0])
+    return np.stack([half, -half], axis=1).reshape(_SHADOW_RAY_COUNT, 4)
 
 
 def _light_members(

@@ -247,7 +247,7 @@ def _strand_view_record(
     members = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "light_factors")
     record = shader.make_record("StrandView", **{name: shade_record[name] for name in members})
     record["coarse"], record["size"] = coarse_count, strands.picture.result.size[:2]
-    record["skin"] = strands.skin_albedo
+    record["skin"] = shade_record["skin_albedo"]
     return record
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.frame.features.surface.record import DEFAULT_COLOUR
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Buffer, Constants, Device, Memo, Texture, UniformRecord, make_texture
 from dermis.mesh.groom import ANCHORS_PER_GUIDE_KNOT, KNOTS_PER_GUIDE, Groom, Guides, StrandRoots
@@ -345,13 +344,11 @@ class Resources:
     tables : buffers of the strands of the head
     picture : lists of strand segments, and the texture of the picture with hair
     shadows : buffer of the deep opacity maps of all lights
-    skin_albedo : (3,) mean albedo of the skin, which reflects light onto the strands [-]
     """
 
     tables: StrandTables
     picture: StrandPicture
     shadows: Buffer
-    skin_albedo: tuple[float, ...]
 
 
 def shader_constants() -> dict[str, float]:
@@ -506,12 +503,6 @@ def _knot_rows(strands: Strands) -> NDArray[np.float32]:
     return rows.reshape(-1, 4)
 
 
-def mean_skin_albedo(head: Head) -> tuple[float, ...]:
-    """Return the mean RGB albedo of the colour map, or a default albedo if there is no map [-]."""
-    colour = head.maps.mean_colour
-    return (DEFAULT_COLOUR,) * 3 if colour is None else tuple(colour.tolist())
-
-
 def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
     """Return the resources for the hair of the requested head, None if no strands are drawn.
 
@@ -534,4 +525,4 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resourc
     tables = cached(make_strand_tables, device, head.without_maps, coarse, buffers, groom)
     picture = cached(make_strand_picture, device, capacity, request.settings.size)
     shadows = cached(make_deep_opacity_maps, device, layers, caller_name=f"{layers} {request.view_name}")
-    return Resources(tables, picture, shadows, cached(mean_skin_albedo, head))
+    return Resources(tables, picture, shadows)

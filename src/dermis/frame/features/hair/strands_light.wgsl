@@ -10,6 +10,10 @@ const SURFACE_OFFSET_MM: f32 = 0.4; // offset of shadow rays from the skin
 const HORIZON_WIDTH: f32 = 0.2; // half-width of the soft horizon of the skin, as a cosine
 const HORIZON_DROP: f32 = 0.3; // amount by which the horizon sinks per millimetre of height above the skin, as a cosine
 const REFLECTION_ROUGHNESS: f32 = 0.7; // roughness of the reflection of the environment by strands
+// Fractions of the lobes R, TT and TRT by azimuth: in the quadrant of the eye, beside it on both sides, and opposite to it.
+const REFLECTED_AROUND: vec3f = vec3f(0.235, 0.48, 0.285);
+const TRANSMITTED_AROUND: vec3f = vec3f(0.0, 0.275, 0.725);
+const INTERNAL_AROUND: vec3f = vec3f(0.865, 0.135, 0.0);
 const SKY_WIDTH: f32 = 0.5; // half-width of the transition from skin to sky at the horizon, as a cosine
 const BACKSCATTER_DENSITY: f32 = 0.7; // density factor of backscattering by the strands behind, as published
 const WIDE_VARIANCE: f32 = 0.3; // longitudinal variance of light that other strands have scattered
@@ -144,11 +148,17 @@ fn radiance_of(knot: Knot) -> vec3f {
         skin_irradiance += tinted(past_hair, absorbed) * panorama_at(knot.normal, 0u);
     }
     let below = skin_irradiance / PI * mix(strand_view.skin, dense_hair_reflectance(forth + back), dense);
-    let cone = sqrt(max(1.0 - sin_o * sin_o, 0.0)) * side;
-    let behind = environment_around(cone - sin_o * knot.along, knot, sky, below, absorbed);
-    let ahead = environment_around(-cone - sin_o * knot.along, knot, sky, below, absorbed);
-    total += (albedo.reflected + albedo.internal) * behind + albedo.transmitted * ahead;
-    return total + albedo.residual * 0.5 * (behind + ahead);
+    let cone = sqrt(max(1.0 - sin_o * sin_o, 0.0));
+    let other = cross(knot.along, side);
+    let behind = environment_around(cone * side - sin_o * knot.along, knot, sky, below, absorbed);
+    let ahead = environment_around(-cone * side - sin_o * knot.along, knot, sky, below, absorbed);
+    let left = environment_around(cone * other - sin_o * knot.along, knot, sky, below, absorbed);
+    let right = environment_around(-cone * other - sin_o * knot.along, knot, sky, below, absorbed);
+    let beside = 0.5 * (left + right);
+    total += albedo.reflected * (REFLECTED_AROUND.x * behind + REFLECTED_AROUND.y * beside + REFLECTED_AROUND.z * ahead);
+    total += albedo.internal * (INTERNAL_AROUND.x * behind + INTERNAL_AROUND.y * beside);
+    total += albedo.transmitted * (TRANSMITTED_AROUND.y * beside + TRANSMITTED_AROUND.z * ahead);
+    return total + albedo.residual * 0.25 * (behind + ahead + 2.0 * beside);
 }
 
 // Whether the head hides all of a coarse strand: its root lies beyond the horizon by more than its length.

@@ -29,6 +29,7 @@ struct Lit {
 struct Film {
     normal: vec3f,
     scattered: vec3f, // fraction of the light that reaches shadows by scattering around the point
+    ambient: vec3f, // fraction of ambient light that arrives
 }
 
 // Normal clamped to the horizon of the eye: beyond it the lobe is undefined.
@@ -102,7 +103,7 @@ fn ambient_entering(point: Point, surface: Surface, open: f32) -> vec3f {
 
 // open : unoccluded fraction of the sky
 fn illuminate(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
-    return illuminate_film(point, surface, Film(surface.normal, vec3f(0.0)), v, open);
+    return illuminate_film(point, surface, Film(surface.normal, vec3f(0.0), vec3f(1.0)), v, open);
 }
 
 fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f32) -> Lit {
@@ -155,7 +156,7 @@ fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f
         }
     }
     if (ENVIRONMENT || INTERREFLECTION) {
-        var entering = ambient_entering(point, surface, open);
+        var entering = ambient_entering(point, surface, open) * film.ambient;
         if (directional) {
             lit.directional += entering * uniform_directional_excess(facing);
             entering *= skin.uniform_reflectance;

@@ -22,13 +22,12 @@ fn shade_centre(pixel: vec2u, size: vec2u) -> ShadedPixel {
     return ShadedPixel(shading_point, lit, shaded(shading_point, lit));
 }
 
-// Albedo; for eyes without the transmittance of the lids, which counts as part of the irradiance.
 fn albedo_output(shaded_pixel: ShadedPixel) -> vec3f {
-    return select(shade.total, vec3f(1.0), is_opaque(shaded_pixel.shading_point.point)) * shaded_pixel.shading_point.surface.colour / shaded_pixel.shading_point.lids;
+    return select(shade.total, vec3f(1.0), is_opaque(shaded_pixel.shading_point.point)) * shaded_pixel.shading_point.surface.colour;
 }
 
 fn irradiance_output(shaded_pixel: ShadedPixel) -> vec3f {
-    return shaded_pixel.lit.entered * shaded_pixel.shading_point.lids;
+    return shaded_pixel.lit.entered;
 }
 
 // Diffuse light; what is diffused over the picture is added afterwards, by spread.wgsl.

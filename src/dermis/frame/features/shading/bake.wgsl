@@ -24,10 +24,10 @@ fn shading_point_from_above(triangle: u32, weights: vec3f) -> ShadingPoint {
     let part = surface_or_part(point, baking.footprint);
     let surface = part.surface;
     let open = open_sky(point, t, weights);
-    let film = Film(surface.normal, vec3f(0.0));
+    let film = Film(surface.normal, vec3f(0.0), vec3f(1.0));
     let side = f32(textureDimensions(scattered).x);
     let texel = texel_axes(triangle, corner_at(t.x), corner_at(t.y), corner_at(t.z), side);
-    var shading_point = ShadingPoint(point, surface, film, vec3f(1.0), surface.normal, baking.footprint, open, texel, part.metalness, part.emission);
+    var shading_point = ShadingPoint(point, surface, film, surface.normal, baking.footprint, open, texel, part.metalness, part.emission);
     if (EYES) {
         apply_modelled_parts(&shading_point);
     }
@@ -77,7 +77,7 @@ fn main(
     let shaded_point = shaded(shading_point, lit);
     let first = NUMBERS * index;
     let pigments = pigments_at(shading_point.point);
-    store_vec3(first, select(shade.total, vec3f(1.0), is_opaque(shading_point.point)) * surface.colour / shading_point.lids);
+    store_vec3(first, select(shade.total, vec3f(1.0), is_opaque(shading_point.point)) * surface.colour);
     store_vec3(first + 3u, tangent_normal(shading_point.point, surface.normal));
     store_vec3(first + 6u, lit.entered);
     store_vec3(first + 9u, PI * (shaded_point.below * shaded_point.leaving + shaded_point.local));

@@ -4,7 +4,7 @@
 
 // The white and the lids scatter light over some mm, so shadows are evaluated at a point above the surface.
 const SHADOW_OFFSET_MM: f32 = 0.5;
-const SHADOW_SCATTER: vec3f = vec3f(0.32, 0.28, 0.26); // fraction of a light that enters such a shadow through lids and white
+const LIT_LIDS: f32 = 0.5; // fraction of the lids around a shadow on the eye that a light reaches
 // Artistic values: fraction of ambient light that the lids absorb.
 const UPPER_SHADE: vec3f = vec3f(0.58, 0.68, 0.72); // lids reflect red light
 const UPPER_SHADE_MM: f32 = 2.2;
@@ -46,8 +46,9 @@ fn tears_at(smooth_film: vec3f, lids: Lids) -> vec3f {
     return normalize(smooth_film + MENISCUS * meniscus_weight(lids) * lids.from_below);
 }
 
-// p: position in the space of the eye; v: direction to the viewer
-fn eye_at(eye: Eye, p: vec3f, lids: Lids, v: vec3f) -> EyeLit {
+// Ambient light is hidden by the lids; lights have shadows, into which lids reflect light.
+// p: position in the space of the eye; v: direction to the viewer; lid_albedo: of skin
+fn eye_at(eye: Eye, p: vec3f, lids: Lids, v: vec3f, lid_albedo: vec3f) -> EyeLit {
     let rotation = mat3x3f(eye.to_own[0].xyz, eye.to_own[1].xyz, eye.to_own[2].xyz);
     let d = normalize(rotation * -v);
     let clear = clearness(p);
@@ -55,10 +56,10 @@ fn eye_at(eye: Eye, p: vec3f, lids: Lids, v: vec3f) -> EyeLit {
     let cornea = normalize(p - vec3f(0.0, 0.0, CORNEA_AT));
     let on_iris = clamped_to_iris(refracted_to_iris(p, d));
     let film = tears_at(normalize(mix(ball, cornea, clear)), lids);
-    // the white scatters light around its curvature
-    let below = normalize(mix(ball + vec3f(0.0, 0.0, FORWARD), iris_normal(on_iris), clear));
-    let colour = mix(white_colour(eye, p), IRIS_FACTOR * iris_colour(eye, on_iris), clear) * lid_transmittance(lids);
+    let below = normalize(mix(ball, iris_normal(on_iris), clear));
+    let colour = mix(white_colour(eye, p), IRIS_FACTOR * iris_colour(eye, on_iris), clear);
+    let open = lid_transmittance(lids);
     let back = transpose(rotation); // rotation and uniform scale, so that it transforms normals
     let film_roughness = mix(TEARS, MENISCUS_ROUGHNESS, meniscus_weight(lids));
-    return EyeLit(Surface(normalize(back * below), colour, film_roughness, 1.0), Film(normalize(back * film), SHADOW_SCATTER));
+    return EyeLit(Surface(normalize(back * below), colour, film_roughness, 1.0), Film(normalize(back * film), LIT_LIDS * (1.0 - open) * lid_albedo, open));
 }

@@ -28,6 +28,7 @@ struct Shade {
     pre: PreIntegrated,
     fine: Fine,
     eyes: array<Eye, 2>,
+    skin_albedo: vec3f, // mean of the head
     lids: array<vec4f, 112>, // edges of the lids in the space of each eye, half of the points for each; see human/lid_rings.csv
     material_colour: array<vec4f, 64>,
     part_materials: array<PartMaterial, 64>,
@@ -42,7 +43,6 @@ struct ShadingPoint {
     point: Point,
     surface: Surface,
     film: Film,
-    lids: vec3f, // fraction of the light that the lids let pass; it is part of the colour of an eye
     v: vec3f, // towards the viewer
     footprint: f32, // side of the filter relative to the side of the maps
     open: f32, // visible fraction of the sky
@@ -166,8 +166,8 @@ fn shading_point_at(triangle: u32, position: vec2f, coverage: f32, size: vec2f) 
         area_u = deviation * (wx.x * a.position + wx.y * b.position + wx.z * c.position);
         area_v = deviation * (wy.x * a.position + wy.y * b.position + wy.z * c.position);
     }
-    let film = Film(surface.normal, vec3f(0.0));
-    var shading_point = ShadingPoint(point, surface, film, vec3f(1.0), v, footprint, open, texel, part.metalness, part.emission);
+    let film = Film(surface.normal, vec3f(0.0), vec3f(1.0));
+    var shading_point = ShadingPoint(point, surface, film, v, footprint, open, texel, part.metalness, part.emission);
     if (EYES) {
         apply_modelled_parts(&shading_point);
     }
@@ -186,16 +186,15 @@ fn apply_modelled_parts(shading_point: ptr<function, ShadingPoint>) {
         let material = shade.material_colour[point.flags >> 8u];
         if (material.w > 0.0) {
             (*shading_point).surface = mouth_at(point, material);
-            (*shading_point).film = Film((*shading_point).surface.normal, MOUTH_SHADOW_SCATTER);
+            (*shading_point).film = Film((*shading_point).surface.normal, MOUTH_SHADOW_SCATTER, vec3f(1.0));
             break;
         }
         if (shade.eyes[k].material == (point.flags >> 8u)) {
             let own = (shade.eyes[k].to_own * vec4f(point.position, 1.0)).xyz;
             let lids = lids_around(k, own);
-            let eye = eye_at(shade.eyes[k], own, lids, (*shading_point).v);
+            let eye = eye_at(shade.eyes[k], own, lids, (*shading_point).v, shade.skin_albedo);
             (*shading_point).surface = eye.surface;
             (*shading_point).film = eye.film;
-            (*shading_point).lids = lid_transmittance(lids);
             (*shading_point).point.lit_position += SHADOW_OFFSET_MM * eye.film.normal;
             break;
         }

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.frame.features.surface.record import fill_eye_records
+from dermis.frame.features.surface.record import DEFAULT_COLOUR, fill_eye_records
 from dermis.frame.projection import (
     Axes,
     Triple,
@@ -124,6 +124,12 @@ def view_record(
         record["eyes"]["material"] = head.eyes.material
         record["eyes"]["middle_mm"] = head.eyes.centre_offset_mm
     return record
+
+
+def mean_skin_albedo(head: Head) -> tuple[float, ...]:
+    """Return the mean RGB albedo of the colour map, or a default albedo if there is no map [-]."""
+    colour = head.maps.mean_colour
+    return (DEFAULT_COLOUR,) * 3 if colour is None else tuple(colour.tolist())
 
 
 def with_camera(shade_record: UniformRecord, pinhole: Pinhole, eyes: EyePoses | None) -> UniformRecord:

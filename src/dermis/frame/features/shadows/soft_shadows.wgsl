@@ -1,6 +1,6 @@
 // Visibility of an area light from a point, by shadow rays that march through the light's shadow map.
 
-const STEPS: u32 = 8u; // steps of a shadow ray
+const STEPS: u32 = 12u; // steps of a shadow ray
 const NEAR_STEPS: u32 = 2u; // first steps, near the point's own surface
 const MIN_THICKNESS: f32 = 4.0; // least thickness of occluders [mm]
 const CROSSING_STEPS: f32 = 1.5; // number of steps that a ray may be behind a surface that it crosses
@@ -36,8 +36,8 @@ fn receiver(light: Light, point: Point) -> Receiver {
     return Receiver(n, dot(n, p), p.xy / p.z, p.z, max(light.softness / p.z, MIN_EDGE_TEXELS * light.texel));
 }
 
-// Visible fraction of an area light above the point's tangent plane: rays to points on the light are marched through its
-// shadow map. Shadows are sharp close to their occluder.
+// Fraction of the irradiance by an area light that arrives at a point: rays to points on the light are marched through its shadow
+// map, and weighted by the cosine of incidence. Shadows are sharp close to their occluder.
 fn soft_visibility(light: Light, point: Point) -> f32 {
     let at = receiver(light, point);
     if (at.depth <= light.map_near) {
@@ -48,9 +48,12 @@ fn soft_visibility(light: Light, point: Point) -> f32 {
     let probes = max(rays / 4u, MIN_PROBES);
     var traced = 0u;
     var hidden = 0u;
+    var all_light = 0.0;
+    var hidden_light = 0.0;
     for (var i = 0u; i < rays; i += 4u) {
         let points = four_points(light, i);
-        let rising = bits(are_above_plane(light, at, points)) & ((1u << min(rays - i, 4u)) - 1u);
+        let heights = heights_above_plane(light, at, points);
+        let rising = bits(heights > vec4f(0.0)) & ((1u << min(rays - i, 4u)) - 1u);
         if (rising == 0u) {
             continue; // below the tangent plane
         }
@@ -62,11 +65,15 @@ fn soft_visibility(light: Light, point: Point) -> f32 {
             if (traced == probes && (hidden == 0u || hidden == probes)) {
                 return select(0.0, 1.0, hidden == 0u); // all rays agree, as for most points
             }
+            let ray = firstTrailingBit(left);
+            let is_blocked = (blocked >> ray) & 1u;
             traced += 1u;
-            hidden += (blocked >> firstTrailingBit(left)) & 1u;
+            hidden += is_blocked;
+            all_light += heights[ray];
+            hidden_light += heights[ray] * f32(is_blocked);
         }
     }
-    return select(0.0, 1.0 - f32(hidden) / f32(traced), traced > 0u);
+    return select(0.0, 1.0 - hidden_light / all_light, traced > 0u);
 }
 
 // Four points on a light or on its map, processed together so that their loads overlap.
@@ -93,15 +100,12 @@ fn bits(which: vec4<bool>) -> u32 {
     return dot(select(vec4u(0u), vec4u(1u, 2u, 4u, 8u), which), vec4u(1u));
 }
 
-// Whether points of the light are above the tangent plane.
-fn are_above_plane(light: Light, at: Receiver, points: FourPoints) -> vec4<bool> {
+// Heights of points of the light above the tangent plane, which are proportional to the cosine of incidence.
+fn heights_above_plane(light: Light, at: Receiver, points: FourPoints) -> vec4f {
     let x = points.x * light.extent.x;
     let y = points.y * light.extent.y;
-    if (is_parallel(light)) {
-        return at.normal.x * x + at.normal.y * y > vec4f(at.normal.z);
-    }
-    let bound = at.depth * (dot(at.normal.xy, at.position) + at.normal.z);
-    return at.normal.x * x + at.normal.y * y > vec4f(bound);
+    let bound = select(at.depth * (dot(at.normal.xy, at.position) + at.normal.z), at.normal.z, is_parallel(light));
+    return at.normal.x * x + at.normal.y * y - bound;
 }
 
 // One bit for each of four points on the light, set if it is occluded.

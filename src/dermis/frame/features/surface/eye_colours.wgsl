@@ -12,7 +12,6 @@ const FOCUS_MM: f32 = EYE_ETA * CORNEA_MM / (EYE_ETA - 1.0); // behind the apex
 const FOCUSED_WIDTH: f32 = 1.0 - (CORNEA_AT + CORNEA_MM - IRIS_AT) / FOCUS_MM; // width of a beam on the iris relative to its width outside
 const IRIS_FACTOR: f32 = 1.0 / (EYE_ETA * EYE_ETA * FOCUSED_WIDTH * FOCUSED_WIDTH);
 const LIMBUS_SOFT_MM: f32 = 0.55; // half of the width over which the sclera becomes transparent
-const FORWARD: f32 = 1.0; // tilt of the normals of the sclera towards the front, as light scatters over some mm in it
 // Artistic values, linear.
 const STROMA: vec3f = vec3f(0.20, 0.27, 0.33); // without pigment; scattering makes it blue
 const PIGMENT: vec3f = vec3f(0.085, 0.040, 0.018); // of eumelanin

@@ -42,7 +42,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let on_iris = clamped_to_iris(refracted_to_iris(p, vec3f(0.0, 0.0, -1.0)));
     let cornea = normalize(p - vec3f(0.0, 0.0, CORNEA_AT));
     let film = normalize(mix(normalize(p), cornea, clear));
-    let below = normalize(mix(normalize(p) + vec3f(0.0, 0.0, FORWARD), iris_normal(on_iris), clear));
+    let below = normalize(mix(normalize(p), iris_normal(on_iris), clear));
     let colour = mix(white_colour(picture.eye, p), IRIS_FACTOR * iris_colour(picture.eye, on_iris), clear);
     textureStore(colours, id.xy, vec4f(colour, 1.0));
     textureStore(normals, id.xy, vec4f(normalize(in_layout(below, film, direction)), 0.0));
