@@ -68,7 +68,7 @@ fn surface_at(point: Point, footprint: f32) -> Surface {
     var out: Surface;
     out.normal = bend(point, gradient + finest.slope * vec2f(length_u, length_v));
     out.colour = textureSampleLevel(colour_map, map_sampler, point.uv, mip_for(colour_map, footprint)).rgb;
-    out.roughness = clamp(sqrt(m * m + spread.x + spread.y + finest.spread), 0.05, 1.0);
+    out.roughness = clamp(widened(max(m, 1e-3), spread.x + spread.y + finest.spread), 0.05, 1.0);
     out.rho_s = skin.specular_strength * gloss.x;
     if (DETAIL) {
         out.colour *= 1.0 - CAVITY_COLOUR * finest.cavity;
