@@ -8,6 +8,7 @@ figures.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -79,7 +80,7 @@ def main(
         print_lines(f"{name}: {found['heads'][name]}")
         if crops is not None:
             crops.mkdir(parents=True, exist_ok=True)
-            write_png(crops / f"{name.replace(':', '_')}.png", encode_srgb8(exposed(linear)))
+            write_png(crops / f"{re.sub(r'[^\w]+', '_', name)}.png", encode_srgb8(exposed(linear)))
     write_results(output, found, 3)
     return 0
 

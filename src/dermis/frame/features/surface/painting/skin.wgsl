@@ -15,7 +15,7 @@
 const PATCHES: f32 = 0.22; // amplitude of patches of melanin [doublings]
 const SPECKLES: f32 = 0.16; // amplitude of fine unevenness of melanin [doublings]
 const BLOTCHES: f32 = 0.40; // amplitude of blotches of blood [doublings]
-const CAPILLARIES: f32 = 0.42; // amplitude of the mottling by capillaries [doublings]
+const CAPILLARIES: f32 = 0.31; // amplitude of the mottling by capillaries [doublings]
 const THREADS: f32 = 0.6; // blood in visible capillaries [doublings]
 const THREAD_MM: f32 = 0.35; // width of visible capillaries [mm]
 const BLEMISH_BLOOD: f32 = 1.7;
