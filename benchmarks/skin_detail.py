@@ -80,7 +80,8 @@ def main(
         print_lines(f"{name}: {found['heads'][name]}")
         if crops is not None:
             crops.mkdir(parents=True, exist_ok=True)
-            write_png(crops / f"{re.sub(r'[^\w]+', '_', name)}.png", encode_srgb8(exposed(linear)))
+            file_name = re.sub(r"\W+", "_", name)
+            write_png(crops / f"{file_name}.png", encode_srgb8(exposed(linear)))
     write_results(output, found, 3)
     return 0
 

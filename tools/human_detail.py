@@ -66,7 +66,7 @@ def main() -> None:
 def jittered_grid(
     columns: int, rows: int, rng: np.random.Generator, spread: float = 0.85
 ) -> tuple[Doubles, Doubles]:
-    """Return (n, 2) jittered positions, one in each cell of a grid over the tile, and the cell's size [mm]."""
+    """Return (n, 2) jittered positions, one in each cell of a grid on the tile, and the cell's size [mm]."""
     cell = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2)
     size = TILE_LENGTH_MM / np.array([columns, rows])
     return (cell + 0.5 + spread * (rng.random(cell.shape) - 0.5)) * size % TILE_LENGTH_MM, size

@@ -1,4 +1,4 @@
-"""Highlight of a bumpy ball at several distances against pixels that are so small that they resolve the bumps."""
+"""Highlight of a bumpy ball at several distances against pixels that resolve the bumps."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ def upload_slopes(device: Device, slopes: Floats | None) -> Texture:
 
 
 def upload_detail(device: Device, slopes: Floats, cavities: Floats) -> Texture:
-    """Upload the slopes of two tiling reliefs as one layer, and their squared lengths and cavities as another.
+    """Upload the slopes of two tiling reliefs as one layer, their squared lengths and cavities as another.
 
     slopes : (h, w, 4) slopes along u and v of the first relief, then of the second relief
     cavities : (h, w, 2) cavities of both reliefs

@@ -110,7 +110,7 @@ def _derived_skin_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[
 
 
 def _lobe_widths(skin: Skin) -> tuple[float, float, float]:
-    """Return the squared roughness factors of the narrow and the wide lobe, and the narrow lobe's weight [-]."""
+    """Return squared roughness factors of the narrow and wide lobe, and the narrow lobe's weight [-]."""
     narrow, wide, weight = MODELS[lobe_name(skin)].lobes
     return narrow**2, wide**2, weight
 

@@ -6,7 +6,7 @@ const MOVEMENT_DEPTH: f32 = 0.7; // depth that a full movement adds to a fold, r
 const MOVEMENT_DEPTH_AGE: f32 = 0.4;
 const GRAIN_MM: f32 = 0.040;
 const LINE_MM: f32 = 0.07;
-const CREASE_MM: f32 = 0.16;
+const CREASE_MM: f32 = 0.10;
 const MOLE_MM: f32 = 0.18;
 const BLEMISH_MM: f32 = 0.24;
 const SCAR_MM: f32 = 0.22;
@@ -31,7 +31,7 @@ fn relief(spot: Spot, lip: f32) -> f32 {
     let creases = (0.6 + 0.6 * noise[NOISE_CREASE_DEPTH]) * groove(noise[NOISE_CREASES], 2.2, texel, 1.7)
         + 0.3 * groove(noise[NOISE_FINE_CREASES], 2.5, texel, 0.8);
     height -= lip * CREASE_MM * creases * smoothstep(0.2, 2.0, abs(spot.fields.y));
-    height += MOLE_MM * smoothstep(0.1, 0.6, dotted[DOT_MOLES]) + BLEMISH_MM * smoothstep(0.1, 0.9, dotted[DOT_BLEMISHES]);
+    height += MOLE_MM * smoothstep(0.1, 0.6, dotted[DOT_MOLES]) + BLEMISH_MM * smoothstep(0.05, 0.5, dotted[DOT_BLEMISHES]);
     return height - SCAR_MM * smoothstep(0.05, 0.7, dotted[DOT_SCARS]) + fold_height(spot);
 }
 

@@ -381,8 +381,8 @@ def paint_textures(
 def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, map_side: int) -> Maps:
     """Paint the maps of a skin that has the given look, and return them as arrays.
 
-    Pores and fine lines are left out, because they are too fine for maps. Heights fade to 0 outside the charts
-    of the uv layout.
+    Pores and fine lines are left out, because they are too fine for maps. Heights fade to 0 outside the
+    charts of the uv layout.
     """
     arrays = paint_raw_arrays(device, surface, look, map_side)
     rho_s = DEFAULT_RHO_S * arrays.specular[..., 0]

@@ -33,6 +33,7 @@ const RED_LIDS: f32 = 0.8;
 const RED_SLIT: f32 = 1.0;
 const STUBBLE_COLOUR: vec3f = vec3f(0.095, 0.085, 0.08); // hair below the surface; scattering makes it blueish
 const BEARD_COLOUR: vec3f = vec3f(0.11, 0.10, 0.095);
+const DEEP_VEINS: f32 = 0.7;
 const VEIN_COLOUR: vec3f = vec3f(0.80, 0.90, 1.0); // factor of the skin colour
 const STRENGTH: f32 = 0.86; // strength of the specular reflection, relative to the default
 const OILY_STRENGTH: f32 = 0.44;
@@ -71,10 +72,10 @@ fn entry(table: u32, at: vec2u) -> vec3f {
     return textureLoad(colour_tables, at, table, 0).rgb;
 }
 
-// Thin branching lines along the zeros of a noise.
+// Thin branching lines along the zeros of a noise, and a blue shade of vessels that lie deeper.
 fn veins() -> f32 {
     let near = 1.0 - smoothstep(0.0, 0.10, abs(noise[NOISE_VEINS] + 0.08 * noise[NOISE_SUN]));
-    return near * saturate(zone_of(ZONE_VEINS)) * paint.veins;
+    return (near + DEEP_VEINS) * saturate(zone_of(ZONE_VEINS)) * paint.veins;
 }
 
 // Weight of the inner side of the lids, which is pink and wet.
@@ -98,7 +99,7 @@ fn pigments(spot: Spot, lip: f32, mucosa: f32) -> vec2f {
     let clothed = smoothstep(-165.0, -205.0, spot.body.y + 6.0 * noise[NOISE_WANDER_Y]);
     brown += TAN * (0.35 * (paint.tan - TYPICAL_TAN) * saturate(zone_of(ZONE_SUN)) - 0.5 * paint.tan * clothed);
     var red = (2.0 * paint.redness * zone_of(ZONE_BLOOD) + capillaries(spot)) * (1.0 - lip) + BLOTCHES * noise[NOISE_BLOTCHES];
-    red += BLEMISH_BLOOD * smoothstep(0.0, 0.6, dotted[DOT_BLEMISHES]) + SCAR_BLOOD * smoothstep(0.0, 0.5, dotted[DOT_SCARS]);
+    red += BLEMISH_BLOOD * smoothstep(0.0, 0.4, dotted[DOT_BLEMISHES]) + SCAR_BLOOD * smoothstep(0.0, 0.5, dotted[DOT_SCARS]);
     let slit = RED_SLIT * (1.0 - smoothstep(0.0, 2.2, spot.fields.y));
     red += lip * (LIP_BLOOD + 0.3 * noise[NOISE_LIP_STREAKS] + slit) + mucosa * (MUCOSA_BLOOD - lip * (LIP_BLOOD + RED_SLIT));
     red += RED_LIDS * (1.0 - smoothstep(0.3, 1.8, spot.fields.z));
