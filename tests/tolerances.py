@@ -59,6 +59,9 @@ SHEARED_PEAK = 0.03
 SHEARED_VARIANCE = 0.03
 """Its second moments, along all directions alike, of the variance asked for."""
 
+BUMPY_HIGHLIGHT = 0.03
+"""Mean highlight of bumps narrower than a pixel against resolved bumps, relative: slopes are not normal."""
+
 MAP_NORMAL = 1e-3
 """Normals from slopes stored as halves, between texels that a sampler weighs in 1/256."""
 

@@ -1,4 +1,7 @@
-"""Make src/dermis/human/data/detail.png: tiles of skin with pores and with fine furrows."""
+"""Make src/dermis/human/data/detail.png: tiles of skin with pores, and with fine lines and follicles.
+
+Both tiles are drawn for a tension line along +u. Shaders turn them to the tension lines of each site.
+"""
 
 from __future__ import annotations
 
@@ -18,15 +21,29 @@ from dermis.human.skin.textures import MAX_TILE_HEIGHT_MM, TILE_LENGTH_MM, TILE_
 Doubles = NDArray[np.float64]
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "detail.png"
-PORES_A_SIDE = 30
-PORE_MM = (0.06, 0.19)
-"""Radius of the smallest and the largest pore [mm], an artist's choice."""
-PORE_DEPTH_MM = (0.03, 0.085)  # of the smallest and the largest pore
-CELLS_A_SIDE, FINE_CELLS_A_SIDE = 44, 92
-"""Cells per side of the coarse and the fine net of furrows, 0.7 and 0.35 mm wide."""
-FURROW_MM, FURROW_DEPTH_MM, CUSHION_MM = 0.11, 0.032, 0.016  # width and depth of furrows, height of cells
-FINE_FRACTION = 0.4  # height of the fine net relative to the coarse net
-BLUR_TEXELS = 0.6
+# Artist's values. Follicles: about 2 to 4 per square millimetre of face.
+PORES_A_SIDE, FOLLICLES_A_SIDE = 34, 58
+PORE_MM, PORE_DEPTH_MM = (0.055, 0.20), (0.03, 0.105)
+"""Radius and depth of the smallest and the largest pore [mm]."""
+FOLLICLE_MM, FOLLICLE_DEPTH_MM = (0.04, 0.075), (0.010, 0.03)
+COARSE_CELLS, FINE_CELLS = (24, 46), (56, 104)
+"""Cells of the coarse and the fine net of lines along a tension line and across."""
+LINE_MM, LINE_DEPTH_MM = 0.085, 0.046
+"""Half width and depth of the deepest lines, which follow the tension."""
+CROSS_LINE_DEPTH = 0.45
+"""Depth of lines across the tension relative to those along it."""
+MISSING_LINES = 0.3
+"""Fraction of the lines between cells that are missing."""
+CELL_MM = 0.012
+"""Height by which cells differ from each other."""
+FINE_FRACTION = 0.55  # height of the fine net relative to the coarse net
+BUMP_MM = 0.007
+"""Standard deviation of soft bumps."""
+WARP_MM = 0.22
+"""Displacement of the nets, so that lines are not straight."""
+TURN_RADIANS = 0.4
+"""Standard deviation of the direction of long pores."""
+BLUR_TEXELS = 0.5
 """Standard deviation of the final blur [texels]."""
 
 
@@ -35,7 +52,9 @@ def main() -> None:
     rng = np.random.default_rng(0)
     across = (np.arange(TILE_SIDE) + 0.5) * TILE_LENGTH_MM / TILE_SIDE
     positions = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
-    layers = [pores(positions, rng), furrows(positions, rng), np.zeros(len(positions))]
+    pores = pits(positions, PORES_A_SIDE, PORE_MM, PORE_DEPTH_MM, rng)
+    fine = pits(positions, FOLLICLES_A_SIDE, FOLLICLE_MM, FOLLICLE_DEPTH_MM, rng)
+    layers = [pores, fine + lines(positions, rng), np.zeros(len(positions))]
     heights = gaussian_filter(
         np.stack(layers, axis=-1).reshape(TILE_SIDE, TILE_SIDE, 3), (BLUR_TEXELS, BLUR_TEXELS, 0), mode="wrap"
     )
@@ -44,21 +63,32 @@ def main() -> None:
     sys.stdout.write(f"{OUT}  {OUT.stat().st_size / 1e3:.0f} kB\n")
 
 
-def jittered_grid(count: int, rng: np.random.Generator, spread: float = 0.85) -> Doubles:
-    """Return (count², 2) jittered positions, one in each cell of a grid over the tile [mm]."""
-    cell = np.stack(np.meshgrid(np.arange(count), np.arange(count)), axis=-1).reshape(-1, 2)
-    return np.asarray(
-        (cell + 0.5 + spread * (rng.random(cell.shape) - 0.5)) * TILE_LENGTH_MM / count % TILE_LENGTH_MM
-    )
+def jittered_grid(
+    columns: int, rows: int, rng: np.random.Generator, spread: float = 0.85
+) -> tuple[Doubles, Doubles]:
+    """Return (n, 2) jittered positions, one in each cell of a grid on the tile, and the cell's size [mm]."""
+    cell = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2)
+    size = TILE_LENGTH_MM / np.array([columns, rows])
+    return (cell + 0.5 + spread * (rng.random(cell.shape) - 0.5)) * size % TILE_LENGTH_MM, size
 
 
-def pores(positions: Doubles, rng: np.random.Generator) -> Doubles:
-    """Return the (n,) height of skin with pores, elliptic pits of several sizes and directions [mm]."""
-    middle = jittered_grid(PORES_A_SIDE, rng)
-    share = rng.random(len(middle)) ** 1.3
-    radius, depth = (low + share * (high - low) for low, high in (PORE_MM, PORE_DEPTH_MM))
-    depth *= rng.random(len(middle)) < 0.85
-    turn, long = rng.uniform(0, np.pi, len(middle)), rng.uniform(1.0, 1.5, len(middle))
+def pits(
+    positions: Doubles,
+    count: int,
+    radii_mm: tuple[float, float],
+    depths_mm: tuple[float, float],
+    rng: np.random.Generator,
+) -> Doubles:
+    """Return the (n,) height of skin with pits of several sizes, most of them long along the tension [mm].
+
+    count : number of pits per side of the tile
+    radii_mm, depths_mm : of the smallest and the largest pit
+    """
+    middle, _ = jittered_grid(count, count, rng)
+    share = rng.random(len(middle)) ** 1.8  # few are large
+    radius, depth = (low + share * (high - low) for low, high in (radii_mm, depths_mm))
+    depth *= (rng.random(len(middle)) < 0.88) * rng.uniform(0.55, 1.0, len(middle))
+    turn, long = TURN_RADIANS * rng.normal(size=len(middle)), rng.uniform(1.0, 1.8, len(middle))
     _, near = nearest(positions, middle, 3)
     height = np.zeros(len(positions))
     for which in near.T:
@@ -66,35 +96,51 @@ def pores(positions: Doubles, rng: np.random.Generator) -> Doubles:
         c, s = np.cos(turn[which]), np.sin(turn[which])
         along, beside = c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0]
         square = (along / long[which]) ** 2 + beside**2
-        height -= depth[which] * np.exp(-square / (0.7 * radius[which]) ** 2)
+        height -= depth[which] * np.exp(-((square / (0.75 * radius[which]) ** 2) ** 1.3))
     return height
 
 
-def furrows(positions: Doubles, rng: np.random.Generator) -> Doubles:
-    """Return the (n,) height of skin with a coarse and a fine net of furrows [mm]."""
-    coarse = net(positions, CELLS_A_SIDE, 1.0, rng)
-    return np.asarray(coarse + FINE_FRACTION * net(positions, FINE_CELLS_A_SIDE, 0.55, rng))
+def lines(positions: Doubles, rng: np.random.Generator) -> Doubles:
+    """Return the (n,) height of skin with soft bumps, and a coarse and a fine net of lines [mm]."""
+    warp = np.stack([smooth_noise(WARP_MM, 12.0, rng) for _ in range(2)], axis=-1)
+    bumps = smooth_noise(BUMP_MM, 3.0, rng)
+    coarse = net((positions + warp) % TILE_LENGTH_MM, COARSE_CELLS, 1.0, rng)
+    return np.asarray(bumps + coarse + FINE_FRACTION * net(positions, FINE_CELLS, 0.6, rng))
 
 
-def net(positions: Doubles, count: int, size: float, rng: np.random.Generator) -> Doubles:
-    """Return the (n,) height of a net of furrows between convex cells [mm].
+def smooth_noise(deviation: float, texels: float, rng: np.random.Generator) -> Doubles:
+    """Return periodic noise (n,) with the given standard deviation, smooth over a number of texels."""
+    noise = gaussian_filter(rng.normal(size=(TILE_SIDE, TILE_SIDE)), texels, mode="wrap")
+    return np.asarray((deviation / noise.std() * noise).ravel())
 
-    count : number of cells per side of the tile
-    size : width of the furrows relative to `FURROW_MM`
+
+def net(positions: Doubles, cells: tuple[int, int], width: float, rng: np.random.Generator) -> Doubles:
+    """Return the (n,) height of a net of lines between cells that are longer along the tension [mm].
+
+    cells : number of cells along the tension and across
+    width : width of the lines relative to `LINE_MM`
     """
-    middle = jittered_grid(count, rng, 0.8)
-    uneven = 0.5 + rng.random(len(middle))
-    distance, near = nearest(positions, middle, 2)
-    between = distance[:, 1] - distance[:, 0]
-    depth = FURROW_DEPTH_MM * 0.5 * uneven[near].sum(axis=1)
-    cushion = CUSHION_MM * np.minimum(between / (TILE_LENGTH_MM / count), 1.0)
-    return np.asarray(cushion - depth * np.exp(-((between / (size * FURROW_MM)) ** 2)))
+    middle, size = jittered_grid(*cells, rng, 0.9)
+    stretch = np.array([size[1] / size[0], 1.0])
+    distance, near = nearest(positions * stretch, middle * stretch, 2, TILE_LENGTH_MM * stretch)
+    between = wrapped(middle[near[:, 1]] - middle[near[:, 0]])
+    between /= np.linalg.norm(between, axis=1, keepdims=True)
+    along = np.abs(between[:, 1]) ** 2  # 1 for a line along the tension
+    pair = np.sort(near, axis=1) @ np.array([7919, 104729]) % 8191
+    uneven = rng.random(8191)[pair]
+    depth = LINE_DEPTH_MM * np.clip((uneven - MISSING_LINES) / (1.0 - MISSING_LINES), 0.0, 1.0) ** 0.7
+    depth *= CROSS_LINE_DEPTH + (1.0 - CROSS_LINE_DEPTH) * along
+    gap = distance[:, 1] - distance[:, 0]
+    rise = 1.0 - np.exp(-((gap / (2.0 * width * LINE_MM)) ** 2))  # cells differ in height, without steps
+    level = CELL_MM * (rng.random(len(middle)) - 0.5)[near[:, 0]]
+    return np.asarray(rise * level - depth * np.exp(-((gap / (width * LINE_MM)) ** 2)))
 
 
-def nearest(positions: Doubles, middle: Doubles, k: int) -> tuple[Doubles, NDArray[np.intp]]:
-    """Return the (n, k) distances to the nearest positions on the tile, and their indices."""
-    box: Any = TILE_LENGTH_MM
-    distance, which = cKDTree(middle, boxsize=box).query(positions, k=k)
+def nearest(
+    positions: Doubles, middle: Doubles, k: int, box: Any = TILE_LENGTH_MM
+) -> tuple[Doubles, NDArray[np.intp]]:
+    """Return the (n, k) distances to the nearest positions on the periodic tile, and their indices."""
+    distance, which = cKDTree(middle % box, boxsize=box).query(positions % box, k=k)
     return np.asarray(distance), np.asarray(which)
 
 

@@ -22,7 +22,7 @@ from dermis.mesh.primitives import plane
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.gaze import looking_at
-from dermis.scene.lights import DirectionalLight
+from dermis.scene.lights import DirectionalLight, RectangleLight
 from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
@@ -212,3 +212,30 @@ def test_eye_appearance_changes_the_iris_only(renderer: Renderer, head: Head) ->
 def test_invalid_eye_appearance_is_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(DermisError, match=f"eyes: {next(iter(wrong))}"):
         EyeLook(**wrong)  # type: ignore[arg-type]
+
+
+def catchlight(renderer: Renderer, head: Head, light: RectangleLight) -> Floats:
+    """Return the specular radiance (n, n) of 12 mm around the left cornea."""
+    assert head.eyes is not None
+    x, y, z = head.control_rig.positions_mm[head.eyes.apex[0]] - np.array(head.centre_mm)
+    camera = Camera(position=(x, y, z + 500.0), target=(x, y, z), frame_mm=12.0)
+    settings = settings_of(size=(120, 120), atlas=64, parts="specular", technique="none", strands=False)
+    drawn = renderer.draw(Scene(head, lights=(light,), camera=camera), settings).linear()
+    return np.asarray(drawn.mean(axis=-1), np.float64)
+
+
+def test_tears_mirror_a_softbox_with_sharp_edges(renderer: Renderer, head: Head) -> None:
+    """The picture of a square in a convex mirror: its size, its radiance, and the width of its edge."""
+    side, distance = 400.0, 1000.0
+    light = RectangleLight(
+        (0.0, 0.0, distance), irradiance=(3, 3, 3), width_mm=side, height_mm=side, shadows=False
+    )
+    seen = catchlight(renderer, head, light)[20:100, 20:100]
+    radiance = 3.0 * distance**2 / side**2
+    bright = np.median(seen[seen > 0.5 * seen.max()])
+    assert 0.018 < bright / radiance < 0.035  # reflectance of water and cornea at normal incidence
+    # a mirror of focal length R / 2 shows a distant light of angle w with a side of w R / 2
+    expected_mm = side / (distance - 20.0) * CORNEA_MM / 2.0
+    assert np.sqrt((seen > 0.5 * bright).sum()) * 0.1 == pytest.approx(expected_mm, rel=0.1)
+    between = ((seen > 0.1 * bright) & (seen < 0.9 * bright)).sum()
+    assert between < 0.9 * (seen > 0.5 * bright).sum()

@@ -280,3 +280,64 @@ def test_the_wrong_gamma_is_wrong_for_painted_skin_too(renderer: Renderer, head:
     )
     seen = right.max(axis=-1) > 0.05
     assert wrong[seen].mean() > 1.2 * right[seen].mean()
+
+
+def near(
+    surface: PaintedSurface, head: Head, place: tuple[float, float, float], radius_mm: float = 6.0
+) -> NDArray[np.bool_]:
+    """Return the (SIDE, SIDE) mask of texels near a place on the average person [mm]."""
+    kinds = np.array([one.kind == "skin" for one in head.mesh.materials])[head.mesh.material]
+    texel, triangle = rasterise(head.mesh, SIDE, np.flatnonzero(kinds))
+    centres = surface.vertices[:, 2:5][head.mesh.triangles[triangle]].mean(axis=1)
+    found = np.zeros(SIDE * SIDE, bool)
+    found[texel[np.linalg.norm(centres - place, axis=1) < radius_mm]] = True
+    return found.reshape(SIDE, SIDE)
+
+
+def test_pores_and_tension_lines_are_those_of_the_site(
+    device: Device, surface: PaintedSurface, head: Head
+) -> None:
+    pores, tension = np.moveaxis(
+        paint.paint_raw_arrays(device, surface, BARE, SIDE).specular[..., [1, 3]], -1, 0
+    )
+    nose, forehead, lids = (
+        float(np.median(pores[near(surface, head, place)]))
+        for place in ((0, -37, 40), (20, 46, 19), (29, 6, 16))
+    )
+    assert nose > 1.3 * forehead > 2.0 * lids
+    lips = (fields(head, surface, "lips") > 2.5) & (fields(head, surface, "mouth") > 1)
+    assert lips.any() and pores[lips].max() < 1e-3
+    left, right, middle = (
+        float(np.median(tension[near(surface, head, place)]))
+        for place in ((40, -35, 8), (-40, -35, 8), (0, 46, 22))
+    )
+    assert left > 0.6 and right < -0.6 and abs(middle) < 0.2
+
+
+def test_blemishes_are_red_bumps_and_scars_are_pits(
+    device: Device, surface: PaintedSurface, head: Head
+) -> None:
+    plain, cheek = painted(device, surface), near(surface, head, (40, -35, 8), 25.0)
+    for field, rises in (("blemishes", True), ("scars", False)):
+        other = painted(device, surface, replace(BARE, **{field: 1.0}))
+        assert plain.colour is not None and other.colour is not None
+        assert plain.height is not None and other.height is not None
+        redder = (lab(other.colour) - lab(plain.colour))[cheek, 1]
+        height = (other.height - plain.height)[cheek]
+        assert redder.max() > 1.0 and redder.min() > -0.5
+        assert (height.max() > 0.04 and height.min() > -0.01) == rises
+        assert (height.min() < -0.02 and height.max() < 0.01) != rises
+
+
+def test_veins_make_skin_below_the_eyes_bluer(device: Device, surface: PaintedSurface, head: Head) -> None:
+    hues = []
+    for veins in (0.0, 0.6):
+        colour = painted(device, surface, replace(BARE, veins=veins)).colour
+        assert colour is not None
+        below, cheek = (
+            np.median(lab(colour[near(surface, head, place)]), axis=0)
+            for place in ((26, -12, 16), (38, -33, 13))
+        )
+        assert below[0] < cheek[0]
+        hues.append(below[2] - cheek[2])
+    assert hues[1] < hues[0] - 0.5

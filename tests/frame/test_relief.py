@@ -23,7 +23,8 @@ INNER = slice(3, SIZE - 3)  # the map's border has its own rule for slopes
 
 def relief(renderer: Renderer, head: Head, *, texels: float = 1.0, roughness: float = 0.3) -> Any:
     """Return the normals (n, n, 3) and the roughness (n, n), filtered over a number of atlas texels."""
-    inputs = run_frame(renderer, scene_of(head, frontal(), roughness=roughness), atlas=SIZE)
+    scene = scene_of(head, frontal(), roughness=roughness, specular="torrance-sparrow")
+    inputs = run_frame(renderer, scene, atlas=SIZE)
     made, _ = probe(
         renderer.device,
         "surface_probe",

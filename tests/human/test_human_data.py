@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.human.skin.textures import detail_slopes
+from dermis.human.skin.textures import detail_cavities, detail_heights_mm, detail_slopes
 
 TOOLS = Path(__file__).parents[2] / "tools"
 DATA = Path(__file__).parents[2] / "src" / "dermis" / "human" / "data"
@@ -70,3 +70,17 @@ def test_detail_tile_is_periodic() -> None:
     slopes = np.abs(detail_slopes()[..., 2:])
     edge = np.concatenate([slopes[0], slopes[-1], slopes[:, 0], slopes[:, -1]])
     assert edge.mean() < 1.3 * slopes.mean()
+
+
+def test_lines_follow_the_tension() -> None:
+    """Both tiles are drawn for a tension line along +u: slopes across it are steeper."""
+    pore_u, pore_v, line_u, line_v = np.moveaxis(detail_slopes(), -1, 0)
+    assert line_v.std() > 1.25 * line_u.std()
+    assert pore_v.std() > 1.05 * pore_u.std()
+
+
+def test_cavities_keep_the_mean_colour() -> None:
+    cavities, depth = detail_cavities(), np.asarray(detail_heights_mm())
+    assert np.abs(cavities.mean(axis=(0, 1))).max() < 1e-4
+    for pattern in (0, 1):
+        assert np.corrcoef(cavities[..., pattern].ravel(), depth[pattern].ravel())[0, 1] < -0.6

@@ -53,6 +53,8 @@ class SpecularModel:
         Keys of entries in the bibliography.
     numbers : mapping
         Dictionary from the names of the placeholders in the shader to their values.
+    lobes : tuple of float
+        Roughness of the narrow and of the wide lobe relative to m, and weight of the narrow lobe [-].
 
     Examples
     --------
@@ -66,6 +68,7 @@ class SpecularModel:
     reciprocal: bool
     sources: tuple[str, ...]
     numbers: Mapping[str, float] = field(default_factory=dict)
+    lobes: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
     @property
     def shader(self) -> Path:

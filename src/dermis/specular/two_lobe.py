@@ -67,4 +67,5 @@ TWO_LOBE = SpecularModel(
     reciprocal=True,
     sources=("EpicGames2025", "Smith1967", "Walter2007", "Beckmann1963"),
     numbers={"narrow": NARROW_FACTOR, "wide": WIDE_FACTOR, "narrow_weight": NARROW_WEIGHT},
+    lobes=(NARROW_FACTOR, WIDE_FACTOR, NARROW_WEIGHT),
 )

@@ -29,12 +29,12 @@ MOVEMENTS = (
 """Facial movements. Movements before "flush" deepen folds, see folds.csv; the others move blood."""
 FOLD_MOVEMENT_COUNT = MOVEMENTS.index("flush")
 """Number of movements that deepen folds."""
-_AMOUNTS_IN_CSV = (
+ZONE_AMOUNTS = (
     "blood", "melanin", "strength", "roughness", "pores", "furrows",
     "sun", "level", "around", "hair", "beard", "veins", "flush",
+    "oxygen", "tension", "capillaries",
 )  # fmt: skip
-ZONE_AMOUNTS = (*_AMOUNTS_IN_CSV, "oxygen", "_unused", "_unused_too")
-"""Quantities that zones of the face change, see zones.csv; padded to a multiple of four names."""
+"""Quantities that zones of the face change, see zones.csv; their number is a multiple of four."""
 _REFERENCE_SITE = "cheek"
 HAIRLINE_STEP_DEGREES = 2
 """Angle between samples of `hairline_heights` [degrees]."""
@@ -80,9 +80,8 @@ def zone_table(recession: float = 0.0, site_differences: SiteDifferences | None 
     for row in rows:
         if row["zone"] == _CROWN_ZONE:
             row["hair"] = str(recession * float(row["hair"]))
-    columns = "x y z", "rx ry rz", " ".join(_AMOUNTS_IN_CSV)
+    columns = "x y z", "rx ry rz", " ".join(ZONE_AMOUNTS)
     centres, radii, amounts = (float_columns(rows, names) for names in columns)
-    amounts = np.hstack([amounts, np.zeros((len(rows), len(ZONE_AMOUNTS) - len(_AMOUNTS_IN_CSV)))])
     if site_differences is not None:
         pigment_columns = [ZONE_AMOUNTS.index(name) for name in ("melanin", "blood", "oxygen")]
         amounts[:, pigment_columns] += _zone_amounts_of_sites() @ np.vstack(
@@ -90,6 +89,12 @@ def zone_table(recession: float = 0.0, site_differences: SiteDifferences | None 
         )
     zero = np.zeros((len(rows), 1))
     return np.hstack([centres, zero, 1.0 / radii, zero, amounts]).astype(np.float32)
+
+
+@cache
+def lowest_zone_oxygen() -> float:
+    """Return the largest reduction of the oxygen saturation by a zone, as a negative number [-]."""
+    return float(min(float_columns(read_rows(__package__, "zones"), "oxygen").min(), 0.0))
 
 
 @cache

@@ -29,6 +29,7 @@ SITES_FIELD = "sites"
 # Artist's values.
 _TYPICAL_FRECKLES = {"african": 0.02, "asian": 0.06, "caucasian": 0.16}
 _TYPICAL_IRIS_EUMELANIN = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
+_NO_BLEMISHES_YEARS = 45.0  # age from which there are no inflamed spots [years]
 _AGE_SPOTS_FROM_YEARS = 45.0  # age from which there are age spots [years]
 _FOLD_STRENGTH_AT_90_YEARS = 1.0  # `SkinLook.age` of people of 90 years
 
@@ -74,6 +75,10 @@ class SkinLook:
         Shininess, 0 to 1 [-].
     age : float
         Depth of folds and lines, from youth to old age, 0 to 1 [-].
+    blemishes : float
+        Density of inflamed spots, 0 to 1 [-].
+    scars : float
+        Density of pitted scars of acne, 0 to 1 [-].
     seed : int
         Seed of the pattern of spots and lines, 0 to 2**32 - 1.
     sites : SiteDifferences or mapping
@@ -108,6 +113,8 @@ class SkinLook:
     beard: float = 0.0
     oil: float = 0.4
     age: float = 0.1
+    blemishes: float = 0.0
+    scars: float = 0.0
     seed: int = 0
     sites: SiteDifferences = field(default_factory=typical_site_differences)
 
@@ -220,12 +227,14 @@ def sample_skin(
     """Return a random skin look of a person, with pigments that are distributed as in measured people.
 
     rng : random generator for marks, folds, tan and shine
-    pigment_rng : random generator for the pigments of the cheek and of other sites of the head
+    pigment_rng : random generator for the pigments of the cheek and of other sites of the head, and for
+        blemishes and scars
 
     Source: [Lu2025] for the pigments.
     """
     pigments, sites = sample_pigments(pigment_rng, *_typical_pigment_arguments(demographics))
     typical = _typical_skin_look(demographics, pigments, sites)
+    blemishes, scars = pigment_rng.beta(0.5, 4.0), pigment_rng.beta(0.25, 5.0)
     n = rng.normal(size=8)
     freckled = float(rng.beta(0.4, 3.0)) * (1.0 - min(typical.melanin / 0.1, 1.0))
     seed = int(rng.integers(2**31))
@@ -241,6 +250,8 @@ def sample_skin(
         beard=male * float(rng.uniform(0.05, 0.9)),
         oil=_clamp(typical.oil + 0.12 * n[6], 0.05, 0.9),
         age=_clamp(typical.age * (1.0 + 0.2 * n[7]), 0.0, 1.0),
+        blemishes=float(blemishes) * _clamp((_NO_BLEMISHES_YEARS - demographics.age) / 20.0, 0.0, 1.0),
+        scars=float(scars),
         seed=seed,
     )
 

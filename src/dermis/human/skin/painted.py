@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.human.skin.colours import skin_colour_table
+from dermis.human.skin.face import lowest_zone_oxygen
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.maps import Maps
 
@@ -30,7 +31,8 @@ def oxygen_range(skin_look: SkinLook) -> tuple[float, float]:
     """Return the lowest and the highest oxygen saturation of the skin of a head [-]."""
     differences = skin_look.sites.as_array()[:, 2]
     low, high = (
-        skin_look.oxygen + float(one) for one in (min(differences.min(), 0.0), max(differences.max(), 0.0))
+        skin_look.oxygen + float(one)
+        for one in (min(differences.min(), 0.0) + lowest_zone_oxygen(), max(differences.max(), 0.0))
     )
     low = min(max(low, 0.0), 1.0 - _MIN_OXYGEN_RANGE)
     return low, max(min(high, 1.0), low + _MIN_OXYGEN_RANGE)

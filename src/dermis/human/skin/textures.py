@@ -1,4 +1,4 @@
-"""Parameters of procedural skin textures: gradient noise, scattered dots, and a tile of pores and furrows."""
+"""Parameters of procedural skin textures: gradient noise, scattered dots, and a tile of pores and lines."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ TILE_LENGTH_MM = 32.0
 """Length of the tile on the skin [mm]."""
 MAX_TILE_HEIGHT_MM = 0.2
 """Full scale of the heights of the tile [mm]."""
+_CAVITY_DEPTH_MM = 0.08  # depth below the median height of the tile at which a cavity is dark
 
 
 class Noise(NamedTuple):
@@ -72,13 +73,14 @@ NOISES = (
     _isotropic_noise("wander-x", 17.0),
     _isotropic_noise("wander-y", 17.0),
     _isotropic_noise("lip-edge", 1.6, region="lips"),
-    _isotropic_noise("patches", 24.0, 0.75, 5, antialiased=True),
-    _isotropic_noise("blotches", 19.0, 0.86, 6, antialiased=True),
+    _isotropic_noise("patches", 24.0, 0.75, 3, antialiased=True),
+    _isotropic_noise("speckles", 2.9, 0.9, 2, antialiased=True),
+    _isotropic_noise("blotches", 19.0, 0.8, 2, antialiased=True),
+    _isotropic_noise("capillaries", 4.8, 0.9, 4, antialiased=True),
     _isotropic_noise("oil-film", 8.0),
     _isotropic_noise("fine-film", 1.9, antialiased=True),
     _isotropic_noise("roughness", 9.0),
-    _isotropic_noise("grain", 2.6, 0.62, 3, antialiased=True),
-    _isotropic_noise("lumps", 1.3, antialiased=True),
+    _isotropic_noise("grain", 2.6, 0.62, 2, antialiased=True),
     _isotropic_noise("sun", 14.0),
     _isotropic_noise("ragged-x", 1.3),
     _isotropic_noise("ragged-y", 1.3),
@@ -122,6 +124,8 @@ DOT_LAYERS = (  # artist's values
     DotLayer("moles", 28.0, 0.045, 0.11, 0.4),
     DotLayer("age-spots", 17.0, 0.12, 0.34, 0.9),
     DotLayer("stubble", 0.85, 0.16, 0.26),
+    DotLayer("blemishes", 13.0, 0.07, 0.2, 0.5),
+    DotLayer("scars", 5.0, 0.08, 0.26, 0.5),
 )
 
 
@@ -166,23 +170,35 @@ def dot_layer_table() -> NDArray[np.float32]:
 
 @cache
 def detail_heights_mm() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the heights of pores and of furrows as periodic tiles (TILE_SIDE, TILE_SIDE) [mm]."""
+    """Return the heights of pores and of lines as periodic tiles (TILE_SIDE, TILE_SIDE) [mm]."""
     from PIL import Image
 
     file = resources.files("dermis.human").joinpath("data", "detail.png")
     levels = np.asarray(Image.open(BytesIO(file.read_bytes())), np.float32)
-    pores, furrows = np.moveaxis(levels[..., :2] * np.float32(MAX_TILE_HEIGHT_MM / 255), -1, 0)
-    return pores, furrows
+    pores, lines = np.moveaxis(levels[..., :2] * np.float32(MAX_TILE_HEIGHT_MM / 255), -1, 0)
+    return pores, lines
 
 
 @cache
 def detail_slopes() -> NDArray[np.float32]:
-    """Return the slopes (TILE_SIDE, TILE_SIDE, 4) of the periodic tiles of pores and of furrows [-].
+    """Return the slopes (TILE_SIDE, TILE_SIDE, 4) of the periodic tiles of pores and of lines [-].
 
-    The channels are the slopes of the pores along +u and down, then the slopes of the furrows along +u and
+    The channels are the slopes of the pores along +u and down, then the slopes of the lines along +u and
     down.
     """
     heights = np.stack(detail_heights_mm(), axis=-1)
     per_mm = np.float32(TILE_SIDE / TILE_LENGTH_MM / 2)
     across, down = (per_mm * (np.roll(heights, -1, axis) - np.roll(heights, 1, axis)) for axis in (1, 0))
     return np.stack([across[..., 0], down[..., 0], across[..., 1], down[..., 1]], axis=-1)
+
+
+@cache
+def detail_cavities() -> NDArray[np.float32]:
+    """Return the cavities (TILE_SIDE, TILE_SIDE, 2) of the periodic tiles of pores and of lines [-].
+
+    A cavity is 0 above the median height and 1 far below it, less the mean over the tile, so that cavities
+    do not change the mean colour of the skin.
+    """
+    heights = np.stack(detail_heights_mm(), axis=-1)
+    depth = np.clip((np.median(heights, axis=(0, 1)) - heights) / np.float32(_CAVITY_DEPTH_MM), 0.0, 1.0)
+    return np.asarray(depth - depth.mean(axis=(0, 1)), np.float32)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ _PART_TEXTURE_SIDE = 1024
 _TEXTURED_PARTS = ("iris", "white", "upper teeth", "lower teeth")  # in the order of person_textures.wgsl
 _MIN_ROUGHNESS = 0.05
 _LOG2_MM_PER_UV_RANGE = 5.0, 14.0  # binary logarithms of mm per unit of uv
+_TURN_STEP = np.pi / 4.0  # as in skin.wgsl [rad]
 _SETTINGS = Settings(size=(16, 16), atlas=64, samples=1, shadow_size=64)
 
 
@@ -51,7 +53,7 @@ def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, texture_si
     head = scene.head
     surface, device = painted_surface(head.mesh, head.control_rig.stencils), renderer.device
     colour, gloss, rough, height = paint.paint_raw_arrays(device, surface, look, texture_side)
-    height = height + _detail_heights_mm(gloss[..., 1], rough[..., 1], gloss[..., 2])
+    height = height + _detail_heights_mm(gloss[..., 1], rough[..., 1], gloss[..., 2], gloss[..., 3])
     roughness = np.maximum(scene.skin.roughness_factor * rough[..., 0], _MIN_ROUGHNESS)
     strength = np.ascontiguousarray(scene.skin.specular_strength * gloss[..., 0])
     radius = float(np.sqrt(SCLERA_MM**2 - iris_plane_mm() ** 2))
@@ -62,30 +64,41 @@ def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, texture_si
     return SkinTextures(colour, roughness, strength, height, iris, radius, white, (teeth[0], teeth[1]))
 
 
-def _detail_heights_mm(pores: Floats, furrows: Floats, log2_mm_per_uv: Floats) -> Floats:
-    """Return the heights (n, n) of fine pores and furrows, which are missing in the head's height map [mm].
+def _detail_heights_mm(pores: Floats, lines: Floats, log2_mm_per_uv: Floats, tension: Floats) -> Floats:
+    """Return the heights (n, n) of pores and fine lines, which are missing in the head's height map [mm].
 
-    The heights are the weighted sum of a pattern of pores and a pattern of furrows, tiled as in skin.wgsl.
+    The heights are the weighted sum of a pattern of pores and a pattern of lines, tiled as in skin.wgsl.
 
-    pores, furrows : (n, n) weights of the two patterns [-]
+    pores, lines : (n, n) weights of the two patterns [-]
     log2_mm_per_uv : (n, n) binary logarithm of the length on the surface per unit of uv [mm]
+    tension : (n, n) direction of the tension lines from +u to down [rad]
     """
     side = len(pores)
     density = np.clip(log2_mm_per_uv, *_LOG2_MM_PER_UV_RANGE)  # undefined outside the charts
-    level = density - np.log2(TILE_LENGTH_MM)
-    octave = np.floor(level)
-    blend = np.clip((level - octave - 0.4) / 0.2, 0.0, 1.0)
-    blend = blend * blend * (3.0 - 2.0 * blend)
+    octave, scale_blend = _whole_and_blend(density - np.log2(TILE_LENGTH_MM), 0.1)
+    turn, turn_blend = _whole_and_blend(tension / _TURN_STEP, 0.15)
     uv = (np.arange(side, dtype=np.float32) + 0.5) / side
     heights = np.zeros((side, side), np.float32)
-    for offset, weight in ((0, 1.0 - blend), (1, blend)):
-        tiles = np.exp2(octave + offset)
+    for next_scale, next_turn in product((0, 1), (0, 1)):
+        weight = np.abs(1 - next_scale - scale_blend) * np.abs(1 - next_turn - turn_blend)
+        tiles, angle = np.exp2(octave + next_scale), _TURN_STEP * (turn + next_turn)
         # Slopes stay the same: the height of a tile is proportional to its length.
         mm = np.exp2(density) / tiles / TILE_LENGTH_MM
-        u, v = tiles * uv, tiles * uv[:, None]
+        c, s = np.cos(angle), np.sin(angle)
+        u, v = tiles * (c * uv + s * uv[:, None]), tiles * (c * uv[:, None] - s * uv)
         pits, nets = (_sample_tile(tile - np.median(tile), u, v) for tile in detail_heights_mm())
-        heights += (weight * mm * (pores * pits + furrows * nets)).astype(np.float32)
+        heights += (weight * mm * (pores * pits + lines * nets)).astype(np.float32)
     return heights
+
+
+def _whole_and_blend(level: Floats, half_width: float) -> tuple[Floats, Floats]:
+    """Return the whole part of levels, and the weight of the next level, as in skin.wgsl.
+
+    half_width : half of the width of the range around 0.5 in which both levels have a weight
+    """
+    whole = np.floor(level)
+    blend = np.clip((level - whole - 0.5 + half_width) / (2.0 * half_width), 0.0, 1.0)
+    return whole, blend * blend * (3.0 - 2.0 * blend)
 
 
 def _sample_tile(periodic_pattern: Floats, u: Any, v: Any) -> Floats:

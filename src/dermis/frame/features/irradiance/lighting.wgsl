@@ -9,6 +9,7 @@
 //#include "hair/strand_shadows.wgsl"
 //#include "environment.wgsl"
 //#include "interreflection/interreflection.wgsl"
+//#include "mirrored_lights.wgsl"
 
 // Whether each point skips lights behind its surface. Without it, software adapters shade a point with all lights that its
 // neighbours see; GPUs are faster when all points read the same light.
@@ -30,6 +31,7 @@ struct Film {
     normal: vec3f,
     scattered: vec3f, // fraction of the light that reaches shadows by scattering around the point
     ambient: vec3f, // fraction of ambient light that arrives
+    smoothness: f32, // 1 for a film that mirrors area lights, 0 for one that reflects by the lobe of its roughness
 }
 
 // Normal clamped to the horizon of the eye: beyond it the lobe is undefined.
@@ -103,12 +105,13 @@ fn ambient_entering(point: Point, surface: Surface, open: f32) -> vec3f {
 
 // open : unoccluded fraction of the sky
 fn illuminate(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
-    return illuminate_film(point, surface, Film(surface.normal, vec3f(0.0), vec3f(1.0)), v, open);
+    return illuminate_film(point, surface, Film(surface.normal, vec3f(0.0), vec3f(1.0), 0.0), v, open);
 }
 
 fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f32) -> Lit {
     var lit = Lit(vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0));
     let mirror = visible_normal(film.normal, v);
+    let smoothness = select(0.0, film.smoothness, EYES && SHAPES);
     let directional = HALF_SPACE && (point.flags & OPAQUE) == 0u;
     let facing = clamp(dot(surface.normal, v), 0.0, 1.0);
     // loops have their test at the end: with it at the start, software adapters run one more iteration
@@ -128,6 +131,11 @@ fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f
         var part = first_facing_part(light, position, normal);
         if (part < parts_of(light)) {
             let seen = total_visibility(light, offset_point(point, offset), incident(light, position, part).direction);
+            let rough = 1.0 - smoothness * f32(1u - light.punctual);
+            if (EYES && SHAPES) {
+                let radiance = seen * mirrored_radiance(light, point.position, reflect(-v, mirror));
+                lit.reflected += (1.0 - rough) * surface.rho_s * surface_albedo(dot(mirror, v), surface.roughness).x * radiance;
+            }
             loop {
                 let arriving = incident(light, position, part);
                 let cosine = dot(normal, arriving.direction);
@@ -141,7 +149,7 @@ fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f
                         lit.across += entering * relative_transmittance(cosine);
                     }
                     lit.entered += entering;
-                    let factor = surface.rho_s * max(dot(mirror, arriving.direction), 0.0);
+                    let factor = rough * surface.rho_s * max(dot(mirror, arriving.direction), 0.0);
                     lit.reflected += e * (factor * lobe(mirror, arriving.direction, v, surface.roughness));
                 }
                 part++;

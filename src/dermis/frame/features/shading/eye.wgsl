@@ -7,11 +7,11 @@ const SHADOW_OFFSET_MM: f32 = 0.5;
 const LIT_LIDS: f32 = 0.5; // fraction of the lids around a shadow on the eye that a light reaches
 // Artistic values: fraction of ambient light that the lids absorb.
 const UPPER_SHADE: vec3f = vec3f(0.58, 0.68, 0.72); // lids reflect red light
-const UPPER_SHADE_MM: f32 = 2.2;
+const UPPER_SHADE_MM: f32 = 2.8;
 const LOWER_SHADE: vec3f = vec3f(0.28, 0.36, 0.40);
 const LOWER_SHADE_MM: f32 = 1.3;
-const MENISCUS: f32 = 1.1; // slope of the tears at the lower lid
-const MENISCUS_ROUGHNESS: f32 = 0.16; // roughness by its curve, which is finer than pixels
+const MENISCUS: f32 = 0.8; // slope of the tears at the lower lid
+const MENISCUS_ROUGHNESS: f32 = 0.22; // roughness by its curve, which is finer than pixels
 const MENISCUS_FROM_MM: f32 = 0.15; // distance from the edge of the lid, where the meniscus starts to fade
 const MENISCUS_TO_MM: f32 = 0.6;
 const TEARS: f32 = 0.06; // roughness of the tear film
@@ -61,5 +61,5 @@ fn eye_at(eye: Eye, p: vec3f, lids: Lids, v: vec3f, lid_albedo: vec3f) -> EyeLit
     let open = lid_transmittance(lids);
     let back = transpose(rotation); // rotation and uniform scale, so that it transforms normals
     let film_roughness = mix(TEARS, MENISCUS_ROUGHNESS, meniscus_weight(lids));
-    return EyeLit(Surface(normalize(back * below), colour, film_roughness, 1.0), Film(normalize(back * film), LIT_LIDS * (1.0 - open) * lid_albedo, open));
+    return EyeLit(Surface(normalize(back * below), colour, film_roughness, 1.0), Film(normalize(back * film), LIT_LIDS * (1.0 - open) * lid_albedo, open, 1.0 - meniscus_weight(lids)));
 }

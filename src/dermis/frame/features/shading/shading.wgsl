@@ -12,7 +12,6 @@
 
 override SPLIT: bool = false; // whether light below the skin is stored in layers of its own, to be diffused over the picture
 override MIXED: bool = false; // whether a map mixes profiles: the alpha of `scattered` then holds their blend weights
-override EYES: bool = false; // whether there are modelled eyes and teeth
 
 struct Shade {
     eye: vec3f,
@@ -166,7 +165,7 @@ fn shading_point_at(triangle: u32, position: vec2f, coverage: f32, size: vec2f) 
         area_u = deviation * (wx.x * a.position + wx.y * b.position + wx.z * c.position);
         area_v = deviation * (wy.x * a.position + wy.y * b.position + wy.z * c.position);
     }
-    let film = Film(surface.normal, vec3f(0.0), vec3f(1.0));
+    let film = Film(surface.normal, vec3f(0.0), vec3f(1.0), 0.0);
     var shading_point = ShadingPoint(point, surface, film, v, footprint, open, texel, part.metalness, part.emission);
     if (EYES) {
         apply_modelled_parts(&shading_point);
@@ -186,7 +185,7 @@ fn apply_modelled_parts(shading_point: ptr<function, ShadingPoint>) {
         let material = shade.material_colour[point.flags >> 8u];
         if (material.w > 0.0) {
             (*shading_point).surface = mouth_at(point, material);
-            (*shading_point).film = Film((*shading_point).surface.normal, MOUTH_SHADOW_SCATTER, vec3f(1.0));
+            (*shading_point).film = Film((*shading_point).surface.normal, MOUTH_SHADOW_SCATTER, vec3f(1.0), 0.0);
             break;
         }
         if (shade.eyes[k].material == (point.flags >> 8u)) {

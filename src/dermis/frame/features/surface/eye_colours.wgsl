@@ -87,12 +87,17 @@ fn white_colour(eye: Eye, p: vec3f) -> vec3f {
     let aside = smoothstep(6.5, 11.5, off);
     let turn = atan2(p.y, p.x);
     let bent = off + 1.3 * eye_noise(p.xy * 0.9, eye.seed + 7.0);
-    let line = abs(eye_noise(vec2f(turn * 7.0 + 0.35 * bent, bent * 0.5), eye.seed + 5.0) - 0.5);
-    let fine = abs(eye_noise(vec2f(turn * 16.0 - 0.3 * bent, bent * 0.9), eye.seed + 6.0) - 0.5);
-    let vessels = (1.0 - smoothstep(0.0, 0.035, line)) + 0.6 * (1.0 - smoothstep(0.0, 0.03, fine));
-    let red = eye.redness * (0.18 * aside + 0.55 * vessels * smoothstep(6.2, 9.0, off));
-    let yellow = mix(vec3f(1.0), vec3f(0.97, 0.90, 0.80), aside);
-    return mix(WHITE * yellow, VESSEL, clamp(red, 0.0, 0.8));
+    let winding = vec2f(eye_noise(p.xy * 2.1, eye.seed + 8.0), eye_noise(p.xy * 2.1, eye.seed + 9.0)) - 0.5;
+    let place = vec2f(turn, bent) + vec2f(0.16, 1.6) * winding;
+    let line = abs(eye_noise(place * vec2f(7.0, 0.5), eye.seed + 5.0) - 0.5);
+    let fine = abs(eye_noise(place * vec2f(17.0, 0.8), eye.seed + 6.0) - 0.5);
+    let presence = smoothstep(0.35, 0.75, eye_noise(vec2f(turn * 4.0, bent * 0.4), eye.seed + 10.0));
+    let thin = 0.5 + 0.5 * smoothstep(7.0, 12.0, off); // vessels are thinner and fainter near the limbus
+    let vessels = presence * (1.0 - smoothstep(0.0, 0.028 * thin, line)) + 0.55 * (1.0 - smoothstep(0.0, 0.022 * thin, fine));
+    let red = (0.2 + eye.redness) * (0.16 * aside + 1.5 * thin * vessels * smoothstep(6.2, 8.2, off));
+    let uneven = 1.0 + 0.09 * (eye_noise(p.xy * 0.55, eye.seed + 11.0) - 0.5);
+    let yellow = mix(vec3f(1.0), vec3f(0.96, 0.89, 0.79), aside);
+    return mix(WHITE * yellow * uneven, VESSEL, clamp(red, 0.0, 0.8));
 }
 
 // Transparency of the surface of the eye at a point: 1 in the cornea, 0 in the sclera.

@@ -16,7 +16,7 @@ from dermis.gpu import Device, MutableBindings, Texture, make_texture, upload
 from dermis.gpu.textures import texture_from_array
 from dermis.human.skin.painted import PaintedMaps
 from dermis.human.skin.surface import PaintedSurface, painted_surface
-from dermis.human.skin.textures import detail_slopes
+from dermis.human.skin.textures import detail_cavities, detail_slopes
 from dermis.images.colour import encode_srgb
 from dermis.images.filters import mip_chain
 from dermis.mesh.geometry import triangle_areas
@@ -76,10 +76,11 @@ def detail_bindings(device: Device, has_fine_relief: bool) -> MutableBindings:
 
     has_fine_relief : whether the skin has relief that is finer than its maps; if False, the texture is flat
     """
-    slopes = detail_slopes() if has_fine_relief else np.zeros((1, 1, 4), np.float32)
+    flat = np.zeros((1, 1, 4), np.float32), np.zeros((1, 1, 2), np.float32)
+    tiles = (detail_slopes(), detail_cavities()) if has_fine_relief else flat
     repeat = {f"address_mode_{axis}": "repeat" for axis in "uv"}
     sampler = device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear", **repeat)
-    return {"detail_map": map_mips.upload_detail_slopes(device, slopes), "detail_sampler": sampler}
+    return {"detail_map": map_mips.upload_detail(device, *tiles), "detail_sampler": sampler}
 
 
 def _paint_maps(

@@ -68,14 +68,15 @@ def upload_slopes(device: Device, slopes: Floats | None) -> Texture:
     return mipped.texture
 
 
-def upload_detail_slopes(device: Device, slopes: Floats) -> Texture:
-    """Upload the slopes of two tiling reliefs as one layer, and their squared lengths as a second layer.
+def upload_detail(device: Device, slopes: Floats, cavities: Floats) -> Texture:
+    """Upload the slopes of two tiling reliefs as one layer, their squared lengths and cavities as another.
 
     slopes : (h, w, 4) slopes along u and v of the first relief, then of the second relief
+    cavities : (h, w, 2) cavities of both reliefs
     """
     squares = slopes * slopes
     sums = np.stack([squares[..., 0] + squares[..., 1], squares[..., 2] + squares[..., 3]], axis=-1)
-    return upload_layers(device, [slopes, np.pad(sums, ((0, 0), (0, 0), (0, 2)))], "texture")
+    return upload_layers(device, [slopes, np.dstack([sums, cavities])], "texture")
 
 
 def upload_layers(device: Device, layer_maps: Sequence[Floats], texture_name: str) -> Texture:

@@ -104,8 +104,15 @@ def _derived_skin_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[
         "returned": energy.returns_internal_light,
         "tint": skin.specular_colour == "wrong",
         "relief_band": _normal_map_level(maps),
+        "lobes": _lobe_widths(skin),
         **(_light_direction_members(skin, maps, profile) if skin.direction == "half-space" else {}),
     }
+
+
+def _lobe_widths(skin: Skin) -> tuple[float, float, float]:
+    """Return squared roughness factors of the narrow and wide lobe, and the narrow lobe's weight [-]."""
+    narrow, wide, weight = MODELS[lobe_name(skin)].lobes
+    return narrow**2, wide**2, weight
 
 
 def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats, float]:

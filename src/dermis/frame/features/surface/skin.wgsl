@@ -10,12 +10,23 @@
 
 //#if PARTS
 //#else
-@group(0) @binding(14) var detail_map: texture_2d_array<f32>; // filtered, a tile: slopes of pores and of furrows, then their squares
+@group(0) @binding(14) var detail_map: texture_2d_array<f32>; // filtered, a tile: slopes of pores and of lines; their squares, and their cavities less the mean
 @group(0) @binding(15) var detail_sampler: sampler;
 //#end
 
 override DETAIL: bool = false; // whether the skin has relief finer than its maps
 //#fill const TILE_MM: f32 = {tile_mm};
+// Artistic values: part of the colour and of the reflection that the deepest cavities lose.
+const CAVITY_COLOUR: vec3f = vec3f(0.16, 0.30, 0.32);
+const CAVITY_GLOSS: f32 = 0.65;
+const TURN_STEP: f32 = 0.7853982; // angle between the orientations in which the tile is used
+
+// Relief finer than the maps.
+struct Detail {
+    slope: vec2f, // along u and down
+    spread: f32, // variance of slopes finer than the footprint
+    cavity: f32, // depth of cavities less its mean over the skin
+}
 
 struct Surface {
     normal: vec3f, // with the relief
@@ -49,48 +60,74 @@ fn surface_at(point: Point, footprint: f32) -> Surface {
     let spread = max(s.zw - s.xy * s.xy, vec2f(0.0)) + max(fine.zw - fine.xy * fine.xy, vec2f(0.0)) * per_mm * per_mm;
     let rough = textureSampleLevel(roughness_map, map_sampler, point.uv, mip_for(roughness_map, footprint));
     let gloss = textureSampleLevel(specular_map, map_sampler, point.uv, mip_for(specular_map, footprint));
-    var finest = vec3f(0.0);
+    var finest = Detail(vec2f(0.0), 0.0, 0.0);
     if (DETAIL) {
-        finest = detail_at(point.uv, footprint, vec2f(gloss.y, rough.y), gloss.z);
+        finest = detail_at(point.uv, footprint, vec2f(gloss.y, rough.y), gloss.z, gloss.w);
     }
     let m = skin.m * rough.x;
     var out: Surface;
-    out.normal = bend(point, gradient + finest.xy * vec2f(length_u, length_v));
+    out.normal = bend(point, gradient + finest.slope * vec2f(length_u, length_v));
     out.colour = textureSampleLevel(colour_map, map_sampler, point.uv, mip_for(colour_map, footprint)).rgb;
-    out.roughness = clamp(sqrt(m * m + spread.x + spread.y + finest.z), 0.05, 1.0);
+    out.roughness = clamp(widened(max(m, 1e-3), spread.x + spread.y + finest.spread), 0.05, 1.0);
     out.rho_s = skin.specular_strength * gloss.x;
+    if (DETAIL) {
+        out.colour *= 1.0 - CAVITY_COLOUR * finest.cavity;
+        out.rho_s *= max(1.0 - CAVITY_GLOSS * finest.cavity, 0.2);
+    }
     return out;
 }
 
 //#if PARTS
 // Heads with parts from files have no relief finer than their maps.
-fn detail_at(uv: vec2f, footprint: f32, amounts: vec2f, density: f32) -> vec3f {
-    return vec3f(0.0);
+fn detail_at(uv: vec2f, footprint: f32, amounts: vec2f, density: f32, tension: f32) -> Detail {
+    return Detail(vec2f(0.0), 0.0, 0.0);
 }
 //#else
-// Slopes of pores and furrows along u and down, and the variance of slopes finer than the footprint.
-// amounts : of pores and furrows; density : log2 of the mm per unit of uv
-// Tiles are scaled by powers of two, so that pores have their true size to a factor of 1.4 in all charts.
-fn detail_at(uv: vec2f, footprint: f32, amounts: vec2f, density: f32) -> vec3f {
-    let level = density - log2(TILE_MM);
-    let octave = floor(level);
-    let part = smoothstep(0.4, 0.6, level - octave);
-    var found = vec3f(0.0);
-    if (part < 1.0) {
-        found = (1.0 - part) * tiled(uv, footprint, amounts, exp2(octave));
-    }
-    if (part > 0.0) {
-        found += part * tiled(uv, footprint, amounts, exp2(octave + 1.0));
+// amounts : of pores and lines; density : log2 of the mm per unit of uv; tension : direction of the tension lines, from +u to down
+// Tiles are scaled by powers of two, so that pores have their true size to a factor of 1.4 in all charts, and turned by multiples of
+// TURN_STEP, as an angle that varies continuously would shear them.
+fn detail_at(uv: vec2f, footprint: f32, amounts: vec2f, density: f32, tension: f32) -> Detail {
+    let level = vec2f(density - log2(TILE_MM), tension / TURN_STEP);
+    let first = floor(level);
+    let part = smoothstep(vec2f(0.4, 0.35), vec2f(0.6, 0.65), level - first);
+    var found = Detail(vec2f(0.0), 0.0, 0.0);
+    var k = 0u;
+    loop { // over the scales and angles that have a weight; nested loops, as software adapters run both sides of a branch
+        var next = vec2f(0.0);
+        var weight = 0.0;
+        loop {
+            if (k >= 4u) {
+                break;
+            }
+            next = vec2f(f32(k & 1u), f32(k >> 1u));
+            let shares = mix(1.0 - part, part, next);
+            weight = shares.x * shares.y;
+            if (weight > 0.0) {
+                break;
+            }
+            k++;
+        }
+        if (k >= 4u) {
+            break;
+        }
+        let one = tiled(uv, footprint, amounts, exp2(first.x + next.x), TURN_STEP * (first.y + next.y));
+        found.slope += weight * one.slope;
+        found.spread += weight * one.spread;
+        found.cavity += weight * one.cavity;
+        k++;
     }
     return found;
 }
 
-fn tiled(uv: vec2f, footprint: f32, amounts: vec2f, tiles: f32) -> vec3f {
+fn tiled(uv: vec2f, footprint: f32, amounts: vec2f, tiles: f32, turn: f32) -> Detail {
     let mip = max(0.0, log2(footprint * tiles * f32(textureDimensions(detail_map).x)));
-    let slopes = textureSampleLevel(detail_map, detail_sampler, tiles * uv, 0, mip);
-    let squares = textureSampleLevel(detail_map, detail_sampler, tiles * uv, 1, mip).xy;
-    let hidden = max(squares - vec2f(dot(slopes.xy, slopes.xy), dot(slopes.zw, slopes.zw)), vec2f(0.0));
-    return vec3f(amounts.x * slopes.xy + amounts.y * slopes.zw, dot(amounts * amounts, hidden));
+    let turned = mat2x2f(cos(turn), -sin(turn), sin(turn), cos(turn));
+    let place = tiles * (turned * uv);
+    let slopes = textureSampleLevel(detail_map, detail_sampler, place, 0, mip);
+    let moments = textureSampleLevel(detail_map, detail_sampler, place, 1, mip);
+    let hidden = max(moments.xy - vec2f(dot(slopes.xy, slopes.xy), dot(slopes.zw, slopes.zw)), vec2f(0.0));
+    let slope = (amounts.x * slopes.xy + amounts.y * slopes.zw) * turned;
+    return Detail(slope, dot(amounts * amounts, hidden), dot(amounts, moments.zw));
 }
 //#end
 

@@ -17,6 +17,7 @@ struct Skin {
     light_count: u32,
     eta_below: f32, // index of refraction of the half-space, 1 without a surface; see direction.wgsl
     mean_single_scattering: f32, // mean of 1/(a + b) over both directions
+    lobes: vec3f, // squared roughnesses of the narrow and the wide lobe relative to m, and weight of the narrow one
     oblique_offset_mm: f32, // lateral offset of the mean exit point for grazing incidence [mm]
     single_scattering: vec3f, // strength of single scattering
     uniform_reflectance: vec3f, // reflectance of uniform light relative to that at normal incidence
@@ -28,6 +29,13 @@ struct Skin {
 @group(0) @binding(13) var nearest_sampler: sampler; // non-filtering
 @group(0) @binding(9) var beckmann_table: texture_2d<f32>;
 @group(0) @binding(10) var albedo_table: texture_2d<f32>; // rho_dt and its mean over directions
+
+// Roughness m of a surface whose slopes have an additional variance [OlanoBaker2010]. Both lobes of a model with two widen by
+// the same variance; the roughness is that with the same peak of their mixed slope distributions.
+fn widened(m: f32, variance: f32) -> f32 {
+    let weights = vec2f(skin.lobes.z, 1.0 - skin.lobes.z);
+    return sqrt(dot(weights, 1.0 / skin.lobes.xy) / dot(weights, 1.0 / (m * m * skin.lobes.xy + variance)));
+}
 
 // Bilinear weights of four texels in the order of textureGather; integers are texel centres.
 fn gather_weights(position: vec2f) -> vec4f {

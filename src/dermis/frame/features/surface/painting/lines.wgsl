@@ -6,8 +6,10 @@ const MOVEMENT_DEPTH: f32 = 0.7; // depth that a full movement adds to a fold, r
 const MOVEMENT_DEPTH_AGE: f32 = 0.4;
 const GRAIN_MM: f32 = 0.040;
 const LINE_MM: f32 = 0.07;
-const CREASE_MM: f32 = 0.16;
+const CREASE_MM: f32 = 0.10;
 const MOLE_MM: f32 = 0.18;
+const BLEMISH_MM: f32 = 0.24;
+const SCAR_MM: f32 = 0.22;
 
 // Depth of a groove along the zeros of a noise n, made wider and shallower where texels do not resolve it.
 fn groove(n: f32, sharpness: f32, texel_mm: f32, blob_mm: f32) -> f32 {
@@ -21,7 +23,7 @@ var<private> deepened: array<f32, FOLDING>; // height that each full movement ad
 fn relief(spot: Spot, lip: f32) -> f32 {
     let texel = spot.texel_mm;
     let bare = max(1.0 + zone_of(ZONE_FURROWS), 0.2) * (1.0 - 0.85 * lip);
-    var height = bare * GRAIN_MM * (0.6 + 0.5 * noise[NOISE_ROUGHNESS]) * (noise[NOISE_GRAIN] + 0.9 * abs(noise[NOISE_LUMPS]));
+    var height = bare * GRAIN_MM * (0.6 + 0.5 * noise[NOISE_ROUGHNESS]) * noise[NOISE_GRAIN];
     let uneven = max(0.45 + 0.9 * noise[NOISE_LINE_DEPTH], 0.0);
     let lines = zone_of(ZONE_LEVEL) * uneven * groove(noise[NOISE_LEVEL_LINES], 3.5, texel, 1.5)
         + zone_of(ZONE_AROUND) * (0.3 + uneven) * 0.9 * groove(noise[NOISE_EYE_LINES], 3.0, texel, 1.1);
@@ -29,7 +31,8 @@ fn relief(spot: Spot, lip: f32) -> f32 {
     let creases = (0.6 + 0.6 * noise[NOISE_CREASE_DEPTH]) * groove(noise[NOISE_CREASES], 2.2, texel, 1.7)
         + 0.3 * groove(noise[NOISE_FINE_CREASES], 2.5, texel, 0.8);
     height -= lip * CREASE_MM * creases * smoothstep(0.2, 2.0, abs(spot.fields.y));
-    return height + MOLE_MM * smoothstep(0.1, 0.6, dotted[DOT_MOLES]) + fold_height(spot);
+    height += MOLE_MM * smoothstep(0.1, 0.6, dotted[DOT_MOLES]) + BLEMISH_MM * smoothstep(0.05, 0.5, dotted[DOT_BLEMISHES]);
+    return height - SCAR_MM * smoothstep(0.05, 0.7, dotted[DOT_SCARS]) + fold_height(spot);
 }
 
 // Height of the folds of the face, with slightly raised borders; sets the heights that movements add.

@@ -1,4 +1,4 @@
-// Freckles, moles, age spots and stubble: dots whose density depends on the person and on the zones of the face.
+// Freckles, moles, age spots, stubble, blemishes and scars: dots whose density depends on the person and on the zones of the face.
 //#include "spot.wgsl"
 
 fn scatter_dots(spot: Spot, scalp: f32, lip: f32) {
@@ -9,6 +9,9 @@ fn scatter_dots(spot: Spot, scalp: f32, lip: f32) {
     density[DOT_SMALL_FRECKLES] = freckled;
     density[DOT_MOLES] = 0.3 * paint.moles * (1.0 - lip);
     density[DOT_AGE_SPOTS] = 0.8 * paint.spots * (0.1 + 0.9 * sun) * (1.0 - lip);
+    let prone = (0.25 + saturate(zone_of(ZONE_CAPILLARIES))) * (1.0 - lip) * (1.0 - scalp);
+    density[DOT_BLEMISHES] = 0.6 * paint.blemishes * prone;
+    density[DOT_SCARS] = 0.8 * paint.scars * prone;
     density[DOT_STUBBLE] = select(0.0, 1.0, max(scalp * paint.stubble, saturate(zone_of(ZONE_BEARD)) * paint.beard) > 0.0);
     for (var k = 0u; k < DOTS; k++) {
         dotted[k] = 0.0;

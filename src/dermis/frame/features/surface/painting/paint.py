@@ -337,8 +337,8 @@ class RawPaintedArrays(NamedTuple):
 
     colour : (n, n, 4) linear Rec. 709 albedo [-], and a channel of ones
     specular : (n, n, 4) specular factor, amount of pores, base-2 logarithm of the surface length in mm per
-        unit of uv, and zeros
-    roughness : (n, n, 4) roughness factor, amount of furrows, and fractions of melanin and blood
+        unit of uv, and direction of the tension lines from +u to down [rad]
+    roughness : (n, n, 4) roughness factor, amount of lines, and fractions of melanin and blood
     height_mm : (n, n) heights of the relief [mm]
     """
 
@@ -381,8 +381,8 @@ def paint_textures(
 def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, map_side: int) -> Maps:
     """Paint the maps of a skin that has the given look, and return them as arrays.
 
-    Pores and furrows are left out, because they are too fine for maps. Heights fade to 0 outside the charts
-    of the uv layout.
+    Pores and fine lines are left out, because they are too fine for maps. Heights fade to 0 outside the
+    charts of the uv layout.
     """
     arrays = paint_raw_arrays(device, surface, look, map_side)
     rho_s = DEFAULT_RHO_S * arrays.specular[..., 0]

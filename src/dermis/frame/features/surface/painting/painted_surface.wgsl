@@ -21,6 +21,8 @@ struct Paint {
     beard: f32,
     oil: f32,
     age: f32,
+    blemishes: f32,
+    scars: f32,
     low_oxygen: f32, // oxygen saturations of the two colour tables of skin
     high_oxygen: f32,
 }

@@ -13,7 +13,13 @@
 
 // Artistic values.
 const PATCHES: f32 = 0.22; // amplitude of patches of melanin [doublings]
+const SPECKLES: f32 = 0.16; // amplitude of fine unevenness of melanin [doublings]
 const BLOTCHES: f32 = 0.40; // amplitude of blotches of blood [doublings]
+const CAPILLARIES: f32 = 0.31; // amplitude of the mottling by capillaries [doublings]
+const THREADS: f32 = 0.6; // blood in visible capillaries [doublings]
+const THREAD_MM: f32 = 0.35; // width of visible capillaries [mm]
+const BLEMISH_BLOOD: f32 = 1.7;
+const SCAR_BLOOD: f32 = 0.5;
 const FRECKLE: f32 = 1.7;
 const AGE_SPOT: f32 = 1.3;
 const MOLE: f32 = 3.4;
@@ -27,6 +33,7 @@ const RED_LIDS: f32 = 0.8;
 const RED_SLIT: f32 = 1.0;
 const STUBBLE_COLOUR: vec3f = vec3f(0.095, 0.085, 0.08); // hair below the surface; scattering makes it blueish
 const BEARD_COLOUR: vec3f = vec3f(0.11, 0.10, 0.095);
+const DEEP_VEINS: f32 = 0.7;
 const VEIN_COLOUR: vec3f = vec3f(0.80, 0.90, 1.0); // factor of the skin colour
 const STRENGTH: f32 = 0.86; // strength of the specular reflection, relative to the default
 const OILY_STRENGTH: f32 = 0.44;
@@ -38,6 +45,8 @@ const WET_STRENGTH: f32 = 0.55; // added inside the mouth and on the lids' edges
 const WET_ROUGHNESS: f32 = -0.12;
 const INNER_LID: vec3f = vec3f(0.46, 0.19, 0.155); // inner side of the lids, and the caruncle
 const TEARS: f32 = 0.11; // roughness of the inner side of the lids
+const PORES: f32 = 0.4; // amount of pores outside zones
+const MIDLINE_MM: f32 = 4.0; // half of the width over which tension lines of both halves of the face meet
 const UNEVEN: f32 = 0.15; // relative variation of gloss by uneven oil
 
 // Colour for fractions of melanin and blood, interpolated bilinearly in their square roots.
@@ -63,10 +72,10 @@ fn entry(table: u32, at: vec2u) -> vec3f {
     return textureLoad(colour_tables, at, table, 0).rgb;
 }
 
-// Thin branching lines along the zeros of a noise.
+// Thin branching lines along the zeros of a noise, and a blue shade of vessels that lie deeper.
 fn veins() -> f32 {
     let near = 1.0 - smoothstep(0.0, 0.10, abs(noise[NOISE_VEINS] + 0.08 * noise[NOISE_SUN]));
-    return near * saturate(zone_of(ZONE_VEINS)) * paint.veins;
+    return (near + DEEP_VEINS) * saturate(zone_of(ZONE_VEINS)) * paint.veins;
 }
 
 // Weight of the inner side of the lids, which is pink and wet.
@@ -74,13 +83,23 @@ fn inner_lid(spot: Spot) -> f32 {
     return smoothstep(0.1, -0.45, spot.fields.z);
 }
 
+// Blood of capillaries: red spots and nets over paler skin, and single vessels where there are many [doublings].
+fn capillaries(spot: Spot) -> f32 {
+    let many = saturate(zone_of(ZONE_CAPILLARIES));
+    let n = noise[NOISE_CAPILLARIES];
+    let mottling = CAPILLARIES * (0.45 + 0.75 * many) * (n + 0.7 * max(n, 0.0) * n);
+    let thread = 1.0 - smoothstep(0.02, 0.09, abs(n + 0.35 * noise[NOISE_SPECKLES]));
+    return 2.0 * paint.redness * (mottling + THREADS * saturate(2.5 * many - 1.2) * thread * visible(THREAD_MM, 0.5 * spot.texel_mm));
+}
+
 fn pigments(spot: Spot, lip: f32, mucosa: f32) -> vec2f {
-    var brown = zone_of(ZONE_MELANIN) * (1.0 - lip) + LIP_MELANIN * lip + PATCHES * noise[NOISE_PATCHES];
+    var brown = zone_of(ZONE_MELANIN) * (1.0 - lip) + LIP_MELANIN * lip + PATCHES * noise[NOISE_PATCHES] + SPECKLES * noise[NOISE_SPECKLES];
     brown += FRECKLE * smoothstep(0.02, 0.3, dotted[DOT_FRECKLES] + 0.7 * dotted[DOT_SMALL_FRECKLES]);
     brown += AGE_SPOT * smoothstep(0.05, 0.4, dotted[DOT_AGE_SPOTS]) + MOLE * smoothstep(0.1, 0.6, dotted[DOT_MOLES]);
     let clothed = smoothstep(-165.0, -205.0, spot.body.y + 6.0 * noise[NOISE_WANDER_Y]);
     brown += TAN * (0.35 * (paint.tan - TYPICAL_TAN) * saturate(zone_of(ZONE_SUN)) - 0.5 * paint.tan * clothed);
-    var red = 2.0 * paint.redness * zone_of(ZONE_BLOOD) * (1.0 - lip) + BLOTCHES * noise[NOISE_BLOTCHES];
+    var red = (2.0 * paint.redness * zone_of(ZONE_BLOOD) + capillaries(spot)) * (1.0 - lip) + BLOTCHES * noise[NOISE_BLOTCHES];
+    red += BLEMISH_BLOOD * smoothstep(0.0, 0.4, dotted[DOT_BLEMISHES]) + SCAR_BLOOD * smoothstep(0.0, 0.5, dotted[DOT_SCARS]);
     let slit = RED_SLIT * (1.0 - smoothstep(0.0, 2.2, spot.fields.y));
     red += lip * (LIP_BLOOD + 0.3 * noise[NOISE_LIP_STREAKS] + slit) + mucosa * (MUCOSA_BLOOD - lip * (LIP_BLOOD + RED_SLIT));
     red += RED_LIDS * (1.0 - smoothstep(0.3, 1.8, spot.fields.z));
@@ -109,9 +128,10 @@ fn store_deltas(at: vec2u, share: f32, flush: f32, pressed: f32) {
     textureStore(expression_deltas, at, 1, vec4f(share * vec3f(deepened[4], deepened[5], deepened[6]), flush - pressed));
 }
 
-fn store_texel(at: vec2u, rgb: vec3f, shine: vec2f, height: f32, amounts: vec3f, pigments: vec2f) {
+// amounts : of pores and of lines, log2 of the mm per unit of uv, and direction of the tension lines
+fn store_texel(at: vec2u, rgb: vec3f, shine: vec2f, height: f32, amounts: vec4f, pigments: vec2f) {
     textureStore(colour, at, vec4f(rgb, 1.0));
-    textureStore(specular, at, vec4f(shine.x, amounts.x, amounts.z, 0.0));
+    textureStore(specular, at, vec4f(shine.x, amounts.x, amounts.z, amounts.w));
     textureStore(roughness, at, vec4f(shine.y, amounts.y, saturate(pigments)));
     heights[(at.y + 1u) * (paint.side + 2u) + at.x + 1u] = height;
 }
@@ -128,7 +148,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         for (var k = 0u; k < AMOUNT_ROWS; k++) {
             zone[k] = vec4f(0.0);
         }
-        store_texel(id.xy, skin_colour(paint.melanin, paint.blood), shine, 0.0, vec3f(0.0), vec2f(paint.melanin, paint.blood));
+        store_texel(id.xy, skin_colour(paint.melanin, paint.blood), shine, 0.0, vec4f(0.0), vec2f(paint.melanin, paint.blood));
         return;
     }
     let spot = spot_of(owner, id.xy);
@@ -152,7 +172,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let height = relief(spot, lip) * fade * (1.0 - inner);
     store_deltas(id.xy, fade, saturate(zone_of(ZONE_FLUSH)) * (1.0 - lip), lip);
     let bare = (1.0 - lip) * (1.0 - mucosa) * (1.0 - inner);
-    let pores = saturate(0.45 + zone_of(ZONE_PORES)) * bare;
+    let pores = clamp(PORES + zone_of(ZONE_PORES), 0.0, 1.5) * (0.75 + 0.6 * paint.oil) * bare;
     let furrows = max(1.0 + zone_of(ZONE_FURROWS), 0.2) * bare * (0.8 + 2.2 * paint.age * paint.age);
-    store_texel(id.xy, rgb, gloss(lip, wet, max(scalp * paint.stubble, beard), inner), height, vec3f(pores, furrows, spot.density), p);
+    let tension = clamp(spot.body.x / MIDLINE_MM, -1.0, 1.0) * clamp(zone_of(ZONE_TENSION), -1.4, 1.4);
+    let amounts = vec4f(pores, furrows, spot.density, tension);
+    store_texel(id.xy, rgb, gloss(lip, wet, max(scalp * paint.stubble, beard), inner), height, amounts, p);
 }

@@ -101,7 +101,7 @@ fn in_space(spot: Spot, space: u32) -> vec3f {
     let p = spot.body;
     switch (space) {
         case 1u: {
-            return p + vec3f(0.9 * noise[NOISE_CREASE_BEND] + 0.02 * p.x * abs(spot.fields.y), 0.0, 0.0);
+            return p + vec3f(0.45 * noise[NOISE_CREASE_BEND] + 0.02 * p.x * abs(spot.fields.y), 0.0, 0.0);
         }
         case 2u: {
             return p + vec3f(0.0, 0.8 * noise[NOISE_LINE_BEND], 0.0);
