@@ -24,7 +24,7 @@ _FRAME_SIZE_PER_MESH_SIZE = 1.08  # size of the frame relative to a mesh that is
 _WORLD_UP = (0.0, 1.0, 0.0)
 # of the preset "headshot": from the left of the front and slightly above, with space where the face looks
 _HEADSHOT_AZIMUTH_DEGREES, _HEADSHOT_ELEVATION_DEGREES, _HEADSHOT_FRAME_MM = 26.0, 3.0, 208.0
-_HEADSHOT_DISTANCE_MM, _HEADSHOT_TARGET_MM = 1500.0, (-8.0, -10.0, 12.0)
+_HEADSHOT_DISTANCE_MM, _HEADSHOT_TARGET_MM = 1500.0, (-13.0, -10.0, 14.0)
 
 
 _PictureFraction = Annotated[float, Field(ge=-10, le=10), BoundsReason("lenses do not shift farther")]
