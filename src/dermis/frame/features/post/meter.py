@@ -76,7 +76,7 @@ def draw(
     images = {"visibility_buffer": visibility_buffer, "image": radiance_image}
     bindings = {**lighting, **images, "camera": camera, "points": meter.points}
     graph.compute("meter", shader, bindings, (METER_GRID_SIDE, METER_GRID_SIDE))
-    key = program(graph.device, "post/meter_key.wgsl", {"FOR_SKIN": for_skin})
+    key = program(graph.device, "post/meter_key.wgsl", (("FOR_SKIN", for_skin),))
     graph.dispatch("meter", key, {"points": meter.points, "exposure": meter.exposure}, (1, 1, 1))
 
 
