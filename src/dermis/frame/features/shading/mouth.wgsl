@@ -16,10 +16,11 @@ const LOWER_MM: array<f32, TEETH_PER_SIDE> = array<f32, TEETH_PER_SIDE>(5.4, 5.9
 const CROWN_HEIGHT_MM: f32 = 9.8; // visible height of a tooth [mm]
 const BULGE_MM: f32 = 0.55; // of a tooth across its width
 const HEIGHT_BULGE_MM: f32 = 0.45; // of a tooth from its biting edge to the gum
-const ENAMEL: vec3f = vec3f(0.60, 0.54, 0.44);
-const NECK: vec3f = vec3f(0.56, 0.45, 0.31);
-const CLEAR_EDGE: vec3f = vec3f(0.47, 0.45, 0.41);
+const ENAMEL: vec3f = vec3f(0.74, 0.68, 0.57);
+const NECK: vec3f = vec3f(0.66, 0.55, 0.40);
+const CLEAR_EDGE: vec3f = vec3f(0.58, 0.55, 0.50);
 const GUM: vec3f = vec3f(0.42, 0.15, 0.14);
+const TOOTH_SHADOW_OFFSET_MM: f32 = 2.5; // light spreads as far in dentine, so lips cast no sharp shadows on teeth
 const SALIVA_ROUGHNESS: f32 = 0.12; // roughness of wet surfaces
 const MOUTH_SHADOW_SCATTER: vec3f = vec3f(0.04, 0.014, 0.008); // fraction of a light that enters through some 8 mm of cheeks and lips
 
