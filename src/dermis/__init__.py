@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from dermis.mesh.pose import Pose
     from dermis.optics.profiles import load_profile
     from dermis.optics.tissue import Tissue, load_tissue
-    from dermis.scene.camera import Camera, full_body, portrait, side, three_quarter
+    from dermis.scene.camera import Camera, full_body, headshot, portrait, side, three_quarter
     from dermis.scene.environment import Environment
     from dermis.scene.files import load_lights, load_scene
     from dermis.scene.heads import load_head
@@ -73,6 +73,7 @@ _MODULE_OF_NAME = {
     "render": "frame.renderer",
     "Camera": "scene.camera",
     "full_body": "scene.camera",
+    "headshot": "scene.camera",
     "portrait": "scene.camera",
     "side": "scene.camera",
     "three_quarter": "scene.camera",
@@ -126,6 +127,7 @@ __all__ = [
     "export_skin",
     "fit",
     "full_body",
+    "headshot",
     "human_targets",
     "load_head",
     "load_lights",

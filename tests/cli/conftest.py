@@ -49,8 +49,9 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> R
 
 @pytest.fixture(autouse=True)
 def plainly_exposed(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Replace exposure and background by neutral ones, except for tests marked `photographed`."""
+    """Replace exposure, background and rig by those of Python, except for tests marked `photographed`."""
     if not request.node.get_closest_marker("photographed"):
+        monkeypatch.setattr("dermis.cli.scene_options.DEFAULT_RIG", "studio")
         monkeypatch.setattr("dermis.cli.scene_options.PHOTOGRAPHIC_SETTINGS", {"background": (0.0, 0.0, 0.0)})
 
 

@@ -12,10 +12,13 @@ from setups import front_camera, frontal, head_of, joined, scene_of, settings_of
 from tolerances import HALVES
 
 from dermis.frame.features.post.meter import (
+    FULL_SKIN_REFLECTANCE,
     MAX_CLIPPED_FRACTION,
+    MAX_SKIN_FACTOR,
     METER_GRID_SIDE,
     METERED_IRRADIANCE,
     MIN_HIGHLIGHT_FACTOR,
+    SKIN_COMPENSATION,
 )
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import plane, uv_sphere
@@ -71,6 +74,17 @@ def test_meter_measures_incident_light(renderer: Renderer, technique: str) -> No
     ]
     assert both[0] == pytest.approx(both[1], rel=1e-6)
     assert both[0] == pytest.approx(METERED_IRRADIANCE * np.pi / 3.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("colour", [0.8, 0.3, 0.1, 0.01])
+def test_exposure_for_skin_grows_with_its_darkness(renderer: Renderer, colour: float) -> None:
+    head = head_of(plane(100.0), colour=np.full((8, 8, 3), colour))
+    scene = scene_of(head, frontal(0.5), **DULL)
+    usual, found = (metered(renderer, scene, exposure=word) for word in ("auto", "skin"))
+    light, brightness = points(renderer, scene).T
+    factor = (FULL_SKIN_REFLECTANCE * np.sqrt((light**2).mean()) / brightness.mean()) ** SKIN_COMPENSATION
+    assert found / usual == pytest.approx(np.clip(factor, 1.0, MAX_SKIN_FACTOR), rel=1e-4)
+    assert (found > usual) == (colour < 0.5)
 
 
 def test_environment_counts_as_incident_light(renderer: Renderer) -> None:

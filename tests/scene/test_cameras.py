@@ -57,6 +57,16 @@ def test_preset_azimuth_increases_to_the_left_of_the_head(head: Head, name: str,
     assert np.degrees(np.arctan2(x, z)) == pytest.approx(degrees, abs=1e-3)
 
 
+def test_headshot_shows_the_face_in_a_three_quarter_view(head: Head) -> None:
+    camera = CAMERA_PRESETS["headshot"](head)
+    assert 190 <= camera.frame_mm <= 220
+    x, y, z = np.subtract(camera.position, camera.target)
+    assert 20 < np.degrees(np.arctan2(x, z)) < 35
+    assert 0 < np.degrees(np.arctan2(y, np.hypot(x, z))) < 6
+    brow, chin = _seen(camera, head, np.array([[0.0, 45.0, 85.0], [0.0, -85.0, 75.0]]))[:, 1]
+    assert -1 < chin < brow < 1 and brow - chin > 1.1
+
+
 def test_nose_points_to_the_left_of_a_profile_from_the_heads_left(head: Head) -> None:
     nose, back = _seen(
         CAMERA_PRESETS["profile"](head), head, np.array([[0.0, 0.0, SIZE[2] / 2], [0.0, 0.0, -SIZE[2] / 2]])

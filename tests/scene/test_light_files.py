@@ -68,8 +68,8 @@ def test_every_rig_loads_and_has_a_description(name: str) -> None:
 
 def test_named_rig_is_loaded() -> None:
     assert light_presets() == [
-        "backlit",
-        *("laser", "none", "rembrandt", "rim", "studio", "top", "window"),
+        *("backlit", "beauty", "laser", "none", "overcast", "portrait"),
+        *("raking", "rembrandt", "rim", "studio", "top", "window"),
     ]
     assert load_lights("studio") == studio()
     assert isinstance(load_lights("laser")[0], StripeLight)

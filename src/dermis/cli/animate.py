@@ -189,7 +189,7 @@ def _render_frames(
 
 def _common_exposure(animated_scene: _AnimatedScene, renderer: Renderer) -> float:
     """Return the exposure of all frames: --exposure, or by default the one metered on the first frame."""
-    if animated_scene.settings.exposure != "auto":
+    if not isinstance(animated_scene.settings.exposure, str):
         return animated_scene.settings.exposure
     (scene,) = animated_scene.scenes([animated_scene.first])
     exposure = renderer.draw(scene, animated_scene.settings, timed=False).exposure
@@ -205,7 +205,7 @@ def _frame_digest(animated_scene: _AnimatedScene, options: SceneOptions, *files:
     """
     scene = animated_scene.scene
     names = [*files, scene.head.name, *map(str, options.head.values()), animated_scene.clip.name]
-    metered_at = animated_scene.first if animated_scene.settings.exposure == "auto" else None
+    metered_at = animated_scene.first if isinstance(animated_scene.settings.exposure, str) else None
     scene_values = scene.lights, scene.camera, scene.skin, scene.environment
     frame_values = *scene_values, animated_scene.settings, animated_scene.rate, metered_at
     option_values = options.head, options.eye, options.pose, options.bone, options.look_at

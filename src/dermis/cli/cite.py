@@ -73,12 +73,13 @@ def _comparison_sources(reference_solution: str, technique: str | None) -> tuple
 
 
 def _picture_sources(scene_file: Path | None, settings: Options, skin: Options) -> tuple[str, ...]:
+    from dermis.cli.scene_options import DEFAULT_RIG
     from dermis.scene import load_scene
-    from dermis.scene.lights import studio
+    from dermis.scene.lights import preset_lights
     from dermis.scene.sources import picture_citation_keys
 
     if scene_file is None:
-        return picture_citation_keys(Skin(**skin), Settings(**settings), studio())
+        return picture_citation_keys(Skin(**skin), Settings(**settings), preset_lights(DEFAULT_RIG))
     scene, scene_settings = load_scene(scene_file)
     maps = scene.head.maps
     return picture_citation_keys(

@@ -99,7 +99,7 @@ def render(
     with _disable_garbage_collection(), ThreadPoolExecutor(1) as pool:
         future = pool.submit(Renderer, adapter)  # the driver starts and compiles while the head is loaded
         with spinner("loading"):
-            loaded_scene, settings = assemble_scene(head, scene)
+            loaded_scene, settings = assemble_scene(head, scene, looks_at_camera=True)
             landmark_output.check_landmark_sets(loaded_scene.head)
         note_subdivision(head, scene, loaded_scene.head)
         with spinner("rendering"):

@@ -43,6 +43,9 @@ if TYPE_CHECKING:
     EnvironmentOptions = Options
     SkinPreset = str | None
 
+DEFAULT_RIG = "portrait"
+"""Lighting rig of the commands for heads without lights of their own."""
+_GAZE_TARGET_PREFIX = "eyeLook"
 ENVIRONMENT_OPTION_NAMES = {field: f"env_{field}" for field in Environment.model_fields}
 ENVIRONMENT_OPTION_NAMES |= {"name": "env", "rotation_degrees": "env_rotation"}
 
@@ -77,16 +80,16 @@ class SceneOptions:
     lights: Annotated[
         str | None,
         Parameter(
-            help="Lighting rig (studio, window, top, rim, backlit, rembrandt, laser, none) or a TOML file "
-            "with [[lights]]. [default: studio, or none with --env]"
+            help="Lighting rig (portrait, beauty, studio, window, rembrandt, overcast, rim, top, backlit, "
+            "raking, laser, none) or a TOML file with [[lights]]. [default: portrait, or none with --env]"
         ),
     ] = None
     environment: EnvironmentOptions = field(default_factory=dict)
     camera: Annotated[
         str | None,
         Parameter(
-            help="Camera: portrait, three-quarter, profile, ear, cheek, full_body, or a TOML file with "
-            "[camera]. [default: portrait]"
+            help="Camera: portrait, three-quarter, profile, ear, cheek, full_body, headshot, or a TOML file "
+            "with [camera]. [default: headshot for people, portrait for other heads]"
         ),
     ] = None
     head: HeadOptions = field(default_factory=dict)
@@ -99,12 +102,15 @@ class SceneOptions:
 DEFAULT_SCENE_OPTIONS = SceneOptions()
 
 
-def assemble_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Settings]:
+def assemble_scene(
+    head_or_scene: str, options: SceneOptions, *, looks_at_camera: bool = False
+) -> tuple[Scene, Settings]:
     """Return the scene and settings that a head or scene file and the command line options describe.
 
     Settings that neither the scene file nor an option specifies are taken from `PHOTOGRAPHIC_SETTINGS`.
 
     head_or_scene : head or scene file as named on the command line
+    looks_at_camera : whether people look at the default camera, unless an option turns eyes or bones
     """
     from dermis.scene import Scene, load_camera
 
@@ -132,12 +138,29 @@ def assemble_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Se
         environment=environment,
         pose=scene.pose,
     )
-    if options.look_at is not None:
-        assembled = replace(assembled, pose=pose_with_gaze(options.look_at, assembled))
+    look_at = options.look_at
+    if looks_at_camera and _is_default_view_of_person(head_or_scene, options):
+        look_at = look_at or "camera"
+    if look_at is not None:
+        assembled = replace(assembled, pose=pose_with_gaze(look_at, assembled))
     set_values = settings.model_dump(exclude_unset=True) | options.settings
     final_settings = Settings(**{**PHOTOGRAPHIC_SETTINGS, **set_values})
     _note_profile_map(assembled.skin, final_settings)
     return assembled, final_settings
+
+
+def default_camera(head_or_scene: str) -> str:
+    """Return the camera preset that commands choose for a head that is named on the command line."""
+    from dermis.scene.heads import is_person_name
+
+    return "headshot" if is_person_name(head_or_scene) else "portrait"
+
+
+def _is_default_view_of_person(head_or_scene: str, options: SceneOptions) -> bool:
+    """Return whether a person is seen by the default camera, with eyes and bones that no option turns."""
+    poses = ",".join(options.pose or ())
+    stated = options.camera is not None or options.bone or _GAZE_TARGET_PREFIX in poses
+    return not stated and default_camera(head_or_scene) == "headshot"
 
 
 def shrink_atlas_on_cpu(scene: Scene, settings: Settings, adapter_kind: str) -> Settings:
@@ -216,10 +239,10 @@ def _base_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Setti
     if has_region_table(vars(table)) and "rho_s" in options.skin:
         actual = "it is given with --regions, which sets it for each region"
         refuse(option_name("rho_s"), "only one of the two", actual, "Remove one, or use --oiliness")
-    camera_for = partial(load_camera, options.camera or "portrait")
+    camera_for = partial(load_camera, options.camera or default_camera(head_or_scene))
     picture = SmoothOutlineLevels(camera_for, Settings(**options.settings).size)
     head, skin = load_head_and_skin(table, Skin(), Path(), picture)
-    return Scene(head, skin=skin), Settings()
+    return Scene(head, lights=DEFAULT_RIG, camera=camera_for(head), skin=skin), Settings()
 
 
 def _merge_environment(scene_environment: Environment | None, options: Options) -> Environment | None:

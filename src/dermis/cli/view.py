@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dermis.base.console import print_lines, print_note, spinner
 from dermis.base.errors import refuse
 from dermis.cli.options import AdapterOption, FlagOption, IntegerOption
-from dermis.cli.scene_options import DEFAULT_SCENE_OPTIONS, SceneOptions, assemble_scene
+from dermis.cli.scene_options import DEFAULT_RIG, DEFAULT_SCENE_OPTIONS, SceneOptions, assemble_scene
 
 if TYPE_CHECKING:
     from dermis.apps.viewer.player import MotionFile
@@ -34,7 +34,7 @@ def view(
     """Show a head in an interactive window or web page.
 
     Drag to rotate, right-drag to pan, scroll to zoom, double-click to set the centre of rotation, and
-    Shift-drag to move the light. Keys 1 to 6 select camera presets, Space plays and pauses a motion, Tab
+    Shift-drag to move the light. Keys 1 to 7 select camera presets, Space plays and pauses a motion, Tab
     hides the panel, Ctrl+Z and Ctrl+Y undo and redo, and ? shows all keys. The panel can save the scene as a
     TOML file for `dermis render`. All other options are those of `dermis render`, but --size is the size of
     the window [default: 1280x800].
@@ -108,7 +108,7 @@ def _initial_state(head_or_scene: str, options: SceneOptions, adapter: str) -> V
         if is_scene
         else with_absolute_paths({"name": head_or_scene} | options.head, Path())
     )
-    preset = "" if is_scene else "none" if "name" in options.environment else "studio"
+    preset = "" if is_scene else "none" if "name" in options.environment else DEFAULT_RIG
     return initial_state(scene, settings, table, preset if options.lights is None else options.lights)
 
 

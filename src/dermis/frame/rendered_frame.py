@@ -79,7 +79,7 @@ class RenderedFrame(ShortRepr):
     @property
     def exposure(self) -> float:
         """Return the factor from radiance to linear light in the picture, whether fixed or metered [-]."""
-        if self.settings.exposure != "auto":
+        if not isinstance(self.settings.exposure, str):
             return float(self.settings.exposure)
         return self._read(lambda frame: read_meter(frame.device, frame.meter) if frame.meter else 1.0)
 

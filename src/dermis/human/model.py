@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from dermis.human import lids, teeth
 from dermis.human.hair.root_finder import RootFinder, eye_centres
 from dermis.human.lids import fit_lid_targets
+from dermis.human.lips import close_lips
 from dermis.human.makehuman import Points, group_points, makehuman_arrays, mesh_point_count, morphed_points_mm
 from dermis.human.movement import build_skeleton, expression_targets, gaze_rotations
 from dermis.mesh import eyeball
@@ -73,7 +74,7 @@ def build_head(target_weights: Mapping[str, float], maps: Maps, layout: Layout, 
     layout : uv layout
     eye_look : look of the eyes
     """
-    points_mm, faces = morphed_points_mm(target_weights), _layout_faces(layout)
+    points_mm, faces = close_lips(morphed_points_mm(target_weights)), _layout_faces(layout)
     sockets = _eye_sockets(points_mm)
     (left, left_centre), (right, right_centre) = map(lids.place_eyeball, sockets)
     points = np.concatenate([lids.fit_lids(points_mm, sockets)[: mesh_point_count()], left, right])
@@ -99,7 +100,7 @@ def control_points_mm(target_weights: Mapping[str, float]) -> NDArray[np.float32
 
     target_weights : mapping from names of MakeHuman's morph targets to weights
     """
-    points_mm = morphed_points_mm(target_weights)
+    points_mm = close_lips(morphed_points_mm(target_weights))
     sockets = _eye_sockets(points_mm)
     balls = [lids.place_eyeball(eye)[0] for eye in sockets]
     skin = lids.fit_lids(points_mm, sockets)[: mesh_point_count()]

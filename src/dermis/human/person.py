@@ -18,6 +18,7 @@ from dermis.human.hair.groom import add_hair
 from dermis.human.hair.look import HairLook, sample_hair, sample_recession, stubble_visibility, typical_hair
 from dermis.human.makehuman import OLD_AGE, YOUNG_AGE, human_targets
 from dermis.human.model import Layout, build_head, control_points_mm, head_template
+from dermis.human.proportions import with_proportions
 from dermis.human.skin.look import (
     Demographics,
     SkinLook,
@@ -120,7 +121,10 @@ def sample_fields(seed: int, fixed_fields: Mapping[str, Any]) -> dict[str, Any]:
         "age": float(YOUNG_AGE + (OLD_AGE - YOUNG_AGE) * old),
         "weight": float(np.clip(weight, -0.7, 0.8)),
         "muscle": float(np.clip(muscle, -0.6, 0.6)),
-        "targets": {**dict(_sample_targets(rng)), **fixed_fields.get("targets", {})},
+        "targets": {
+            **with_proportions(np.random.default_rng((int(seed), 5)), dict(_sample_targets(rng))),
+            **fixed_fields.get("targets", {}),
+        },
     }
     fields |= dict(zip(_ANCESTRIES, map(float, ancestry), strict=True)) | fixed_numbers
     african, asian, caucasian = ancestry

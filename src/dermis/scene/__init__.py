@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from dermis.base.renamed import successor
 
 if TYPE_CHECKING:
-    from dermis.scene.camera import Camera, full_body, portrait, side, three_quarter
+    from dermis.scene.camera import Camera, full_body, headshot, portrait, side, three_quarter
     from dermis.scene.environment import Environment
     from dermis.scene.files import load_camera, load_lights, load_scene
     from dermis.scene.lights import *  # noqa: F403 each kind
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dermis.scene.skin import Skin
 
 _NAMES_BY_MODULE = {
-    "camera": ("Camera", "full_body", "portrait", "side", "three_quarter"),
+    "camera": ("Camera", "full_body", "headshot", "portrait", "side", "three_quarter"),
     "environment": ("Environment",),
     "files": ("load_camera", "load_lights", "load_scene"),
     "model": ("Scene",),
@@ -32,6 +32,7 @@ __all__ = [  # in addition to those of dermis.scene.lights
     "Settings",
     "Skin",
     "full_body",
+    "headshot",
     "load_camera",
     "load_lights",
     "load_scene",

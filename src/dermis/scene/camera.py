@@ -22,6 +22,9 @@ _DEFAULT_DISTANCE_MM = 1100.0  # as in portrait photography; from closer, the no
 _MIN_DISTANCE_PER_MESH_SIZE = 3.0  # least distance relative to the size of a mesh that is shown completely
 _FRAME_SIZE_PER_MESH_SIZE = 1.08  # size of the frame relative to a mesh that is shown completely
 _WORLD_UP = (0.0, 1.0, 0.0)
+# of the preset "headshot": from the left of the front and slightly above, with space where the face looks
+_HEADSHOT_AZIMUTH_DEGREES, _HEADSHOT_ELEVATION_DEGREES, _HEADSHOT_FRAME_MM = 26.0, 3.0, 208.0
+_HEADSHOT_DISTANCE_MM, _HEADSHOT_TARGET_MM = 1500.0, (-13.0, -10.0, 14.0)
 
 
 _PictureFraction = Annotated[float, Field(ge=-10, le=10), BoundsReason("lenses do not shift farther")]
@@ -199,6 +202,41 @@ def three_quarter(head: Head) -> Camera:
     return _camera_at_azimuth(head, 40.0)
 
 
+def headshot(head: Head) -> Camera:
+    """Return a camera for a close portrait of the face, 26 degrees from the front towards the head's left.
+
+    The picture ends at the forehead and below the chin. Shoulders and long hair are outside it.
+
+    Parameters
+    ----------
+    head : Head
+        The head. If the mesh has no head, for example a hand, the camera shows the whole mesh.
+
+    Returns
+    -------
+    Camera
+        Camera 1.5 m from the head, or farther from a large mesh without a head.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> from dermis.mesh.maps import Maps
+    >>> from dermis.mesh.primitives import uv_sphere
+    >>> dermis.headshot(dermis.Head("ball", uv_sphere(90.0, 8, 4), Maps())).frame_mm
+    208.0
+    """
+    if head.skull_centre_mm is None:
+        return _camera_showing_all(head, _HEADSHOT_AZIMUTH_DEGREES)
+    elevation = math.radians(_HEADSHOT_ELEVATION_DEGREES)
+    x, _, z = _direction_at_azimuth(_HEADSHOT_AZIMUTH_DEGREES)
+    towards = (math.cos(elevation) * x, math.sin(elevation), math.cos(elevation) * z)
+    return Camera(
+        position=_offset_point(_HEADSHOT_TARGET_MM, towards, _HEADSHOT_DISTANCE_MM),
+        target=_HEADSHOT_TARGET_MM,
+        frame_mm=_HEADSHOT_FRAME_MM,
+    )
+
+
 def side(head: Head) -> Camera:
     """Return a camera on the left side of the head, for a view in profile.
 
@@ -277,6 +315,7 @@ CAMERA_PRESETS = {
     "ear": ear,
     "cheek": cheek,
     "full_body": full_body,
+    "headshot": headshot,
 }
 """Functions of the head that return a camera, by name; hyphens and underscores are interchangeable."""
 

@@ -18,6 +18,8 @@ from dermis.scene.techniques import TECHNIQUES
 _PictureSide = Annotated[int, Field(ge=1, le=16384), BoundsReason("pixels: what the largest GPUs hold")]
 _MAX_SAMPLES_PER_PIXEL = 64
 MAX_SAMPLE_COUNT = 2**27
+METERED_EXPOSURES = "auto", "skin"
+"""Words for exposures that are metered in the picture."""
 _HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 
 
@@ -40,14 +42,14 @@ def _parse_colour(typed_colour: Any) -> Any:
 
 
 if TYPE_CHECKING:
-    Exposure = float | Literal["auto"]
+    Exposure = float | Literal["auto", "skin"]
     Background = Colour | Literal["none", "gradient", "environment"]
 else:
     Exposure = Annotated[
         float,
         Field(ge=1e-6, le=1e6, json_schema_extra=slider(0.05, 20, logarithmic=True)),
         BoundsReason("20 stops either way"),
-        AcceptedWords("auto"),
+        AcceptedWords(*METERED_EXPOSURES),
     ]
     _BACKGROUNDS = AcceptedWords("none", "gradient", "environment")
     Background = Annotated[Colour, BeforeValidator(_parse_colour), _BACKGROUNDS]
@@ -95,7 +97,8 @@ class Settings(FrozenModel):
     interreflection: bool = True
     """Light reflected from skin to skin: in ears, around the eyes, under chin and nose."""
     exposure: Exposure = 1.0
-    """Factor from radiance to picture values; "auto" meters the irradiance of the visible skin."""
+    """Factor from radiance to picture values; "auto" meters the irradiance of the visible skin, "skin" also
+    how much light it reflects, and exposes dark skin longer, as for portraits."""
     bloom: Annotated[float, Field(ge=0, le=1, json_schema_extra=slider(0, 0.5))] = 0.0
     """Fraction of the light that the lens scatters."""
     tone: Literal["none", "filmic", "neutral"] = "none"
@@ -121,5 +124,5 @@ class Settings(FrozenModel):
         return self
 
 
-PHOTOGRAPHIC_SETTINGS: Mapping[str, Any] = MappingProxyType({"exposure": "auto", "background": "gradient"})
+PHOTOGRAPHIC_SETTINGS: Mapping[str, Any] = MappingProxyType({"exposure": "skin", "background": "gradient"})
 """Defaults of `dermis render`, `animate` and `view` where they differ from the defaults of `Settings`."""

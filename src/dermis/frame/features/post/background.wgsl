@@ -9,9 +9,9 @@
 const COLOUR: u32 = 0u;
 const GRADIENT: u32 = 1u;
 const BACKDROP_MIDDLE: vec2f = vec2f(0.5, 0.42); // brightest point of the backdrop, relative to the picture
-const BACKDROP_BRIGHT: f32 = 0.16;
-const BACKDROP_DARK: f32 = 0.012;
-const BACKDROP_WIDTH: f32 = 0.42; // standard deviation relative to the longer side of the picture
+const BACKDROP_BRIGHT: vec3f = vec3f(0.20, 0.207, 0.22); // a little cooler than skin
+const BACKDROP_DARK: vec3f = vec3f(0.026, 0.027, 0.029);
+const BACKDROP_WIDTH: f32 = 0.45; // standard deviation relative to the longer side of the picture
 
 struct Background {
     rays: Rays,
@@ -28,7 +28,7 @@ struct Background {
 // Colour in the picture, independent of the exposure.
 fn backdrop(position: vec2f, size: vec2f) -> vec3f {
     let from_middle = (position - BACKDROP_MIDDLE * size) / (BACKDROP_WIDTH * max(size.x, size.y));
-    return vec3f(mix(BACKDROP_DARK, BACKDROP_BRIGHT, exp(-0.5 * dot(from_middle, from_middle))));
+    return mix(BACKDROP_DARK, BACKDROP_BRIGHT, exp(-0.5 * dot(from_middle, from_middle)));
 }
 
 fn environment_at(position: vec2f, size: vec2f) -> vec3f {

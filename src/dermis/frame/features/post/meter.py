@@ -19,12 +19,23 @@ MAX_CLIPPED_FRACTION = 0.01
 """Largest fraction of the visible skin that may be overexposed."""
 MIN_HIGHLIGHT_FACTOR = 0.5
 """Least factor by which the exposure is scaled to preserve highlights; 0.5 is one stop."""
+FULL_SKIN_REFLECTANCE = 0.53
+"""Reflectance of skin, in its largest channel, up to which the exposure for skin is longer than usual."""
+SKIN_COMPENSATION = 0.43
+"""Exponent with which the exposure for skin grows with the inverse of its reflectance."""
+MAX_SKIN_FACTOR = 2.0
+"""Largest factor by which dark skin is exposed longer; 2 is one stop."""
 
 
 def shader_constants() -> dict[str, float]:
     """Return the named values that the shader preprocessor inserts at `//#fill` in shaders of the meter."""
     highlights = {"meter_clipping": MAX_CLIPPED_FRACTION, "meter_stopped_down": MIN_HIGHLIGHT_FACTOR}
-    return {"meter_side": METER_GRID_SIDE, "meter_key": METERED_IRRADIANCE, **highlights}
+    skin = {
+        "full_skin_reflectance": FULL_SKIN_REFLECTANCE,
+        "skin_compensation": SKIN_COMPENSATION,
+        "max_skin_factor": MAX_SKIN_FACTOR,
+    }
+    return {"meter_side": METER_GRID_SIDE, "meter_key": METERED_IRRADIANCE, **highlights, **skin}
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +60,7 @@ def draw(
     shading_inputs: tuple[Bindings, UniformRecord, Constants],
     visibility_buffer: Texture,
     radiance_image: Texture,
+    for_skin: bool,
 ) -> None:
     """Declare the passes that measure the irradiance of the visible skin, and derive the exposure from it.
 
@@ -56,6 +68,7 @@ def draw(
         the lights
     visibility_buffer : texture with the index of the triangle that covers each sample
     radiance_image : texture of the radiance of the picture
+    for_skin : whether the exposure depends on the reflectance of the skin too
     """
     lighting, view, constants = shading_inputs
     shader = program(graph.device, "post/meter.wgsl", constants)
@@ -63,7 +76,7 @@ def draw(
     images = {"visibility_buffer": visibility_buffer, "image": radiance_image}
     bindings = {**lighting, **images, "camera": camera, "points": meter.points}
     graph.compute("meter", shader, bindings, (METER_GRID_SIDE, METER_GRID_SIDE))
-    key = program(graph.device, "post/meter_key.wgsl")
+    key = program(graph.device, "post/meter_key.wgsl", (("FOR_SKIN", for_skin),))
     graph.dispatch("meter", key, {"points": meter.points, "exposure": meter.exposure}, (1, 1, 1))
 
 
@@ -72,7 +85,7 @@ def exposure_inputs(device: Device, settings: Settings, meter: Meter | None) -> 
 
     The fixed exposure is 0 if the metered exposure is used.
     """
-    if settings.exposure == "auto":
+    if isinstance(settings.exposure, str):
         assert meter is not None
         return 0.0, meter.exposure
     unused = device.cached("no meter", lambda: device.buffer(np.ones(1, np.float32), "STORAGE"))

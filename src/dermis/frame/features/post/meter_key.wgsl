@@ -5,6 +5,10 @@
 //#fill const KEY: f32 = {meter_key}; // value of white skin in the metered light
 //#fill const CLIPPING: f32 = {meter_clipping}; // fraction of the points that may be brighter than 1
 //#fill const MIN_HIGHLIGHT_FACTOR: f32 = {meter_stopped_down}; // least factor by which highlights lower the exposure
+//#fill const FULL_SKIN_REFLECTANCE: f32 = {full_skin_reflectance};
+//#fill const SKIN_COMPENSATION: f32 = {skin_compensation};
+//#fill const MAX_SKIN_FACTOR: f32 = {max_skin_factor};
+override FOR_SKIN: bool = false; // whether dark skin is exposed longer
 const LANES: u32 = 256u;
 const POINTS_PER_LANE: u32 = METER_SIDE * METER_SIDE / LANES; // metered points per invocation
 const BISECTIONS: u32 = 24u; // of the range of radiances, down to 6e-5 of it
@@ -14,7 +18,7 @@ const LOG_RANGE: vec2f = vec2f(-24.0, 24.0);
 @group(0) @binding(0) var<storage, read> points: array<vec2f>; // see meter.wgsl
 @group(0) @binding(1) var<storage, read_write> exposure: array<f32>;
 
-var<workgroup> sums: array<vec2f, LANES>; // of squared light, and number of points on skin
+var<workgroup> sums: array<vec3f, LANES>; // of squared light, number of points on skin, and sum of the radiances
 var<workgroup> count_above: atomic<u32>;
 
 fn root_mean_square(lane: u32) -> f32 {
@@ -56,21 +60,29 @@ fn highlight_radiance(lane: u32, brightness: array<f32, POINTS_PER_LANE>) -> f32
     return exp2(high);
 }
 
+// reflectance : mean radiance of the skin relative to that of a white surface
+fn skin_factor(reflectance: f32) -> f32 {
+    return clamp(pow(FULL_SKIN_REFLECTANCE / max(reflectance, 1e-4), SKIN_COMPENSATION), 1.0, MAX_SKIN_FACTOR);
+}
+
 @compute @workgroup_size(LANES)
 fn main(@builtin(local_invocation_index) lane: u32) {
     var brightness: array<f32, POINTS_PER_LANE>; // logarithms
-    var sum = vec2f(0.0);
+    var sum = vec3f(0.0);
     for (var i = 0u; i < POINTS_PER_LANE; i += 1u) {
         let point = points[lane + i * LANES];
         let on_skin = point.x >= 0.0;
-        sum += select(vec2f(0.0), vec2f(point.x * point.x, 1.0), on_skin);
+        sum += select(vec3f(0.0), vec3f(point.x * point.x, 1.0, point.y), on_skin);
         brightness[i] = select(LOG_RANGE.x, log2(max(point.y, 1e-7)), on_skin);
     }
     sums[lane] = sum;
     let light = root_mean_square(lane);
     let limit = 1.0 / highlight_radiance(lane, brightness);
     if (lane == 0u) {
-        let key_exposure = KEY / light;
+        var key_exposure = KEY / light;
+        if (FOR_SKIN) {
+            key_exposure *= skin_factor(sums[0].z / (max(sums[0].y, 1.0) * light));
+        }
         // Without light or skin the exposure is 1.
         let result = clamp(clamp(limit, MIN_HIGHLIGHT_FACTOR * key_exposure, key_exposure), MIN_EXPOSURE, 1.0 / MIN_EXPOSURE);
         exposure[0] = select(result, 1.0, light == 0.0);

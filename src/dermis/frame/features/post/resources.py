@@ -13,7 +13,7 @@ from dermis.frame.features.post.picture import Picture, make_picture
 from dermis.frame.lights.environment import unfiltered_panorama
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Bindings, Constants, Device, Memo, Recorder, Texture, UniformRecord, make_texture
-from dermis.scene.settings import Settings
+from dermis.scene.settings import METERED_EXPOSURES, Settings
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resourc
     settings, cached = request.settings, memo.get
     return Resources(
         picture=cached(make_picture, device, settings.size),
-        meter=cached(make_meter, device) if settings.exposure == "auto" else None,
+        meter=cached(make_meter, device) if settings.exposure in METERED_EXPOSURES else None,
         backdrop=_make_backdrop(memo, device, request),
         bloom=cached(make_bloom, device, settings.size) if settings.bloom else None,
     )
@@ -64,7 +64,7 @@ def draw(
     """
     if resources.meter:
         shading = lighting_bindings, shade_record, light_constants
-        meter.draw(graph, resources.meter, shading, visibility_buffer, radiance)
+        meter.draw(graph, resources.meter, shading, visibility_buffer, radiance, settings.exposure == "skin")
     if resources.backdrop:
         backdrop, exposure = resources.backdrop, resources.meter
         radiance = background.draw(

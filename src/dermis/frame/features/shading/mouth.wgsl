@@ -14,11 +14,13 @@ const UPPER_MM: array<f32, TEETH_PER_SIDE> = array<f32, TEETH_PER_SIDE>(8.6, 6.6
 const LOWER_MM: array<f32, TEETH_PER_SIDE> = array<f32, TEETH_PER_SIDE>(5.4, 5.9, 6.9, 7.0, 7.2, 11.2, 10.5);
 // Artistic values, linear.
 const CROWN_HEIGHT_MM: f32 = 9.8; // visible height of a tooth [mm]
-const BULGE_MM: f32 = 0.55;
-const ENAMEL: vec3f = vec3f(0.60, 0.54, 0.44);
-const NECK: vec3f = vec3f(0.56, 0.45, 0.31);
-const CLEAR_EDGE: vec3f = vec3f(0.36, 0.38, 0.40);
+const BULGE_MM: f32 = 0.55; // of a tooth across its width
+const HEIGHT_BULGE_MM: f32 = 0.45; // of a tooth from its biting edge to the gum
+const ENAMEL: vec3f = vec3f(0.74, 0.68, 0.57);
+const NECK: vec3f = vec3f(0.66, 0.55, 0.40);
+const CLEAR_EDGE: vec3f = vec3f(0.58, 0.55, 0.50);
 const GUM: vec3f = vec3f(0.42, 0.15, 0.14);
+const TOOTH_SHADOW_OFFSET_MM: f32 = 2.5; // light spreads as far in dentine, so lips cast no sharp shadows on teeth
 const SALIVA_ROUGHNESS: f32 = 0.12; // roughness of wet surfaces
 const MOUTH_SHADOW_SCATTER: vec3f = vec3f(0.04, 0.014, 0.008); // fraction of a light that enters through some 8 mm of cheeks and lips
 
@@ -45,10 +47,12 @@ fn teeth_at(point: Point, kind: f32) -> Surface {
     let gum = smoothstep(-0.25, 0.25, height - crown);
     let gap = smoothstep(0.02, 0.30 + 0.5 * (1.0 - smoothstep(0.0, 1.8, height)), between);
     var colour = mix(ENAMEL, NECK, smoothstep(0.45, 1.0, height / crown));
-    colour = mix(CLEAR_EDGE, colour, smoothstep(0.0, 2.0, height));
+    colour = mix(CLEAR_EDGE, colour, smoothstep(0.0, 1.4, height));
     colour = mix(colour * mix(0.16, 1.0, gap), GUM * mix(0.75, 1.0, gap), gum);
     let slope = -4.0 * BULGE_MM * side / width * (1.0 - gum) * sign(point.uv.x - MIDDLE);
-    return Surface(bend(point, vec2f(slope * ARCH_MM, 0.0)), colour, SALIVA_ROUGHNESS, 1.0);
+    let down = clamp(2.0 * height / crown - 1.0, -1.0, 1.0); // -1 at the biting edge, 1 at the gum
+    let rise = -4.0 * HEIGHT_BULGE_MM * down / crown * (1.0 - gum);
+    return Surface(bend(point, vec2f(slope * ARCH_MM, rise * CROWN_MM)), colour, SALIVA_ROUGHNESS, 1.0);
 }
 
 fn tongue_at(point: Point, colour: vec3f) -> Surface {

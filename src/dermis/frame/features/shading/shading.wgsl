@@ -186,6 +186,7 @@ fn apply_modelled_parts(shading_point: ptr<function, ShadingPoint>) {
         if (material.w > 0.0) {
             (*shading_point).surface = mouth_at(point, material);
             (*shading_point).film = Film((*shading_point).surface.normal, MOUTH_SHADOW_SCATTER, vec3f(1.0), 0.0);
+            (*shading_point).point.lit_position += TOOTH_SHADOW_OFFSET_MM * point.normal;
             break;
         }
         if (shade.eyes[k].material == (point.flags >> 8u)) {

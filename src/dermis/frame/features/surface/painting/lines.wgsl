@@ -2,8 +2,12 @@
 //#include "spot.wgsl"
 
 // Artistic values.
-const MOVEMENT_DEPTH: f32 = 0.7; // depth that a full movement adds to a fold, relative to its depth in an old face
-const MOVEMENT_DEPTH_AGE: f32 = 0.4;
+const MOVEMENT_DEPTH: f32 = 0.6; // depth that a full movement adds to a fold, relative to its depth in an old face
+const MOVEMENT_DEPTH_AGE: f32 = 0.5;
+const MOVEMENT_WIDTH: f32 = 2.0; // width of a fold of moved skin relative to its width at rest: skin bulges softly
+const MOVEMENT_WIDTH_AGE: f32 = -0.5;
+const MOVED_FOLD_AT_REST: f32 = 0.35; // depth in a young face at rest, of folds that movements deepen
+const FOLD_AGES: vec2f = vec2f(0.08, 1.1); // ages between which folds remain at rest, 0 to 1
 const GRAIN_MM: f32 = 0.040;
 const LINE_MM: f32 = 0.07;
 const CREASE_MM: f32 = 0.10;
@@ -65,16 +69,28 @@ fn fold_height(spot: Spot) -> f32 {
         let width = width_of(fold, spot.texel_mm);
         let near = nearest(p, fold.knots);
         let square = near.x / (width * width);
-        let shape = (0.35 * exp(-square / 7.0) - exp(-square)) * (1.0 - smoothstep(0.6 * 36.0, 36.0, square));
         let ends = 1.0 - pow(2.0 * near.y - 1.0, 4.0);
-        let part = ends * shape * fold.size.x / width * max(0.8 + 0.6 * noise[NOISE_LINE_DEPTH], 0.0);
-        height += mix(fold.size.y, fold.size.z, paint.age) * part;
-        if (fold.size.w > 0.0) {
-            deepened[u32(fold.size.w) - 1u] += (MOVEMENT_DEPTH + MOVEMENT_DEPTH_AGE * paint.age) * fold.size.z * part;
+        let part = ends * fold.size.x / width * max(0.8 + 0.6 * noise[NOISE_LINE_DEPTH], 0.0);
+        let moves = fold.size.w > 0.0;
+        let young = fold.size.y * select(1.0, MOVED_FOLD_AT_REST, moves);
+        height += mix(young, fold.size.z, smoothstep(FOLD_AGES.x, FOLD_AGES.y, paint.age)) * part * fold_shape(square);
+        if (moves) {
+            let relative_width = MOVEMENT_WIDTH + MOVEMENT_WIDTH_AGE * paint.age;
+            let depth = (MOVEMENT_DEPTH + MOVEMENT_DEPTH_AGE * paint.age) * fold.size.z;
+            deepened[u32(fold.size.w) - 1u] += depth * part * fold_shape(square / (relative_width * relative_width)) * fold_reach(square);
         }
         k++;
     }
     return height;
+}
+
+// Profile of a fold with raised borders: squared distance from its middle in squared widths.
+fn fold_shape(square: f32) -> f32 {
+    return (0.35 * exp(-square / 7.0) - exp(-square)) * fold_reach(square);
+}
+
+fn fold_reach(square: f32) -> f32 {
+    return 1.0 - smoothstep(0.6 * FOLD_REACH * FOLD_REACH, FOLD_REACH * FOLD_REACH, square);
 }
 
 fn reaches(fold: Fold, p: vec3f, texel_mm: f32) -> bool {

@@ -1,0 +1,83 @@
+"""Lips that touch in the rest pose, with a closed line between them instead of a slit."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.tables import float_columns, read_rows
+from dermis.human.makehuman import Points
+from dermis.human.skin.surface import average_surface
+
+Index = NDArray[np.int64]
+
+_RINGS = "vermilion lip crest rim contact inner wall"
+_RIM, _CONTACT, _INNER = 3, 4, 5  # columns of lip_rings.csv
+_RING_MOTION = np.array([0.0, 0.15, 0.4, 0.75, 1.0, 1.0, 0.4])
+"""Motion of each ring relative to the ring on which the lips touch [-]."""
+_NEIGHBOUR_WEIGHT = 1 / 6
+"""Weight of each of two neighbours in the smooth surface of a row of points [-]."""
+_OVERLAP_MM, _OVERLAP_TAPER_MM = 0.3, 3.0
+"""Overlap of the smooth lips, as soft lips press on each other, and its decrease towards the corners [mm]."""
+_VIEW_SLOPE = 0.22
+"""Slope of a view from above or below in which closed lips still hide the mouth [-]."""
+
+
+class _LipPairs(NamedTuple):
+    """Points of half of the lips, and the opposite point of each.
+
+    rings : (2, r, 7) indices of the points of the left and the right half
+    opposite : (r, r) weights of the points of the contact ring whose mean is opposite to each of them
+    upper : (r,) 1 for points of the upper lip, -1 for points of the lower lip, 0 for the corner
+    overlap_mm : (r,) overlap of closed lips [mm]
+    """
+
+    rings: Index
+    opposite: Points
+    upper: Points
+    overlap_mm: Points
+
+
+def close_lips(points_mm: Points) -> Points:
+    """Return the points (n, 3) of a person in the rest pose with lips that touch [mm].
+
+    Upper and lower lip move towards each other by half of the gap between their smooth surfaces. The rings
+    around the gap follow less with their distance from it. Lips that touch already stay as they are.
+    """
+    pairs, closed = _lip_pairs(), points_mm.copy()
+    for rings in pairs.rings:
+        heights = points_mm[rings, 1]
+        beside = heights[:, _RIM] + heights[:, _INNER]
+        smooth = (1.0 - 2.0 * _NEIGHBOUR_WEIGHT) * heights[:, _CONTACT] + _NEIGHBOUR_WEIGHT * beside
+        depth = points_mm[rings[:, _CONTACT], 2]
+        overlap = pairs.overlap_mm + _VIEW_SLOPE * np.abs(depth - pairs.opposite @ depth)
+        gap = np.maximum(pairs.upper * (smooth - pairs.opposite @ smooth) + overlap, 0.0)
+        closed[rings, 1] -= np.outer(0.5 * gap * pairs.upper / _smooth_motion(), _RING_MOTION)
+    return closed
+
+
+def _smooth_motion() -> float:
+    """Return the motion of the smooth surface relative to that of the contact ring [-]."""
+    beside = float(_RING_MOTION[_RIM] + _RING_MOTION[_INNER])
+    return 1.0 - 2.0 * _NEIGHBOUR_WEIGHT + _NEIGHBOUR_WEIGHT * beside
+
+
+@cache
+def _lip_pairs() -> _LipPairs:
+    left = float_columns(read_rows("dermis.human", "lip_rings"), _RINGS).astype(np.int64)
+    average_mm = average_surface()[0].astype(np.float64)
+    mirrored = average_mm[left.ravel()] * np.array([-1.0, 1.0, 1.0])
+    right = np.array([np.abs(average_mm - point).sum(axis=1).argmin() for point in mirrored])
+    x = average_mm[left[:, _CONTACT], 0]
+    corner, rows = int(x.argmax()), np.arange(len(x))
+    halves = rows[: corner + 1], rows[corner:][::-1]  # from the middle to the corner
+    opposite = np.eye(len(x))
+    for one, other in (halves, halves[::-1]):
+        for row in one[:-1]:
+            opposite[row] = [np.interp(x[row], x[other], unit[other]) for unit in np.eye(len(x))]
+    upper = np.sign(corner - rows).astype(np.float64)
+    overlap_mm = _OVERLAP_MM * np.clip((x[corner] - x) / _OVERLAP_TAPER_MM, 0.0, 1.0)
+    return _LipPairs(np.stack([left, right.reshape(left.shape)]), opposite, upper, overlap_mm)
