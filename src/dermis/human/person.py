@@ -222,7 +222,10 @@ def _sample_hair_and_skin(
     fixed_fields : values of fields that are not sampled
     """
     hair, recession = sample_hair(rng, demographics, typical_look), sample_recession(rng, demographics)
-    hair = replace(hair, **fixed_fields.get("hair", {}))
+    fixed = dict(fixed_fields.get("hair", {}))
+    if "beard_style" in fixed:
+        fixed.setdefault("beard_mm", None)  # the usual length of the style
+    hair = replace(hair, **fixed)
     visibility = stubble_visibility(hair)
     beard = visibility * max(skin.beard, _MIN_BEARD_SHADOW if hair.beard_mm else 0.0)
     skin = replace(skin, stubble=visibility * skin.stubble, beard=beard, recession=recession)

@@ -64,7 +64,11 @@ _ROOT_DTYPE = np.dtype(
 )
 _HAIR_COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
 _HAIRS_DTYPE = np.dtype(
-    [*((name, "u4") for name in _HAIR_COUNT_MEMBERS), ("width_scale", "f4"), ("absorptance", "f4")]
+    [
+        *((name, "u4") for name in _HAIR_COUNT_MEMBERS),
+        *((name, "f4") for name in ("width_scale", "absorptance", "pad")),
+        ("dye", "f4", 4),
+    ]
 )
 
 
@@ -301,6 +305,7 @@ class StrandTables:
     width_mm : width of one strand of the longer of the two [mm]
     cover : projected area of hair per area of skin, where the longer of the two grows [-]
     absorptance : fraction of diffuse light that a hair absorbs, mean of all colours [-]
+    dye : (3,) absorption of dyed strands of natural width; 0 for hair that is not dyed [1/mm]
     """
 
     strands: Buffer
@@ -319,6 +324,7 @@ class StrandTables:
     width_mm: float
     cover: float
     absorptance: float
+    dye: NDArray[np.float64]
 
     def hairs_record(self, coarse_counts: StrandCounts) -> UniformRecord:
         """Return the numbers of strands as a uniform record of the struct Hairs in strand_knots.wgsl.
@@ -334,6 +340,8 @@ class StrandTables:
             coarse_counts.knots,
             width_scale,
             self.absorptance,
+            0.0,
+            (*(self.dye / width_scale), 0.0),
         )
         return np.array(values, _HAIRS_DTYPE)
 
@@ -439,7 +447,17 @@ def make_strand_tables(
         width_mm=0.0 if largest is None else 2.0 * float(largest["radius_mm"]),
         cover=0.0 if largest is None else float(largest["cover"]),
         absorptance=1.0 if hair is None else mean_hair_absorptance(hair),
+        dye=np.zeros(3) if parts is None else _dye_absorption(parts),
     )
+
+
+def _dye_absorption(hair_parameters: NDArray[np.void]) -> NDArray[np.float64]:
+    """Return the absorption coefficients (3,) of dyed strands [1/mm]; 0 if no hair is dyed.
+
+    hair_parameters : rows of `Groom.parameters`, for scalp hair and beard
+    """
+    dyed = hair_parameters[hair_parameters["dyed"] > 0.0]
+    return np.asarray((dyed["dye"] / dyed["hairs_per_strand"][:, None]).sum(axis=0), np.float64)
 
 
 def _least_bend_mm(hair_parameters: NDArray[np.void]) -> float:
