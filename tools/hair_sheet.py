@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +11,8 @@ from PIL import Image
 import dermis
 from dermis.base.command_line import run_script
 from dermis.frame.renderer import Renderer
-from dermis.human.hair.look import HAIR_STYLES
-from dermis.human.hair.styles import styles
+from dermis.human.hair.look import BEARD_STYLES, HAIR_STYLES
+from dermis.human.hair.styles import styles as style_table
 from dermis.scene import Scene, Settings, load_lights
 from dermis.scene.settings import PHOTOGRAPHIC_SETTINGS
 
@@ -22,11 +21,7 @@ TEXTURES = {"straight": 0.0, "wavy": 0.35, "coiled": 0.9}
 TONES = {"dark": (5.0, 0.3), "blond": (0.35, 0.4)}
 """Name of a hair colour -> eumelanin and pheomelanin."""
 RIGS = "studio", "rim"
-BEARDS = {
-    f"beard {name}": {"beard_style": name}
-    for name in ("stubble", "short", "full", "moustache", "goatee")
-    if hasattr(dermis.HairLook, "beard_style")
-}
+ALL_STYLES = (*HAIR_STYLES[1:], *(f"beard-{name}" for name in BEARD_STYLES[1:]))
 SEEN_FROM_THE_SIDE = "ponytail", "bun", "cornrows"
 _ANCESTRY_BY_TEXTURE = {"straight": "asian", "wavy": "caucasian", "coiled": "african"}
 
@@ -42,7 +37,7 @@ def panels(
     side : width and height of a picture [pixel]
     """
     weights = {"african": 0.0, "asian": 0.0, "caucasian": 0.0} | {_ANCESTRY_BY_TEXTURE[texture]: 1.0}
-    style = styles().get(look.style)
+    style = style_table().get(look.style)
     man = look.beard_mm > 0.0 or style is None or style.men > style.women
     head = dermis.Human(**weights, sex=float(man), age=30.0, hair=look).head()
     settings = Settings(size=(side, side), atlas=1024, **PHOTOGRAPHIC_SETTINGS)
@@ -69,7 +64,7 @@ def main(
     side:
         Side of each picture [pixel].
     styles:
-        Names of styles, separated by commas; all by default.
+        Names of styles of hair, or "beard-" and a style of beards, separated by commas; all by default.
     textures:
         Names of textures, separated by commas; all by default.
     tones:
@@ -79,13 +74,17 @@ def main(
     """
     output.mkdir(parents=True, exist_ok=True)
     renderer = Renderer(adapter)
-    for name in styles.split(",") if styles else HAIR_STYLES[1:]:
+    for name in styles.split(",") if styles else ALL_STYLES:
         columns = []
         for texture in textures.split(",") if textures else TEXTURES:
             for tone in tones.split(",") if tones else TONES:
-                eumelanin, pheomelanin = TONES[tone]
+                is_hair, (eumelanin, pheomelanin) = name in HAIR_STYLES, TONES[tone]
                 look = dermis.HairLook(
-                    name, curl=TEXTURES[texture], eumelanin=eumelanin, pheomelanin=pheomelanin
+                    style=name if is_hair else "short",
+                    beard_style="none" if is_hair else name.removeprefix("beard-"),
+                    curl=TEXTURES[texture],
+                    eumelanin=eumelanin,
+                    pheomelanin=pheomelanin,
                 )
                 camera = "side" if name in SEEN_FROM_THE_SIDE else "three-quarter"
                 columns.append(panels(renderer, look, texture, camera, side))

@@ -426,9 +426,10 @@ def _frizz_offsets(strand_seed: UInt32s, hair_parameters: NDArray[np.void], leng
 def _strand_absorption(
     strand_seed: UInt32s, hair_parameters: NDArray[np.void], place: NDArray[np.floating], length_mm: Doubles
 ) -> Doubles:
-    """Return the absorption coefficients (n, 3) of strands [1/mm]; of dyed strands, the mean along the strand.
+    """Return the absorption coefficients (n, 3) of strands [1/mm].
 
-    Each strand represents several hairs, some of which may be white.
+    Each strand represents several hairs, some of which may be white. A dyed strand gets the mean along its
+    length.
 
     strand_seed : (n,) random seeds of the strands, for `_uniform_random`
     hair_parameters : (n,) row of `Groom.parameters` for each strand

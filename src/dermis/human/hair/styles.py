@@ -84,7 +84,7 @@ def styles() -> dict[str, Style]:
 
 @cache
 def beard_styles() -> dict[str, Style]:
-    """Return a dictionary from name to beard style; `Style.area` names the part of the face that it covers."""
+    """Return a dictionary from name to beard style; `Style.area` is the part of the face that it covers."""
     combed = Style(
         "beard", max_length_mm=150.0, length_mm=10.0, lift=1.0, volume_mm=5.0, gravity=0.35, clump_mm=4.0
     )
