@@ -15,7 +15,14 @@ from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import check_fields, checked_integer, checked_number
 from dermis.base.renamed import renamed_classmethod
 from dermis.human.hair.groom import add_hair
-from dermis.human.hair.look import HairLook, sample_hair, sample_recession, stubble_visibility, typical_hair
+from dermis.human.hair.look import (
+    HairLook,
+    sample_hair,
+    sample_recession,
+    scalp_shadow,
+    stubble_visibility,
+    typical_hair,
+)
 from dermis.human.makehuman import OLD_AGE, YOUNG_AGE, human_targets
 from dermis.human.model import Layout, build_head, control_points_mm, head_template
 from dermis.human.skin.look import (
@@ -228,7 +235,7 @@ def _sample_hair_and_skin(
     hair = replace(hair, **fixed)
     visibility = stubble_visibility(hair)
     beard = visibility * max(skin.beard, _MIN_BEARD_SHADOW if hair.beard_mm else 0.0)
-    skin = replace(skin, stubble=visibility * skin.stubble, beard=beard, recession=recession)
+    skin = replace(skin, **scalp_shadow(hair, skin.stubble), beard=beard, recession=recession)
     return {"hair": hair, "skin": replace(skin, **fixed_fields.get("skin", {}))}
 
 
@@ -493,7 +500,8 @@ class Human:
         if self.skin is not None:
             return self.skin
         typical, visibility = typical_skin(self._demographics), stubble_visibility(self.hair_look)
-        return replace(typical, stubble=visibility * typical.stubble, beard=visibility * typical.beard)
+        shadow = scalp_shadow(self.hair_look, typical.stubble)
+        return replace(typical, **shadow, beard=visibility * typical.beard)
 
     @property
     def iris(self) -> EyeLook:

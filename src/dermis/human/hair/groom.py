@@ -75,7 +75,9 @@ def _grow_brows(
     grid_mm = surface.root_frames(root_finder.brow_grid_roots).positions_mm
     brow_surface = BrowSurface(*surface.skin.project(grid_mm))
     knots, radius = brows.grow_brow_hairs(brow_surface, frames.positions_mm, hair[0], hair[1:3], hair[3:])
-    yield from _split_group(_hair_group(frames, knots, radius, _BROW_PIGMENT_FACTOR), [len(part.quad) for part in roots])
+    yield from _split_group(
+        _hair_group(frames, knots, radius, _BROW_PIGMENT_FACTOR), [len(part.quad) for part in roots]
+    )
 
 
 def _grow_lashes(

@@ -255,6 +255,22 @@ def sample_recession(rng: np.random.Generator, demographics: Demographics) -> fl
     return float(np.clip(man * rng.beta(1.2, 1.8) * (0.15 + 1.1 * old), 0.0, 1.0))
 
 
+def scalp_shadow(hair: HairLook, shaved: float) -> dict[str, float]:
+    """Return the fields of `SkinLook` that describe the shadow of the hair of the head in the scalp.
+
+    shaved : strength of the shadow of shaved hair, 0 to 1; below hair that is worn, the density counts
+    """
+    strength = (
+        shaved * stubble_visibility(hair) if hair.style == "none" else min(1.0, 0.4 + 0.6 * hair.density)
+    )
+    pigmented = 1.0 - hair.grey
+    return {
+        "stubble": strength,
+        "stubble_eumelanin": pigmented * hair.eumelanin,
+        "stubble_pheomelanin": pigmented * hair.pheomelanin,
+    }
+
+
 def stubble_visibility(hair: HairLook) -> float:
     """Return how visible shaved hair is below the skin, from 0.15 for white hair to 1 for dark hair."""
     return min(1.0, 0.15 + (hair.eumelanin + 0.3 * hair.pheomelanin) * (1.0 - hair.grey) / _DARK_EUMELANIN)

@@ -17,6 +17,7 @@ from dermis.human.hair.guides import (
     bind_guides,
     cornrow_position,
     cut_fractions,
+    fringe_weight,
     grow_guides,
     parting_side,
     smoothstep,
@@ -111,6 +112,8 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
     root_mm = np.einsum("nk,nkc->nc", weight, points_mm[corners])
     if style.comb == "fall":
         same = parting_side(points_mm[points], style)[guide] * parting_side(root_mm, style)[:, None] >= 0
+        in_fringe = fringe_weight(points_mm[points], style) > 0.5
+        same &= in_fringe[guide] == (fringe_weight(root_mm, style) > 0.5)[:, None]
         one_sided = weight * same
         total = one_sided.sum(axis=1, keepdims=True)
         weight = np.where(total > 1e-3, one_sided / np.maximum(total, 1e-9), weight)

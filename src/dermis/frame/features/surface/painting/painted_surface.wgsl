@@ -23,6 +23,7 @@ struct Paint {
     age: f32,
     low_oxygen: f32, // oxygen saturations of the two colour tables of skin
     high_oxygen: f32,
+    stubble_colour: vec3f, // reflectance of a scalp covered by short hair
 }
 
 struct Vertex {
