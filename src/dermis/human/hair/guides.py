@@ -233,7 +233,7 @@ def _root_directions(points: Doubles, normals: Doubles, style: Style) -> Doubles
     combed = unit_vectors(tangent_component(COMBS[style.comb](points, style), normals))
     if style.comb == "up":
         return unit_vectors(normals + style.tilt * combed)
-    lift = style.lift * (smoothstep(10.0, 70.0, points[:, 1]) if style.comb == "fall" else 1.0)
+    lift = style.lift * (smoothstep(40.0, 95.0, points[:, 1]) if style.comb == "fall" else 1.0)
     return unit_vectors(np.reshape(lift, (-1, 1)) * normals + combed)
 
 

@@ -18,9 +18,9 @@ from dermis.specular.hair import absorption_per_mm
 
 MAX_HAIRS_PER_CM2 = 200.0
 """Density of the densest hair of the head [1/cm2]."""
-BEARD_HAIRS_PER_CM2 = 60.0
+BEARD_HAIRS_PER_CM2 = 75.0
 """Density of beards [1/cm2]."""
-_BEARD_RADIUS_RATIO = 1.4  # of hairs of the beard, relative to those of the head
+_BEARD_RADIUS_RATIO = 1.25  # of hairs of the beard, relative to those of the head
 _MIN_EUMELANIN = 0.07  # white hair is not quite white
 _SEED_COUNT = 1 << 24  # seeds are exact as float32
 # Radius and pitch of the curls of hair, by the dial `HairLook.curl` [mm].
@@ -32,7 +32,7 @@ _CLUMP_PHASES_BY_CURL = np.array([0.3, 0.3, 0.22, 0.5, 0.9, 1.0])
 _FRIZZ_BY_CURL_MM = np.array([0.25, 0.35, 0.6, 0.9, 0.8, 0.5])
 _ROPE_PITCH_RATIO = 7.0  # pitch of twists relative to their radius
 _MAX_SEGMENT_MM = 7.0  # length of the segments of straight hair
-_MAX_DEVIATION_MM = 0.08  # largest deviation of curls and twists from the segments that represent them
+_MAX_DEVIATION_MM = 0.06  # largest deviation of curls and twists from the segments that represent them
 _MIN_KNOTS, _MAX_KNOTS = 5, 96
 _FLOAT_FIELDS = (
     "density", "hairline", "thinning", "length_mm", "guide_mm", "fade", "layers", "clump", "clump_start_mm",

@@ -29,9 +29,9 @@ from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
 STRANDS_PER_CM2 = 150.0
 """Density of the strand roots on the scalp; strands grow from all or some of them [1/cm2]."""
-BEARD_STRANDS_PER_CM2 = 60.0
+BEARD_STRANDS_PER_CM2 = 100.0
 """Density of the strand roots in beards [1/cm2]."""
-_CACHE_VERSION = 10  # of this module's algorithm, part of the keys of cached tables
+_CACHE_VERSION = 11  # of this module's algorithm, part of the keys of cached tables
 _MAX_CACHED_STYLES, _MAX_CACHED_LOOKS = 4, 24  # single styles; hair styles with or without a beard
 # Distances between guides from which strands are less, and then not at all, interpolated between them [mm].
 _GUIDE_SEPARATION_MM = 25.0, 55.0
@@ -162,7 +162,7 @@ def _root_locations(corner_weight: Doubles, corner_points: Doubles) -> Doubles:
     angle = density.hairline_angle(points)
     height = points[:, 1] + density.hairline_waves(points)
     thinning = -recession_effect("hair", 1.0, points)
-    top = smoothstep(-45.0, 62.0, points[:, 1] + 0.15 * (points[:, 2] - density.HEAD_AXIS_Z))
+    top = smoothstep(-30.0, 85.0, points[:, 1] + 0.15 * (points[:, 2] - density.HEAD_AXIS_Z))
     return np.stack([angle, height, np.clip(thinning, 0.0, 1.0), top], axis=1)
 
 
