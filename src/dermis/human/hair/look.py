@@ -260,9 +260,7 @@ def scalp_shadow(hair: HairLook, shaved: float) -> dict[str, float]:
 
     shaved : strength of the shadow of shaved hair, 0 to 1; below hair that is worn, the density counts
     """
-    strength = (
-        shaved * stubble_visibility(hair) if hair.style == "none" else min(1.0, 0.4 + 0.6 * hair.density)
-    )
+    strength = shaved * stubble_visibility(hair) if hair.style == "none" else 0.55 + 0.45 * hair.density
     pigmented = 1.0 - hair.grey
     return {
         "stubble": strength,

@@ -60,7 +60,8 @@ _PAINTING_LISTS: dict[str, Sequence[str]] = {
 }
 _SKIN_SHADER, _TEXEL_TRIANGLE_SHADER = "surface/painting/skin.wgsl", "surface/painting/owner.wgsl"
 _MAX_PAINTED_TRIANGLES = 1 << 20  # limit by the bits of a triangle index in painted_surface.wgsl
-_SCALP_REFLECTANCE = 0.03  # diffuse reflectance that short hair adds to that of a dense layer of hair
+# Reflectance of a scalp in short hair by that of a dense layer of hair: factor, and constant.
+_SCALP_FACTOR, _SCALP_REFLECTANCE = 1.12, 0.022
 _TRIANGLE_ROW_PADDING = (0, 0), (0, 2)  # padding from two to four columns
 _PAINTED_CACHE_FOLDER = "painted"
 _WORD_BYTES = 4
@@ -128,7 +129,7 @@ def paint_inputs(surface: PaintedSurface, look: SkinLook, map_side: int) -> Pain
         side=map_side,
         low_oxygen=low,
         high_oxygen=high,
-        stubble_colour=stubble + _SCALP_REFLECTANCE,
+        stubble_colour=_SCALP_FACTOR * stubble + _SCALP_REFLECTANCE,
         **values,
     )
     tables = np.ndarray((), struct_dtype(text, "Tables"), _face_tables(look.recession, look.sites))
