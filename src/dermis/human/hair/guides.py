@@ -97,7 +97,7 @@ def fringe_weight(points_mm: Doubles, style: Style) -> Doubles:
     """Return weights (n,) of points (n, 3) on the scalp: 1 where the fringe has its roots, 0 elsewhere."""
     if style.fringe_y_mm is None:
         return np.zeros(len(points_mm))
-    return smoothstep(-48.0, -34.0, points_mm[:, 2]) * smoothstep(56.0, 44.0, np.abs(points_mm[:, 0]))
+    return smoothstep(-48.0, -34.0, points_mm[:, 2]) * smoothstep(66.0, 54.0, np.abs(points_mm[:, 0]))
 
 
 def _parted_directions(points: Doubles, style: Style) -> Doubles:
@@ -388,13 +388,13 @@ def cut_fractions(knots: Doubles, style: Style) -> Doubles:
 def _first_resting_fractions(knots: Doubles, below_y_mm: float) -> Doubles:
     """Return where each curve first lies on the shoulders or the back, as a fraction (g,) of its length.
 
-    A curve lies there where it descends by less than a third of its length. The fraction is 1 for others.
+    A curve lies there where it descends by less than two thirds of its length. The fraction is 1 for others.
 
     knots : (g, k, 3) knots of the curves [mm]
     below_y_mm : height below which curves may lie [mm]
     """
     steps = np.diff(knots, axis=1)
-    flat = -steps[..., 1] < np.linalg.norm(steps, axis=2) / 3.0
+    flat = -steps[..., 1] < 2.0 / 3.0 * np.linalg.norm(steps, axis=2)
     resting = flat & (knots[:, :-1, 1] < below_y_mm)
     return np.where(resting.any(axis=1), resting.argmax(axis=1) / (KNOTS_PER_GUIDE - 1), 1.0)
 

@@ -18,8 +18,9 @@ from dermis.specular.hair import absorption_per_mm
 
 MAX_HAIRS_PER_CM2 = 200.0
 """Density of the densest hair of the head [1/cm2]."""
-BEARD_HAIRS_PER_CM2 = 75.0
+BEARD_HAIRS_PER_CM2 = 90.0
 """Density of beards [1/cm2]."""
+_MIN_BEARD_CURL, _BEARD_FRIZZ = 0.45, 0.025  # least curl; amplitude of frizz relative to the length
 _BEARD_RADIUS_RATIO = 1.25  # of hairs of the beard, relative to those of the head
 _MIN_EUMELANIN = 0.07  # white hair is not quite white
 _SEED_COUNT = 1 << 24  # seeds are exact as float32
@@ -112,7 +113,9 @@ def _beard_parameters(style: Style, hair_look: HairLook) -> tuple[object, ...]:
         min(hair_look.beard_mm, style.max_length_mm),
         (BEARD_STRANDS_PER_CM2, BEARD_HAIRS_PER_CM2, 1.0),
     )
-    values = _shared_parameters(style, hair_look, length, densities, _BEARD_RADIUS_RATIO)
+    wavy = replace(hair_look, curl=max(hair_look.curl, _MIN_BEARD_CURL))
+    values = _shared_parameters(style, wavy, length, densities, _BEARD_RADIUS_RATIO)
+    values |= {"fade": style.fade, "frizz_mm": _BEARD_FRIZZ * length}
     return tuple(values[name] for name in HAIR_PARAMETERS_DTYPE.names or ())
 
 

@@ -29,13 +29,14 @@ from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
 STRANDS_PER_CM2 = 150.0
 """Density of the strand roots on the scalp; strands grow from all or some of them [1/cm2]."""
-BEARD_STRANDS_PER_CM2 = 100.0
+BEARD_STRANDS_PER_CM2 = 220.0
 """Density of the strand roots in beards [1/cm2]."""
-_CACHE_VERSION = 11  # of this module's algorithm, part of the keys of cached tables
+_CACHE_VERSION = 12  # of this module's algorithm, part of the keys of cached tables
 _MAX_CACHED_STYLES, _MAX_CACHED_LOOKS = 4, 24  # single styles; hair styles with or without a beard
 # Distances between guides from which strands are less, and then not at all, interpolated between them [mm].
 _GUIDE_SEPARATION_MM = 25.0, 55.0
 _HAIRLINE_MARGIN_MM = 12.0  # distance below the hairline at which widow's peaks and baby hairs begin
+_BEARD_EDGE_DENSITY = 0.05, 0.9  # relative densities between which a beard reaches its length
 _SEED = 20
 _CENTRE_ROOT_COUNT = 2000  # number of roots whose mean is the centre of the hair
 _GUIDE_FIELDS = "corner", "local_mm", "weight", "rest_mm", "cut"
@@ -119,6 +120,9 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
         weight = np.where(total > 1e-3, one_sided / np.maximum(total, 1e-9), weight)
     weight = _near_guide_weights(weight, guide, knots)
     place = _root_locations(weight, average_control_points()[corners])
+    if beard:
+        points = np.einsum("nk,nkc->nc", weight, average_control_points()[corners])
+        place[:, 3] = smoothstep(*_BEARD_EDGE_DENSITY, where.relative_density(points))
     guides = bind_guides(mesh, points_mm, knots, heights, cut_fractions(knots, style))
     clump = _clump_centre_strands(
         root_mm, np.einsum("nk,nkc->nc", weight, knots[guide, KNOTS_PER_GUIDE // 2]), style, rng

@@ -86,7 +86,16 @@ def styles() -> dict[str, Style]:
 def beard_styles() -> dict[str, Style]:
     """Return a dictionary from name to beard style; `Style.area` is the part of the face that it covers."""
     combed = Style(
-        "beard", max_length_mm=150.0, length_mm=10.0, lift=1.0, volume_mm=5.0, gravity=0.35, clump_mm=4.0
+        "beard",
+        max_length_mm=150.0,
+        length_mm=10.0,
+        lift=0.5,
+        volume_mm=3.0,
+        gravity=0.4,
+        layers=0.35,
+        fade=0.8,
+        clump=0.15,
+        clump_mm=3.0,
     )
     return {
         "stubble": replace(combed, length_mm=1.0),

@@ -47,7 +47,7 @@ _KEPT_STYLE_COUNT = 12  # hair styles whose buffers, of about 10 MB each, are ke
 _MIN_STRANDS_PER_PIXEL = 2.0  # where all strands are short; fewer would look like dots
 _HAIRY_SKIN_AREA_MM2 = 6e4  # approximate area of the skin on which scalp hair and beard grow
 _MAX_KNOT_FRACTION_FOR_SHORT_HAIR = 0.4  # largest fraction of `Detail.drawn_knots` that is spent against dots
-_MAX_BEND_MM = 20.0  # radius of curvature of the guides near the skin
+_MAX_BEND_MM = 35.0  # radius of curvature of the guides near the skin
 _ROPE_PITCH_RATIO = (
     7.0  # pitch of twists relative to their radius; that of braids is 8, see strands_grow.wgsl
 )
@@ -76,7 +76,8 @@ class StrandDetail(NamedTuple):
     """Limits of the detail of coarse strands (scalp hair and beard), for GPUs or for software adapters.
 
     drawn_knots : largest total number of knots of the drawn strands
-    casters : largest number of strands that are drawn into shadow maps in place of all coarse strands
+    casters : number of strands that are drawn into shadow maps in place of all coarse strands; more if they
+        have fewer than `caster_knots` knots
     caster_knots : largest number of knots of a strand in shadow maps
     width_px : least width of drawn strands [pixel]
     deviation_px : largest deviation of a curl from the segments that represent it [pixel]
@@ -92,8 +93,8 @@ class StrandDetail(NamedTuple):
 
 
 _GPU_DETAIL, _SOFTWARE_DETAIL = (
-    StrandDetail(1 << 23, 10_000, 24, 0.6, 0.1, 6.0),
-    StrandDetail(1 << 20, 5_000, 10, 0.9, 0.25, 10.0),
+    StrandDetail(1 << 23, 10_000, 24, 0.6, 0.15, 9.0),
+    StrandDetail(1 << 20, 5_000, 10, 0.9, 0.3, 14.0),
 )
 
 
@@ -176,9 +177,8 @@ def caster_strand_counts(device: Device, coarse_counts: StrandCounts) -> StrandC
     coarse_counts : result of `max_coarse_counts`
     """
     detail = adapter_strand_detail(device)
-    return StrandCounts(
-        min(coarse_counts.hairs, detail.casters), min(coarse_counts.knots, detail.caster_knots)
-    )
+    knots = min(coarse_counts.knots, detail.caster_knots)
+    return StrandCounts(min(coarse_counts.hairs, detail.casters * detail.caster_knots // knots), knots)
 
 
 def adapter_strand_detail(device: Device) -> StrandDetail:
