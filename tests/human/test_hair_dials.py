@@ -19,7 +19,7 @@ from dermis.mesh.strands import Strands
 from dermis.specular.hair import absorption_per_mm
 
 Floats = NDArray[np.float64]
-STRAND_COUNT = 6_000
+STRAND_COUNT = 2_500
 
 
 @cache

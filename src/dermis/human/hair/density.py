@@ -26,8 +26,8 @@ _R2_SEQUENCE_STEPS = np.array(
 )  # of a low-discrepancy sequence in the unit square
 _SCALP_BOTTOM_Y = -80.0  # lower end of the hair of the head [mm]
 _HAIRLINE_FADE_MM = (-3.0, 11.0)  # heights above the hairline between which density rises from 0 to 1
-_LIP_FADE_MM = (1.5, 4.5)  # distances from the lips between which the density of the beard rises
-_BEARD_FADE = (0.25, 0.75)  # zone amounts between which the density of the beard rises
+_LIP_FADE_MM = (0.8, 3.0)  # distances from the lips between which the density of the beard rises
+_BEARD_FADE = (0.2, 0.6)  # zone amounts between which the density of the beard rises
 _HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # wave vectors of the hairline [rad/mm]
 
 _SCALP_MARGIN_MM = 25.0  # distance below the hairline down to which quads may have hair

@@ -93,7 +93,7 @@ def beard_styles() -> dict[str, Style]:
         volume_mm=3.0,
         gravity=0.4,
         layers=0.35,
-        fade=0.8,
+        fade=0.65,
         clump=0.15,
         clump_mm=3.0,
     )
