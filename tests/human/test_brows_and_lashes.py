@@ -49,10 +49,10 @@ def test_hairs_are_of_their_usual_size(index: int) -> None:
     places, radius = knots(head), head.strands.radius_mm
     length = np.linalg.norm(np.diff(places, axis=1), axis=2).sum(axis=1)
     brows = ~lashes(head)
-    assert 2 * 400 < brows.sum() < 2 * 800 and (~brows).sum() == 2 * (165 + 84)
-    assert length[brows].min() > 2.5 and length[brows].max() < 14.0
-    assert length[~brows].min() > 1.5 and length[~brows].max() < 12.0
-    assert (2 * radius.max(axis=1) > 0.04).all() and 2 * radius.max() < 0.12
+    assert 2 * 550 < brows.sum() < 2 * 1100 and (~brows).sum() == 2 * (220 + 116)
+    assert length[brows].min() > 1.9 and length[brows].max() < 14.0
+    assert length[~brows].min() > 1.2 and length[~brows].max() < 12.0
+    assert (2 * radius.max(axis=1) > 0.022).all() and 2 * radius.max() < 0.1
     assert (radius[:, -1] < 0.4 * radius.max(axis=1)).all()
 
 

@@ -121,15 +121,18 @@ def head(
     skin:
         Pigments and texture, such as melanin=0.1,freckles=0.4: melanin, eumelanin, blood, oxygen, redness,
         freckles, moles, spots, tan, veins, stubble, recession, beard, oil, age, blemishes and scars from 0 to
-        1, epidermis_mm, and seed. [default: from the person]
+        1, stubble_eumelanin and stubble_pheomelanin from 0 to 10, epidermis_mm, and seed. [default: from the
+        person]
     eye:
         Eye appearance, such as eumelanin=0.2: eumelanin from 0 (blue) to 1 (dark brown), pupil_mm, redness,
         seed. [default: from the person]
     hair:
         Hair, such as style=bob,curl=0.3: style (none, short, long, afro, ponytail and others, see the guide),
-        length_mm, density, curl, fade, beard_mm, bushy, grey, eumelanin, pheomelanin and seed [default: from
-        the person]. In .glb files, hairs are thin tubes; dermis ignores these tubes when it reads such a
-        file.
+        beard_style (none, stubble, short, full, moustache or goatee), length_mm, density, diameter_mm, curl,
+        curl_radius_mm, curl_pitch_mm, curl_coherence, clump, clump_mm, frizz_mm, flyaways, parting_mm, fade,
+        widows_peak, baby_hairs, beard_mm, bushy, grey, temple_grey, eumelanin, pheomelanin, dye_eumelanin,
+        dye_pheomelanin, roots_mm and seed [default: from the person]. In .glb files, hairs are thin tubes;
+        dermis ignores these tubes when it reads such a file.
     colour:
         Colour map of the skin, sRGB. [default: painted]
     normal:
@@ -224,17 +227,21 @@ def _look_with_values(look: Look, option_values: list[str] | None, option_name: 
     return replace(look, **numbers)
 
 
+_WORD_FIELDS = "style=", "beard_style="
+
+
 def _hair_look_with_values(look: HairLook, option_values: list[str] | None) -> HairLook:
     """Return a copy of a hair look with the field values that the option --hair gives.
 
-    option_values : values "NAME=VALUE,..." of the option; VALUE is a word for the field `style`, and a number
-        for all other fields
+    option_values : values "NAME=VALUE,..." of the option; VALUE is a word for the fields `style` and
+        `beard_style`, and a number for all other fields
     """
     pairs = [pair for pair in ",".join(option_values or []).split(",") if pair]
-    styles = [pair.removeprefix("style=") for pair in pairs if pair.startswith("style=")]
-    numbers = [pair for pair in pairs if not pair.startswith("style=")]
-    style: Options = {"style": styles[-1]} if styles else {}
-    return replace(_look_with_values(look, numbers, "--hair"), **style)
+    words: Options = dict(pair.split("=", 1) for pair in pairs if pair.startswith(_WORD_FIELDS))
+    numbers = [pair for pair in pairs if not pair.startswith(_WORD_FIELDS)]
+    if "beard_style" in words and not any(pair.startswith("beard_mm=") for pair in pairs):
+        words["beard_mm"] = None  # the usual length of the style
+    return replace(_look_with_values(look, numbers, "--hair"), **words)
 
 
 def _head_with_maps(head: Head, map_files: Options) -> Head:

@@ -15,7 +15,14 @@ from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import check_fields, checked_integer, checked_number
 from dermis.base.renamed import renamed_classmethod
 from dermis.human.hair.groom import add_hair
-from dermis.human.hair.look import HairLook, sample_hair, sample_recession, stubble_visibility, typical_hair
+from dermis.human.hair.look import (
+    HairLook,
+    sample_hair,
+    sample_recession,
+    scalp_shadow,
+    stubble_visibility,
+    typical_hair,
+)
 from dermis.human.makehuman import OLD_AGE, YOUNG_AGE, human_targets
 from dermis.human.model import Layout, build_head, control_points_mm, head_template
 from dermis.human.proportions import with_proportions
@@ -226,10 +233,13 @@ def _sample_hair_and_skin(
     fixed_fields : values of fields that are not sampled
     """
     hair, recession = sample_hair(rng, demographics, typical_look), sample_recession(rng, demographics)
-    hair = replace(hair, **fixed_fields.get("hair", {}))
+    fixed = dict(fixed_fields.get("hair", {}))
+    if "beard_style" in fixed:
+        fixed.setdefault("beard_mm", None)  # the usual length of the style
+    hair = replace(hair, **fixed)
     visibility = stubble_visibility(hair)
     beard = visibility * max(skin.beard, _MIN_BEARD_SHADOW if hair.beard_mm else 0.0)
-    skin = replace(skin, stubble=visibility * skin.stubble, beard=beard, recession=recession)
+    skin = replace(skin, **scalp_shadow(hair, skin.stubble), beard=beard, recession=recession)
     return {"hair": hair, "skin": replace(skin, **fixed_fields.get("skin", {}))}
 
 
@@ -494,7 +504,8 @@ class Human:
         if self.skin is not None:
             return self.skin
         typical, visibility = typical_skin(self._demographics), stubble_visibility(self.hair_look)
-        return replace(typical, stubble=visibility * typical.stubble, beard=visibility * typical.beard)
+        shadow = scalp_shadow(self.hair_look, typical.stubble)
+        return replace(typical, **shadow, beard=visibility * typical.beard)
 
     @property
     def iris(self) -> EyeLook:

@@ -50,7 +50,8 @@ class StrandRoots(ShortRepr):
     clump : (n,) index of the strand at the centre of the clump to which each strand belongs
     place : (n, 4) four properties of the spot where each root is: its angle from the front [degrees]; its
         height above the midpoint of the eyes [mm]; how much its hair thins if the crown goes bald, 0 to 1;
-        and its position from the nape (0) to the top of the head (1)
+        and its position from the nape (0) to the top of the head (1), or from the edge of a beard (0) to
+        its middle (1)
     along_mm : (n,) position of each strand's clump along its cornrow [mm]
     part : (n,) index of the row of `Groom.parameters` for each strand: the row of scalp hair or of the beard
     """

@@ -18,7 +18,12 @@ MAX_EXPORTED_STRANDS = 40_000
 """Largest number of strands in exports and in path tracing."""
 _SMOOTHING_KNOTS, _SMOOTH_HEIGHTS_MM = 8, (2.0, 18.0)
 _MIN_HEIGHT_ABOVE_SKIN_MM, _RISE_LENGTH_MM = 0.35, 4.0
-_HAIRLINE_FADE_MM, _SHORT_HAIR_HEIGHTS_MM = (-3.0, 11.0), (-2.0, 14.0)
+# Constants near the hairline, as in strands_grow.wgsl.
+_HAIRLINE_FADE_MM, _SHORT_HAIR_HEIGHTS_MM, _HAIRLINE_NOISE_MM = (-5.0, 7.0), (-4.0, 14.0), 2.0
+_SHORTEST, _THINNEST, _LOOSEST, _LOOSE_HEIGHTS_MM = 0.55, 0.35, 0.25, (0.0, 22.0)
+_BABY_DROP_MM, _BABY_HEIGHTS_MM, _BABY_LENGTHS_MM = 4.0, (4.0, 24.0), (3.0, 17.0)
+_BABY_THICKNESS, _BABY_TURN = 0.42, 0.35
+_TEMPLE_HEIGHTS_MM, _TEMPLE_DEGREES = (75.0, 20.0), (140.0, 95.0)
 _HAIRLINE_STEP_DEGREES = 2.0
 _TIP_FRACTION, _TIP_WIDTH_RATIO = 0.12, 0.35
 _HAIRS_SAMPLED_PER_STRAND = 5
@@ -76,7 +81,8 @@ def mean_hair_absorptance(groom: Groom) -> float:
     """
     parts = groom.parameters
     chord = 0.5 * np.pi * (parts["radius_mm"] / parts["hairs_per_strand"])[:, None]
-    absorption = np.maximum((1.0 - parts["grey"][:, None]) * parts["dark"], parts["white"])
+    natural = np.maximum((1.0 - parts["grey"][:, None]) * parts["dark"], parts["white"])
+    absorption = np.where(parts["dyed"][:, None] > 0.0, parts["dye"], natural)
     weights = np.maximum(parts["density"] * parts["cover"], 1e-6)
     return float(np.average((1.0 - np.exp(-absorption * chord)).mean(axis=1), weights=weights))
 
@@ -139,9 +145,10 @@ def _grow_chunk(
     strand_seed = strand_index.astype(np.uint32) + seed[roots.part[strand_index]]
     clump = roots.clump[strand_index]
     clump_seed = clump.astype(np.uint32) + seed[roots.part[strand_index]]
-    above_hairline_mm = _heights_above_hairline(groom, strand_index)
+    edge = _hairline_effects(groom, strand_index)
     t = np.linspace(0.0, 1.0, groom.knots)[None]
-    u = t * _length_fractions(groom, strand_index, part, strand_seed, above_hairline_mm)[:, None]
+    length = _length_fractions(groom, strand_index, edge)
+    u = t * length[:, None]
     own, at = (
         _interpolate_guides(groom, posed_guides, strand_index, u, root_mm),
         _interpolate_guides(groom, posed_guides, clump, u, clump_centre_mm),
@@ -149,31 +156,36 @@ def _grow_chunk(
     s = u * _parameter_column(part, "guide_mm")
     near = 1.0 - np.exp(-((s / _parameter_column(part, "clump_start_mm")) ** 1.5))
     rope = _parameter_column(part, "rope_mm") > 0
-    pull = (
-        _parameter_column(part, "clump")
-        * near
-        * np.where(rope, 1.0, 0.6 + 0.4 * _uniform_random(strand_seed, 2)[:, None])
-    )
+    loosened = _LOOSEST + (1.0 - _LOOSEST) * _smoothstep(*_LOOSE_HEIGHTS_MM, edge.above_mm)
+    loose = 1.0 + part["hairline"] * (loosened - 1.0)
+    grown, pulled = 1.0 - edge.baby[:, None], (0.6 + 0.4 * _uniform_random(strand_seed, 2)) * loose
+    pull = _parameter_column(part, "clump") * near * grown * np.where(rope, 1.0, pulled[:, None])
     side, other = _cross_section_axes(at)
     to_middle = pull[..., None] * (at.position - own.position)
     across = (
         near
-        * np.where(rope, 1.0, 0.0)
+        * np.where(rope, grown, 0.0)
         * _rope_offsets(strand_seed, part, s + roots.along_mm[strand_index, None])
     )
-    across = across + np.where(rope, 0.0, 1.0) * _curl_offsets(strand_seed, clump_seed, part, s)
+    across = across + np.where(rope, 0.0, 1.0) * _curl_offsets(
+        strand_seed, clump_seed, part, s, roots.place[clump]
+    )
     across = across + _frizz_offsets(strand_seed, part, s)
+    across[0] += (edge.baby * _BABY_TURN * _normal_random(strand_seed, 35))[:, None] * s
     varied = across[0][..., None] * side + across[1][..., None] * other
     height = (1.0 - pull) * own.height + pull * at.height + (varied * own.normal).sum(axis=-1)
     least = _MIN_HEIGHT_ABOVE_SKIN_MM * np.minimum(s / _RISE_LENGTH_MM, 1.0)
     positions = own.position + to_middle + varied + np.maximum(least - height, 0.0)[..., None] * own.normal
     taper = 1.0 - (1.0 - _TIP_WIDTH_RATIO) * _smoothstep(1.0 - _TIP_FRACTION, 1.0, t)
-    edge = 1.0 - part["hairline"] * (0.45 - 0.45 * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_hairline_mm))
-    radius = (part["radius_mm"] * (0.8 + 0.4 * _uniform_random(strand_seed, 3)) * edge)[:, None] * taper
+    thinned = _THINNEST + (1.0 - _THINNEST) * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, edge.above_mm)
+    thickness = 1.0 + part["hairline"] * (
+        np.minimum(thinned, 1.0 + edge.baby * (_BABY_THICKNESS - 1.0)) - 1.0
+    )
+    radius = (part["radius_mm"] * (0.8 + 0.4 * _uniform_random(strand_seed, 3)) * thickness)[:, None] * taper
     return (
         offsets_in_root_axes(root_axes, positions - root_mm[:, None]),
         radius,
-        _strand_absorption(strand_seed, part),
+        _strand_absorption(strand_seed, part, roots.place[strand_index], length * part["guide_mm"]),
         part["cover"],
     )
 
@@ -208,39 +220,57 @@ def _heights_above_hairline(groom: Groom, strand_index: Ints) -> Doubles:
     return np.asarray(place[:, 1] - np.interp(place[:, 0], angles, groom.hairline_mm))
 
 
+class _HairlineEffects(NamedTuple):
+    """How n strands differ from others because they grow near the hairline.
+
+    above_mm : (n,) heights of the roots above the hairline, with a random part [mm]
+    baby : (n,) 1 for baby hairs, 0 for others
+    part, seed : (n,) row of `Groom.parameters` for each strand, and its random seed for `_uniform_random`
+    """
+
+    above_mm: Doubles
+    baby: Doubles
+    part: NDArray[np.void]
+    seed: UInt32s
+
+
+def _hairline_effects(groom: Groom, strand_index: Ints) -> _HairlineEffects:
+    rows = groom.roots.part[strand_index]
+    part = groom.parameters[rows]
+    seeds = groom.parameters["seed"].astype(np.uint32) * np.uint32(131071)
+    seed = strand_index.astype(np.uint32) + seeds[rows]
+    above = _heights_above_hairline(groom, strand_index) + _HAIRLINE_NOISE_MM * _normal_random(seed, 30)
+    chance = part["hairline"] * part["baby_hairs"] * (1.0 - _smoothstep(*_BABY_HEIGHTS_MM, above))
+    return _HairlineEffects(above, (_uniform_random(seed, 33) < chance).astype(np.float64), part, seed)
+
+
 def _growing_root_indices(groom: Groom, root_count: int) -> Ints:
     """Return the indices of the roots from which a strand grows, among the first `root_count` roots."""
     index = np.arange(root_count, dtype=np.int32)
-    roots, part = groom.roots, groom.parameters[groom.roots.part[:root_count]]
-    fade = _smoothstep(*_HAIRLINE_FADE_MM, _heights_above_hairline(groom, index))
-    density = 1.0 + part["hairline"] * (fade - 1.0)
-    density = density * part["density"] * (1.0 - part["thinning"] * roots.place[:root_count, 2])
-    strand_seed = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
-    return np.flatnonzero(_uniform_random(strand_seed, 0) < density).astype(np.int32)
+    edge, place = _hairline_effects(groom, index), groom.roots.place[:root_count]
+    fade = _smoothstep(*_HAIRLINE_FADE_MM, edge.above_mm + _BABY_DROP_MM * edge.baby)
+    density = 1.0 + edge.part["hairline"] * (fade - 1.0)
+    density = density * edge.part["density"] * (1.0 - edge.part["thinning"] * place[:, 2])
+    return np.flatnonzero(_uniform_random(edge.seed, 0) < density).astype(np.int32)
 
 
-def _length_fractions(
-    groom: Groom,
-    strand_index: Ints,
-    hair_parameters: NDArray[np.void],
-    strand_seed: UInt32s,
-    above_hairline_mm: Doubles,
-) -> Doubles:
+def _length_fractions(groom: Groom, strand_index: Ints, hairline_effects: _HairlineEffects) -> Doubles:
     """Return the length (n,) of each strand as a fraction of the length of its guides.
 
     strand_index : (n,) indices of the strands
-    hair_parameters : (n,) row of `Groom.parameters` for each strand
-    strand_seed : (n,) random seeds of the strands, for `_uniform_random`
-    above_hairline_mm : (n,) heights of the roots above the hairline [mm]
+    hairline_effects : effects of the hairline on the strands
     """
-    roots = groom.roots
+    roots, (above_mm, baby, part, seed) = groom.roots, hairline_effects
     cut = (roots.guide_weight[strand_index] * groom.guides.cut[roots.guide[strand_index]]).sum(axis=1)
-    sides = 1.0 - hair_parameters["fade"] * (1.0 - roots.place[strand_index, 3])
-    edge = 1.0 - hair_parameters["hairline"] * (
-        0.75 - 0.75 * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_hairline_mm)
+    sides = 1.0 - part["fade"] * (1.0 - roots.place[strand_index, 3])
+    shortened = _SHORTEST + (1.0 - _SHORTEST) * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_mm)
+    whole = 1.0 + part["hairline"] * (shortened - 1.0)
+    length = np.minimum(cut, part["length_mm"] / part["guide_mm"] * sides) * whole
+    shortest, longest = _BABY_LENGTHS_MM
+    short = np.minimum(
+        length, (shortest + (longest - shortest) * _uniform_random(seed, 34)) / part["guide_mm"]
     )
-    length = np.minimum(cut, hair_parameters["length_mm"] / hair_parameters["guide_mm"] * sides) * edge
-    return np.asarray(length * (1.0 - hair_parameters["layers"] * _uniform_random(strand_seed, 1)))
+    return np.asarray((length + baby * (short - length)) * (1.0 - part["layers"] * _uniform_random(seed, 1)))
 
 
 def _interpolate_guides(
@@ -261,6 +291,10 @@ def _interpolate_guides(
     at = np.clip(guide_position, 0.0, 1.0) * (KNOTS_PER_GUIDE - 1)
     first = np.minimum(at.astype(np.int64), KNOTS_PER_GUIDE - 2)
     part = (at - first)[..., None]
+    around = np.stack(
+        [np.maximum(first, 1) - 1, first, first + 1, np.minimum(first + 2, KNOTS_PER_GUIDE - 1)]
+    )
+    value, slope = _spline_weights(at - first)
     height_mm = groom.guides.rest_mm[..., 3]
     position = np.repeat(root_mm[:, None], guide_position.shape[1], axis=1)
     normal, tangent, middle = (np.zeros_like(position) for _ in range(3))
@@ -270,20 +304,35 @@ def _interpolate_guides(
             groom.roots.guide[strand_index, k][:, None],
             groom.roots.guide_weight[strand_index, k][:, None, None],
         )
-        a, b = knots[guide, first], knots[guide, first + 1]
-        here = (1.0 - part) * a + part * b
+        near = knots[guide[None], around]
+        here = np.einsum("jnk,jnkc->nkc", value, near)
         position += weight * (here - knots[guide, 0])
         middle += weight * (here - root_mm[:, None])
         square += weight[..., 0] * ((here - root_mm[:, None]) ** 2).sum(axis=-1)
         normal += weight * ((1.0 - part) * normals[guide, first] + part * normals[guide, first + 1])
-        tangent += weight * (b - a)
-        heights = (1.0 - part[..., 0]) * height_mm[guide, first] + part[..., 0] * height_mm[guide, first + 1]
-        height += weight[..., 0] * heights
+        tangent += weight * np.einsum("jnk,jnkc->nkc", slope, near)
+        height += weight[..., 0] * (value * height_mm[guide[None], around]).sum(axis=0)
     normal = _unit_vectors(normal)
-    near = 1.0 / (1.0 + (np.maximum(height, 0.0) / _LIFTED_HEIGHT_MM) ** 2)
-    sag = near * np.maximum(square - (middle**2).sum(axis=-1), 0.0) / (2.0 * _HEAD_RADIUS_MM)
+    close = 1.0 / (1.0 + (np.maximum(height, 0.0) / _LIFTED_HEIGHT_MM) ** 2)
+    sag = close * np.maximum(square - (middle**2).sum(axis=-1), 0.0) / (2.0 * _HEAD_RADIUS_MM)
     position += sag[..., None] * normal
     return _Curves(position, height, normal, _unit_vectors(tangent + 1e-9 * normal))
+
+
+def _spline_weights(t: Doubles) -> tuple[Doubles, Doubles]:
+    """Return weights (4, n, k) of four knots in a Catmull-Rom spline and in its derivative.
+
+    t : (n, k) positions between the second and the third knot, 0 to 1
+    """
+    cubic, square = t**3, t**2
+    value = (
+        2 * square - cubic - t,
+        3 * cubic - 5 * square + 2,
+        4 * square - 3 * cubic + t,
+        cubic - square,
+    )
+    slope = 4 * t - 3 * square - 1, 9 * square - 10 * t, 8 * t - 9 * square + 1, 3 * square - 2 * t
+    return 0.5 * np.stack(value), 0.5 * np.stack(slope)
 
 
 def _cross_section_axes(curves: _Curves) -> tuple[Doubles, Doubles]:
@@ -318,7 +367,11 @@ def _rope_offsets(strand_seed: UInt32s, hair_parameters: NDArray[np.void], lengt
 
 
 def _curl_offsets(
-    strand_seed: UInt32s, clump_seed: UInt32s, hair_parameters: NDArray[np.void], length_mm: Doubles
+    strand_seed: UInt32s,
+    clump_seed: UInt32s,
+    hair_parameters: NDArray[np.void],
+    length_mm: Doubles,
+    clump_place: NDArray[np.floating],
 ) -> Doubles:
     """Return the offsets (2, n, k) by which curls displace the points of strands [mm].
 
@@ -327,12 +380,14 @@ def _curl_offsets(
     strand_seed, clump_seed : (n,) random seeds of the strands and of their clumps, for `_uniform_random`
     hair_parameters : (n,) row of `Groom.parameters` for each strand
     length_mm : (n, k) lengths from the root along the strand [mm]
+    clump_place : (n, 4) rows of `StrandRoots.place` of the strands at the middle of the clumps
     """
-    pitch = (
-        _parameter_column(hair_parameters, "pitch_mm")
-        * (0.85 + 0.3 * _uniform_random(clump_seed, 8))[:, None]
-    )
-    shift = _uniform_random(clump_seed, 9) + hair_parameters["incoherence"] * _uniform_random(strand_seed, 7)
+    spread = hair_parameters["clump_phases"].astype(np.float64)
+    varied = 1.0 + 0.3 * spread * (_uniform_random(clump_seed, 8) - 0.5)
+    pitch = _parameter_column(hair_parameters, "pitch_mm") * varied[:, None]
+    wave = 0.2 * np.sin(0.07 * clump_place[:, 0]) - 0.5 * clump_place[:, 1] / hair_parameters["pitch_mm"]
+    shift = (1.0 - spread) * wave + spread * _uniform_random(clump_seed, 9)
+    shift = shift + hair_parameters["incoherence"] * _uniform_random(strand_seed, 7)
     phase = 2 * np.pi * (length_mm / pitch + shift[:, None])
     radius = (
         _parameter_column(hair_parameters, "curl_mm")
@@ -368,26 +423,33 @@ def _frizz_offsets(strand_seed: UInt32s, hair_parameters: NDArray[np.void], leng
     )
 
 
-def _strand_absorption(strand_seed: UInt32s, hair_parameters: NDArray[np.void]) -> Doubles:
+def _strand_absorption(
+    strand_seed: UInt32s, hair_parameters: NDArray[np.void], place: NDArray[np.floating], length_mm: Doubles
+) -> Doubles:
     """Return the absorption coefficients (n, 3) of strands [1/mm].
 
-    Each strand represents several hairs, some of which may be white.
+    Each strand represents several hairs, some of which may be white. A dyed strand gets the mean along its
+    length.
 
     strand_seed : (n,) random seeds of the strands, for `_uniform_random`
     hair_parameters : (n,) row of `Groom.parameters` for each strand
+    place : (n, 4) rows of `StrandRoots.place`
+    length_mm : (n,) lengths of the strands [mm]
     """
+    temple = _smoothstep(*_TEMPLE_HEIGHTS_MM, place[:, 1]) * _smoothstep(*_TEMPLE_DEGREES, place[:, 0])
+    greyed = hair_parameters["grey"] + hair_parameters["temple_grey"] * hair_parameters["hairline"] * temple
     white = (
-        sum(
-            _uniform_random(strand_seed, 20 + k) < hair_parameters["grey"]
-            for k in range(_HAIRS_SAMPLED_PER_STRAND)
-        )
+        sum(_uniform_random(strand_seed, 20 + k) < greyed for k in range(_HAIRS_SAMPLED_PER_STRAND))
         / _HAIRS_SAMPLED_PER_STRAND
     )
     white = np.asarray(white)[:, None]
     dark = hair_parameters["dark"] * np.exp(0.12 * _normal_random(strand_seed, 26))[:, None]
     mixed = (1.0 - white) ** 2 * ((1.0 - white) * dark + white * dark.mean(axis=1, keepdims=True))
+    natural = np.maximum(mixed, hair_parameters["white"])
+    undyed = np.clip(hair_parameters["roots_mm"] / np.maximum(length_mm, 1e-3), 0.002, 0.998)
+    dyed = (hair_parameters["dyed"] * (1.0 - undyed))[:, None]
     return np.asarray(
-        np.maximum(mixed, hair_parameters["white"]) / hair_parameters["hairs_per_strand"][:, None]
+        (natural + dyed * (hair_parameters["dye"] - natural)) / hair_parameters["hairs_per_strand"][:, None]
     )
 
 

@@ -80,6 +80,23 @@ def absorption_per_mm(eumelanin: ArrayLike, pheomelanin: ArrayLike) -> Floats:
     )
 
 
+def dense_hair_reflectance(absorption: ArrayLike, radius_mm: float = _REFERENCE_FIBRE_RADIUS_MM) -> Floats:
+    """Return the diffuse reflectance (3,) of an infinitely dense layer of hair [-].
+
+    The layer is a medium that scatters isotropically with the albedo of a hair that is seen from the side.
+
+    absorption : (3,) absorption coefficient of the hairs [1/mm]
+    radius_mm : radius of the hairs [mm]
+
+    Source: [dEon2011] for the albedo of a hair.
+    """
+    offsets = (np.arange(FIBRE_SAMPLE_COUNT) + 0.5) * 2 / FIBRE_SAMPLE_COUNT - 1
+    depth = np.asarray(absorption, float) * radius_mm
+    albedo = np.mean([sum(lobe_fractions(0.0, depth, h)) for h in offsets], axis=0)
+    root = np.sqrt(np.maximum(1.0 - albedo, 0.0))
+    return np.asarray((1.0 - root) / (1.0 + root))
+
+
 def longitudinal_scattering(sin_i: ArrayLike, sin_o: ArrayLike, variance: float) -> Floats:
     """Return the longitudinal scattering function, whose integral over sin_i is 1 [-].
 

@@ -16,7 +16,7 @@ from dermis.human.hair.skin_surface import tangent_component
 _GRID_CELL_MM = 2.5
 _GRID_LOW, _GRID_HIGH = (1.0, -2.0), (64.0, 40.0)  # grid around the left brow and the tips of its hairs [mm]
 KNOTS_PER_HAIR = 9
-_MAX_HAIRS = 760  # number of hairs of the bushiest brow
+_MAX_HAIRS = 1080  # number of hairs of the bushiest brow
 # Artist's values along the brow, from its inner to its outer end, in a view from the front [mm]: position,
 # half height, angle of the hairs from outwards to upwards, density and length.
 _POSITIONS_ALONG_BROW = np.array([0.0, 0.1, 0.25, 0.45, 0.65, 0.85, 1.0])
@@ -170,7 +170,7 @@ def sample_shapes(
     angle = (
         np.interp(position_along, _POSITIONS_ALONG_BROW, _HAIR_ANGLES_RADIANS)
         - 0.6 * position_across * np.minimum(2.5 * position_along, 1.0)
-        + rng.normal(0, 0.13, n)
+        + rng.normal(0, 0.13, n) * (1.0 + 0.8 * np.exp(-position_along / 0.12))
     )
     bend = (
         -0.5
@@ -185,11 +185,12 @@ def sample_shapes(
     bend += rng.normal(0, 0.14, n)
     length = (
         np.interp(position_along, _POSITIONS_ALONG_BROW, _HAIR_LENGTH_MM)
-        * rng.uniform(0.6, 1.1, n)
+        * rng.uniform(0.45, 1.1, n)
         * (0.85 + 0.3 * hair_look.bushy)
     )
     rise = np.clip(rng.gamma(4.0, 0.15, n), 0.15, 1.3)
-    radius = rng.uniform(0.03, 0.05, n) * (0.9 + 0.2 * hair_look.bushy)
+    edge = np.minimum(1.0, 0.65 + 3.0 * position_along) * (1.0 - 0.2 * np.abs(position_across))
+    radius = rng.uniform(0.022, 0.042, n) * (0.9 + 0.2 * hair_look.bushy) * np.maximum(edge, 0.6)
     return np.stack([angle, bend, length, rise, radius])
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dermis.base.arrays import Doubles, Floats
 from dermis.base.tables import read_rows
 from dermis.human.hair.root_finder import Index, RootFinder
+from dermis.human.hair.styles import BeardArea
 from dermis.human.skin.face import HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, hairline_heights, zone_table
 from dermis.human.skin.surface import BORDER_FIELDS, average_surface
 from dermis.mesh.geometry import cross_columns, dot_columns
@@ -25,8 +26,8 @@ _R2_SEQUENCE_STEPS = np.array(
 )  # of a low-discrepancy sequence in the unit square
 _SCALP_BOTTOM_Y = -80.0  # lower end of the hair of the head [mm]
 _HAIRLINE_FADE_MM = (-3.0, 11.0)  # heights above the hairline between which density rises from 0 to 1
-_LIP_FADE_MM = (1.5, 4.5)  # distances from the lips between which the density of the beard rises
-_BEARD_FADE = (0.25, 0.75)  # zone amounts between which the density of the beard rises
+_LIP_FADE_MM = (0.8, 3.0)  # distances from the lips between which the density of the beard rises
+_BEARD_FADE = (0.2, 0.6)  # zone amounts between which the density of the beard rises
 _HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # wave vectors of the hairline [rad/mm]
 
 _SCALP_MARGIN_MM = 25.0  # distance below the hairline down to which quads may have hair
@@ -110,16 +111,17 @@ def recession_effect(amount_name: str, recession: float, points: Doubles) -> Dou
     return _sum_zones(amount_name, zone_table(recession)[receding], points)
 
 
-def scalp_density(recession: float) -> HairDensity:
+def scalp_density(recession: float, margin_mm: float = 0.0) -> HairDensity:
     """Return the relative density of scalp hair, which fades at the hairline and is thin on a receding crown.
 
     recession : recession of hairline and crown, 0 to 1, see `SkinLook`
+    margin_mm : distance by which the hairline is lowered, for roots of people whose hair begins lower [mm]
     """
     column = _amount_column("hair")
     receding = zone_table(recession)[:, column] != zone_table()[:, column]
 
     def relative_density(points: Doubles) -> Doubles:
-        above = height_above_hairline(points, recession)
+        above = height_above_hairline(points, recession) + margin_mm
         low, high = _HAIRLINE_FADE_MM
         margin = len(_HAIRLINE_WAVES)
         near = np.flatnonzero((above > low - margin) & (above < high + margin))
@@ -131,9 +133,32 @@ def scalp_density(recession: float) -> HairDensity:
     return HairDensity(relative_density, _scalp_point_mask())
 
 
-def beard_density() -> HairDensity:
-    """Return the relative density of the beard, which ends at the lips."""
-    return HairDensity(_beard_amount, _beard_point_mask())
+def beard_density(area: BeardArea = "all") -> HairDensity:
+    """Return the relative density of the beard, which ends at the lips.
+
+    area : part of the face that the beard covers, see `Style`
+    """
+    return HairDensity(lambda points: _beard_amount(points) * _BEARD_AREAS[area](points), _beard_point_mask())
+
+
+def _lip_weight(points: Doubles) -> Doubles:
+    """Return weights (n,) of points: 1 where a moustache grows, 0 elsewhere."""
+    x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
+    return smoothstep(34.0, 27.0, x) * smoothstep(-71.0, -66.0, y - 0.12 * x) * (z > 0.0)
+
+
+def _chin_weight(points: Doubles) -> Doubles:
+    """Return weights (n,) of points: 1 where a moustache or a goatee grows, 0 elsewhere."""
+    x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
+    chin = smoothstep(33.0, 26.0, x) * smoothstep(-116.0, -108.0, y) * (z > 0.0)
+    return np.asarray(np.maximum(chin * (y < -60.0), _lip_weight(points)))
+
+
+_BEARD_AREAS: dict[BeardArea, Callable[[Doubles], Doubles]] = {
+    "all": lambda points: np.ones(len(points)),
+    "lip": _lip_weight,
+    "chin": _chin_weight,
+}
 
 
 @cache
@@ -152,7 +177,7 @@ def _beard_amount(points: Doubles) -> Doubles:
 
 
 def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
-    """Return a smooth cubic transition of x from 0 at `low` to 1 at `high`, constant outside."""
+    """Return a smooth cubic transition of x from 0 at `low` to 1 at `high`, which may be the lower one."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
 

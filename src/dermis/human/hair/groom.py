@@ -23,7 +23,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.strands import Roots, Strands, offsets_in_root_axes
 from dermis.specular.hair import absorption_per_mm
 
-_LASH_PIGMENT_FACTOR = 1.6
+_BROW_PIGMENT_FACTOR, _LASH_PIGMENT_FACTOR = 1.3, 3.0
 
 
 def add_hair(
@@ -75,7 +75,9 @@ def _grow_brows(
     grid_mm = surface.root_frames(root_finder.brow_grid_roots).positions_mm
     brow_surface = BrowSurface(*surface.skin.project(grid_mm))
     knots, radius = brows.grow_brow_hairs(brow_surface, frames.positions_mm, hair[0], hair[1:3], hair[3:])
-    yield from _split_group(_hair_group(frames, knots, radius, 1.0), [len(part.quad) for part in roots])
+    yield from _split_group(
+        _hair_group(frames, knots, radius, _BROW_PIGMENT_FACTOR), [len(part.quad) for part in roots]
+    )
 
 
 def _grow_lashes(

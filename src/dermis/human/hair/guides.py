@@ -28,6 +28,8 @@ _ROUND_CUT_RADII_MM = np.array([75.0, 96.0, 92.0])  # semi-axes of the skull
 # heights between which it begins [mm].
 _FACE_CENTRE_Z, _FACE_RADII_MM, _FACE_TOP_MM = -60.0, (74.0, 118.0), (78.0, 40.0)
 _ANCHOR_SOFTENING_MM = 6.0  # distance below which the quads that a knot follows have about equal weights
+_RESTING_ABOVE_CUT_MM = 45.0  # height above a level cut below which hair that lies on the shoulders is cut
+_NAPE_TRIM_MM = -70.0, 25.0  # heights of roots between which standing hair is cut less and less round
 _COMBS_OVER_EARS = "fall", "twist"  # combs of hair that bulges over the ears
 _EAR_CENTRE_MM = np.array([75.0, -22.0, -76.0])
 _EAR_SPREAD_MM = np.array([1.0, 42.0, 34.0])
@@ -95,7 +97,7 @@ def fringe_weight(points_mm: Doubles, style: Style) -> Doubles:
     """Return weights (n,) of points (n, 3) on the scalp: 1 where the fringe has its roots, 0 elsewhere."""
     if style.fringe_y_mm is None:
         return np.zeros(len(points_mm))
-    return smoothstep(-48.0, -34.0, points_mm[:, 2]) * smoothstep(56.0, 44.0, np.abs(points_mm[:, 0]))
+    return smoothstep(-48.0, -34.0, points_mm[:, 2]) * smoothstep(66.0, 54.0, np.abs(points_mm[:, 0]))
 
 
 def _parted_directions(points: Doubles, style: Style) -> Doubles:
@@ -231,7 +233,7 @@ def _root_directions(points: Doubles, normals: Doubles, style: Style) -> Doubles
     combed = unit_vectors(tangent_component(COMBS[style.comb](points, style), normals))
     if style.comb == "up":
         return unit_vectors(normals + style.tilt * combed)
-    lift = style.lift * (smoothstep(10.0, 70.0, points[:, 1]) if style.comb == "fall" else 1.0)
+    lift = style.lift * (smoothstep(40.0, 95.0, points[:, 1]) if style.comb == "fall" else 1.0)
     return unit_vectors(np.reshape(lift, (-1, 1)) * normals + combed)
 
 
@@ -255,7 +257,7 @@ def _grow_one_step(surface: SkinSurface, growth: Growth, step_mm: float, style: 
     least = np.minimum(length / 6.0, 1.0) * (_MIN_HEIGHT_ABOVE_SKIN_MM + layer + height_of_ears)
     pushed = np.clip(least - height, 0.0, 0.8 * step_mm)[:, None]
     moved += pushed * normal
-    if style.comb == "fall":
+    if style.comb in _COMBS_OVER_EARS:
         loose = fringe_weight(growth.root_mm, style)[:, None] < 0.5
         moved = np.where(loose, _move_off_face(moved), moved)
     if style.coil_mm:
@@ -369,16 +371,32 @@ def cut_fractions(knots: Doubles, style: Style) -> Doubles:
     root = knots[:, 0]
     if style.cut_y_mm is not None:
         cut = np.minimum(cut, _first_crossing_fractions(knots, np.full(len(knots), style.cut_y_mm)))
+        cut = np.minimum(cut, _first_resting_fractions(knots, style.cut_y_mm + _RESTING_ABOVE_CUT_MM))
     if style.fringe_y_mm is not None:
         fringe = fringe_weight(root, style) > 0.5
         cut = np.where(fringe, _first_crossing_fractions(knots, np.full(len(knots), style.fringe_y_mm)), cut)
     if style.round:
         radius = np.linalg.norm((knots - _SKULL_CENTRE_MM) / _ROUND_CUT_RADII_MM, axis=2)
-        limit = 1.0 + style.round * style.max_length_mm / 90.0
+        trimmed = smoothstep(*_NAPE_TRIM_MM, root[:, 1])[:, None]  # shorter towards the nape
+        limit = 1.0 + style.round * style.max_length_mm / 90.0 * (0.25 + 0.75 * trimmed)
         outside = radius > limit
         first = np.where(outside.any(axis=1), outside.argmax(axis=1), KNOTS_PER_GUIDE - 1)
         cut = np.minimum(cut, first / (KNOTS_PER_GUIDE - 1))
     return cut
+
+
+def _first_resting_fractions(knots: Doubles, below_y_mm: float) -> Doubles:
+    """Return where each curve first lies on the shoulders or the back, as a fraction (g,) of its length.
+
+    A curve lies there where it descends by less than two thirds of its length. The fraction is 1 for others.
+
+    knots : (g, k, 3) knots of the curves [mm]
+    below_y_mm : height below which curves may lie [mm]
+    """
+    steps = np.diff(knots, axis=1)
+    flat = -steps[..., 1] < 2.0 / 3.0 * np.linalg.norm(steps, axis=2)
+    resting = flat & (knots[:, :-1, 1] < below_y_mm)
+    return np.where(resting.any(axis=1), resting.argmax(axis=1) / (KNOTS_PER_GUIDE - 1), 1.0)
 
 
 def _first_crossing_fractions(knots: Doubles, height_mm: Doubles) -> Doubles:

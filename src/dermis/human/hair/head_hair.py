@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.arrays import Doubles
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.root_finder import RootFinder
 from dermis.human.hair.strand_roots import BEARD_STRANDS_PER_CM2, STRANDS_PER_CM2, strands_of_style
-from dermis.human.hair.styles import BEARD, Style, styles
+from dermis.human.hair.styles import Style, beard_styles, styles
 from dermis.human.skin.face import hairline_heights
 from dermis.mesh.groom import Groom
 from dermis.specular.hair import absorption_per_mm
 
 MAX_HAIRS_PER_CM2 = 200.0
 """Density of the densest hair of the head [1/cm2]."""
-BEARD_HAIRS_PER_CM2 = 60.0
+BEARD_HAIRS_PER_CM2 = 90.0
 """Density of beards [1/cm2]."""
-_HAIR_RADIUS_MM, _BEARD_RADIUS_MM = 0.034, 0.048
+_MIN_BEARD_CURL, _BEARD_FRIZZ = 0.45, 0.025  # least curl; amplitude of frizz relative to the length
+_BEARD_RADIUS_RATIO = 1.25  # of hairs of the beard, relative to those of the head
 _MIN_EUMELANIN = 0.07  # white hair is not quite white
 _SEED_COUNT = 1 << 24  # seeds are exact as float32
 # Radius and pitch of the curls of hair, by the dial `HairLook.curl` [mm].
@@ -25,15 +29,16 @@ _CURL_NODES = np.array([0.0, 0.1, 0.3, 0.6, 0.8, 1.0])
 _COIL_RADIUS_BY_CURL_MM = np.array([0.0, 0.5, 5.0, 6.5, 3.6, 1.7])
 _COIL_PITCH_BY_CURL_MM = np.array([150.0, 130.0, 95.0, 34.0, 15.0, 7.5])
 _INCOHERENCE_BY_CURL = np.array([0.3, 0.3, 0.12, 0.2, 0.5, 1.0])
+_CLUMP_PHASES_BY_CURL = np.array([0.3, 0.3, 0.22, 0.5, 0.9, 1.0])
 _FRIZZ_BY_CURL_MM = np.array([0.25, 0.35, 0.6, 0.9, 0.8, 0.5])
-_FLYAWAY_FRACTION = 0.012
-_KNOTS_PER_TURN = 7.0
-_STRAIGHT_SEGMENT_MM = 14.0  # length of the segments of straight hair
-_MIN_KNOTS, _MAX_KNOTS = 5, 64
+_ROPE_PITCH_RATIO = 7.0  # pitch of twists relative to their radius
+_MAX_SEGMENT_MM = 7.0  # length of the segments of straight hair
+_MAX_DEVIATION_MM = 0.06  # largest deviation of curls and twists from the segments that represent them
+_MIN_KNOTS, _MAX_KNOTS = 5, 96
 _FLOAT_FIELDS = (
     "density", "hairline", "thinning", "length_mm", "guide_mm", "fade", "layers", "clump", "clump_start_mm",
     "rope_mm", "braid", "curl_mm", "pitch_mm", "incoherence", "frizz_mm", "flyaways", "radius_mm", "cover",
-    "grey", "hairs_per_strand",
+    "grey", "hairs_per_strand", "clump_phases", "baby_hairs", "temple_grey", "roots_mm",
 )  # fmt: skip
 HAIR_PARAMETERS_DTYPE = np.dtype(
     [
@@ -41,6 +46,8 @@ HAIR_PARAMETERS_DTYPE = np.dtype(
         ("dark", "f4", 3),
         ("seed", "f4"),
         ("white", "f4", 3),
+        ("dyed", "f4"),
+        ("dye", "f4", 3),
         ("pad", "f4"),
     ]
 )
@@ -62,107 +69,136 @@ def make_groom(
     hair_fraction : fraction of the strands to grow; the strands are widened by the inverse of this fraction,
         so that coverage stays the same
     """
-    scalp, bearded = styles().get(hair_look.style), hair_look.beard_mm > 0.0
-    if hair_look.density == 0.0:
-        scalp = None
-    if scalp is None and not bearded:
+    scalp, beard = _worn_style(hair_look), beard_styles().get(hair_look.beard_style)
+    if scalp is None and beard is None:
         return None
-    tables = strands_of_style(scalp, bearded, root_finder, subdivision_levels)
+    grown = beard and replace(beard, length_mm=beard.max_length_mm)  # beards of all lengths have one table
+    tables = strands_of_style(scalp, grown, root_finder, subdivision_levels)
     parts = [_scalp_parameters(scalp, hair_look, recession)] if scalp else []
-    parts += [_beard_parameters(hair_look)] if bearded else []
+    parts += [_beard_parameters(beard, hair_look)] if beard else []
     parameters, strands = np.array(parts, HAIR_PARAMETERS_DTYPE), round(hair_fraction * len(tables.roots))
-    heights, knots = hairline_heights(max(recession, scalp.crown if scalp else 0.0)), _knot_count(parameters)
+    receding = max(recession, scalp.crown if scalp else 0.0)
+    heights, knots = hairline_heights(receding, hair_look.widows_peak), _knot_count(parameters)
     return Groom(tables.guides, tables.roots, parameters, strands, knots, heights, tables.centre_mm)
+
+
+def _worn_style(hair_look: HairLook) -> Style | None:
+    """Return the style of a person's hair, with the person's parting and clumps; None for a bald head."""
+    style = styles().get(hair_look.style) if hair_look.density > 0.0 else None
+    changes = {name: getattr(hair_look, name) for name in ("parting_mm", "clump_mm")}
+    given = {name: round(value, 1) for name, value in changes.items() if value is not None}
+    return replace(style, **given) if style and given else style
 
 
 def _scalp_parameters(style: Style, hair_look: HairLook, recession: float) -> tuple[object, ...]:
     length, fade = min(hair_look.length_mm, style.max_length_mm), hair_look.fade if style.fade else 0.0
-    densities = STRANDS_PER_CM2, MAX_HAIRS_PER_CM2, hair_look.density
-    return _parameter_row(
-        style, hair_look, length, densities, _HAIR_RADIUS_MM, fade, max(recession, style.crown), 1.0
+    values = _shared_parameters(
+        style, hair_look, length, (STRANDS_PER_CM2, MAX_HAIRS_PER_CM2, hair_look.density)
     )
+    values |= {
+        "hairline": 1.0,
+        "thinning": max(recession, style.crown),
+        "fade": fade,
+        "clump": style.clump if hair_look.clump is None else hair_look.clump,
+        "baby_hairs": hair_look.baby_hairs,
+    }
+    if hair_look.dye_eumelanin is not None or hair_look.dye_pheomelanin is not None:
+        dye = absorption_per_mm(hair_look.dye_eumelanin or 0.0, hair_look.dye_pheomelanin or 0.0)
+        values |= {"dyed": 1.0, "dye": tuple(dye), "roots_mm": hair_look.roots_mm}
+    return tuple(values[name] for name in HAIR_PARAMETERS_DTYPE.names or ())
 
 
-def _beard_parameters(hair_look: HairLook) -> tuple[object, ...]:
+def _beard_parameters(style: Style, hair_look: HairLook) -> tuple[object, ...]:
     length, densities = (
-        min(hair_look.beard_mm, BEARD.max_length_mm),
+        min(hair_look.beard_mm, style.max_length_mm),
         (BEARD_STRANDS_PER_CM2, BEARD_HAIRS_PER_CM2, 1.0),
     )
-    return _parameter_row(BEARD, hair_look, length, densities, _BEARD_RADIUS_MM)
+    wavy = replace(hair_look, curl=max(hair_look.curl, _MIN_BEARD_CURL))
+    values = _shared_parameters(style, wavy, length, densities, _BEARD_RADIUS_RATIO)
+    values |= {"fade": style.fade, "frizz_mm": _BEARD_FRIZZ * length}
+    return tuple(values[name] for name in HAIR_PARAMETERS_DTYPE.names or ())
 
 
-def _parameter_row(
+def _shared_parameters(
     style: Style,
     hair_look: HairLook,
     length_mm: float,
     densities: tuple[float, float, float],
-    hair_radius_mm: float,
-    fade: float = 0.0,
-    thinning: float = 0.0,
-    hairline_effect: float = 0.0,
-) -> tuple[object, ...]:
-    """Return the parameters of scalp hair or of a beard as a row of `HAIR_PARAMETERS_DTYPE`.
+    radius_ratio: float = 1.0,
+) -> dict[str, object]:
+    """Return the parameters that scalp hair and beards share, by the names of `HAIR_PARAMETERS_DTYPE`.
+
+    The parameters of scalp hair alone have the values by which they have no effect.
 
     length_mm : length of the hair where it is longest [mm]
     densities : number of strand roots per area [1/cm2], number of real hairs per area [1/cm2], and fraction
         of the roots from which a strand grows
-    hair_radius_mm : radius of a single hair [mm]
-    fade : how much shorter the hair is at the sides and the nape than on top, 0 to 1
-    thinning : how far the hair on the crown has thinned, 0 to 1
-    hairline_effect : 1 for hair that is sparser, shorter and finer near the hairline, 0 for other hair
+    radius_ratio : radius of a single hair, relative to the hair of the head
     """
     strands_per_cm2, hairs_per_cm2, density = densities
     hairs_per_strand = hairs_per_cm2 / strands_per_cm2
-    curl_mm, pitch_mm, incoherence, frizz_mm = (
-        float(np.interp(hair_look.curl, _CURL_NODES, column))
-        for column in (
-            _COIL_RADIUS_BY_CURL_MM,
-            _COIL_PITCH_BY_CURL_MM,
-            _INCOHERENCE_BY_CURL,
-            _FRIZZ_BY_CURL_MM,
-        )
-    )
     rope = style.rope_mm > 0.0
-    radius = hairs_per_strand * hair_radius_mm
+    radius = hairs_per_strand * radius_ratio * 0.5 * hair_look.diameter_mm
     cover = 0.5 * 2.0 * radius * min(length_mm, 60.0) * strands_per_cm2 * density / 100.0
-    values = {
-        "density": density,
-        "hairline": hairline_effect,
-        "thinning": thinning,
-        "length_mm": length_mm,
-        "guide_mm": style.max_length_mm,
-        "fade": fade,
-        "layers": style.layers,
-        "clump": style.clump,
-        "clump_start_mm": 8.0 if rope else min(80.0, 0.5 * length_mm + 4.0),
-        "rope_mm": style.rope_mm,
-        "braid": float(style.braid),
-        "curl_mm": min(curl_mm, 0.35 * length_mm),
-        "pitch_mm": pitch_mm,
-        "incoherence": incoherence,
-        "frizz_mm": frizz_mm * min(1.0, length_mm / 60.0) * (0.3 if rope else 1.0),
-        "flyaways": 0.3 * _FLYAWAY_FRACTION if rope else _FLYAWAY_FRACTION,
-        "radius_mm": radius,
-        "cover": min(cover, 4.0),
-        "grey": hair_look.grey,
-        "hairs_per_strand": hairs_per_strand,
-        "dark": tuple(absorption_per_mm(hair_look.eumelanin, hair_look.pheomelanin)),
-        "seed": hair_look.seed % _SEED_COUNT,
-        "white": tuple(absorption_per_mm(_MIN_EUMELANIN, 0.0)),
-        "pad": 0.0,
+    values: dict[str, object] = dict.fromkeys(HAIR_PARAMETERS_DTYPE.names or (), 0.0)
+    return (
+        values
+        | _curl_parameters(hair_look, length_mm, rope)
+        | {
+            "density": density,
+            "length_mm": length_mm,
+            "guide_mm": style.max_length_mm,
+            "layers": style.layers,
+            "clump": style.clump,
+            "clump_start_mm": 8.0 if rope else min(80.0, 0.5 * length_mm + 4.0),
+            "rope_mm": style.rope_mm,
+            "braid": float(style.braid),
+            "flyaways": (0.3 if rope else 1.0) * hair_look.flyaways,
+            "radius_mm": radius,
+            "cover": min(cover, 4.0),
+            "grey": hair_look.grey,
+            "temple_grey": hair_look.temple_grey,
+            "hairs_per_strand": hairs_per_strand,
+            "dark": tuple(absorption_per_mm(hair_look.eumelanin, hair_look.pheomelanin)),
+            "seed": hair_look.seed % _SEED_COUNT,
+            "white": tuple(absorption_per_mm(_MIN_EUMELANIN, 0.0)),
+            "dye": (0.0, 0.0, 0.0),
+        }
+    )
+
+
+def _curl_parameters(hair_look: HairLook, length_mm: float, is_rope: bool) -> dict[str, object]:
+    """Return the parameters of curls and frizz; those that the look leaves out follow from its curl.
+
+    length_mm : length of the hair where it is longest [mm]
+    is_rope : whether the hair is twisted or braided
+    """
+
+    def given(value: float | None, by_curl: Doubles) -> float:
+        return float(np.interp(hair_look.curl, _CURL_NODES, by_curl)) if value is None else value
+
+    incoherence = None if hair_look.curl_coherence is None else 1.0 - hair_look.curl_coherence
+    frizz_mm = given(hair_look.frizz_mm, _FRIZZ_BY_CURL_MM)
+    return {
+        "curl_mm": min(given(hair_look.curl_radius_mm, _COIL_RADIUS_BY_CURL_MM), 0.35 * length_mm),
+        "pitch_mm": given(hair_look.curl_pitch_mm, _COIL_PITCH_BY_CURL_MM),
+        "incoherence": given(incoherence, _INCOHERENCE_BY_CURL),
+        "clump_phases": given(incoherence, _CLUMP_PHASES_BY_CURL),
+        "frizz_mm": frizz_mm * min(1.0, length_mm / 60.0) * (0.3 if is_rope else 1.0),
     }
-    return tuple(values[name] for name in HAIR_PARAMETERS_DTYPE.names or ())
 
 
 def _knot_count(parameters: NDArray[np.void]) -> int:
     """Return a number of knots per strand that resolves the longest and most tightly curled strands.
 
+    A helix of radius r and pitch p has the radius of curvature R = r + p^2 / (4 pi^2 r); a chord of length c
+    deviates from it by c^2 / (8 R).
+
     parameters : (p,) rows of `HAIR_PARAMETERS_DTYPE`, for scalp hair and beard
     """
-    lengths, pitches, curls, ropes = (
-        parameters[name] for name in ("length_mm", "pitch_mm", "curl_mm", "rope_mm")
-    )
-    straight = lengths / _STRAIGHT_SEGMENT_MM + _MIN_KNOTS
-    curled = np.where((curls > 1.0) & (ropes == 0.0), _KNOTS_PER_TURN * lengths / pitches, 0.0)
-    roped = np.where(ropes > 0.0, _KNOTS_PER_TURN * lengths / (7.0 * np.maximum(ropes, 1.0)), 0.0)
-    return int(np.clip(np.ceil(np.max([straight, curled, roped])), _MIN_KNOTS, _MAX_KNOTS))
+    lengths, curls, ropes = (parameters[name].astype(float) for name in ("length_mm", "curl_mm", "rope_mm"))
+    radius = np.maximum(np.where(ropes > 0.0, ropes, curls), 1e-3)
+    pitch = np.where(ropes > 0.0, _ROPE_PITCH_RATIO * ropes, parameters["pitch_mm"])
+    bend = radius + (pitch / (2.0 * np.pi)) ** 2 / radius
+    segments = np.minimum(np.sqrt(8.0 * _MAX_DEVIATION_MM * bend), _MAX_SEGMENT_MM)
+    return int(np.clip(np.ceil((lengths / segments).max()) + _MIN_KNOTS, _MIN_KNOTS, _MAX_KNOTS))

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from dermis.base.arrays import Doubles
 from dermis.human.hair.brows import KNOTS_PER_HAIR
 
+_LINE_DISTANCES = np.array([0.04, 0.22])  # of the two lines of roots from the edge of a lid, see `LashRow`
+_CLUMP_SPACING = 0.024  # mean distance between clumps, as a fraction of the row
 _POSITIONS_ALONG_ROW = np.array([0.0, 0.15, 0.35, 0.55, 0.75, 0.9, 1.0])
 
 
@@ -37,23 +39,23 @@ class LashRow(NamedTuple):
 
 UPPER_LASHES = LashRow(
     edge_points=(2625, 2664, 2622, 2619, 2616, 2563, 2562, 2568, 2571, 2574, 2577, 2580),
-    hairs=165,
+    hairs=220,
     start=0.14,
     end=0.96,
     length=np.array([5.0, 7.0, 8.6, 9.6, 10.0, 9.2, 7.2]),
-    rise=(-0.3, 1.15),
+    rise=(-0.3, 1.1),
     splay=(-0.35, 0.55),
-    radius=0.041,
+    radius=0.036,
 )
 LOWER_LASHES = LashRow(
     edge_points=(2634, 2615, 4280, 2612, 2609, 2606, 2603, 2598, 2595, 2592, 4278),
-    hairs=84,
+    hairs=116,
     start=0.2,
     end=0.95,
     length=np.array([2.8, 3.4, 4.0, 4.6, 5.2, 5.0, 4.0]),
     rise=(-0.25, -0.85),
     splay=(-0.3, 0.5),
-    radius=0.033,
+    radius=0.028,
 )
 
 
@@ -63,7 +65,7 @@ def sample_positions(lash_row: LashRow, rng: np.random.Generator) -> tuple[Doubl
     The coordinates are `edge_position` and `edge_distance` of `RootFinder.lid_edge_roots`.
     """
     u = (np.arange(lash_row.hairs) + rng.uniform(-0.3, 1.3, lash_row.hairs)) / lash_row.hairs
-    across = 0.04 + 0.12 * rng.integers(0, 3, lash_row.hairs)
+    across = _LINE_DISTANCES[rng.integers(0, 2, lash_row.hairs)] + rng.uniform(0.0, 0.06, lash_row.hairs)
     return lash_row.start + (lash_row.end - lash_row.start) * np.clip(u, 0, 1), np.asarray(across, np.float64)
 
 
@@ -83,11 +85,12 @@ def sample_shapes(
     splay = np.interp(fraction, [0, 1], lash_row.splay) + rng.normal(0, 0.1, n)
     first = lash_row.rise[0] + rng.normal(0, 0.12, n)
     last = lash_row.rise[1] + rng.normal(0, 0.18, n)
-    length = np.interp(fraction, _POSITIONS_ALONG_ROW, lash_row.length) * rng.uniform(0.7, 1.08, n)
-    clump = np.empty(n)  # neighbours that stick together
-    clump[np.argsort(edge_position)] = first_clump + np.cumsum(rng.random(n) < 0.4)
-    pull = rng.uniform(0.2, 0.7, n)
-    radius = lash_row.radius * rng.uniform(0.8, 1.15, n)
+    variation = np.minimum(rng.uniform(0.75, 1.08, n), rng.uniform(0.45, 1.9, n))  # some lashes are short
+    length = np.interp(fraction, _POSITIONS_ALONG_ROW, lash_row.length) * variation
+    borders = np.sort(rng.uniform(0.0, 1.0, round(1.0 / _CLUMP_SPACING)))
+    clump = first_clump + np.searchsorted(borders, fraction).astype(float)  # neighbours that stick together
+    pull = rng.uniform(0.35, 0.9, n) * (rng.random(n) < 0.85)
+    radius = lash_row.radius * rng.uniform(0.75, 1.15, n)
     return np.stack([splay, first, last, length, radius, clump, pull])
 
 
@@ -115,7 +118,7 @@ def grow_lashes(
     steps = (length / (KNOTS_PER_HAIR - 1))[:, None] * directions
     knots = np.cumsum(np.concatenate([[root_mm - 0.25 * ahead], steps]), axis=0).swapaxes(0, 1)
     clumped = _clump_tips(knots, clump.astype(np.int64), pull, t)
-    return clumped, radius[:, None] * np.maximum(1.0 - t, 0.0) ** 0.55 * np.minimum(1.0, 0.8 + t)
+    return clumped, radius[:, None] * np.maximum(1.0 - t, 0.0) ** 0.75 * np.minimum(1.0, 0.8 + t)
 
 
 def _clump_tips(

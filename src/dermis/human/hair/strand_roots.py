@@ -17,23 +17,26 @@ from dermis.human.hair.guides import (
     bind_guides,
     cornrow_position,
     cut_fractions,
+    fringe_weight,
     grow_guides,
     parting_side,
     smoothstep,
 )
 from dermis.human.hair.root_finder import RootFinder
-from dermis.human.hair.styles import BEARD, Style
+from dermis.human.hair.styles import Style
 from dermis.mesh.groom import KNOTS_PER_GUIDE, Guides, StrandRoots
 from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
 STRANDS_PER_CM2 = 150.0
 """Density of the strand roots on the scalp; strands grow from all or some of them [1/cm2]."""
-BEARD_STRANDS_PER_CM2 = 60.0
+BEARD_STRANDS_PER_CM2 = 220.0
 """Density of the strand roots in beards [1/cm2]."""
-_CACHE_VERSION = 9  # of this module's algorithm, part of the keys of cached tables
+_CACHE_VERSION = 13  # of this module's algorithm, part of the keys of cached tables
 _MAX_CACHED_STYLES, _MAX_CACHED_LOOKS = 4, 24  # single styles; hair styles with or without a beard
 # Distances between guides from which strands are less, and then not at all, interpolated between them [mm].
 _GUIDE_SEPARATION_MM = 25.0, 55.0
+_HAIRLINE_MARGIN_MM = 12.0  # distance below the hairline at which widow's peaks and baby hairs begin
+_BEARD_EDGE_DENSITY = 0.05, 0.9  # relative densities between which a beard reaches its length
 _SEED = 20
 _CENTRE_ROOT_COUNT = 2000  # number of roots whose mean is the centre of the hair
 _GUIDE_FIELDS = "corner", "local_mm", "weight", "rest_mm", "cut"
@@ -55,16 +58,16 @@ class StyleStrands(NamedTuple):
 
 @lru_cache(_MAX_CACHED_LOOKS)
 def strands_of_style(
-    scalp_style: Style | None, has_beard: bool, root_finder: RootFinder, subdivision_levels: int
+    scalp_style: Style | None, beard_style: Style | None, root_finder: RootFinder, subdivision_levels: int
 ) -> StyleStrands:
     """Return the guides and the roots of a hair style and a beard.
 
     scalp_style : style of the hair of the head; None for a bald head
-    has_beard : whether to include the beard
+    beard_style : style of the beard; None for no beard
     root_finder : root finder of the mean person
     subdivision_levels : subdivision levels of the mesh on whose quads the roots lie
     """
-    worn = [*([scalp_style] if scalp_style else []), *([BEARD] if has_beard else [])]
+    worn = [style for style in (scalp_style, beard_style) if style is not None]
     parts = [_cached_style_arrays(style, root_finder) for style in worn]
     guides = Guides(*(np.concatenate([part[name] for part in parts]) for name in _GUIDE_FIELDS))
     counts = [len(part["quad"]) for part in parts]
@@ -97,8 +100,8 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
     The names are those of the fields of `Guides` and of `StrandRoots`.
     """
     mesh, rng = root_finder.mesh, np.random.default_rng(_SEED)
-    beard = style is BEARD
-    where = density.beard_density() if beard else density.scalp_density(0.0)
+    beard = style.comb == "beard"
+    where = density.beard_density(style.area) if beard else density.scalp_density(0.0, _HAIRLINE_MARGIN_MM)
     max_roots_per_cm2 = BEARD_STRANDS_PER_CM2 if beard else STRANDS_PER_CM2
     roots = density.sample_roots(mesh, where, max_roots_per_cm2, rng)
     corners = quad_corners(mesh, roots.quad)
@@ -110,11 +113,16 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
     root_mm = np.einsum("nk,nkc->nc", weight, points_mm[corners])
     if style.comb == "fall":
         same = parting_side(points_mm[points], style)[guide] * parting_side(root_mm, style)[:, None] >= 0
+        in_fringe = fringe_weight(points_mm[points], style) > 0.5
+        same &= in_fringe[guide] == (fringe_weight(root_mm, style) > 0.5)[:, None]
         one_sided = weight * same
         total = one_sided.sum(axis=1, keepdims=True)
         weight = np.where(total > 1e-3, one_sided / np.maximum(total, 1e-9), weight)
     weight = _near_guide_weights(weight, guide, knots)
     place = _root_locations(weight, average_control_points()[corners])
+    if beard:
+        points = np.einsum("nk,nkc->nc", weight, average_control_points()[corners])
+        place[:, 3] = smoothstep(*_BEARD_EDGE_DENSITY, where.relative_density(points))
     guides = bind_guides(mesh, points_mm, knots, heights, cut_fractions(knots, style))
     clump = _clump_centre_strands(
         root_mm, np.einsum("nk,nkc->nc", weight, knots[guide, KNOTS_PER_GUIDE // 2]), style, rng
@@ -158,7 +166,7 @@ def _root_locations(corner_weight: Doubles, corner_points: Doubles) -> Doubles:
     angle = density.hairline_angle(points)
     height = points[:, 1] + density.hairline_waves(points)
     thinning = -recession_effect("hair", 1.0, points)
-    top = smoothstep(-45.0, 62.0, points[:, 1] + 0.15 * (points[:, 2] - density.HEAD_AXIS_Z))
+    top = smoothstep(-30.0, 85.0, points[:, 1] + 0.15 * (points[:, 2] - density.HEAD_AXIS_Z))
     return np.stack([angle, height, np.clip(thinning, 0.0, 1.0), top], axis=1)
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from typing import Literal
 
 _NO_TIE = 0.0, 0.0, 0.0
 Comb = Literal["up", "fall", "back", "rows", "gather", "twist", "beard"]
+BeardArea = Literal["all", "lip", "chin"]
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,7 @@ class Style:
     women, men : relative probabilities of the style among women and among men
     tight : whether tightly coiled hair is worn in this style
     loose : whether hair that is not tightly coiled is worn in this style
+    area : where the hair of a beard grows: "all", only above the upper "lip", or there and around the "chin"
     """
 
     comb: Comb
@@ -69,6 +71,7 @@ class Style:
     men: float = 0.0
     tight: bool = False
     loose: bool = True
+    area: BeardArea = "all"
 
 
 @cache
@@ -79,7 +82,25 @@ def styles() -> dict[str, Style]:
     return {name: Style(**{**row, "tie_mm": tuple(row.get("tie_mm", _NO_TIE))}) for name, row in rows.items()}
 
 
-BEARD = Style(
-    "beard", max_length_mm=150.0, length_mm=10.0, lift=1.0, volume_mm=5.0, gravity=0.35, clump_mm=4.0
-)
-"""Style of beards, which are combed down."""
+@cache
+def beard_styles() -> dict[str, Style]:
+    """Return a dictionary from name to beard style; `Style.area` is the part of the face that it covers."""
+    combed = Style(
+        "beard",
+        max_length_mm=150.0,
+        length_mm=10.0,
+        lift=0.5,
+        volume_mm=3.0,
+        gravity=0.4,
+        layers=0.35,
+        fade=0.65,
+        clump=0.15,
+        clump_mm=3.0,
+    )
+    return {
+        "stubble": replace(combed, length_mm=1.0),
+        "short": replace(combed, length_mm=7.0),
+        "full": replace(combed, length_mm=28.0),
+        "moustache": replace(combed, length_mm=9.0, area="lip"),
+        "goatee": replace(combed, length_mm=14.0, area="chin"),
+    }

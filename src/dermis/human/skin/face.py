@@ -43,6 +43,7 @@ _FOLD_SAMPLES_PER_SEGMENT = 4
 _MAX_CACHED_TABLES = 32  # number of results that each function caches
 _CROWN_ZONE = "crown"  # zone where hair thins first
 _TEMPLE_RECESSION_MM, _FOREHEAD_RECESSION_MM = 22.0, 16.0  # maximum recession of the hairline
+_PEAK_MM, _PEAK_WIDTH_DEGREES = 9.0, 8.0  # depth and width of the strongest widow's peak
 _TEMPLE_DEGREES, _TEMPLE_WIDTH_DEGREES, _FOREHEAD_WIDTH_DEGREES = 33.0, 15.0, 38.0  # from the front
 
 
@@ -115,12 +116,13 @@ def _zone_amounts_of_sites() -> NDArray[np.float64]:
 
 
 @lru_cache(maxsize=_MAX_CACHED_TABLES)
-def hairline_heights(recession: float = 0.0) -> Floats:
+def hairline_heights(recession: float = 0.0, widows_peak: float = 0.0) -> Floats:
     """Return the heights (91,) of the hairline above y = 0 [mm].
 
     The heights are for angles around the head from 0 (front) to 180 (back) in steps of 2 degrees.
 
     recession : recession of the hairline, 0 to 1, which is strongest at the temples, see `SkinLook`
+    widows_peak : how far the middle of the hairline reaches down, 0 to 1, see `HairLook`
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -129,7 +131,10 @@ def hairline_heights(recession: float = 0.0) -> Floats:
     temples = np.exp(-(((edges - _TEMPLE_DEGREES) / _TEMPLE_WIDTH_DEGREES) ** 2))
     forehead = np.exp(-((edges / _FOREHEAD_WIDTH_DEGREES) ** 4))
     receded = recession * (_TEMPLE_RECESSION_MM * temples + recession * _FOREHEAD_RECESSION_MM * forehead)
-    return np.asarray(PchipInterpolator(angle, height)(edges) + receded, np.float32)
+    peak = np.exp(-edges / _PEAK_WIDTH_DEGREES) - 0.3 * temples
+    return np.asarray(
+        PchipInterpolator(angle, height)(edges) + receded - widows_peak * _PEAK_MM * peak, np.float32
+    )
 
 
 class Folds(NamedTuple):

@@ -22,7 +22,12 @@ from dermis.human.skin.measured import (
 from dermis.mesh.eye_look import EyeLook
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 
-FIELD_RANGES: dict[str, tuple[float, float]] = {"seed": (0, 2**32 - 1), "epidermis_mm": (0.01, 0.5)}
+FIELD_RANGES: dict[str, tuple[float, float]] = {
+    "seed": (0, 2**32 - 1),
+    "epidermis_mm": (0.01, 0.5),
+    "stubble_eumelanin": (0.0, 10.0),
+    "stubble_pheomelanin": (0.0, 10.0),
+}
 """Ranges of the numeric fields whose range is not 0 to 1."""
 SITES_FIELD = "sites"
 """Name of the only field of `SkinLook` that is not a number."""
@@ -66,7 +71,7 @@ class SkinLook:
     veins : float
         Visibility of veins at temples, lids and neck, 0 to 1 [-].
     stubble : float
-        Shadow of the shaved hair of the head, 0 to 1 [-].
+        Shadow of the hair of the head on and in the scalp, 0 to 1 [-].
     recession : float
         Recession of the hair at temples, forehead and crown, 0 to 1 [-].
     beard : float
@@ -84,6 +89,8 @@ class SkinLook:
     sites : SiteDifferences or mapping
         Differences in pigments between other sites of the head and the cheek; by default the medians of
         measured people.
+    stubble_eumelanin, stubble_pheomelanin : float
+        Pigments of the hair of which `stubble` is the shadow, 0 to 10, see `HairLook` [-].
 
     Raises
     ------
@@ -117,6 +124,8 @@ class SkinLook:
     scars: float = 0.0
     seed: int = 0
     sites: SiteDifferences = field(default_factory=typical_site_differences)
+    stubble_eumelanin: float = 4.0
+    stubble_pheomelanin: float = 0.3
 
     def __post_init__(self) -> None:
         """Raise DermisError for fields out of range."""

@@ -45,6 +45,7 @@ _CROWDED_TILE_SEGMENT_RATIO = (
     14.0  # ratio of the number of segments in a crowded tile to the mean of all tiles
 )
 _CLEARING_WORKGROUP_COUNT = 256
+_LIGHT_STRIDE, _MIN_BEND_OF_STRIDE_MM = 2, 12.0  # where strands bend less, every second knot is shaded
 _SHADOW_RAY_STRIDE = 4  # one of four rays to an area light is traced: pictures change by 0.0002 at most
 
 
@@ -177,7 +178,8 @@ def draw(
     pose_strands(graph, tables, shape, posed, coarse)
     segments = tables.fine.total_segment_count() + coarse.total_segment_count()
     knots = tables.fine.total_knot_count() + coarse.total_knot_count()
-    light_constants = (*light_constants, ("RAY_STRIDE", _SHADOW_RAY_STRIDE))
+    stride = _LIGHT_STRIDE if tables.bend_mm >= _MIN_BEND_OF_STRIDE_MM else 1
+    light_constants = (*light_constants, ("RAY_STRIDE", _SHADOW_RAY_STRIDE), ("STRIDE", stride))
     light = program(graph.device, "hair/strands_light.wgsl", light_constants)
     record = _strand_view_record(light, strands, view, coarse.hairs)
     hairs = tables.hairs_record(coarse)
@@ -185,7 +187,13 @@ def draw(
     _draw_view_map(graph, tables, picture.view_map, record, pixel_mm)
     shared["posed"] = posed
     _dispatch_hair(graph, "hair/strands_hide.wgsl", {**shared, "view_map": picture.view_map}, knots)
-    graph.dispatch("strands", light, {**lighting, **shared}, workgroup_grid(knots))
+    points = tables.fine.total_knot_count() + coarse.hairs * ((coarse.knots - 2) // stride + 2)
+    graph.dispatch("strands", light, {**lighting, **shared}, workgroup_grid(points))
+    if stride > 1 and coarse.hairs:
+        inner: Bindings = {name: shared[name] for name in ("strand_view", "projected", "hairs")}
+        _dispatch_hair(
+            graph, "hair/strands_spread.wgsl", inner, coarse.total_knot_count(), (("STRIDE", stride),)
+        )
     lists: Bindings = {"list_heads": picture.list_heads, "links": picture.links}
     _dispatch_hair(graph, "hair/strands_empty.wgsl", lists, picture.list_heads.size // 4)
     tile_side = (("STRAND_TILE", picture.tile_side),)

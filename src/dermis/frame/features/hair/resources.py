@@ -46,7 +46,7 @@ _KEPT_STYLE_COUNT = 12  # hair styles whose buffers, of about 10 MB each, are ke
 _MIN_STRANDS_PER_PIXEL = 2.0  # where all strands are short; fewer would look like dots
 _HAIRY_SKIN_AREA_MM2 = 6e4  # approximate area of the skin on which scalp hair and beard grow
 _MAX_KNOT_FRACTION_FOR_SHORT_HAIR = 0.4  # largest fraction of `Detail.drawn_knots` that is spent against dots
-_MAX_BEND_MM = 20.0  # radius of curvature of the guides near the skin
+_MAX_BEND_MM = 35.0  # radius of curvature of the guides near the skin
 _ROPE_PITCH_RATIO = (
     7.0  # pitch of twists relative to their radius; that of braids is 8, see strands_grow.wgsl
 )
@@ -63,7 +63,11 @@ _ROOT_DTYPE = np.dtype(
 )
 _HAIR_COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
 _HAIRS_DTYPE = np.dtype(
-    [*((name, "u4") for name in _HAIR_COUNT_MEMBERS), ("width_scale", "f4"), ("absorptance", "f4")]
+    [
+        *((name, "u4") for name in _HAIR_COUNT_MEMBERS),
+        *((name, "f4") for name in ("width_scale", "absorptance", "pad")),
+        ("dye", "f4", 4),
+    ]
 )
 
 
@@ -71,7 +75,8 @@ class StrandDetail(NamedTuple):
     """Limits of the detail of coarse strands (scalp hair and beard), for GPUs or for software adapters.
 
     drawn_knots : largest total number of knots of the drawn strands
-    casters : largest number of strands that are drawn into shadow maps in place of all coarse strands
+    casters : number of strands that are drawn into shadow maps in place of all coarse strands; more if they
+        have fewer than `caster_knots` knots
     caster_knots : largest number of knots of a strand in shadow maps
     width_px : least width of drawn strands [pixel]
     deviation_px : largest deviation of a curl from the segments that represent it [pixel]
@@ -87,8 +92,8 @@ class StrandDetail(NamedTuple):
 
 
 _GPU_DETAIL, _SOFTWARE_DETAIL = (
-    StrandDetail(1 << 23, 10_000, 24, 0.6, 0.1, 6.0),
-    StrandDetail(1 << 20, 5_000, 10, 0.9, 0.25, 10.0),
+    StrandDetail(1 << 23, 10_000, 24, 0.6, 0.15, 9.0),
+    StrandDetail(1 << 20, 5_000, 10, 0.9, 0.3, 14.0),
 )
 
 
@@ -171,9 +176,8 @@ def caster_strand_counts(device: Device, coarse_counts: StrandCounts) -> StrandC
     coarse_counts : result of `max_coarse_counts`
     """
     detail = adapter_strand_detail(device)
-    return StrandCounts(
-        min(coarse_counts.hairs, detail.casters), min(coarse_counts.knots, detail.caster_knots)
-    )
+    knots = min(coarse_counts.knots, detail.caster_knots)
+    return StrandCounts(min(coarse_counts.hairs, detail.casters * detail.caster_knots // knots), knots)
 
 
 def adapter_strand_detail(device: Device) -> StrandDetail:
@@ -300,6 +304,7 @@ class StrandTables:
     width_mm : width of one strand of the longer of the two [mm]
     cover : projected area of hair per area of skin, where the longer of the two grows [-]
     absorptance : fraction of diffuse light that a hair absorbs, mean of all colours [-]
+    dye : (3,) absorption of dyed strands of natural width; 0 for hair that is not dyed [1/mm]
     """
 
     strands: Buffer
@@ -318,6 +323,7 @@ class StrandTables:
     width_mm: float
     cover: float
     absorptance: float
+    dye: NDArray[np.float64]
 
     def hairs_record(self, coarse_counts: StrandCounts) -> UniformRecord:
         """Return the numbers of strands as a uniform record of the struct Hairs in strand_knots.wgsl.
@@ -333,6 +339,8 @@ class StrandTables:
             coarse_counts.knots,
             width_scale,
             self.absorptance,
+            0.0,
+            (*(self.dye / width_scale), 0.0),
         )
         return np.array(values, _HAIRS_DTYPE)
 
@@ -436,7 +444,17 @@ def make_strand_tables(
         width_mm=0.0 if largest is None else 2.0 * float(largest["radius_mm"]),
         cover=0.0 if largest is None else float(largest["cover"]),
         absorptance=1.0 if hair is None else mean_hair_absorptance(hair),
+        dye=np.zeros(3) if parts is None else _dye_absorption(parts),
     )
+
+
+def _dye_absorption(hair_parameters: NDArray[np.void]) -> NDArray[np.float64]:
+    """Return the absorption coefficients (3,) of dyed strands [1/mm]; 0 if no hair is dyed.
+
+    hair_parameters : rows of `Groom.parameters`, for scalp hair and beard
+    """
+    dyed = hair_parameters[hair_parameters["dyed"] > 0.0]
+    return np.asarray((dyed["dye"] / dyed["hairs_per_strand"][:, None]).sum(axis=0), np.float64)
 
 
 def _least_bend_mm(hair_parameters: NDArray[np.void]) -> float:

@@ -2,7 +2,8 @@
 // lashes) come first, then coarse strands (scalp hair and beard); if only some coarse strands are drawn, they are wider.
 
 const ROWS_BEFORE: u32 = 2u; // rows of a strand before its knots: normal of the skin, and radius by which light is absorbed,
-// 0 for that of the knots; absorption [1/mm] and cover by other hair
+// 0 for that of the knots; absorption [1/mm], and packed: cover by other hair, and from where the strand is dyed
+const COVER_STEPS: f32 = 64.0; // the packed number is floor(COVER_STEPS cover) + fraction of the strand that is not dyed, or + 0
 
 struct Hairs {
     fine: u32, // number of strands
@@ -12,6 +13,7 @@ struct Hairs {
     coarse_knots: u32,
     width_scale: f32, // factor of the width of coarse strands, so that they cover the area of all
     absorptance: f32, // fraction of diffuse light that a hair absorbs, mean of all colours
+    dye: vec3f, // absorption of dyed strands [1/mm]
 }
 
 @group(0) @binding(41) var<uniform> hairs: Hairs;

@@ -1,4 +1,5 @@
-// Marks the segments of coarse strands that other hair hides, by the deep opacity map of the picture.
+// Projects all knots, and marks the segments of coarse strands that other hair or the head hides. Hair is tested by the deep opacity
+// map of the picture.
 //#include "each.wgsl"
 //#include "strand_knots.wgsl"
 //#include "view_map.wgsl"
@@ -6,6 +7,8 @@
 const HIDING_COVER: f32 = 9.0; // cover by other hair that hides a strand: it transmits exp(-9) of the light
 const TEST_STEP: f32 = 2.0; // largest distance between tested points of a segment [texel]
 const MAX_TESTS: u32 = 16u; // parts of a segment whose ends are tested; longer segments are not hidden
+const HEAD_MM: f32 = 85.0; // radius of a head
+const HORIZON_MARGIN: f32 = 0.15; // margin of the test whether the head hides a strand, as a cosine
 
 @group(0) @binding(30) var<storage, read> posed: array<vec4f>;
 @group(0) @binding(31) var<storage, read_write> projected: array<ProjectedKnot>;
@@ -51,6 +54,13 @@ fn is_segment_covered(a: ProjectedKnot, b: ProjectedKnot) -> bool {
     return true;
 }
 
+// Whether the head hides all of a coarse strand: its root lies beyond the horizon by more than its length.
+fn is_behind_head(row: u32) -> bool {
+    let root = posed[row + ROWS_BEFORE].xyz;
+    let reach = distance(posed[row + ROWS_BEFORE + hairs.coarse_knots - 1u].xyz, root);
+    return dot(posed[row].xyz, normalize(strand_view.eye - root)) < -(HORIZON_MARGIN + sqrt(2.0 * reach / HEAD_MM));
+}
+
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
     let index = list_index(group, groups, lane);
@@ -58,14 +68,19 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         return;
     }
     let hair = hair_of_knot(index);
+    let row = row_of_knot(index, hair);
+    var knot = project_knot(posed[row].xyz, posed[row].w);
     var covered = false;
     if (is_coarse(hair)) {
-        let row = row_of_knot(index, hair);
         let is_last = index - first_knot(hair) + 1u == hairs.coarse_knots;
         covered = is_last;
-        if (!is_last && posed[row].w >= 0.0) {
-            covered = is_segment_covered(project_knot(posed[row].xyz, posed[row].w), project_knot(posed[row + 1u].xyz, posed[row + 1u].w));
+        if (is_behind_head(row_of_hair(hair))) {
+            knot.width = -1.0;
+            covered = true;
+        } else if (!is_last && posed[row].w >= 0.0) {
+            covered = is_segment_covered(knot, project_knot(posed[row + 1u].xyz, posed[row + 1u].w));
         }
     }
-    projected[index].covered = u32(covered);
+    knot.covered = u32(covered);
+    projected[index] = knot;
 }

@@ -17,10 +17,10 @@ const INTERNAL_AROUND: vec3f = vec3f(0.865, 0.135, 0.0);
 const SKY_WIDTH: f32 = 0.5; // half-width of the transition from skin to sky at the horizon, as a cosine
 const BACKSCATTER_DENSITY: f32 = 0.7; // density factor of backscattering by the strands behind, as published
 const WIDE_VARIANCE: f32 = 0.3; // longitudinal variance of light that other strands have scattered
-const HEAD_MM: f32 = 85.0; // radius of a head
-const HORIZON_MARGIN: f32 = 0.15; // margin of the test whether the head hides a strand, as a cosine
 const HORIZON_REACH_MM: vec2f = vec2f(8.0, 30.0); // distances from the root between which the horizon of the skin fades
 const PICTURE_MARGIN: f32 = 64.0; // distance outside the picture beyond which knots are not shaded [pixel]
+
+override STRIDE: u32 = 1u; // one of this many knots of a coarse strand is shaded, see strands_spread.wgsl
 
 @group(0) @binding(30) var<storage, read> posed: array<vec4f>;
 @group(0) @binding(31) var<storage, read_write> projected: array<ProjectedKnot>;
@@ -42,10 +42,13 @@ fn knot_at(hair: u32, k: u32) -> Knot {
     let first = row + ROWS_BEFORE;
     let here = posed[first + k];
     let along = normalize(posed[first + min(k + 1u, knots_of(hair) - 1u)].xyz - posed[first + max(k, 1u) - 1u].xyz);
-    let depth = posed[row + 1u].xyz * select(here.w, posed[row].w, posed[row].w > 0.0);
-    let height = dot(here.xyz - posed[first].xyz, posed[row].xyz);
-    let cover = posed[row + 1u].w;
     let along_strand = f32(k) / f32(knots_of(hair) - 1u);
+    let packed = posed[row + 1u].w;
+    let undyed = fract(packed);
+    let absorption = select(posed[row + 1u].xyz, hairs.dye, undyed > 0.0 && along_strand > undyed);
+    let depth = absorption * select(here.w, posed[row].w, posed[row].w > 0.0);
+    let height = dot(here.xyz - posed[first].xyz, posed[row].xyz);
+    let cover = floor(packed) / COVER_STEPS;
     let eye = normalize(strand_view.eye - here.xyz);
     return Knot(here.xyz, posed[row].xyz, along, eye, depth, height, distance(here.xyz, posed[first].xyz), cover * along_strand);
 }
@@ -161,34 +164,37 @@ fn radiance_of(knot: Knot) -> vec3f {
     return total + albedo.residual * 0.25 * (behind + ahead + 2.0 * beside);
 }
 
-// Whether the head hides all of a coarse strand: its root lies beyond the horizon by more than its length.
-fn is_hidden(hair: u32) -> bool {
-    if (!is_coarse(hair)) {
-        return false;
+// Knot that an invocation shades. Of coarse strands, every STRIDE-th knot and the last one are shaded.
+fn shaded_knot(index: u32) -> u32 {
+    let fines = hairs.fine * hairs.fine_knots;
+    if (index < fines) {
+        return index;
     }
-    let row = row_of_hair(hair);
-    let root = posed[row + ROWS_BEFORE].xyz;
-    let reach = distance(posed[row + ROWS_BEFORE + hairs.coarse_knots - 1u].xyz, root);
-    return dot(posed[row].xyz, normalize(strand_view.eye - root)) < -(HORIZON_MARGIN + sqrt(2.0 * reach / HEAD_MM));
+    let points = (hairs.coarse_knots - 2u) / STRIDE + 2u;
+    let hair = hairs.fine + (index - fines) / points;
+    return first_knot(hair) + min((index - fines) % points * STRIDE, hairs.coarse_knots - 1u);
+}
+
+// Whether a segment that the radiance of a knot colours is visible.
+fn colours_segments(knot: u32, hair: u32) -> bool {
+    let first = first_knot(hair);
+    var seen = false;
+    for (var k = max(knot, first + STRIDE) - STRIDE; k < min(knot + STRIDE, first + knots_of(hair)); k += 1u) {
+        seen |= projected[k].covered == 0u;
+    }
+    return seen;
 }
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let index = list_index(group, groups, lane);
+    let index = shaded_knot(list_index(group, groups, lane));
     if (index >= total_knot_count(strand_view.coarse)) {
         return;
     }
+    let knot = projected[index];
     let hair = hair_of_knot(index);
-    let here = posed[row_of_knot(index, hair)];
-    var knot = project_knot(here.xyz, here.w);
     let inside = all(knot.position > vec2f(-PICTURE_MARGIN)) && all(knot.position < strand_view.size + PICTURE_MARGIN);
-    if (is_hidden(hair)) {
-        knot.width = -1.0;
+    if (inside && knot.width >= 0.0 && colours_segments(index, hair)) {
+        projected[index].radiance = strand_view.light_factors.y * radiance_of(knot_at(hair, index - first_knot(hair)));
     }
-    knot.covered = projected[index].covered;
-    let is_covered = knot.covered != 0u && (index == first_knot(hair) || projected[index - 1u].covered != 0u);
-    if (inside && knot.width >= 0.0 && !is_covered) {
-        knot.radiance = strand_view.light_factors.y * radiance_of(knot_at(hair, index - first_knot(hair)));
-    }
-    projected[index] = knot;
 }

@@ -38,6 +38,6 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     if (index == first_knot(hair)) {
         let row = row_of_hair(hair);
         posed[row] = vec4f(normal, 0.0);
-        posed[row + 1u] = strand.absorption;
+        posed[row + 1u] = vec4f(strand.absorption.xyz, floor(COVER_STEPS * strand.absorption.w));
     }
 }

@@ -50,6 +50,7 @@ from dermis.human.skin.textures import (
 )
 from dermis.mesh.maps import Maps
 from dermis.scene.skin import DEFAULT_RHO_S
+from dermis.specular.hair import absorption_per_mm, dense_hair_reflectance
 
 _PAINTING_LISTS: dict[str, Sequence[str]] = {
     "noises": [noise.name for noise in NOISES],
@@ -59,6 +60,8 @@ _PAINTING_LISTS: dict[str, Sequence[str]] = {
 }
 _SKIN_SHADER, _TEXEL_TRIANGLE_SHADER = "surface/painting/skin.wgsl", "surface/painting/owner.wgsl"
 _MAX_PAINTED_TRIANGLES = 1 << 20  # limit by the bits of a triangle index in painted_surface.wgsl
+# Reflectance of a scalp in short hair by that of a dense layer of hair: factor, and constant.
+_SCALP_FACTOR, _SCALP_REFLECTANCE = 1.12, 0.022
 _TRIANGLE_ROW_PADDING = (0, 0), (0, 2)  # padding from two to four columns
 _PAINTED_CACHE_FOLDER = "painted"
 _WORD_BYTES = 4
@@ -119,7 +122,16 @@ def paint_inputs(surface: PaintedSurface, look: SkinLook, map_side: int) -> Pain
     names = set(struct_dtype(text, "Paint").names or ()) & set(vars(look))
     values = {name: getattr(look, name) for name in names}
     low, high = oxygen_range(look)
-    paint = make_record(text, "Paint", side=map_side, low_oxygen=low, high_oxygen=high, **values)
+    stubble = dense_hair_reflectance(absorption_per_mm(look.stubble_eumelanin, look.stubble_pheomelanin))
+    paint = make_record(
+        text,
+        "Paint",
+        side=map_side,
+        low_oxygen=low,
+        high_oxygen=high,
+        stubble_colour=_SCALP_FACTOR * stubble + _SCALP_REFLECTANCE,
+        **values,
+    )
     tables = np.ndarray((), struct_dtype(text, "Tables"), _face_tables(look.recession, look.sites))
     return PaintInputs(paint, tables, painted_colour_tables(look), surface)
 

@@ -25,6 +25,7 @@ struct Paint {
     scars: f32,
     low_oxygen: f32, // oxygen saturations of the two colour tables of skin
     high_oxygen: f32,
+    stubble_colour: vec3f, // reflectance of a scalp covered by short hair
 }
 
 struct Vertex {

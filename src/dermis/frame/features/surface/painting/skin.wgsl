@@ -31,7 +31,6 @@ const LIP_MELANIN: f32 = 0.5;
 const MUCOSA_BLOOD: f32 = 3.2;
 const RED_LIDS: f32 = 0.8;
 const RED_SLIT: f32 = 1.0;
-const STUBBLE_COLOUR: vec3f = vec3f(0.095, 0.085, 0.08); // hair below the surface; scattering makes it blueish
 const BEARD_COLOUR: vec3f = vec3f(0.11, 0.10, 0.095);
 const DEEP_VEINS: f32 = 0.7;
 const VEIN_COLOUR: vec3f = vec3f(0.80, 0.90, 1.0); // factor of the skin colour
@@ -163,7 +162,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     rgb *= mix(vec3f(1.0), VEIN_COLOUR, veins());
     let bristles = 0.6 + 0.4 * dotted[DOT_STUBBLE];
     let beard = 0.55 * paint.beard * saturate(zone_of(ZONE_BEARD)) * (1.0 - lip) * (0.45 + 0.9 * dotted[DOT_STUBBLE]);
-    rgb = over(rgb, STUBBLE_COLOUR, paint.stubble * scalp * bristles);
+    rgb = over(rgb, paint.stubble_colour, paint.stubble * scalp * bristles);
     rgb = over(rgb, BEARD_COLOUR, beard);
     let wet = max(mucosa, 1.0 - smoothstep(0.2, 1.2, spot.fields.z));
     rgb = mix(rgb, INNER_LID * (1.0 + 0.15 * noise[NOISE_BLOTCHES]), 0.85 * inner);

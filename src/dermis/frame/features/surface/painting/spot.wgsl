@@ -51,7 +51,7 @@ struct Tables {
 const WANDER_MM: f32 = 5.0; // displacement of the borders of zones
 const LIP_WANDER_MM: f32 = 0.45; // displacement of the border of the lips
 const LIP_MM: vec2f = vec2f(-1.1, 1.3); // distances inside the border of the lips between which skin turns into lips
-const HAIRLINE_MM: vec2f = vec2f(-9.0, 16.0); // heights above the hairline between which hair becomes dense
+const HAIRLINE_MM: vec2f = vec2f(-6.0, 11.0); // heights above the hairline between which hair becomes dense
 const HAIRLINE_WANDER_MM: vec2f = vec2f(5.0, 4.0);
 const LOWEST_HAIR_MM: f32 = -80.0;
 const EYE: vec2f = vec2f(29.5, -0.5); // centre of the lines around an eye [mm]
