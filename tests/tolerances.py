@@ -159,3 +159,9 @@ SITE_PAINTED = 1.5
 
 TONE_PARITY = 0.01
 """Difference between skin tones of the relative error of light after exposure and tone curve."""
+
+SWUNG_LENGTHS = 1e-5
+"""Lengths of the segments of guides that swing, relative: float32."""
+
+SWUNG_KNOTS_MM = 0.01
+"""Knots of guides that swing, at rest and against a twin in float64 after a few frames [mm]."""
