@@ -109,6 +109,7 @@ __all__ = [
     "Environment",
     "EyeLook",
     "HairLook",
+    "HairMotion",
     "Head",
     "Human",
     "MovieWriter",

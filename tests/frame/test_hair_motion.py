@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from tolerances import SWUNG_KNOTS_MM, SWUNG_LENGTHS
 
 from dermis.base.errors import DermisError
 from dermis.frame.features.hair.swing import SUBSTEPS_PER_S, gravity_change
+from dermis.frame.frame import draw_swing_step
 from dermis.frame.hair_motion import HairMotion
 from dermis.frame.renderer import Renderer
 from dermis.human.hair.look import HairLook
@@ -74,7 +76,11 @@ def simulated(renderer: Renderer, scene: Scene, motion: HairMotion) -> Simulated
     frame = motion.advance(scene)
     inputs = renderer.prepare(scene, SETTINGS, hair_frame=frame)
     assert inputs.swing is not None and inputs.resources.hair is not None
-    renderer._submit(inputs, False, False, hair_frame=frame)
+    for step in inputs.swing.steps:  # the passes of pictures are not needed
+        renderer.graph.begin()
+        draw_swing_step(renderer.graph, inputs, step)
+        renderer.graph.submit()
+    motion.mark_done(inputs.swing.buffers, frame.index)
     groom = inputs.resources.hair.tables.groom
     assert groom is not None
     buffers, now = inputs.swing.buffers, frame.index % 2
@@ -94,7 +100,7 @@ def simulated(renderer: Renderer, scene: Scene, motion: HairMotion) -> Simulated
 @pytest.fixture(scope="module")
 def turn(renderer: Renderer, long_haired: Head) -> list[Simulated]:
     """Return frames of a head that turns in a third of a second and then stays."""
-    angles = [0.0, 0.0, *(TURN * np.sin(np.pi * k / 20) ** 2 for k in range(1, 11)), *([TURN] * 28)]
+    angles = [0.0, 0.0, *(TURN * np.sin(np.pi * k / 20) ** 2 for k in range(1, 11)), *([TURN] * 20)]
     return simulate(renderer, long_haired, angles)
 
 
@@ -117,14 +123,14 @@ def test_hair_lags_behind_a_turning_head_and_then_comes_to_rest(turn: list[Simul
     assert lag > 10.0
     assert speeds[2:12].max() > 30.0
     assert speeds[-1] < 0.25 * speeds[2:12].max()
-    late = (speeds[12:] ** 2).reshape(4, -1).mean(axis=1)  # mean kinetic energy of spans of seven frames
+    late = (speeds[12:] ** 2).reshape(4, -1).mean(axis=1)  # mean kinetic energy of spans of five frames
     assert (np.diff(late) < 0.0).all()
 
 
 def test_hair_does_not_enter_the_skin_further_than_at_rest(turn: list[Simulated]) -> None:
-    for before, frame in zip(turn, turn[1:], strict=False):
+    for before, frame in pairwise(turn):
         distance, _ = twin.nearest_skin(grid_of(before, frame), frame.knots.position, 0.0, 0.0)
-        assert (frame.knots.clearance - distance).max() <= 0.5
+        assert (np.minimum(frame.knots.clearance, 0.0) - distance).max() <= 0.5
 
 
 def grid_of(before: Simulated, now: Simulated) -> twin.Grid:
@@ -137,7 +143,7 @@ def test_a_few_frames_equal_those_of_the_twin(turn: list[Simulated], long_haired
     rest_mm = long_haired.hair.guides.rest_mm.astype(float)
     knots = twin.at_rest(rest_mm, turn[0].stiff[..., :3], grid_of(turn[0], turn[0]))
     np.testing.assert_allclose(knots.lever, turn[0].knots.lever, atol=1e-3)
-    for before, now in zip(turn[:5], turn[1:6], strict=True):
+    for before, now in pairwise(turn[:6]):
         grid = grid_of(before, now)
         knots = twin.advance(knots, now.stiff[..., :3], grid, now.gravity, substeps, 1.0 / SUBSTEPS_PER_S)
     off = np.linalg.norm(knots.position - turn[5].knots.position, axis=2)

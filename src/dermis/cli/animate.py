@@ -126,7 +126,7 @@ def animate(
     overwrite:
         Render all numbered images again, including those that exist.
     hair_motion:
-        Whether long hair swings. It is at rest at the first frame; --no-hair-motion makes it follow the head stiffly.
+        Swing long hair, from rest at the first frame; otherwise hair follows the head stiffly.
     names:
         List the morph targets, bones and clips of the head without rendering.
     as_json:
@@ -207,7 +207,7 @@ def _hair_motion(animated_scene: _AnimatedScene) -> HairMotion | None:
 def _rendered_scenes(
     animated_scene: _AnimatedScene, frame_numbers: Sequence[int], motion: HairMotion | None
 ) -> Iterator[Scene]:
-    """Yield the scenes to render, while the motion of hair also takes account of the frames before and between them."""
+    """Yield the scenes to render, and advance the motion of hair by the frames before and between them."""
     if motion is None:
         yield from animated_scene.scenes(frame_numbers)
         return

@@ -28,8 +28,8 @@ class HairFrame(NamedTuple):
 class HairMotion:
     """Swing of long hair over the frames of one animation, by a simulation of its guides on the device.
 
-    Hair is at rest in the first frame. Each further frame advances the simulation by its time in fixed substeps, so the frames
-    depend only on the poses, not on which of them are rendered, or when.
+    Hair is at rest in the first frame. Each further frame advances the simulation by its time in fixed
+    substeps, so the frames depend only on the poses, not on which of them are rendered, or when.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class HairMotion:
         return self._scenes[index]
 
     def buffers(self, device: Device, guides: Buffer) -> SwingBuffers | None:
-        """Return the buffers of the simulation; None before the first step, and for another device or style."""
+        """Return the buffers of the simulation; None before its first step and for another device."""
         found = self._buffers
         usable = found is not None and found.device is device and found.guides.size == guides.size
         return found if usable else None
@@ -94,7 +94,7 @@ class HairMotion:
     def missing_frames(self, buffers: SwingBuffers, index: int) -> range:
         """Return the indices of the frames to simulate up to a frame, which is the last of them.
 
-        The step of a frame whose buffers are still held is repeated; an earlier one is simulated from the start.
+        The step of the latest frame can be repeated; an earlier frame is simulated from the start.
         """
         if buffers is not self._buffers or self._done > index:
             return range(index + 1)

@@ -139,7 +139,7 @@ fn restore_lengths() {
 fn store(index: u32, knot: Knot, guide: vec4f, outward: vec3f) {
     let here = nearest_skin(knot.position, vec3f(0.0), 0.0);
     let stiff = nearest_skin(knot.shape, vec3f(0.0), 0.0);
-    let height = guide.w + here.distance - stiff.distance;
+    let height = guide.w + (here.distance - stiff.distance);
     let both = length(here.normal) > 0.0 && length(stiff.normal) > 0.0;
     let normal = select(outward, normalize(outward + here.normal - stiff.normal + 1e-6 * outward), both);
     knots_now[index] = knot;
