@@ -168,3 +168,6 @@ SWUNG_KNOTS_MM = 0.01
 
 WRITTEN_CURVES_MM = 1e-3
 """Knots of hair in files of other programs against the head's, by seven digits [mm]."""
+
+KNOTS_INSIDE_SKIN = 0.006
+"""Share of knots of hair more than 0.5 mm inside the skin: strands are interpolated between guides."""

@@ -37,7 +37,7 @@ def groups(head: Head) -> list[CurveGroup]:
 
 
 def curve_points(control_points: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """Return the points (n, k, c) at the knots of uniform cubic B-splines with control points (n, k + 2, c)."""
+    """Return the points (n, k, c) at the knots of cubic B-splines with control points (n, k + 2, c)."""
     before, here, after = control_points[:, :-2], control_points[:, 1:-1], control_points[:, 2:]
     return np.asarray((before + 4.0 * here + after) / 6.0)
 
