@@ -162,3 +162,15 @@ SITE_PAINTED = 1.5
 
 TONE_PARITY = 0.01
 """Difference between skin tones of the relative error of light after exposure and tone curve."""
+
+SWUNG_LENGTHS = 1e-5
+"""Lengths of the segments of guides that swing, relative: float32."""
+
+SWUNG_KNOTS_MM = 0.01
+"""Knots of guides that swing, at rest and against a twin in float64 after a few frames [mm]."""
+
+WRITTEN_CURVES_MM = 1e-3
+"""Knots of hair in files of other programs against the head's, by seven digits [mm]."""
+
+KNOTS_INSIDE_SKIN = 0.006
+"""Share of knots of hair more than 0.5 mm inside the skin: strands are interpolated between guides."""

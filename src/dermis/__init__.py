@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from dermis.apps.inverse.unmixing.unmix import unmix
     from dermis.apps.viewer.windows import view
     from dermis.base.errors import DermisError
+    from dermis.frame.hair_motion import HairMotion
     from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer, render
     from dermis.human.hair.look import HairLook
@@ -60,6 +61,7 @@ _MODULE_OF_NAME = {
     "SkinLook": "human.skin.look",
     "EyeLook": "mesh.eye_look",
     "HairLook": "human.hair.look",
+    "HairMotion": "frame.hair_motion",
     "human_targets": "human.makehuman",
     "with_regions": "human.regions.apply",
     "DermisError": "base.errors",
@@ -108,6 +110,7 @@ __all__ = [
     "Environment",
     "EyeLook",
     "HairLook",
+    "HairMotion",
     "Head",
     "Human",
     "MovieWriter",

@@ -31,6 +31,21 @@ _KNOWN: dict[str, dict[str, str]] = {
     "LightSource distant": {"from": "point3", "to": "point3", "L": "rgb"},
     "LightSource infinite": {"L": "rgb"},
     "AreaLightSource diffuse": {"L": "rgb"},
+    "Shape curve": {
+        "type": "string",
+        "basis": "string",
+        "degree": "integer",
+        "P": "point3*",
+        "width0": "float",
+        "width1": "float",
+    },
+    "Material hair": {
+        "sigma_a": "rgb",
+        "eta": "float",
+        "beta_m": "float",
+        "beta_n": "float",
+        "alpha": "float",
+    },
     "Shape bilinearmesh": {"P": "point3*"},
     "Shape sphere": {"radius": "float"},
     "Shape plymesh": {"filename": "string", "alpha": "texture"},
@@ -60,8 +75,11 @@ class Directive(NamedTuple):
     parameters: dict[str, list[str]]
 
 
-def read(text: str) -> list[Directive]:
-    """Return the directives of a file, or raise AssertionError where pbrt would report an error."""
+def read(text: str, worlds: int = 1) -> list[Directive]:
+    """Return the directives of a file, or raise AssertionError where pbrt would report an error.
+
+    worlds : number of directives WorldBegin, 0 for a file that another one includes
+    """
     tokens = [found.groups() for found in _TOKEN.finditer(text) if not found[0].startswith("#")]
     assert not _TOKEN.sub("", text).strip(), "text that is not a token"
     directives, position, depth = [], 0, 0
@@ -73,7 +91,7 @@ def read(text: str) -> list[Directive]:
         assert depth >= 0
         directives.append(one)
     assert depth == 0
-    assert [one.word for one in directives].count("WorldBegin") == 1
+    assert [one.word for one in directives].count("WorldBegin") == worlds
     return directives
 
 
@@ -86,6 +104,8 @@ def _directive(word: str, tokens: list[tuple[str, ...]], position: int) -> tuple
     count = _NAMES.get(word, 1)
     names = [one[0] for one in tokens[position : position + count]]
     # The type of a named material is its first parameter.
+    if word == "Include":
+        return Directive(word, names, [], {}), position + count
     known = {"type": "string", **_SURFACE} if word == "MakeNamedMaterial" else _KNOWN[f"{word} {names[-1]}"]
     position, parameters = position + count, dict[str, list[str]]()
     while position < len(tokens) and tokens[position][0] is not None:

@@ -27,6 +27,7 @@ from dermis.cli.scene_options import (
 )
 
 if TYPE_CHECKING:
+    from dermis.frame.hair_motion import HairMotion
     from dermis.frame.renderer import Renderer
     from dermis.mesh.clip import Clip
     from dermis.mesh.head import Head
@@ -42,7 +43,8 @@ class _AnimatedScene:
     settings : settings of all frames
     clip : motion of the head
     rate : frame rate of the animation [1/s]
-    first : number of the first frame, at which automatic exposure is metered
+    first : number of the first frame, at which automatic exposure is metered and hair is at rest
+    hair_motion : whether hair swings
     """
 
     scene: Scene
@@ -50,6 +52,7 @@ class _AnimatedScene:
     clip: Clip
     rate: Fraction
     first: int
+    hair_motion: bool = True
 
     def scenes(self, frame_numbers: Iterable[int]) -> Iterator[Scene]:
         """Yield the scene at each frame; morph targets and bones not in the clip keep the pose of `scene`.
@@ -77,6 +80,7 @@ def animate(
     crf: IntegerOption = None,
     overwrite: Annotated[bool, Parameter(name="--anew", negative="", show_default=False)] = False,
     names: FlagOption = False,
+    hair_motion: bool = True,
     scene: SceneOptions = DEFAULT_SCENE_OPTIONS,
     adapter: AdapterOption = "auto",
     as_json: JsonOption = False,
@@ -121,6 +125,8 @@ def animate(
         Constant rate factor of the movie, 0 (lossless) to 51 (lowest quality). [default: 18]
     overwrite:
         Render all numbered images again, including those that exist.
+    hair_motion:
+        Swing long hair, from rest at the first frame; otherwise hair follows the head stiffly.
     names:
         List the morph targets, bones and clips of the head without rendering.
     as_json:
@@ -143,7 +149,7 @@ def animate(
         print_note(f"note: {motion_clip.note}")
     note_subdivision(head, scene, animated.head)
     settings = shrink_atlas_on_cpu(animated, settings, select_adapters(adapter)[0][0].kind)
-    animation = _AnimatedScene(animated, settings, motion_clip, rate, numbers[0])
+    animation = _AnimatedScene(animated, settings, motion_clip, rate, numbers[0], hair_motion)
     missing = target.frames_to_render(
         numbers, settings.size, _frame_digest(animation, scene, head, motion_path)
     )
@@ -180,11 +186,37 @@ def _render_frames(
     options["alpha"] = animation_output.is_numbered and animated_scene.settings.background == "none"
     writing, bar = animation_output.open_writer(size, animated_scene.rate), progress_bar("rendering frames")
     with writing as write, bar as report:
-        pictures = renderer.render_many(animated_scene.scenes(frame_numbers), **options)
+        motion = _hair_motion(animated_scene)
+        scenes = _rendered_scenes(animated_scene, frame_numbers, motion)
+        pictures = renderer.render_many(scenes, hair_motion=motion, **options)
         for done, (number, picture) in enumerate(zip(frame_numbers, pictures, strict=True), 1):
             write(number, picture)
             report(done, len(frame_numbers))
     return str(renderer.device.adapter.name)
+
+
+def _hair_motion(animated_scene: _AnimatedScene) -> HairMotion | None:
+    """Return the motion of hair from the first frame on; None if the head has no hair that swings."""
+    from dermis.frame.hair_motion import MAX_FRAMES_PER_S, HairMotion
+
+    if not animated_scene.hair_motion or animated_scene.scene.head.hair is None:
+        return None
+    return HairMotion(min(float(animated_scene.rate), MAX_FRAMES_PER_S))
+
+
+def _rendered_scenes(
+    animated_scene: _AnimatedScene, frame_numbers: Sequence[int], motion: HairMotion | None
+) -> Iterator[Scene]:
+    """Yield the scenes to render, and advance the motion of hair by the frames before and between them."""
+    if motion is None:
+        yield from animated_scene.scenes(frame_numbers)
+        return
+    rendered, every = set(frame_numbers), range(animated_scene.first, frame_numbers[-1] + 1)
+    for number, scene in zip(every, animated_scene.scenes(every), strict=True):
+        if number in rendered:
+            yield scene
+        else:
+            motion.advance(scene)
 
 
 def _common_exposure(animated_scene: _AnimatedScene, renderer: Renderer) -> float:
@@ -212,6 +244,7 @@ def _frame_digest(animated_scene: _AnimatedScene, options: SceneOptions, *files:
     parts = [
         *map(_file_fingerprint, names),
         *map(repr, option_values),
+        f"hair motion {animated_scene.hair_motion}",
         repr(frame_values),
         str(scene.head.levels),
     ]

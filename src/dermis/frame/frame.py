@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 from dermis.frame.features import (
@@ -15,6 +16,7 @@ from dermis.frame.features import (
     shape,
     visibility,
 )
+from dermis.frame.features.hair.swing import SwingStep
 from dermis.frame.features.outputs.stage_inputs import PictureDiffusion, StageInputs
 from dermis.frame.features.surface.painting.paint import draw_expression
 from dermis.frame.inputs import FrameInputs
@@ -35,10 +37,11 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
         draw_expression(graph, resources.expression_maps, inputs.face_movements)
     area_lights = ("SHAPES", 1) in inputs.light_constants
     shadows.draw(graph, resources.shadow_maps, inputs.shadow_views, resources.head, area_lights)
-    hair_geometry = resources.shape.shape, resources.head
+    hair_geometry, strands = (resources.shape.shape, resources.head), None
     if resources.hair:
         has_sky = ("ENVIRONMENT", 1) in inputs.light_constants
-        hair.draw_shadows(graph, resources.hair, hair_geometry, inputs.shadow_views, bindings, has_sky)
+        strands = hair.draw_guides(graph, resources.hair, hair_geometry, inputs.swing)
+        hair.draw_shadows(graph, strands, hair_geometry, inputs.shadow_views, bindings, has_sky)
     if resources.sky and inputs.sky_view:
         maps = [(layout, layout.occlusion) for layout in inputs.layouts]
         occlusion.draw(graph, resources.sky, *inputs.sky_view, maps)
@@ -54,11 +57,20 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
     radiance = technique.add_subsurface_light(graph, inputs, radiance)
     stage_inputs = _stage_inputs(graph, inputs, technique, scattered)
     shared, triangles = (bindings, view, inputs.light_constants), resources.visibility.texture
-    if resources.hair:
+    if strands:
         labels = outputs.hair_label_bindings(graph, resources.outputs, stage_inputs)
-        radiance = hair.draw(graph, resources.hair, hair_geometry, shared, triangles, radiance, labels)
+        radiance = hair.draw(graph, strands, hair_geometry, shared, triangles, radiance, labels)
     post.draw(graph, resources.post, inputs.settings, radiance, *shared, triangles)
     outputs.draw(graph, resources.outputs, stage_inputs)
+
+
+def draw_swing_step(graph: Graph, inputs: FrameInputs, step: SwingStep) -> None:
+    """Declare the passes of a step of the simulation of hair, for a frame that is not rendered."""
+    resources = inputs.resources
+    assert inputs.swing is not None and resources.hair is not None
+    geometry = resources.shape.shape, resources.head
+    shape.draw(graph, geometry[0], step.pose_bytes)
+    hair.draw_guides(graph, resources.hair, geometry, replace(inputs.swing, steps=(step,)))
 
 
 def _stage_inputs(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.features.diffusion.pyramid import Blur
+from dermis.frame.features.hair.swing import Swing
 from dermis.frame.features.occlusion.moving import SkyViews
 from dermis.frame.features.outputs.stage_inputs import PreviousScene
 from dermis.frame.features.shape.shape import PoseBytes
@@ -39,6 +40,7 @@ class FrameInputs:
     constants : pipeline constants of the shading pass
     centre_mm : centre of the head, the origin of positions in the scene [mm]
     previous : pose and camera of the previous scene for motion vectors, None if these are not requested
+    swing : simulation of the hair, None if hair does not swing
     """
 
     resources: Resources
@@ -56,6 +58,7 @@ class FrameInputs:
     constants: Constants
     centre_mm: Triple
     previous: PreviousScene | None = None
+    swing: Swing | None = None
 
     @property
     def bindings(self) -> Bindings:

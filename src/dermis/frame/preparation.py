@@ -13,6 +13,13 @@ from dermis.frame.allocation import make_resources
 from dermis.frame.features.diffusion.profiles import ProfileMix, SkinProfiles
 from dermis.frame.features.diffusion.pyramid import Blur, half_precision_scale
 from dermis.frame.features.hair.resources import strand_shadow_constants
+from dermis.frame.features.hair.swing import (
+    Swing,
+    SwingStep,
+    gravity_change,
+    make_colliders,
+    make_swing_buffers,
+)
 from dermis.frame.features.occlusion.moving import (
     HeadRotationPoints,
     SkyViews,
@@ -25,6 +32,7 @@ from dermis.frame.features.outputs.stage_inputs import PreviousScene
 from dermis.frame.features.shading.shade import shade_program
 from dermis.frame.features.shading.view import EyePoses, camera_views, with_camera, world_space_pinhole
 from dermis.frame.features.shape.shape import PoseBytes, rest_pose_bytes
+from dermis.frame.hair_motion import HairFrame, HairMotion
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.lights.environment import add_suns, load_environment_map, peak_irradiance
 from dermis.frame.lights.records import light_constants, light_part_counts, light_records, light_shadow_views
@@ -79,6 +87,7 @@ class Preparation:
         outputs: tuple[str, ...] = (),
         previous: Scene | None = None,
         landmarks: tuple[str, ...] = (),
+        hair_frame: HairFrame | None = None,
     ) -> FrameInputs:
         """Return the inputs of a frame.
 
@@ -90,6 +99,7 @@ class Preparation:
         outputs : names of outputs besides the picture
         previous : scene of the same head for motion vectors; without it, motion is 0
         landmarks : names of landmark sets
+        hair_frame : frame of an animation in which hair swings; None for hair that follows the head stiffly
 
         Raises DermisError for sizes that exceed the limits of the device.
         """
@@ -98,6 +108,8 @@ class Preparation:
         )
         if "motion" in outputs:
             inputs = replace(inputs, previous=self._previous_scene(scene, previous or scene, inputs))
+        if hair_frame is not None:
+            inputs = replace(inputs, swing=self._swing(inputs.resources, hair_frame))
         self.memo.end_frame()
         return inputs
 
@@ -209,6 +221,34 @@ class Preparation:
         camera = world_space_pinhole(previous.camera, head, inputs.settings)
         view = with_camera(inputs.resources.view, camera, None)
         return PreviousScene(None if pose_bytes == inputs.pose_bytes else pose_bytes, view)
+
+    def _swing(self, resources: Resources, hair_frame: HairFrame) -> Swing | None:
+        """Return the simulation of hair up to a frame; None for heads without scalp hair or beard.
+
+        Raises DermisError if the frames show different heads.
+        """
+        motion, index = hair_frame
+        if resources.hair is None or resources.hair.tables.groom is None:
+            return None
+        head, guides = motion.scene(index).head.without_maps, resources.hair.tables.groom.style.guides
+        colliders = self.memo.get(make_colliders, self.device, head.topology_head)
+        found = motion.buffers(self.device, guides)
+        buffers = found or make_swing_buffers(self.device, guides, colliders.vertices.size // 4)
+        frames = motion.missing_frames(buffers, index)
+        steps = tuple(self._swing_step(head, motion, frame) for frame in frames)
+        return Swing(buffers, colliders, steps)
+
+    def _swing_step(self, head: Head, motion: HairMotion, frame: int) -> SwingStep:
+        rotation_points = self.memo.get(make_head_rotation_points, head.topology_head)
+        at_rest, arrays = self.memo.get(_rest_pose_bytes, head), []
+        for scene in (motion.scene(0), motion.scene(frame)):
+            if not are_equal(scene.head.without_maps, head):
+                actual, advice = f"got {scene.head.name!r}", "Start another HairMotion when the head changes"
+                refuse("hair_motion", "scenes of one head", actual, advice)
+            arrays.append(scene.pose_arrays or head.control_rig.rest)
+        first, now = (head_rotation(rotation_points, one) for one in arrays)
+        pose_bytes = _pose_bytes(head, arrays[1], at_rest)
+        return SwingStep(frame, pose_bytes, gravity_change(now, first), motion.seconds_per_frame)
 
     def _head_state(self, head: Head, pose_arrays: PoseArrays | None) -> HeadState:
         """Return the pose, outline and eyes of a head; if `pose_arrays` is None, the head is at rest."""

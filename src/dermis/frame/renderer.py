@@ -18,7 +18,9 @@ from dermis.base.renamed import renamed_attribute, renamed_keywords
 from dermis.frame.features.outputs.landmarks import checked_landmark_sets
 from dermis.frame.features.outputs.readback import Readback, start_readback
 from dermis.frame.features.post.picture import Picture
-from dermis.frame.frame import draw_frame
+from dermis.frame.frame import draw_frame, draw_swing_step
+from dermis.frame.frames_in_flight import FRAMES_IN_FLIGHT, SubmitFrame, pipeline_frames
+from dermis.frame.hair_motion import HairFrame, HairMotion
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.observation import Observation, observation_jobs
 from dermis.frame.preparation import Preparation
@@ -35,46 +37,8 @@ from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
 
 T = TypeVar("T")
-FRAMES_IN_FLIGHT = 3
-"""Largest number of frames that are submitted but not complete.
-
-With three frames, Python and the device work in parallel, and the latency stays low.
-"""
-
-SubmitFrame = Callable[[], Readback]
-ReceiveResult = Callable[[Readback], T]
 _MAX_CACHE_SIZE = 1000
 _WARM_UP_FRAME_COUNT = 100
-
-
-def pipeline_frames(
-    reopening_device: ReopeningDevice,
-    current_device: Callable[[], Device],
-    frames: Iterable[tuple[SubmitFrame, ReceiveResult[T]]],
-) -> Iterator[T]:
-    """Yield the results of frames in order; while a frame is read back, later frames are already submitted.
-
-    A frame whose device is lost is submitted again.
-
-    reopening_device : object that runs functions, and opens the device again when it is lost
-    current_device : function that returns the current device
-    frames : for each frame, a function that submits the frame, and a function that returns the result of its
-        readback
-    """
-    pending: deque[tuple[Readback, SubmitFrame, ReceiveResult[T]]] = deque()
-
-    def oldest_result() -> T:
-        readback, submit, receive = pending.popleft()
-        return reopening_device.run(
-            lambda: receive(readback if readback.fetched.device is current_device() else submit())
-        )
-
-    for submit, receive in frames:
-        pending.append((reopening_device.run(submit), submit, receive))
-        if len(pending) >= FRAMES_IN_FLIGHT:
-            yield oldest_result()
-    while pending:
-        yield oldest_result()
 
 
 class Renderer:
@@ -160,6 +124,7 @@ class Renderer:
         timed: Timing,
         run_all_passes: bool,
         read_back: Callable[[Graph, Picture], T] | None = None,
+        hair_frame: HairFrame | None = None,
     ) -> tuple[CommandList, T | None]:
         """Declare the passes of a frame, run those whose inputs have changed, and start a readback.
 
@@ -168,13 +133,21 @@ class Renderer:
         timed : whether stages or the whole frame are timed, see `draw`
         run_all_passes : whether to run all passes, instead of only the passes whose inputs have changed
         read_back : function that starts the readback of the picture, None for no readback
+        hair_frame : frame of an animation in which hair swings, as in `inputs`
         """
         if run_all_passes:
             self.graph.invalidate()
+        swing = inputs.swing
+        for step in swing.steps[:-1] if swing else ():
+            self.graph.begin()
+            draw_swing_step(self.graph, inputs, step)
+            self.graph.submit()
         self.graph.begin()
         draw_frame(self.graph, inputs, TECHNIQUES[inputs.settings.technique])
         readback = read_back(self.graph, inputs.resources.post.picture) if read_back else None
         frame, self._latest = self.graph.submit(timed), None
+        if swing and hair_frame:
+            hair_frame.motion.mark_done(swing.buffers, hair_frame.index)
         return frame, readback
 
     def _limit_frames_in_flight(self, frame: CommandList) -> None:
@@ -198,6 +171,7 @@ class Renderer:
         alpha: bool,
         outputs: tuple[str, ...] = (),
         landmarks: tuple[str, ...] = (),
+        hair_frame: HairFrame | None = None,
     ) -> Readback:
         """Submit a frame together with the readback of its picture and outputs.
 
@@ -206,11 +180,12 @@ class Renderer:
         alpha : whether the picture gets the coverage by the head as alpha
         outputs : names of outputs besides the picture
         landmarks : names of landmark sets
+        hair_frame : frame of an animation in which hair swings
         """
-        inputs = self.prepare(scene, settings, "", outputs, previous, landmarks)
+        inputs = self.prepare(scene, settings, "", outputs, previous, landmarks, hair_frame)
         coverage, extra = settings if alpha else None, inputs.resources.outputs
         read_back = partial(start_readback, as_linear=linear, alpha_settings=coverage, outputs=extra)
-        _, readback = self._submit(inputs, False, False, read_back)
+        _, readback = self._submit(inputs, False, False, read_back, hair_frame)
         assert readback is not None
         return readback
 
@@ -225,6 +200,7 @@ class Renderer:
         view: str = "",
         outputs: Iterable[str] = (),
         previous: Scene | None = None,
+        hair_frame: HairFrame | None = None,
     ) -> RenderedFrame:
         """Render one frame and leave the picture on the device.
 
@@ -247,6 +223,9 @@ class Renderer:
             Names of outputs for `RenderedFrame.output`.
         previous : Scene, optional
             Scene of the same head for motion vectors. Without it, motion is 0.
+        hair_frame : HairFrame, optional
+            Frame of an animation in which hair swings, from `HairMotion.advance` for the same scene. Without
+            it, hair follows the head stiffly.
 
         Returns
         -------
@@ -268,7 +247,7 @@ class Renderer:
         """
         settings = as_model(Settings, settings or {}, "settings", "size=(512, 512)")
         previous = previous and Scene.coerce(previous)
-        prepared = Scene.coerce(scene), settings, view, check_outputs(outputs), previous
+        prepared = Scene.coerce(scene), settings, view, check_outputs(outputs), previous, (), hair_frame
         return self.reopening_device.run(partial(self._draw, run_all_passes, timed, *prepared))
 
     def _draw(self, run_all_passes: bool, timed: Timing, *prepared: Any) -> RenderedFrame:
@@ -280,7 +259,7 @@ class Renderer:
         started = time.perf_counter()
         inputs = self.prepare(*prepared)
         ready = time.perf_counter()
-        frame, _ = self._submit(inputs, timed, run_all_passes)
+        frame, _ = self._submit(inputs, timed, run_all_passes, hair_frame=prepared[-1])
         if timed:
             frame.wait()
         else:
@@ -365,16 +344,34 @@ class Renderer:
 
     @overload
     def render_many(
-        self, scenes: Iterable[Scene], *, linear: Literal[False] = False, alpha: bool = False, **settings: Any
+        self,
+        scenes: Iterable[Scene],
+        *,
+        linear: Literal[False] = False,
+        alpha: bool = False,
+        hair_motion: HairMotion | None = None,
+        **settings: Any,
     ) -> Iterator[NDArray[np.uint8]]: ...
 
     @overload
     def render_many(
-        self, scenes: Iterable[Scene], *, linear: Literal[True], alpha: bool = False, **settings: Any
+        self,
+        scenes: Iterable[Scene],
+        *,
+        linear: Literal[True],
+        alpha: bool = False,
+        hair_motion: HairMotion | None = None,
+        **settings: Any,
     ) -> Iterator[NDArray[np.float32]]: ...
 
     def render_many(
-        self, scenes: Iterable[Scene], *, linear: bool = False, alpha: bool = False, **settings: Any
+        self,
+        scenes: Iterable[Scene],
+        *,
+        linear: bool = False,
+        alpha: bool = False,
+        hair_motion: HairMotion | None = None,
+        **settings: Any,
     ) -> Iterator[NDArray[Any]]:
         """Yield the picture of each scene, while the next scenes are rendered.
 
@@ -386,6 +383,8 @@ class Renderer:
             True yields float32 linear Rec. 709 instead of sRGB bytes.
         alpha : bool
             True adds the coverage by the head as alpha; floats are multiplied by it, bytes are not.
+        hair_motion : HairMotion, optional
+            Motion of hair, which each scene advances by a frame. Without it, hair follows the head stiffly.
         **settings
             Fields of `Settings`, for all scenes.
 
@@ -400,7 +399,12 @@ class Renderer:
             For sizes that exceed the limits of the device, and if the device fails.
         """
         submit = partial(self._submit_readback, settings=Settings(**settings), linear=linear, alpha=alpha)
-        frames = ((partial(submit, Scene.coerce(scene)), Readback.image) for scene in scenes)
+
+        def submission(scene: Scene) -> SubmitFrame:
+            hair_frame = None if hair_motion is None else hair_motion.advance(scene)
+            return partial(submit, scene, hair_frame=hair_frame)
+
+        frames = ((submission(Scene.coerce(scene)), Readback.image) for scene in scenes)
         yield from pipeline_frames(self.reopening_device, lambda: self.device, frames)
 
     def observe(

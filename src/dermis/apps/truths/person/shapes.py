@@ -308,23 +308,30 @@ def hair_shapes(mi: Mitsuba, hairs: HairFibres, shape_name: str = "hairs") -> Sc
     shape_name : prefix of the shapes' names, which end in a number
     """
     shapes = {}
-    # Mitsuba's unit of length is the radius.
     optical_depth = hairs.absorption * hairs.radius_mm.max(axis=1, keepdims=True)
     with tempfile.TemporaryDirectory() as folder:
         for k, group in enumerate(group_by_optical_depth(optical_depth)):
             file = Path(folder) / f"{k}.txt"
             write_curves(file, hairs.knots_mm[group], hairs.radius_mm[group])
-            fibre = {
-                "type": "hair",
-                "sigma_a": mitsuba_rgb(optical_depth[group].mean(axis=0)),
-                "longitudinal_roughness": LONGITUDINAL_ROUGHNESS,
-                "azimuthal_roughness": AZIMUTHAL_ROUGHNESS,
-                "scale_tilt": CUTICLE_TILT_DEGREES,
-                "int_ior": KERATIN_IOR,
-            }
+            fibre = fibre_bsdf(optical_depth[group].mean(axis=0))
             curves = {"type": "bsplinecurve", "filename": str(file), "bsdf": fibre}
             shapes[f"{shape_name}_{k}"] = mi.load_dict(curves)
     return shapes
+
+
+def fibre_bsdf(optical_depth: NDArray[np.floating]) -> SceneDict:
+    """Return Mitsuba's description of the material of hair fibres.
+
+    optical_depth : (3,) absorption coefficient times the radius of a fibre, Mitsuba's unit of length [-]
+    """
+    return {
+        "type": "hair",
+        "sigma_a": mitsuba_rgb(optical_depth),
+        "longitudinal_roughness": LONGITUDINAL_ROUGHNESS,
+        "azimuthal_roughness": AZIMUTHAL_ROUGHNESS,
+        "scale_tilt": CUTICLE_TILT_DEGREES,
+        "int_ior": KERATIN_IOR,
+    }
 
 
 def group_by_optical_depth(optical_depth: NDArray[np.floating]) -> list[NDArray[np.int64]]:
@@ -338,7 +345,12 @@ def group_by_optical_depth(optical_depth: NDArray[np.floating]) -> list[NDArray[
 
 
 def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating]) -> None:
-    """Write B-spline curves to a file for Mitsuba: a line per control point, an empty line after each curve.
+    """Write the text of `curves_text` to a file."""
+    path.write_text(curves_text(knots_mm, radius_mm), encoding="ascii")
+
+
+def curves_text(knots_mm: Doubles, radius_mm: NDArray[np.floating]) -> str:
+    """Return B-spline curves for Mitsuba as text: a line per control point, an empty line after each curve.
 
     knots_mm : (n, k, 3) points through which the curves pass [mm]
     radius_mm : (n, k) radius at these points [mm]
@@ -346,10 +358,10 @@ def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating])
     rows = np.concatenate([knots_mm, radius_mm[..., None].astype(np.float64)], axis=-1)
     points = bspline_control_points(rows)
     points[..., 3] = np.maximum(points[..., 3], _MIN_HAIR_RADIUS_MM)
-    with path.open("w", encoding="ascii") as file:
-        for curve in points.tolist():
-            file.writelines(f"{x:.5f} {y:.5f} {z:.5f} {r:.5f}\n" for x, y, z, r in curve)
-            file.write("\n")
+    curves = (
+        "".join(f"{x:.5f} {y:.5f} {z:.5f} {r:.5f}\n" for x, y, z, r in curve) for curve in points.tolist()
+    )
+    return "".join(f"{curve}\n" for curve in curves)
 
 
 def bspline_control_points(knots: Doubles) -> Doubles:

@@ -19,6 +19,7 @@ from dermis.frame.features.hair.resources import (
     drawn_strand_counts,
     sky_cell_count,
 )
+from dermis.frame.features.hair.swing import Swing, run_step
 from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.frame.features.shape.shape import Shape
 from dermis.frame.programs import program, workgroup_grid
@@ -57,7 +58,7 @@ def draw_shadows(
     lighting_bindings: Bindings,
     has_environment: bool,
 ) -> None:
-    """Declare the passes that move the hair with the skin, and compute the shadows of the hair.
+    """Declare the passes that pose the strands that cast shadows, and compute the shadows of the hair.
 
     The passes fill the deep opacity maps of lights. For an environment, they also fill the grid of sky
     transmittance.
@@ -65,12 +66,25 @@ def draw_shadows(
     geometry : current shape of the head, and its vertices and triangles
     """
     tables = strands.tables
-    graph.add_replayable(pose_guides, tables, geometry[0])
     pose_strands(graph, tables, geometry[0], tables.buffers.casters, tables.casters)
     if len(shadow_views.clips) or has_environment:
         _draw_deep_opacity(graph, strands, lighting_bindings)
     if has_environment and tables.casters.hairs:
         _draw_sky_transmittance(graph, strands, geometry[1], lighting_bindings)
+
+
+def draw_guides(
+    graph: Graph, strands: Resources, geometry: tuple[Shape, HeadGeometry], swing: Swing | None
+) -> Resources:
+    """Declare the passes that move the guides with the skin, and the current step of their simulation.
+
+    Returns the resources with the guides that the strands follow.
+
+    geometry : current shape of the head, and its vertices and triangles
+    swing : simulation of the guides, None if hair does not swing
+    """
+    graph.add_replayable(pose_guides, strands.tables, geometry[0])
+    return strands if swing is None else run_step(graph, strands, geometry, swing, swing.steps[-1])
 
 
 def pose_guides(graph: Recorder, strand_tables: StrandTables, shape: Shape) -> None:

@@ -10,9 +10,11 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.export.hair_curves import CurveGroup
 from dermis.apps.export.scene_parts import supported_lights
 from dermis.apps.export.targets.maps import encode_map_exr
 from dermis.apps.export.targets.mitsuba import xml
+from dermis.apps.export.targets.mitsuba.hairs import hair_files, hair_shape
 from dermis.apps.export.targets.mitsuba.meshes import skin_meshes
 from dermis.apps.export.targets.mitsuba.xml import XmlBackend
 from dermis.apps.truths.lights import MITSUBA_LIGHTS, mitsuba_emitter
@@ -63,6 +65,7 @@ class SkinAppearance(NamedTuple):
     pictured : dictionary from material index to the roles of the texture images that the material uses, such
         as "colour"; materials without texture images are absent
     pictures : dictionary from role to the PNG file of a texture image, which all materials share
+    hairs : groups of hairs with similar absorption
     """
 
     media: Mapping[SurfaceModel, IsotropicMedium]
@@ -72,6 +75,7 @@ class SkinAppearance(NamedTuple):
     opaque: Mapping[int, bytes] = MappingProxyType({})
     pictured: Mapping[int, set[PartRole]] = MappingProxyType({})
     pictures: Mapping[PartRole, bytes] = MappingProxyType({})
+    hairs: tuple[CurveGroup, ...] = ()
 
 
 def scene_files(
@@ -106,6 +110,7 @@ def scene_files(
             xml.scene_document(_skin_elements(backend, each, skin_appearance, meshes)),
         )
     yield from ((f"meshes/{name}.ply", content) for name, content in meshes.items())
+    yield from hair_files(skin_appearance.hairs).items()
     for index, content in skin_appearance.opaque.items():
         yield _opaque_mesh_file(index), content
     yield from ((_part_picture_file(role), content) for role, content in skin_appearance.pictures.items())
@@ -213,6 +218,7 @@ def _scene_elements(
         roles = skin_appearance.pictured.get(index)
         bsdf = opaque if roles is None else _part_bsdf(roles)
         parts.append({"type": "ply", "filename": _opaque_mesh_file(index), "bsdf": bsdf})
+    parts += map(hair_shape, skin_appearance.hairs)
     defaults = [xml.default_property_element(*one) for one in (("boundary", surface_model), *sizes)]
     elements = [xml.object_element(part, "", xml_backend) for part in parts]
     return [*defaults, *elements, xml.include_element("boundary_$boundary.xml")]

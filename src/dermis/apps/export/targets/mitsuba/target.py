@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.export.fitting import fit_burley_width, fit_homogeneous_medium
+from dermis.apps.export.hair_curves import HAIR_LIMITATIONS, curve_groups
 from dermis.apps.export.scene_parts import mesh_ply
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import (
@@ -68,7 +69,7 @@ class Mitsuba(Target):
     limitations = (
         "One medium per channel cannot represent layers, whose red light spreads differently. Through rough "
         "and smooth surfaces, point, spot and parallel lights cannot be sampled and are black. The matched "
-        "surface has a constant reflectance, and colour maps change its lightness only. Hairs are omitted."
+        "surface has a constant reflectance, and colour maps change its lightness only. " + HAIR_LIMITATIONS
     )
     part_limitations = (
         "Parts that are not skin do not emit light, and green of their normal maps is inverted where uv is "
@@ -122,7 +123,8 @@ class Mitsuba(Target):
         pictured = _image_roles_by_material(subject)
         opaque = _encode_opaque_meshes(scene, self.adapter, pictured)
         pictures = subject.part_pictures.encode(PART_ROLES) if subject.part_pictures else {}
-        appearance = SkinAppearance(media, *skin_textures(subject, colours), opaque, pictured, pictures)
+        textures, hairs = skin_textures(subject, colours), tuple(curve_groups(scene.head))
+        appearance = SkinAppearance(media, *textures, opaque, pictured, pictures, hairs)
         return write_files(
             output, scene_files(scene, appearance, self._surface_model, _PICTURE_SIZE, _SAMPLES_PER_PIXEL)
         )

@@ -15,10 +15,10 @@ SCENE_FORMAT_VERSION = "3.0.0"
 _POINT_KEYS, _VECTOR_KEYS = ("position", "center"), ("direction",)
 _PLUGINS_BY_KIND = {
     "emitter": ("point", "projector", "directional", "area", "constant", "envmap", "spot"),
-    "shape": ("rectangle", "sphere", "disk", "ply"),
+    "shape": ("rectangle", "sphere", "disk", "ply", "bsplinecurve"),
     "bsdf": (
         *("null", "diffuse", "principled", "dielectric", "roughdielectric", "roughconductor"),
-        *("mask", "normalmap", "twosided"),
+        *("mask", "normalmap", "twosided", "hair"),
     ),
     "texture": ("bitmap", "mesh_attribute"),
     "medium": ("homogeneous",),

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.export.fitting import fit_radius_scale, scale_radii
+from dermis.apps.export.hair_curves import HAIR_LIMITATIONS, curve_groups
 from dermis.apps.export.scene_parts import mesh_ply
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, flat_tuple, get_numbers, write_files
@@ -21,6 +22,7 @@ from dermis.apps.export.targets.openpbr.materials import (
     open_pbr_maps,
 )
 from dermis.apps.export.targets.openpbr.target import published_mean_free_path_mm
+from dermis.apps.export.targets.pbrt.hairs import hair_directives
 from dermis.apps.export.targets.pbrt.scene import Lines, camera_directives, format_directive, light_directives
 from dermis.formats.part_pictures import PartRole
 from dermis.human.person_file import relief_slopes
@@ -175,9 +177,9 @@ class Pbrt(Target):
     untested = True
     limitations = (
         "Diffusion assumes a plane at every point, so thin parts and folds are wrong. Specular reflection "
-        "cannot be reduced, as the material has no such parameter. Hairs and colours of eyes are omitted. "
+        "cannot be reduced, as the material has no such parameter. Colours of eyes are omitted. "
         "Colours become smooth spectra. The scene must stay in millimetres: the parameter scale multiplies "
-        "mfp here, but in media given by sigma it multiplies sigma."
+        "mfp here, but in media given by sigma it multiplies sigma. " + HAIR_LIMITATIONS
     )
     part_limitations = (
         "Parts that are not skin do not emit light, and green of their normal maps is inverted where uv is "
@@ -278,6 +280,10 @@ def _scene_directives(
         alpha = {"texture alpha": "parts_opacity"} if "opacity" in roles else {}
         shape = format_directive("Shape", "plymesh", {"string filename": name, **alpha})
         lines += ["AttributeBegin", *texts, shape, "AttributeEnd"]
+    for group in curve_groups(head):
+        name = f"{file_prefix}{group.name}.pbrt"
+        files[name] = "\n".join([*hair_directives(group), ""]).encode("ascii")
+        lines.append(f'Include "{name}"')
     return lines, files
 
 

@@ -1,0 +1,48 @@
+"""Hair as B-spline curves of pbrt, with its material `hair`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dermis.apps.export.hair_curves import CurveGroup
+from dermis.apps.export.targets.pbrt.scene import Lines, format_directive
+from dermis.apps.truths.person.shapes import (
+    AZIMUTHAL_ROUGHNESS,
+    CUTICLE_TILT_DEGREES,
+    KERATIN_IOR,
+    LONGITUDINAL_ROUGHNESS,
+    bspline_control_points,
+)
+
+
+def hair_directives(curve_group: CurveGroup) -> Lines:
+    """Return the directives of a group of hairs: a material, and a shape for each hair.
+
+    pbrt's unit of length in the material is the radius of a fibre. The width of a curve varies linearly
+    from its root to its tip.
+    """
+    material = {
+        "rgb sigma_a": curve_group.optical_depth,
+        "float eta": KERATIN_IOR,
+        "float beta_m": LONGITUDINAL_ROUGHNESS,
+        "float beta_n": AZIMUTHAL_ROUGHNESS,
+        "float alpha": CUTICLE_TILT_DEGREES,
+    }
+    points = bspline_control_points(curve_group.knots_mm)
+    ends = 2.0 * curve_group.radius_mm[:, [0, -1]].astype(np.float64)
+    shapes = [
+        format_directive(
+            "Shape",
+            "curve",
+            {
+                "string type": "cylinder",
+                "string basis": "bspline",
+                "integer degree": 3,
+                "point3 P": curve,
+                "float width0": first,
+                "float width1": last,
+            },
+        )
+        for curve, (first, last) in zip(points, ends, strict=True)
+    ]
+    return ["AttributeBegin", format_directive("Material", "hair", material), *shapes, "AttributeEnd"]

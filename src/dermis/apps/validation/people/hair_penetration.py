@@ -1,0 +1,60 @@
+"""Depth of knots of hair inside the skin of people."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from dermis.base.arrays import Doubles
+from dermis.human.hair.skin_surface import SkinSurface
+from dermis.human.person import Human
+from dermis.mesh.grown_strands import grow_strands
+
+_MAX_DEPTH_MM = 40.0  # knots deeper than this are on the other side of a thin part or below the bust
+
+
+class Penetration(NamedTuple):
+    """Knots of hair inside the skin.
+
+    knots : number of knots, without those at the roots
+    inside : number of knots further inside than the limit
+    deepest_mm : depth of the deepest of them, 0 if there is none [mm]
+    """
+
+    knots: int
+    inside: int
+    deepest_mm: float
+
+
+def with_style(person: Human, style: str) -> Human:
+    """Return a person who wears another hair style, at its usual length."""
+    look = replace(person.hair_look, style=style, length_mm=None, fade=None)  # type: ignore[arg-type]  # defaults
+    return replace(person, hair=look)
+
+
+def hair_penetration(person: Human, limit_mm: float, max_strands: int = 3000) -> Penetration:
+    """Return how many knots of a person's hair are further inside the skin than a limit, at rest.
+
+    The depth is that below the tangent planes of the nearest vertices of the person's own skin.
+
+    limit_mm : depth up to which knots are not counted [mm]
+    max_strands : number of strands that are checked
+    """
+    head = person.head()
+    if head.hair is None:
+        return Penetration(0, 0, 0.0)
+    mesh = head.mesh
+    skin = np.unique(mesh.triangles[mesh.material == 0])
+    strands = grow_strands(head.hair, mesh, mesh.points_mm, max_strands)
+    knots = strands.knot_positions_mm(mesh, mesh.points_mm)[:, 1:].reshape(-1, 3)
+    depth = _depths(SkinSurface(mesh.positions[skin], mesh.normals[skin]), knots)
+    inside = depth[(depth > limit_mm) & (depth < _MAX_DEPTH_MM)]
+    return Penetration(len(knots), len(inside), float(inside.max(initial=0.0)))
+
+
+def _depths(surface: SkinSurface, points_mm: Doubles) -> Doubles:
+    """Return the depths (n,) of points below a skin; negative outside [mm]."""
+    base, normal = surface.project(points_mm)
+    return np.asarray(((base - points_mm) * normal).sum(axis=1))
