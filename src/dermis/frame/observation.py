@@ -21,6 +21,11 @@ from dermis.scene.model import Scene
 from dermis.scene.opencv import OpenCvCamera
 from dermis.scene.settings import Settings
 
+OCCLUSION_LEVELS = "real", "partial", "occluded"
+"""Names of the levels of `Landmarks.occlusion`, in the order of their numbers."""
+_MIN_PARTIAL_COVER, _MIN_OCCLUDED_COVER = 0.1, 0.75
+"""Fractions of a pixel that hair and beard cover, from which a landmark is partially or fully occluded."""
+_VISIBLE_OFFSET = 2.0  # see landmarks.wgsl
 _NO_PREVIOUS_SCENE: Any = object()
 
 
@@ -31,12 +36,15 @@ class Landmarks(NamedTuple):
     positions_mm : (n, 3) world positions relative to the centre of the head [mm]
     pixels : (n, 2) image coordinates, x to the right and y down, (0, 0) at the centre of the upper left pixel
     visible : (n,) whether the landmark is visible: not hidden by the mesh; hair is ignored
+    occlusion : (n,) index into `OCCLUSION_LEVELS`: 0 where the landmark is seen, 1 where hair or beard covers
+        10 to 75 % of its pixel, 2 where they cover more, where the mesh hides it, and outside the picture
     """
 
     names: tuple[str, ...]
     positions_mm: NDArray[np.float32]
     pixels: NDArray[np.float64]
     visible: NDArray[np.bool_]
+    occlusion: NDArray[np.uint8]
 
 
 @dataclass(frozen=True, repr=False)
@@ -108,7 +116,10 @@ def _project_landmarks(
     projected = (landmark_rows[:, :3].astype(np.float64) @ camera.R.T + camera.t) @ camera.K.T
     with np.errstate(divide="ignore", invalid="ignore"):  # points in the plane of the pinhole
         pixels = projected[:, :2] / projected[:, 2:]
-    return Landmarks(landmark_names, landmark_rows[:, :3].copy(), pixels, landmark_rows[:, 3] > 0)
+    visible = landmark_rows[:, 3] >= _VISIBLE_OFFSET
+    cover = landmark_rows[:, 3] - _VISIBLE_OFFSET * visible
+    occlusion = np.where(visible, np.digitize(cover, (_MIN_PARTIAL_COVER, _MIN_OCCLUDED_COVER)), 2)
+    return Landmarks(landmark_names, landmark_rows[:, :3].copy(), pixels, visible, occlusion.astype(np.uint8))
 
 
 def pair_with_previous(

@@ -139,6 +139,11 @@ class Spec(FrozenModel):
         return self._sampler.distributions
 
     @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Return the names of all parameters that the images of this spec can have, in a fixed order."""
+        return self._sampler.parameter_names
+
+    @property
     def landmark_tables(self) -> Mapping[str, str]:
         """Return a dictionary from landmark set name to source: a preset name, or the path of a table."""
         return {name: name if name in LANDMARK_SETS else str(self.folder / name) for name in self.landmarks}

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 from dermis.apps.batch.atomic_files import remove_path
 from dermis.apps.batch.child_processes import LostProcessError
 from dermis.apps.batch.encoder_pool import EncodedImage, EncoderPool
+from dermis.apps.batch.image_facts import ImageFacts
 from dermis.apps.batch.parts import KeptImages, copy_images, join_parts, kept_images
 from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.sampling import Parameters
@@ -107,12 +108,14 @@ class WorkerEvent:
 class _PlannedImage(NamedTuple):
     """Image to render, with its scene and settings.
 
+    facts : person, gaze errors and boxes, for the record
     previous : scene of the preceding image, from which motion vectors are computed; None if no motion vectors
         can be computed
     """
 
     number: int
     parameters: Parameters
+    facts: ImageFacts
     scene: Scene
     settings: Settings
     previous: Scene | None
@@ -211,8 +214,8 @@ class Worker:
 
     def _encoder_jobs(
         self, image_numbers: Iterator[int], failures: list[Failure]
-    ) -> Iterator[tuple[int, Observation, Parameters, SkinTone | None]]:
-        """Render images; yield the number, observation, parameters and skin tone of each, in order.
+    ) -> Iterator[tuple[int, Observation, Parameters, SkinTone | None, ImageFacts]]:
+        """Render images; yield the number, observation, parameters, skin tone and facts of each, in order.
 
         An observation holds the picture and the output arrays of an image.
 
@@ -225,7 +228,8 @@ class Worker:
             try:
                 for observation in self._render_images(self._plan_images(image_numbers, in_flight, failures)):
                     done = in_flight.popleft()
-                    yield done.number, observation, done.parameters, _head_skin_tone(done.scene.head)
+                    tone = head_skin_tone(done.scene.head)
+                    yield done.number, observation, done.parameters, tone, done.facts
             except DeviceError:
                 raise
             except DermisError as fault:
@@ -251,7 +255,9 @@ class Worker:
             parameters = self._options.spec.parameters(number)
             try:
                 scene, settings = self._builder.build(parameters)
-                plan = _PlannedImage(number, parameters, scene, settings, self._previous_scene(number))
+                facts = self._builder.facts(parameters, scene)
+                previous = self._previous_scene(number)
+                plan = _PlannedImage(number, parameters, facts, scene, settings, previous)
             except DermisError as fault:
                 if not self._options.keep_going:
                     raise DermisError(f"image {number}: {fault}") from fault
@@ -334,7 +340,7 @@ def _forward_warnings(forward_message: Callable[[str], None]) -> None:
     warnings.showwarning = forward_or_show
 
 
-def _head_skin_tone(head: Head) -> SkinTone | None:
+def head_skin_tone(head: Head) -> SkinTone | None:
     """Return the description of the mean colour of a head's skin; None for a head without a skin colour."""
     colour = head.maps.mean_colour
     return None if colour is None else skin_tone(colour)
@@ -346,5 +352,6 @@ def _encode_image(
     observation: Observation,
     parameters: Parameters,
     skin_tone: SkinTone | None,
+    facts: ImageFacts,
 ) -> EncodedImage:
-    return image_number, encode_record(image_number, observation, parameters, spec, skin_tone)
+    return image_number, encode_record(image_number, observation, parameters, spec, skin_tone, facts)
