@@ -117,7 +117,7 @@ def read_dataset(
     (2, 4, 3) 12.5
     """
     random = None if shuffle is None else Random(checked_integer("shuffle", shuffle, 0, 2**64))
-    return _iterate_images(_select_shards(checked_path(path, "a data set"), shards), random)
+    return _iterate_images(select_shards(checked_path(path, "a data set"), shards), random)
 
 
 @renamed_keywords(culprit="error_subject")
@@ -132,7 +132,8 @@ def decode_image(files: Mapping[str, object], error_subject: object = "") -> Ima
     source = error_subject or files.get("__key__", "an image")
     data = {suffix: content for suffix, content in files.items() if not suffix.startswith("__")}
     encoded, record = (_pop_file(data, suffix, source) for suffix in (PICTURE_SUFFIX, RECORD_SUFFIX))
-    image = _decode_record(record, f"{source}.{RECORD_SUFFIX}")
+    name = f"{source}.{RECORD_SUFFIX}"
+    image = record_fields(read_record(record, name), name)
     picture = image["picture"] = _decode_picture(f"{source}.{PICTURE_SUFFIX}", "", PICTURE_SUFFIX, encoded)
     if picture.dtype != np.uint8:
         refuse(source, "an 8-bit picture", f"it has {picture.dtype}", "Copy or download it again")
@@ -224,7 +225,7 @@ def _read_tar_member(path: Path, tar_file: BinaryIO, member: TarMember) -> bytes
     return data
 
 
-def _select_shards(path: Path, shards: Iterable[int] | None) -> list[Path]:
+def select_shards(path: Path, shards: Iterable[int] | None) -> list[Path]:
     """Return the paths of the shards to read: those in the folder `path`, or `path` if it is itself a shard.
 
     shards : numbers of the shards; None for all shards of the data set
@@ -274,8 +275,11 @@ def _pop_file(files: dict[str, object], suffix: str, error_subject: object) -> b
     return content
 
 
-def _decode_record(json_bytes: bytes, error_subject: object) -> ImageFields:
-    record = read_record(json_bytes, error_subject)
+def record_fields(record: Record, error_subject: object) -> ImageFields:
+    """Return the ground truth of an image from its record, with the keys that `read_dataset` lists.
+
+    Raises DermisError if the record is malformed.
+    """
     with _refuse_malformed_record(error_subject):
         landmarks = {name: _decode_landmarks(one) for name, one in record["landmarks"].items()}
     image = {"number": record["number"], "parameters": record["parameters"]}

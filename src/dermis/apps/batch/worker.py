@@ -105,6 +105,9 @@ class WorkerEvent:
     refusal: str = ""
 
 
+_ObservedImage = tuple[int, Observation, Parameters, SkinTone | None, ImageFacts]
+
+
 class _PlannedImage(NamedTuple):
     """Image to render, with its scene and settings.
 
@@ -129,17 +132,20 @@ class Worker:
     The device is opened when the first image is rendered.
 
     adapter : name or number of the graphics adapter, as for `Renderer`
+    freezes_objects : whether all objects of the process are excluded from garbage collections when the first
+        image is rendered, which is useful in processes that only render
     """
 
-    def __init__(self, adapter: str, options: RunOptions) -> None:
-        self._options, self._adapter = options, adapter
+    def __init__(self, adapter: str, options: RunOptions, *, freezes_objects: bool = True) -> None:
+        self._options, self._adapter, self._freezes_objects = options, adapter, freezes_objects
         self._builder = SceneBuilder(options.spec)
         self._encoders = EncoderPool(options.encoders, partial(_encode_image, options.spec))
 
     @cached_property
     def _renderer(self) -> Renderer:
         renderer = Renderer(self._adapter, cache_ttl=_MAX_CACHED_FRAMES)
-        gc.freeze()  # excludes the objects created so far from collections, which would scan them each time
+        if self._freezes_objects:  # collections would scan the objects created so far each time
+            gc.freeze()
         return renderer
 
     def run_tasks(self, tasks: Iterable[Shard], send_event: Callable[[WorkerEvent], None]) -> None:
@@ -178,6 +184,13 @@ class Worker:
                 )
             )
 
+    def observe(self, image_numbers: Iterator[int]) -> Iterator[_ObservedImage]:
+        """Render images without files; yield number, observation, parameters, skin tone and facts of each.
+
+        Raises DermisError for images that cannot be rendered.
+        """
+        return self._encoder_jobs(image_numbers, [])
+
     def close(self) -> None:
         """Kill the encoder processes."""
         self._encoders.close()
@@ -214,7 +227,7 @@ class Worker:
 
     def _encoder_jobs(
         self, image_numbers: Iterator[int], failures: list[Failure]
-    ) -> Iterator[tuple[int, Observation, Parameters, SkinTone | None, ImageFacts]]:
+    ) -> Iterator[_ObservedImage]:
         """Render images; yield the number, observation, parameters, skin tone and facts of each, in order.
 
         An observation holds the picture and the output arrays of an image.
