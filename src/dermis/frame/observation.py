@@ -16,6 +16,7 @@ from dermis.base.summary import ShortRepr
 from dermis.frame.features.outputs.output_images import OutputArray
 from dermis.frame.features.outputs.readback import Readback
 from dermis.gpu.memo import are_equal
+from dermis.human.landmarks.sets import LANDMARK_SETS, SILHOUETTE_SUFFIX
 from dermis.scene.head_pose import gaze_directions, head_pose
 from dermis.scene.model import Scene
 from dermis.scene.opencv import OpenCvCamera
@@ -105,9 +106,36 @@ def observation_jobs(
 
 def _read_observation(scene: Scene, settings: Settings, readback: Readback) -> Observation:
     picture, outputs, landmark_sets = readback.image_and_outputs()
-    camera = scene.camera.to_opencv(settings.size)
+    camera, pose = scene.camera.to_opencv(settings.size), head_pose(scene)
     landmarks = {name: _project_landmarks(camera, *rows) for name, rows in landmark_sets.items()}
-    return Observation(picture, outputs, camera, landmarks, head_pose(scene), gaze_directions(scene))
+    for name, candidates in landmarks.items():
+        if name in LANDMARK_SETS and name.endswith(SILHOUETTE_SUFFIX):
+            landmarks[name] = _on_silhouette(candidates, camera.R, pose[:, :3])
+    return Observation(picture, outputs, camera, landmarks, pose, gaze_directions(scene))
+
+
+def _on_silhouette(
+    candidates: Landmarks, camera_rotation: NDArray[np.float64], head_rotation: NDArray[np.float64]
+) -> Landmarks:
+    """Return, of the candidates of each landmark, the one that is farthest outwards in the picture.
+
+    Outwards is the direction from the centre of the landmarks in the frontal view of the head, turned with
+    the head in the plane of the picture, but not with its yaw and pitch.
+
+    candidates : landmarks, of which consecutive ones with equal names are candidates, the outermost one first
+    camera_rotation : (3, 3) rotation from the world to the camera
+    head_rotation : (3, 3) rotation from the head at rest to the camera
+    """
+    starts = [k for k, name in enumerate(candidates.names) if candidates.names.index(name) == k]
+    in_head = candidates.positions_mm @ camera_rotation.T @ head_rotation  # axes of the head
+    directions = in_head[starts, :2] - in_head[starts, :2].mean(axis=0)
+    up = head_rotation[:2, 1] / max(float(np.linalg.norm(head_rotation[:2, 1])), 1e-9)
+    outwards = directions[:, :1] * [-up[1], up[0]] + directions[:, 1:] * up
+    chosen = []
+    for start, stop, direction in zip(starts, [*starts[1:], len(candidates.names)], outwards, strict=True):
+        chosen.append(start + int((candidates.pixels[start:stop] @ direction).argmax()))
+    names = tuple(candidates.names[k] for k in starts)
+    return Landmarks(names, *(values[chosen] for values in candidates[1:]))
 
 
 def _project_landmarks(

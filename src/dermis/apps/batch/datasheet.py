@@ -193,5 +193,6 @@ def landmark_names(set_name: str, spec: Spec) -> list[str]:
     set_name : name of a preset landmark set, or of a landmark table of the spec
     """
     if set_name in LANDMARK_SETS:
-        return [row["landmark"] for row in read_rows("dermis.human.landmarks", set_name)]
+        rows = read_rows("dermis.human.landmarks", set_name)
+        return list(dict.fromkeys(row["landmark"] for row in rows))  # without further candidates
     return [landmark for landmark, _ in read_landmark_table(spec.landmark_tables[set_name])]
