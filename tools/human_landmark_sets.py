@@ -19,9 +19,9 @@ _NASION_Y, _TIP_Y, _SUBNASALE_Y = 0.2, -36.3, -47.6  # on the average human [mm]
 # x, y on the front plane [mm]
 _WING, _NOSTRIL, _ALA = (14.6, -42.6), (8.0, -46.2), (17.6, -37.5)
 _BROW_EDGE = 0.9  # across the brow: just inside its upper edge
-# Positions in MediaPipe's canonical face model (canonical_face_model.obj, Apache-2.0) [cm], and where its outer
-# corner of the eye lies on the average human, with the ratio of both sizes [mm/cm], from the width between these
-# corners, the height from them to the chin, and the depth of chin and forehead.
+# Positions in MediaPipe's canonical face model (canonical_face_model.obj, Apache-2.0) [cm], and where its
+# outer corner of the eye lies on the average human, with the ratio of both sizes [mm/cm], from the width
+# between these corners, the height from them to the chin, and the depth of chin and forehead.
 _EYE_CORNER_CM, _EYE_CORNER_MM = np.array([4.446, 2.664, 3.173]), np.array([40.5, -1.1, 7.3])
 _MODEL_SCALE = np.array([9.11, 8.76, 9.0])
 _OVAL_CM = {
@@ -41,7 +41,7 @@ _UPPER_BROW_SHARES = (
     0.599,
     0.829,
     1.0,
-)  # x of 336, 296, 334, 293, 300 from the inner to the outer end
+)  # x of 336, 296, 334, 293, 300 from inside
 _LOWER_BROW_SHARES = 0.0, 0.289, 0.541, 0.738, 0.892  # 285, 295, 282, 283, 276
 _NOSE_SHARES = 0.0, 0.214, 0.413, 0.592, 0.778, 1.0  # y of 168, 6, 197, 195, 5, 4 from the first to the last
 _MODEL_NASION_Y, _BELOW_TIP_Y, _MODEL_WING = 4.2, -40.9, (12.8, -45.0)  # 168, 1 and 327 on the average human

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from human_landmark_candidates import Surface
@@ -21,18 +22,18 @@ HEADER = """\
 # licence: CC0
 landmark,quad,along,across,sunk
 """
-SETS = {
-    "ibug-68": (ibug, "the 68 landmarks of iBUG's 300-W in their order, on the surface and at rest in it"),
+SETS: dict[str, tuple[Callable[[Surface], list[tuple[str, tuple[int, float]]]], str]] = {
+    "ibug-68": (lambda surface: list(ibug(surface).items()),
     "ibug-68-silhouette": (
         silhouette,
-        "those of ibug-68, with candidates for the visible contour: rows of one name, from the outline inwards",
+        "those of ibug-68, with candidates for the visible contour in rows of the same name",
     ),
     "face-synthetics-70": (
-        face_synthetics,
+        lambda surface: list(face_synthetics(surface).items()),
         "the 70 landmarks of FaceSynthetics in their order: those of iBUG, then the right and the left pupil",
     ),
     "mediapipe": (
-        mediapipe,
+        lambda surface: list(mediapipe(surface).items()),
         "points of MediaPipe's face mesh by their numbers there: outlines and the midline",
     ),
 }
@@ -42,9 +43,7 @@ def main() -> None:
     """Compute the landmarks and write the tables."""
     surface = Surface()
     for name, (made, what) in SETS.items():
-        anchors = made(surface)
-        pairs = anchors.items() if isinstance(anchors, dict) else anchors
-        rows = [row(surface, landmark, anchor) for landmark, anchor in pairs]
+        rows = [row(surface, landmark, anchor) for landmark, anchor in made(surface)]
         path = OUT / f"{name}.csv"
         header = HEADER.format(what=what, source=SOURCE.format(model=MODEL))
         path.write_text(header + "".join(rows), encoding="utf-8")

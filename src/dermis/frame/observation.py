@@ -135,7 +135,8 @@ def _on_silhouette(
     for start, stop, direction in zip(starts, [*starts[1:], len(candidates.names)], outwards, strict=True):
         chosen.append(start + int((candidates.pixels[start:stop] @ direction).argmax()))
     names = tuple(candidates.names[k] for k in starts)
-    return Landmarks(names, *(values[chosen] for values in candidates[1:]))
+    positions, pixels, visible, occlusion = candidates[1:]
+    return Landmarks(names, positions[chosen], pixels[chosen], visible[chosen], occlusion[chosen])
 
 
 def _project_landmarks(
