@@ -23,7 +23,10 @@ HEADER = """\
 landmark,quad,along,across,sunk
 """
 SETS: dict[str, tuple[Callable[[Surface], list[tuple[str, tuple[int, float]]]], str]] = {
-    "ibug-68": (lambda surface: list(ibug(surface).items()),
+    "ibug-68": (
+        lambda surface: list(ibug(surface).items()),
+        "the 68 landmarks of iBUG's 300-W in their order, on the surface and at rest in it",
+    ),
     "ibug-68-silhouette": (
         silhouette,
         "those of ibug-68, with candidates for the visible contour in rows of the same name",
