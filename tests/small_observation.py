@@ -34,6 +34,7 @@ def observation(number: int, alpha: bool = False, outputs: tuple[str, ...] = OUT
         positions_mm=rng.normal(0, 50, (2, 3)).astype(np.float32),
         pixels=rng.uniform(0, 16, (2, 2)),
         visible=np.array([True, False]),
+        occlusion=np.array([number % 2, 2], np.uint8),
     )
     return Observation(
         picture=rng.integers(0, 256, (height, width, 4 if alpha else 3), np.uint8),

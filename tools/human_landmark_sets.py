@@ -18,7 +18,37 @@ PUPIL = _SEEN_MM / (apex_mm() + SCLERA_MM)
 _NASION_Y, _TIP_Y, _SUBNASALE_Y = 0.2, -36.3, -47.6  # on the average human [mm]
 # x, y on the front plane [mm]
 _WING, _NOSTRIL, _ALA = (14.6, -42.6), (8.0, -46.2), (17.6, -37.5)
-_OVAL_MM = (69.0, -15.0, 54.0)  # half its width, height of the largest width, and height of the top
+_BROW_EDGE = 0.9  # across the brow: just inside its upper edge
+# Positions in MediaPipe's canonical face model (canonical_face_model.obj, Apache-2.0) [cm], and where its
+# outer corner of the eye lies on the average human, with the ratio of both sizes [mm/cm], from the width
+# between these corners, the height from them to the chin, and the depth of chin and forehead.
+_EYE_CORNER_CM, _EYE_CORNER_MM = np.array([4.446, 2.664, 3.173]), np.array([40.5, -1.1, 7.3])
+_MODEL_SCALE = np.array([9.11, 8.76, 9.0])
+_OVAL_CM = {
+    "10": (0.0, 8.262, 4.482), "338": (1.891, 8.236, 4.275), "297": (3.524, 8.006, 3.729),
+    "332": (5.133, 7.486, 2.660), "284": (6.279, 6.615, 1.426), "251": (7.088, 5.435, 0.100),
+    "389": (7.556, 4.107, -0.992), "356": (7.743, 2.365, -2.005), "454": (7.664, 0.673, -2.436),
+    "323": (7.542, -1.049, -2.431), "361": (7.271, -2.891, -2.252), "288": (6.720, -4.789, -1.745),
+    "397": (5.941, -6.224, -0.631), "365": (5.085, -7.179, 0.715), "379": (4.069, -7.993, 1.925),
+    "378": (3.211, -8.533, 2.802), "400": (2.309, -8.974, 3.609), "377": (1.293, -9.296, 4.094),
+}  # fmt: skip
+_MOUTH_CORNER_CM, _INNER_CORNER_CM = 2.456, 2.153  # x of 291 and 308
+_INNER_UPPER_CM = {"415": 1.845, "310": 1.469, "311": 1.024, "312": 0.533, "13": 0.0}  # x
+_INNER_LOWER_CM = {"324": 1.827, "318": 1.537, "402": 1.099, "317": 0.583, "14": 0.0}
+_UPPER_BROW_SHARES = (
+    0.0,
+    0.315,
+    0.599,
+    0.829,
+    1.0,
+)  # x of 336, 296, 334, 293, 300 from inside
+_LOWER_BROW_SHARES = 0.0, 0.289, 0.541, 0.738, 0.892  # 285, 295, 282, 283, 276
+_NOSE_SHARES = 0.0, 0.214, 0.413, 0.592, 0.778, 1.0  # y of 168, 6, 197, 195, 5, 4 from the first to the last
+_MODEL_NASION_Y, _BELOW_TIP_Y, _MODEL_WING = 4.2, -40.9, (12.8, -45.0)  # 168, 1 and 327 on the average human
+# Silhouette: inner ends of the lines of candidates, which run inwards from the outline of the face [mm]
+_INNER_END_MM = [(47.0, -4.0), (30.0, -21.0), (24.0, -42.0), (27.0, -60.0), (22.0, -76.0), (16.0, -88.0),
+                 (12.0, -96.0), (7.0, -101.0)]  # fmt: skip
+_CANDIDATES = 12
 
 
 def ibug(surface: Surface) -> Anchors:
@@ -36,8 +66,8 @@ def ibug(surface: Surface) -> Anchors:
         *[("L", f"eye {k}") for k in ("inner", "up 1", "up 2", "outer", "down 2", "down 1")],
         *[("R", "lips"), ("R", "up side"), ("R", "up peak"), ("L", "up middle"), ("L", "up peak")],
         *[("L", "up side"), ("L", "lips"), ("L", "low 1"), ("L", "low 2"), ("L", "low middle")],
-        *[("R", "low 2"), ("R", "low 1"), ("R", "lips"), ("R", "in up"), ("L", "in up middle")],
-        *[("L", "in up"), ("L", "lips"), ("L", "in low"), ("L", "in low middle"), ("R", "in low")],
+        *[("R", "low 2"), ("R", "low 1"), ("R", "in corner"), ("R", "in up"), ("L", "in up middle")],
+        *[("L", "in up"), ("L", "in corner"), ("L", "in low"), ("L", "in low middle"), ("R", "in low")],
     ]
     return {str(k): (both[name][side == "R"], 0.0) for k, (side, name) in enumerate(order)}
 
@@ -54,7 +84,8 @@ def _half(surface: Surface) -> dict[str, int]:
         f"jaw {k}": surface.nearest(p) for k, p in enumerate(points_along(surface.jaw(), np.arange(9) / 8))
     }
     found["jaw 8"] = surface.midline(float(surface.jaw()[-1, 1]))
-    found |= {f"brow {k}": surface.nearest(p) for k, p in enumerate(_brow(surface, 0.0, 5))}
+    brow = surface.brow(_BROW_EDGE)
+    found |= {f"brow {k}": surface.nearest(p) for k, p in enumerate(points_along(brow, np.arange(5) / 4))}
     heights = np.linspace(_NASION_Y, _TIP_Y, 4)
     found |= {f"bridge {k}": surface.midline(y) for k, y in enumerate(heights)}
     found |= {"subnasale": surface.midline(_SUBNASALE_Y)}
@@ -75,15 +106,48 @@ def _lips(surface: Surface) -> dict[str, int]:
     wanted |= dict(zip(("low 1", "low 2"), points_along(lower, np.array([1, 2]) / 3), strict=True))
     found = {name: surface.nearest(place) for name, place in wanted.items()}
     found |= {"lips": surface.mouth_corner()}
+    found |= {"in corner": _on_inner_lip(surface, True, _INNER_CORNER_CM / _MOUTH_CORNER_CM)}
+    peak_share = float(upper[peak, 0] / upper[0, 0])  # the inner points lie below and above the peaks
     for word, up in (("up", True), ("low", False)):
-        inner = surface.inner_lip(up)
-        found[f"in {word}"] = surface.on_inner_lip(points_along(inner, np.array([0.5]))[0], up)
-        found[f"in {word} middle"] = surface.on_inner_lip(inner[-1], up)
+        found[f"in {word}"] = _on_inner_lip(surface, up, peak_share)
+        found[f"in {word} middle"] = _on_inner_lip(surface, up, 0.0)
     return found
 
 
-def _brow(surface: Surface, across: float, count: int) -> Doubles:
-    return points_along(surface.brow(across), np.linspace(0.0, 1.0, count))
+def _on_inner_lip(surface: Surface, upper: bool, share: float) -> int:
+    """Return the index of the candidate on the inner edge of a lip.
+
+    share : distance from the middle, as a fraction of that of the corner
+    """
+    inner = surface.inner_lip(upper)
+    return surface.on_inner_lip(_at_x(inner, share * float(inner[0, 0])), upper)
+
+
+def _at_x(path: Doubles, x: float) -> Doubles:
+    """Return the point (3,) of a path at a distance from the middle of the face [mm]."""
+    order = np.argsort(path[:, 0])
+    return np.array([np.interp(x, path[order, 0], column) for column in path[order].T])
+
+
+def silhouette(surface: Surface) -> list[tuple[str, Anchor]]:
+    """Return the landmarks of iBUG with several candidates for each point of the outline.
+
+    The candidates lie on a line that runs from the outline inwards over the cheek. The one that is farthest
+    outwards in the picture is the point of the visible contour.
+    """
+    rows = []
+    for name, anchor in ibug(surface).items():
+        rows.append((name, anchor))
+        number = int(name)
+        if number > 16 or number == 8:
+            continue
+        k = min(number, 16 - number)
+        outer = surface.at_mm[anchor[0]] * ([1, 1, 1] if number > 8 else [-1, 1, 1])
+        for share in np.arange(1, _CANDIDATES) / (_CANDIDATES - 1):
+            x, y = (1 - share) * outer[:2] + share * np.array(_INNER_END_MM[k])
+            candidate = surface.frontmost(x, y)
+            rows.append((name, (candidate if number > 8 else surface.opposite(candidate), 0.0)))
+    return rows
 
 
 def mediapipe(surface: Surface) -> Anchors:
@@ -105,17 +169,16 @@ def _pairs(left: str, right: str, candidates: list[int]) -> Pairs:
 
 
 def _oval(surface: Surface) -> Pairs:
-    half, middle, top = _OVAL_MM
-    angle = np.linspace(np.pi / 2, 0.0, 9)
-    x, y = half * np.cos(angle), middle + (top - middle) * np.sin(angle)
-    above = [
-        surface.midline(top),
-        *(surface.frontmost(0.97 * a, b) for a, b in zip(x[1:], y[1:], strict=True)),
-    ]
-    below = [surface.nearest(p) for p in points_along(surface.jaw()[2:], np.arange(1, 11) / 10)]
-    left = "10 338 297 332 284 251 389 356 454 323 361 288 397 365 379 378 400 377 152"
-    right = "10 109 67 103 54 21 162 127 234 93 132 58 172 136 150 149 176 148 152"
-    return _pairs(left, right, [*above, *below])
+    """Return the outline: the nearest points of the face to those of the scaled canonical model."""
+    left = "10 338 297 332 284 251 389 356 454 323 361 288 397 365 379 378 400 377"
+    right = "10 109 67 103 54 21 162 127 234 93 132 58 172 136 150 149 176 148"
+    wanted = {
+        name: _EYE_CORNER_MM + _MODEL_SCALE * (np.array(cm) - _EYE_CORNER_CM) for name, cm in _OVAL_CM.items()
+    }
+    found = {name: surface.nearest(place) for name, place in wanted.items()}
+    found["10"] = surface.midline(float(wanted["10"][1]))
+    chin = {"152": (surface.midline(float(surface.jaw()[-1, 1])), "")}
+    return chin | _pairs(left, right, [found[name] for name in left.split()])
 
 
 def _eye(surface: Surface) -> Pairs:
@@ -127,7 +190,11 @@ def _eye(surface: Surface) -> Pairs:
 
 
 def _brows(surface: Surface) -> Pairs:
-    above, below = ([surface.nearest(place) for place in _brow(surface, across, 5)] for across in (0.9, -0.9))
+    """Return the brows, at the heights of their edges and at the fractions of their width in the model."""
+    upper, lower = surface.brow(_BROW_EDGE), surface.brow(-_BROW_EDGE)
+    ends = upper[[0, -1], 0]
+    above = [surface.nearest(_at_x(upper, float(ends @ [1 - s, s]))) for s in _UPPER_BROW_SHARES]
+    below = [surface.nearest(_at_x(lower, float(ends @ [1 - s, s]))) for s in _LOWER_BROW_SHARES]
     return _pairs("336 296 334 293 300", "107 66 105 63 70", above) | _pairs(
         "285 295 282 283 276", "55 65 52 53 46", below
     )
@@ -141,16 +208,20 @@ def _mouth(surface: Surface) -> Pairs:
     below = points_along(lower, np.arange(1, 6) / 5)
     found |= _pairs("375 321 405 314 17", "146 91 181 84 17", [surface.nearest(p) for p in below])
     corner = surface.mouth_corner()
-    found |= _pairs("291 308", "61 78", [corner, corner])
-    for up, left, right in ((True, "415 310 311 312 13", "191 80 81 82 13"),
-                            (False, "324 318 402 317 14", "95 88 178 87 14")):  # fmt: skip
-        inner = points_along(surface.inner_lip(up), np.arange(1, 6) / 5)
-        found |= _pairs(left, right, [surface.on_inner_lip(p, up) for p in inner])
+    inner_corner = _on_inner_lip(surface, True, _INNER_CORNER_CM / _MOUTH_CORNER_CM)
+    found |= _pairs("291 308", "61 78", [corner, inner_corner])
+    for up, right, model in (
+        (True, "191 80 81 82 13", _INNER_UPPER_CM),
+        (False, "95 88 178 87 14", _INNER_LOWER_CM),
+    ):
+        shares = [x / _MOUTH_CORNER_CM for x in model.values()]
+        found |= _pairs(" ".join(model), right, [_on_inner_lip(surface, up, share) for share in shares])
     return found
 
 
 def _nose(surface: Surface) -> Pairs:
-    heights = [*np.linspace(_NASION_Y, _TIP_Y, 6), _TIP_Y - 3.0, _SUBNASALE_Y]
+    ridge = _MODEL_NASION_Y + np.array(_NOSE_SHARES) * (_TIP_Y - _MODEL_NASION_Y)
+    heights = [*ridge.tolist(), _BELOW_TIP_Y, _SUBNASALE_Y]
     numbers = "168 6 197 195 5 4 1 2"
     middle = _pairs(numbers, numbers, [surface.midline(y) for y in heights])
-    return middle | _pairs("327 358", "98 129", [surface.frontmost(*_WING), surface.frontmost(*_ALA)])
+    return middle | _pairs("327 358", "98 129", [surface.frontmost(*_MODEL_WING), surface.frontmost(*_ALA)])

@@ -157,6 +157,8 @@ def __getattr__(name: str) -> Any:
 
     if name == "__version__":
         value = import_module(f"{__name__}.base.version").version()
+    elif name == "dataset":
+        value = import_module(f"{__name__}.{name}")
     elif name in _MODULE_OF_NAME:
         value = getattr(import_module(f"{__name__}.{_MODULE_OF_NAME[name]}"), name)
     elif new := successor(__name__, name):

@@ -31,6 +31,10 @@ def image(number: int, **spec: Any) -> tuple[Any, dict[str, bytes]]:
     return seen, encode_record(number, seen, used.parameters(number), used)
 
 
+def used_parameters(found: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in found["parameters"].items() if value is not None}
+
+
 @pytest.mark.parametrize("encoding", ["png", "exr", "npy"])
 @pytest.mark.parametrize("name", ALL)
 def test_each_output_comes_back_as_exactly_as_is_said(name: str, encoding: Encoding) -> None:
@@ -72,7 +76,7 @@ def test_names_and_order_of_the_files() -> None:
 def test_all_that_is_known_comes_back() -> None:
     seen, files = image(1)
     found = decode_image(files)
-    assert found["number"] == 1 and found["parameters"] == small_spec().parameters(1)
+    assert found["number"] == 1 and used_parameters(found) == small_spec().parameters(1)
     np.testing.assert_array_equal(found["picture"], seen.picture)
     for ours, theirs in zip(found["camera"], seen.camera, strict=True):
         np.testing.assert_allclose(ours, theirs, atol=1e-4)

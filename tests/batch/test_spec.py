@@ -57,7 +57,7 @@ REFUSED = {
     "[render]\nsize = [64, 64]": "render: size: .* Write it as size, above",
     "[render]\nbackground = 'none'": r"render: background: .* Write it as \[background\]",
     "[render]\natlas = 1": "render: atlas: expected a whole number from 64",
-    "size = 0": "render: size",
+    "size = 0": "spec: size",
     "count = 0": "spec: count: expected a whole number from 1",
     "counts = 1": "spec: counts: expected count",
     "folder = '/'": "folder: expected no such key",
@@ -287,3 +287,18 @@ def test_landmark_tables_are_identified_by_their_hashes(tmp_path: Path) -> None:
     table.write_text("name,point\ntop,4\n")
     with pytest.raises(DermisError, match=r"points\.csv: expected landmarks in CSV"):
         parse_spec(tables, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        ({"yaw_deg": 3}, r"expected this key in \[camera\] or \[gaze\] or \[head\] or \[light\.fill\]"),
+        ({"counts": 5}, "spec: counts: expected count, but this name is unknown"),
+        ({"mystery": 5}, "expected one of size, count, seed"),
+        ({"size": [3]}, r"^spec: size"),
+    ],
+)
+def test_unknown_keys_above_all_tables_name_the_table(data: dict[str, object], told: str) -> None:
+    with pytest.raises(DermisError, match=told) as found:
+        parse_spec(data)
+    assert "Table" not in str(found.value) and "folder" not in str(found.value)

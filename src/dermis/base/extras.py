@@ -37,7 +37,9 @@ def import_extra(module_name: str, task_noun: str) -> Any:
     try:
         return import_module(module_name)
     except ImportError as fault:
-        advice = f'Install it: pip install "dermis[{EXTRAS[package]}]", or ".[{EXTRAS[package]}]" in a clone'
+        advice = (
+            f'Install it: pip install "dermis[{EXTRAS[package]}]", or -e ".[{EXTRAS[package]}]" in a clone'
+        )
         name = distribution_name(package)
         refuse(task_noun, f"the package {name}", f"it cannot be imported ({fault})", advice)
 

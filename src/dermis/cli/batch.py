@@ -142,8 +142,12 @@ def batch(
     else:
         pool, encoder_count = _local_process_pool(adapter, adapters, workers, workers_per_gpu, encoders)
     work = RunOptions(loaded_spec, output, encoder_count or 0, keep_going)
-    with image_progress() as report_progress:
-        report = run(work, pool, shards, parts, report_progress)
+    try:
+        with image_progress() as report_progress:
+            report = run(work, pool, shards, parts, report_progress)
+    except KeyboardInterrupt:
+        print_note(f"note: interrupted; complete parts remain in {output}, and the same command continues")
+        raise
     _print_report(report, output, as_json)
     return 0
 

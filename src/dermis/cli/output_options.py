@@ -148,9 +148,12 @@ def _observation_json(observation: Observation) -> dict[str, object]:
 
 
 def _landmark_rows(landmarks: ProjectedLandmarks) -> list[dict[str, object]]:
+    from dermis.frame.observation import OCCLUSION_LEVELS
+
     positions, visible = landmarks.positions_mm.tolist(), landmarks.visible.tolist()
-    rows = zip(landmarks.names, landmarks.pixels.tolist(), positions, visible, strict=True)
-    keys = "name", "pixel", "position_mm", "visible"
+    occlusion = [OCCLUSION_LEVELS[level] for level in landmarks.occlusion.tolist()]
+    rows = zip(landmarks.names, landmarks.pixels.tolist(), positions, visible, occlusion, strict=True)
+    keys = "name", "pixel", "position_mm", "visible", "occlusion"
     return [dict(zip(keys, row, strict=True)) for row in rows]
 
 

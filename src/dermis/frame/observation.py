@@ -16,11 +16,17 @@ from dermis.base.summary import ShortRepr
 from dermis.frame.features.outputs.output_images import OutputArray
 from dermis.frame.features.outputs.readback import Readback
 from dermis.gpu.memo import are_equal
+from dermis.human.landmarks.sets import LANDMARK_SETS, SILHOUETTE_SUFFIX
 from dermis.scene.head_pose import gaze_directions, head_pose
 from dermis.scene.model import Scene
 from dermis.scene.opencv import OpenCvCamera
 from dermis.scene.settings import Settings
 
+OCCLUSION_LEVELS = "real", "partial", "occluded"
+"""Names of the levels of `Landmarks.occlusion`, in the order of their numbers."""
+_MIN_PARTIAL_COVER, _MIN_OCCLUDED_COVER = 0.1, 0.75
+"""Fractions of a pixel that hair and beard cover, from which a landmark is partially or fully occluded."""
+_VISIBLE_OFFSET = 2.0  # see landmarks.wgsl
 _NO_PREVIOUS_SCENE: Any = object()
 
 
@@ -31,12 +37,15 @@ class Landmarks(NamedTuple):
     positions_mm : (n, 3) world positions relative to the centre of the head [mm]
     pixels : (n, 2) image coordinates, x to the right and y down, (0, 0) at the centre of the upper left pixel
     visible : (n,) whether the landmark is visible: not hidden by the mesh; hair is ignored
+    occlusion : (n,) index into `OCCLUSION_LEVELS`: 0 where the landmark is seen, 1 where hair or beard covers
+        10 to 75 % of its pixel, 2 where they cover more, where the mesh hides it, and outside the picture
     """
 
     names: tuple[str, ...]
     positions_mm: NDArray[np.float32]
     pixels: NDArray[np.float64]
     visible: NDArray[np.bool_]
+    occlusion: NDArray[np.uint8]
 
 
 @dataclass(frozen=True, repr=False)
@@ -97,9 +106,37 @@ def observation_jobs(
 
 def _read_observation(scene: Scene, settings: Settings, readback: Readback) -> Observation:
     picture, outputs, landmark_sets = readback.image_and_outputs()
-    camera = scene.camera.to_opencv(settings.size)
+    camera, pose = scene.camera.to_opencv(settings.size), head_pose(scene)
     landmarks = {name: _project_landmarks(camera, *rows) for name, rows in landmark_sets.items()}
-    return Observation(picture, outputs, camera, landmarks, head_pose(scene), gaze_directions(scene))
+    for name, candidates in landmarks.items():
+        if name in LANDMARK_SETS and name.endswith(SILHOUETTE_SUFFIX):
+            landmarks[name] = _on_silhouette(candidates, camera.R, pose[:, :3])
+    return Observation(picture, outputs, camera, landmarks, pose, gaze_directions(scene))
+
+
+def _on_silhouette(
+    candidates: Landmarks, camera_rotation: NDArray[np.float64], head_rotation: NDArray[np.float64]
+) -> Landmarks:
+    """Return, of the candidates of each landmark, the one that is farthest outwards in the picture.
+
+    Outwards is the direction from the centre of the landmarks in the frontal view of the head, turned with
+    the head in the plane of the picture, but not with its yaw and pitch.
+
+    candidates : landmarks, of which consecutive ones with equal names are candidates, the outermost one first
+    camera_rotation : (3, 3) rotation from the world to the camera
+    head_rotation : (3, 3) rotation from the head at rest to the camera
+    """
+    starts = [k for k, name in enumerate(candidates.names) if candidates.names.index(name) == k]
+    in_head = candidates.positions_mm @ camera_rotation.T @ head_rotation  # axes of the head
+    directions = in_head[starts, :2] - in_head[starts, :2].mean(axis=0)
+    up = head_rotation[:2, 1] / max(float(np.linalg.norm(head_rotation[:2, 1])), 1e-9)
+    outwards = directions[:, :1] * [-up[1], up[0]] + directions[:, 1:] * up
+    chosen = []
+    for start, stop, direction in zip(starts, [*starts[1:], len(candidates.names)], outwards, strict=True):
+        chosen.append(start + int((candidates.pixels[start:stop] @ direction).argmax()))
+    names = tuple(candidates.names[k] for k in starts)
+    positions, pixels, visible, occlusion = candidates[1:]
+    return Landmarks(names, positions[chosen], pixels[chosen], visible[chosen], occlusion[chosen])
 
 
 def _project_landmarks(
@@ -108,7 +145,10 @@ def _project_landmarks(
     projected = (landmark_rows[:, :3].astype(np.float64) @ camera.R.T + camera.t) @ camera.K.T
     with np.errstate(divide="ignore", invalid="ignore"):  # points in the plane of the pinhole
         pixels = projected[:, :2] / projected[:, 2:]
-    return Landmarks(landmark_names, landmark_rows[:, :3].copy(), pixels, landmark_rows[:, 3] > 0)
+    visible = landmark_rows[:, 3] >= _VISIBLE_OFFSET
+    cover = landmark_rows[:, 3] - _VISIBLE_OFFSET * visible
+    occlusion = np.where(visible, np.digitize(cover, (_MIN_PARTIAL_COVER, _MIN_OCCLUDED_COVER)), 2)
+    return Landmarks(landmark_names, landmark_rows[:, :3].copy(), pixels, visible, occlusion.astype(np.uint8))
 
 
 def pair_with_previous(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dermis.mesh.rig import PoseArrays
 from dermis.scene.model import Scene
@@ -40,6 +40,24 @@ def gaze_directions(scene: Scene) -> Doubles | None:
         directions / np.linalg.norm(directions, axis=1, keepdims=True) @ _camera_extrinsics(scene)[0].T
     )
     return np.asarray(in_camera)
+
+
+def gaze_errors_deg(scene: Scene, target_mm: ArrayLike) -> tuple[float, float] | None:
+    """Return the angles by which the left and the right eye miss a point [degrees].
+
+    The result is None for heads without anatomical eyes.
+
+    target_mm : (3,) point, relative to the head's centre [mm]
+    """
+    head = scene.head
+    if head.eyes is None:
+        return None
+    frames = head.eyes.eye_matrices(head.control_rig, _pose_arrays(scene))
+    to_target = (frames @ np.append(np.asarray(target_mm) + np.array(head.centre_mm), 1.0))[:, :3]
+    to_target[:, 2] -= head.eyes.centre_offset_mm
+    across = np.linalg.norm(np.cross(to_target, head.eyes.gaze), axis=1)
+    left, right = np.degrees(np.arctan2(across, (to_target * head.eyes.gaze).sum(axis=1))).tolist()
+    return left, right
 
 
 def _camera_extrinsics(scene: Scene) -> tuple[Doubles, Doubles]:

@@ -248,6 +248,17 @@ _BUILT_IN_OUTPUTS = (
     ),
     Output("label", "label", "I", "uint8", "", "class of the surface, see docs/labels.md"),
     Output("label_face_synthetics", "label", "I", "uint8", "", "class as in FaceSynthetics"),
+    Output("label_amodal", "label", "I", "uint8", "", "class of the surface behind all hair"),
+    Output(
+        "hair_alpha",
+        "label",
+        "A",
+        _FLOAT_CHANNEL,
+        "",
+        "coverage of the pixel's centre by hair",
+        0.0,
+        _FRACTION_QUANTISATION,
+    ),
 )
 
 OUTPUTS: Registry[Output] = Registry("output", {output.name: output for output in _BUILT_IN_OUTPUTS})

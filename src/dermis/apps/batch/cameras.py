@@ -6,7 +6,7 @@ import math
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.batch.lighting import direction_from_angles
 from dermis.apps.batch.sampling import Parameters, table_numbers
@@ -36,9 +36,20 @@ def face_hull_indices(head: Head, direction_count: int = 64) -> NDArray[np.int32
     inside = np.flatnonzero(((positions > low) & (positions < high)).all(axis=1))
     if not len(inside):
         inside = np.arange(len(positions))
-    return np.unique(
-        inside[(_sphere_directions(direction_count) @ positions[inside].T).argmax(axis=1)]
-    ).astype(np.int32)
+    return extreme_points(positions, inside, direction_count)
+
+
+def extreme_points(
+    positions_mm: ArrayLike, candidates: NDArray[np.integer], direction_count: int
+) -> NDArray[np.int32]:
+    """Return the sorted indices of the points that lie farthest in evenly distributed directions.
+
+    candidates : (n,) indices of the points to choose from
+    """
+    points = np.asarray(positions_mm)[candidates]
+    return np.unique(candidates[(_sphere_directions(direction_count) @ points.T).argmax(axis=1)]).astype(
+        np.int32
+    )
 
 
 def sampled_camera(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from importlib import resources
 from pathlib import Path
 from string import Template
@@ -13,22 +13,21 @@ from typing import TypedDict
 from dermis.apps.batch.atomic_files import atomic_write
 from dermis.apps.batch.goodness_of_fit import FitTest, fit_tests
 from dermis.apps.batch.index import parameter_summaries
+from dermis.apps.batch.licences import asset_licences
 from dermis.apps.batch.output_encoding import file_format, storage_description
 from dermis.apps.batch.shard_formats import ShardManifest
 from dermis.apps.batch.shards import list_shards, read_manifest, shard_exists, shard_path
 from dermis.apps.batch.spec import Spec
 from dermis.base.tables import read_rows
-from dermis.formats.samples import SAMPLES
 from dermis.human.labels.classes import label_classes
 from dermis.human.landmarks.points import read_landmark_table
 from dermis.human.landmarks.sets import LANDMARK_SETS
-from dermis.human.model import MAKEHUMAN_CREDIT
 from dermis.scene.outputs import OUTPUTS
 
 README_FILE, DESCRIPTION_FILE = "README.md", "dataset.json"
 _MAX_LISTED_FAILURES = 50
-_LABEL_OUTPUTS = "label", "label_face_synthetics"
-_NAMES_WITHOUT_FILES = {"none", "uniform", "human"}
+_CLASS_OUTPUTS = "label", "label_amodal"
+_FACE_SYNTHETICS_OUTPUT = "label_face_synthetics"
 
 TableRows = Iterable[Sequence[object]]
 
@@ -94,7 +93,7 @@ def _files_table(spec: Spec) -> str:
     rows = [
         ("png", f"picture, sRGB{alpha}", "", "8-bit PNG", ""),
         *outputs,
-        ("json", "parameters, camera, head_pose, gaze, landmarks", "", "", ""),
+        ("json", "parameters, camera, head_pose, gaze, boxes, landmarks, split, licence", "", "", ""),
     ]
     return _markdown_table(("file", "content", "unit", "stored as", "background value"), rows)
 
@@ -180,7 +179,8 @@ def label_names(spec: Spec) -> dict[str, dict[int, str]]:
     """Return, for each output of the spec that labels pixels, a dictionary from pixel value to class name."""
     by_output: dict[str, dict[int, str]] = {}
     for one in label_classes():
-        for output, level in zip(_LABEL_OUTPUTS, (one.number, one.face_synthetics), strict=True):
+        levels = dict.fromkeys(_CLASS_OUTPUTS, one.number) | {_FACE_SYNTHETICS_OUTPUT: one.face_synthetics}
+        for output, level in levels.items():
             if output in spec.outputs:
                 names = by_output.setdefault(output, {})
                 names[level] = f"{names[level]}, {one.name}" if level in names else one.name
@@ -193,19 +193,6 @@ def landmark_names(set_name: str, spec: Spec) -> list[str]:
     set_name : name of a preset landmark set, or of a landmark table of the spec
     """
     if set_name in LANDMARK_SETS:
-        return [row["landmark"] for row in read_rows("dermis.human.landmarks", set_name)]
+        rows = read_rows("dermis.human.landmarks", set_name)
+        return list(dict.fromkeys(row["landmark"] for row in rows))  # without further candidates
     return [landmark for landmark, _ in read_landmark_table(spec.landmark_tables[set_name])]
-
-
-def asset_licences(spec: Spec) -> Iterator[tuple[str, str, str]]:
-    """Yield name, author and licence of every asset (head, person, environment) that the spec can use."""
-    author, _, licence = MAKEHUMAN_CREDIT.rpartition(", ")
-    yield "people: the parametric human", author, licence
-    for parameter in ("person.head", "environment.name"):
-        distribution = spec.distributions.get(parameter)
-        for name in () if distribution is None else map(str, distribution.support):
-            if name in SAMPLES:
-                yield f"{parameter} {name}", SAMPLES[name].attribution, SAMPLES[name].licence
-            elif name not in _NAMES_WITHOUT_FILES and not name.startswith("human:"):
-                yield f"{parameter} {name}", "a file of the spec", "set by its owner: state it here"
-    yield "light, skin and pictures", "computed by dermis (Apache-2.0)", "none is claimed"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dermis.apps.batch.atomic_files import atomic_write
+from dermis.apps.batch.face_boxes import BOX_NAMES
 from dermis.apps.batch.reader import read_record, shard_files
 from dermis.apps.batch.records import RECORD_SUFFIX, Record
 from dermis.apps.batch.shards import list_shards, shard_exists, shard_path
@@ -20,9 +21,18 @@ if TYPE_CHECKING:
     import pyarrow.parquet
 
 INDEX_FILE = "index.parquet"
-MATRIX_COLUMNS = {"camera.K": 9, "camera.R": 9, "camera.t": 3, "head_pose": 12, "gaze": 6}
+MATRIX_COLUMNS = {
+    "camera.K": 9,
+    "camera.R": 9,
+    "camera.t": 3,
+    "head_pose": 12,
+    "gaze": 6,
+    "gaze_error_deg": 2,
+    **{f"box.{name}": 4 for name in BOX_NAMES},
+}
 """Columns of flattened matrices (row by row), with the number of elements."""
 _IDENTIFIER_COLUMNS = "number", "key", "shard"
+_TEXT_COLUMNS = "split", "licence"
 _MAX_LISTED_VALUES = 12
 
 IndexRow = dict[str, object]
@@ -31,9 +41,11 @@ IndexRow = dict[str, object]
 def write_index(dataset_folder: Path, spec: Spec) -> Path:
     """Write the index of the existing shards, with one row per image; return the path of the index.
 
-    The columns "number", "key" and "shard" identify the image and its file; "camera.K", "camera.R",
-    "camera.t", "head_pose" and "gaze" are flattened matrices; columns that begin with "skin_tone." describe
-    the colour of the skin; all other columns are parameters, with null for images without the parameter.
+    The columns "number", "key" and "shard" identify the image and its file; "split" is "train", "val" or
+    "test", by person; "camera.K", "camera.R", "camera.t", "head_pose" and "gaze" are flattened matrices;
+    "gaze_error_deg" has a number for each eye, and columns that begin with "box." the edges of a box; columns
+    that begin with "skin_tone." describe the colour of the skin; all other columns are parameters, with null
+    for images without the parameter.
 
     Identical shards give an identical index.
 
@@ -78,7 +90,7 @@ def parameter_summaries(dataset_folder: Path) -> Iterator[tuple[str, int, str]]:
     """
     with open_index(dataset_folder, "the statistics of a data set") as file:
         for name in file.schema_arrow.names:
-            if name not in (*_IDENTIFIER_COLUMNS, *MATRIX_COLUMNS):
+            if name not in (*_IDENTIFIER_COLUMNS, *MATRIX_COLUMNS, *_TEXT_COLUMNS):
                 column = file.read(columns=[name]).column(0)
                 yield name, len(column) - column.null_count, _column_summary(column)
 
@@ -101,7 +113,8 @@ def _rows_of_shards(dataset_folder: Path, spec: Spec) -> Iterator[list[IndexRow]
 
 def _index_row(image_key: str, shard: str, record: Record) -> IndexRow:
     matrices = {f"camera.{name}": value for name, value in record["camera"].items()}
-    matrices |= {"head_pose": record["head_pose"], "gaze": record["gaze"]}
+    matrices |= {name: record.get(name) for name in ("head_pose", "gaze", "gaze_error_deg")}
+    matrices |= {f"box.{name}": box for name, box in (record.get("boxes") or {}).items()}
     flat = {name: _flatten_matrix(value) for name, value in matrices.items()}
     tone = {f"skin_tone.{name}": one for name, one in (record.get("skin_tone") or {}).items()}
     tone.pop("skin_tone.statement", None)
@@ -109,6 +122,7 @@ def _index_row(image_key: str, shard: str, record: Record) -> IndexRow:
         "number": record["number"],
         "key": image_key,
         "shard": shard,
+        **{name: record.get(name) for name in _TEXT_COLUMNS},
         **record["parameters"],
         **tone,
         **flat,
@@ -128,17 +142,20 @@ def _index_schema(dataset_folder: Path, spec: Spec) -> pyarrow.Schema:
     for rows in _rows_of_shards(dataset_folder, spec):
         for row in rows:
             for name, value in row.items():
-                if value is not None:
-                    kinds.setdefault(name, set()).add(type(value))
-    parameters = sorted(kinds.keys() - MATRIX_COLUMNS.keys() - set(_IDENTIFIER_COLUMNS))
-    columns = [("number", arrow.int64()), ("key", arrow.string()), ("shard", arrow.string())]
+                kinds.setdefault(name, set()).update(() if value is None else (type(value),))
+    parameters = sorted(kinds.keys() - MATRIX_COLUMNS.keys() - {*_IDENTIFIER_COLUMNS, *_TEXT_COLUMNS})
+    columns = [("number", arrow.int64())]
+    columns += [(name, arrow.string()) for name in _IDENTIFIER_COLUMNS[1:]]
     columns += [(name, arrow.list_(arrow.float64(), size)) for name, size in MATRIX_COLUMNS.items()]
+    columns += [(name, arrow.string()) for name in _TEXT_COLUMNS]
     columns += [(name, _column_type(kinds[name])) for name in parameters]
     return arrow.schema(columns)
 
 
 def _column_type(value_types: set[type]) -> pyarrow.DataType:
     arrow = import_extra("pyarrow", "the index of a data set")
+    if not value_types:  # no image has a value
+        return arrow.float64()
     if value_types <= {bool}:
         return arrow.bool_()
     if value_types <= {int}:
@@ -162,6 +179,8 @@ def _arrow_table(index_rows: list[IndexRow], schema: pyarrow.Schema) -> pyarrow.
 def _column_summary(column: pyarrow.ChunkedArray) -> str:
     arrow = import_extra("pyarrow", "the statistics of a data set")
     compute = import_extra("pyarrow.compute", "the statistics of a data set")
+    if column.null_count == len(column):
+        return "unused"
     if arrow.types.is_string(column.type) or arrow.types.is_boolean(column.type):
         counts = {one["values"]: one["counts"] for one in compute.value_counts(column).to_pylist()}
         counts.pop(None, None)

@@ -40,8 +40,13 @@ _MAX_SHARD_NUMBER = 10**9
 _IMAGE_FILE_PATTERN = re.compile(r"(\d{9})\.([a-z0-9_]{1,40}(?:\.[a-z0-9]{1,10})?)")
 _OUTPUT_FILE_PATTERN = re.compile(r"([a-z0-9_]+)\.(png|exr|npy)")
 _RESERVED_IMAGE_KEYS = frozenset(
-    ("number", "picture", "parameters", "camera", "head_pose", "gaze", "landmarks", "skin_tone")
+    (
+        *("number", "picture", "parameters", "camera", "head_pose", "gaze", "landmarks", "skin_tone"),
+        *("gaze_error_deg", "boxes", "split", "licence"),
+    )
 )
+UNKNOWN_OCCLUSION = 255
+"""Occlusion of landmarks in data sets that earlier versions have written."""
 
 
 class LandmarkPoints(NamedTuple):
@@ -49,12 +54,15 @@ class LandmarkPoints(NamedTuple):
 
     pixels : (n, 2) positions in the picture, x to the right and y down, from the centre of the first pixel
     positions_mm : (n, 3) positions relative to the head's centre [mm]
-    visible : (n,) whether nothing occludes the landmark
+    visible : (n,) whether the mesh does not occlude the landmark
+    occlusion : (n,) 0 where the landmark is seen, 1 where hair or beard partially occlude it, 2 where hair,
+        beard or the mesh occlude it, and outside the picture; 255 in data sets of earlier versions
     """
 
     pixels: NDArray[np.float64]
     positions_mm: NDArray[np.float64]
     visible: NDArray[np.bool_]
+    occlusion: NDArray[np.uint8]
 
 
 def read_dataset(
@@ -75,11 +83,14 @@ def read_dataset(
     -------
     iterator of dict
         Each image has one key for each output of the data set, such as "depth" or "normal", and these keys:
-        "number"; "picture", sRGB bytes (h, w, 3 or 4); "parameters", by name; "camera", with K, R and t in
-        OpenCV's convention; "head_pose" (3, 4), rotation and translation [mm] from the head at rest to the
-        camera; "gaze" (2, 3), unit vectors of the left and the right eye in camera axes, or None;
-        "landmarks", `LandmarkPoints` by the name of the set; and "skin_tone", a dictionary that describes the
-        colour of the skin, or None.
+        "number"; "picture", sRGB bytes (h, w, 3 or 4); "parameters", by name, with None for parameters that
+        the image does not use; "camera", with K, R and t in OpenCV's convention; "head_pose" (3, 4), rotation
+        and translation [mm] from the head at rest to the camera; "gaze" (2, 3), unit vectors of the left and
+        the right eye in camera axes, or None; "gaze_error_deg" (2,), angles by which they miss the target of
+        the spec, or None; "boxes", left, upper, right and lower edge of each box by name, or None;
+        "landmarks", `LandmarkPoints` by the name of the set; "skin_tone", a dictionary that describes the
+        colour of the skin, or None; "split", "train", "val" or "test" by person; and "licence". The last two
+        are "" in data sets of earlier versions. `dermis.dataset.arrays` converts the image for batches.
 
     Raises
     ------
@@ -106,7 +117,7 @@ def read_dataset(
     (2, 4, 3) 12.5
     """
     random = None if shuffle is None else Random(checked_integer("shuffle", shuffle, 0, 2**64))
-    return _iterate_images(_select_shards(checked_path(path, "a data set"), shards), random)
+    return _iterate_images(select_shards(checked_path(path, "a data set"), shards), random)
 
 
 @renamed_keywords(culprit="error_subject")
@@ -121,7 +132,8 @@ def decode_image(files: Mapping[str, object], error_subject: object = "") -> Ima
     source = error_subject or files.get("__key__", "an image")
     data = {suffix: content for suffix, content in files.items() if not suffix.startswith("__")}
     encoded, record = (_pop_file(data, suffix, source) for suffix in (PICTURE_SUFFIX, RECORD_SUFFIX))
-    image = _decode_record(record, f"{source}.{RECORD_SUFFIX}")
+    name = f"{source}.{RECORD_SUFFIX}"
+    image = record_fields(read_record(record, name), name)
     picture = image["picture"] = _decode_picture(f"{source}.{PICTURE_SUFFIX}", "", PICTURE_SUFFIX, encoded)
     if picture.dtype != np.uint8:
         refuse(source, "an 8-bit picture", f"it has {picture.dtype}", "Copy or download it again")
@@ -213,7 +225,7 @@ def _read_tar_member(path: Path, tar_file: BinaryIO, member: TarMember) -> bytes
     return data
 
 
-def _select_shards(path: Path, shards: Iterable[int] | None) -> list[Path]:
+def select_shards(path: Path, shards: Iterable[int] | None) -> list[Path]:
     """Return the paths of the shards to read: those in the folder `path`, or `path` if it is itself a shard.
 
     shards : numbers of the shards; None for all shards of the data set
@@ -263,23 +275,30 @@ def _pop_file(files: dict[str, object], suffix: str, error_subject: object) -> b
     return content
 
 
-def _decode_record(json_bytes: bytes, error_subject: object) -> ImageFields:
-    record = read_record(json_bytes, error_subject)
+def record_fields(record: Record, error_subject: object) -> ImageFields:
+    """Return the ground truth of an image from its record, with the keys that `read_dataset` lists.
+
+    Raises DermisError if the record is malformed.
+    """
     with _refuse_malformed_record(error_subject):
         landmarks = {name: _decode_landmarks(one) for name, one in record["landmarks"].items()}
     image = {"number": record["number"], "parameters": record["parameters"]}
     image["skin_tone"] = record.get("skin_tone")
+    image |= {name: str(record.get(name, "")) for name in ("split", "licence")}
     return image | _decode_pose(record) | {"landmarks": landmarks}
 
 
 def _decode_pose(record: Record) -> ImageFields:
-    """Return the arrays of camera, head pose and gaze in a record."""
+    """Return the arrays of camera, head pose, gaze and boxes in a record."""
     camera, gaze = record["camera"], record["gaze"]
+    errors, boxes = record.get("gaze_error_deg"), record.get("boxes")  # earlier versions wrote none
     K, R, t = _to_array(camera["K"], (3, 3)), _to_array(camera["R"], (3, 3)), _to_array(camera["t"], (3,))
     return {
         "camera": OpenCvCamera(K, R, t),
         "head_pose": _to_array(record["head_pose"], (3, 4)),
         "gaze": None if gaze is None else _to_array(gaze, (2, 3)),
+        "gaze_error_deg": None if errors is None else _to_array(errors, (2,)),
+        "boxes": None if boxes is None else {name: _to_array(box, (4,)) for name, box in boxes.items()},
     }
 
 
@@ -288,7 +307,12 @@ def _decode_landmarks(record: LandmarksRecord) -> LandmarkPoints:
         raise ValueError("the visibility of a landmark is neither true nor false")
     visible = np.array(record["visible"], bool)
     pixels = _to_array(record["pixels"], (len(visible), 2))
-    return LandmarkPoints(pixels, _to_array(record["positions_mm"], (len(visible), 3)), visible)
+    unknown: NestedNumbers = [UNKNOWN_OCCLUSION] * len(visible)
+    levels = _to_array(record.get("occlusion", unknown), (len(visible),))
+    if not np.isin(levels, (*range(3), UNKNOWN_OCCLUSION)).all():
+        raise ValueError("the occlusion of a landmark is not 0, 1 or 2")
+    positions = _to_array(record["positions_mm"], (len(visible), 3))
+    return LandmarkPoints(pixels, positions, visible, levels.astype(np.uint8))
 
 
 def _to_array(nested_numbers: NestedNumbers, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -8,6 +8,8 @@ from typing import TypedDict, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dermis.apps.batch.image_facts import ImageFacts, image_split, record_parameters
+from dermis.apps.batch.licences import image_licence
 from dermis.apps.batch.output_encoding import encode_output, file_format
 from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.spec import Spec
@@ -22,6 +24,8 @@ NestedNumbers = list[Union["NestedNumbers", float, None]]
 _PIXEL_DECIMALS = 3
 _MM_DECIMALS = 4
 _DIRECTION_DECIMALS = 8  # rotations and directions
+_DEGREE_DECIMALS = 3
+_NO_FACTS = ImageFacts()
 
 
 class CameraRecord(TypedDict):
@@ -38,20 +42,26 @@ class LandmarksRecord(TypedDict):
     pixels: NestedNumbers
     positions_mm: NestedNumbers
     visible: list[bool]
+    occlusion: NestedNumbers
 
 
 class Record(TypedDict):
-    """Description of one image as stored in its JSON file: parameters, skin tone, camera, pose, landmarks.
+    """Description of one image as stored in its JSON file, with the same keys for all images of a data set.
 
-    For `head_pose` and `gaze`, see `Observation`.
+    For `head_pose` and `gaze`, see `Observation`; for `gaze_error_deg` and `boxes`, see `ImageFacts`. `split`
+    is "train", "val" or "test", by person.
     """
 
     number: int
-    parameters: Parameters
+    split: str
+    licence: str
+    parameters: dict[str, float | int | str | None]
     skin_tone: dict[str, float | int | str] | None
     camera: CameraRecord
     head_pose: NestedNumbers
     gaze: NestedNumbers | None
+    gaze_error_deg: NestedNumbers | None
+    boxes: dict[str, NestedNumbers] | None
     landmarks: dict[str, LandmarksRecord]
 
 
@@ -61,12 +71,14 @@ def encode_record(
     parameters: Parameters,
     spec: Spec,
     skin_tone: SkinTone | None = None,
+    facts: ImageFacts = _NO_FACTS,
 ) -> dict[str, bytes]:
     """Return the bytes of the files of image `image_number`, by file suffix.
 
     observation : sRGB picture and output arrays of the image
     parameters : sampled parameters of the image
     skin_tone : description of the colour of the skin; None if this colour is unknown
+    facts : person, gaze errors and boxes
 
     The suffixes are "png" for the picture, with an alpha channel if the picture has no background;
     "NAME.png", "NAME.exr" or "NAME.npy" for each output, see `output_encoding.storage_description`; and
@@ -76,24 +88,28 @@ def encode_record(
     for name in spec.outputs:
         suffix = f"{name}.{file_format(name, spec.encoding)}"
         files[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
-    record = _make_record(image_number, observation, parameters, spec, skin_tone)
+    record = make_record(image_number, observation, parameters, spec, skin_tone, facts)
     text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     files[RECORD_SUFFIX] = f"{text}\n".encode()
     return files
 
 
-def _make_record(
+def make_record(
     image_number: int,
     observation: Observation,
     parameters: Parameters,
     spec: Spec,
     skin_tone: SkinTone | None,
+    facts: ImageFacts,
 ) -> Record:
-    camera, gaze = observation.camera, observation.gaze
+    """Return the record of an image; the arguments are those of `encode_record`."""
+    camera, gaze, errors, boxes = observation.camera, observation.gaze, facts.gaze_error_deg, facts.boxes
     names = {path: name for name, path in spec.landmark_tables.items()}  # records hold no absolute paths
     return {
         "number": image_number,
-        "parameters": dict(parameters),
+        "split": image_split(spec, parameters),
+        "licence": image_licence(parameters),
+        "parameters": record_parameters(spec, parameters, facts.person),
         "skin_tone": None if skin_tone is None else skin_tone.as_json(),
         "camera": {
             "K": _rounded_list(camera.K, _MM_DECIMALS),
@@ -102,11 +118,16 @@ def _make_record(
         },
         "head_pose": _rounded_list(observation.head_pose, _DIRECTION_DECIMALS),
         "gaze": None if gaze is None else _rounded_list(gaze, _DIRECTION_DECIMALS),
+        "gaze_error_deg": None if errors is None else _rounded_list(errors, _DEGREE_DECIMALS),
+        "boxes": None
+        if boxes is None
+        else {name: _rounded_list(box, _PIXEL_DECIMALS) for name, box in boxes.items()},
         "landmarks": {
             names.get(path, path): {
                 "pixels": _rounded_list(one.pixels, _PIXEL_DECIMALS),
                 "positions_mm": _rounded_list(one.positions_mm, _MM_DECIMALS),
                 "visible": np.asarray(one.visible, bool).tolist(),
+                "occlusion": one.occlusion.tolist(),
             }
             for path, one in observation.landmarks.items()
         },

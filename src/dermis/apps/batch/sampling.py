@@ -28,6 +28,7 @@ _UNIFORM_NUMBER_BITS = (
     52  # used bits of the hash; integers of so many bits plus one half are exact in double precision
 )
 _PERSON_PREFIX = "person."
+_HEAD_PARAMETER = "person.head"
 _PERSON_SEED_COUNT = 2**32
 _EXPRESSION_VARIATION_KEYS = "intensity", "asymmetry", "variation"
 _LAMP_PREFIXES = tuple(f"light.{lamp}." for lamp in ("key", "fill", "rim"))
@@ -186,7 +187,7 @@ class Sampler:
         """Return the sampled parameters of one image by dotted name, independently of other images."""
         person = image_number // self.images_per_person
         sampled: Parameters = {"person.number": person}
-        if "person.head" not in self.distributions:
+        if _HEAD_PARAMETER not in self.distributions:
             sampled["person.seed"] = int(
                 hashed_uniform(self.seed, person, "person.seed") * _PERSON_SEED_COUNT
             )
@@ -201,6 +202,15 @@ class Sampler:
         return sampled | {
             f"pose.{name}": weight for name, weight in self._target_weights(image_number, sampled).items()
         }
+
+    @cached_property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Return the names of all parameters that images can have, in the order of `parameters`."""
+        person = (
+            ["person.number"] if _HEAD_PARAMETER in self.distributions else ["person.number", "person.seed"]
+        )
+        names = [name for name in self.distributions if not name.startswith("pose.")]
+        return *person, *names, *(f"pose.{target}" for target in self.targets)
 
     def _sample_parameter(self, image_number: int, parameter: str, distribution: Distribution) -> float | str:
         is_constant = isinstance(distribution, Constant)

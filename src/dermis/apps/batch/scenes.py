@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dermis.apps.batch.cameras import face_hull_indices, sampled_camera
+from dermis.apps.batch.face_boxes import BoxPoints, box_points, face_boxes
+from dermis.apps.batch.image_facts import ImageFacts, person_facts
 from dermis.apps.batch.lighting import direction_from_angles, sampled_lights
 from dermis.apps.batch.sampling import Parameters, table_numbers
 from dermis.apps.batch.spec import Spec
@@ -26,7 +28,8 @@ from dermis.mesh.rotations import angles_matrix, matrix_angles
 from dermis.scene.environment import Environment
 from dermis.scene.files import load_scene
 from dermis.scene.gaze import looking_at
-from dermis.scene.heads import MIN_HUMAN_SUBDIVISION_LEVELS, load_head
+from dermis.scene.head_pose import gaze_errors_deg
+from dermis.scene.heads import MIN_HUMAN_SUBDIVISION_LEVELS, is_person_name, load_head, load_person
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 from dermis.scene.settings import Settings
@@ -47,14 +50,18 @@ class _Person:
     """Head and skin of a person, with all data that does not change between the person's images.
 
     points : indices of points that must stay in the picture, see `face_hull_indices`
+    boxes : indices of points that bound the face and the head, see `box_points`
     bones : fraction of the head's rotation that each bone performs, by bone name
     skin : skin of the person, before the [skin] table of the spec is applied
+    facts : properties of the person, see `person_facts`; empty for meshes from files
     """
 
     head: Head
     points: NDArray[np.int32]
     bones: Mapping[str, float]
     skin: Skin
+    boxes: BoxPoints
+    facts: Mapping[str, float | str | None]
 
 
 class SceneBuilder:
@@ -91,6 +98,17 @@ class SceneBuilder:
         )
         return scene, self.spec.render.replace(**_background_settings(parameters))
 
+    def facts(self, parameters: Parameters, scene: Scene) -> ImageFacts:
+        """Return the facts about an image that its record states besides the parameters.
+
+        scene : scene of the image, from `build`
+        """
+        person, camera = self._cached_person(parameters), scene.camera
+        pose = scene.head.control_rig.rest if scene.pose_arrays is None else scene.pose_arrays
+        errors = gaze_errors_deg(scene, _gaze_target(parameters, camera.position))
+        boxes = face_boxes(scene.head, person.boxes, pose, camera.to_opencv(self.spec.size))
+        return ImageFacts(person.facts, errors if _has_turning_eyes(scene.head) else None, boxes)
+
     def _cached_person(self, parameters: Parameters) -> _Person:
         values = table_values(parameters, "person")
         key = frozenset((name, value) for name, value in values.items() if name != "number")
@@ -104,9 +122,10 @@ class SceneBuilder:
         return self._people[key]
 
     def _build_person(self, parameters: Parameters) -> _Person:
-        size = self.spec.size
+        size, facts = self.spec.size, dict[str, float | str | None]()
         if _HEAD_PARAMETER not in parameters:
             human = sampled_person(parameters)
+            facts = person_facts(human)
             head = human.head(subdivide=_subdivision_levels(size), hairs=_hair_count_fraction(size))
             skin = skin_of(human)
         elif Path(name := self._resolve_file(parameters[_HEAD_PARAMETER])).suffix.lower() == ".toml":
@@ -114,9 +133,10 @@ class SceneBuilder:
             head, skin = scene.head, scene.skin
         else:
             head, skin = load_head(name, subdivide=SmoothOutlineLevels(size=size)), Skin()
-        return _Person(
-            head, face_hull_indices(head), find_rotation_bones(head.control_rig.skeleton).head, skin
-        )
+            if is_person_name(name):
+                facts = person_facts(load_person(name))
+        bones = find_rotation_bones(head.control_rig.skeleton).head
+        return _Person(head, face_hull_indices(head), bones, skin, box_points(head), facts)
 
     def _resolve_file(self, head_or_panorama: float | str) -> str:
         """Return the path of a head or panorama file, or the argument if it names no file.
@@ -210,14 +230,24 @@ def _pose_with_gaze(
 
     camera_position_mm : position of the camera, the default gaze target [mm]
     """
-    if head.eyes is None or head.control_rig.skeleton is None:
+    if not _has_turning_eyes(head):
         return pose
-    target = np.array(camera_position_mm)
-    if parameters["gaze.at"] == GAZE_ANGLES:
-        gaze = table_numbers(parameters, "gaze")
-        direction = np.array(direction_from_angles(gaze["yaw_deg"], -gaze["pitch_deg"]))
-        target = _head_rotation(parameters) @ direction * _GAZE_DISTANCE_MM
-    return looking_at(head, target, pose)
+    return looking_at(head, _gaze_target(parameters, camera_position_mm), pose)
+
+
+def _has_turning_eyes(head: Head) -> bool:
+    return head.eyes is not None and head.control_rig.skeleton is not None
+
+
+def _gaze_target(
+    parameters: Parameters, camera_position_mm: tuple[float, float, float]
+) -> NDArray[np.float64]:
+    """Return the point (3,) at which the eyes of an image are to look, relative to the head's centre [mm]."""
+    if parameters["gaze.at"] != GAZE_ANGLES:
+        return np.array(camera_position_mm)
+    gaze = table_numbers(parameters, "gaze")
+    direction = np.array(direction_from_angles(gaze["yaw_deg"], -gaze["pitch_deg"]))
+    return np.asarray(_head_rotation(parameters) @ direction * _GAZE_DISTANCE_MM)
 
 
 def _background_settings(parameters: Parameters) -> dict[str, object]:

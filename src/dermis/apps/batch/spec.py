@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -17,7 +18,7 @@ from dermis.apps.batch.distributions import Distribution, FileChoice
 from dermis.apps.batch.output_encoding import Encoding
 from dermis.apps.batch.sampling import Parameters, Sampler
 from dermis.apps.batch.spec_checks import check_landmarks, check_spec
-from dermis.base.errors import error_context, format_value, refuse
+from dermis.base.errors import error_context, format_value, refuse, shorten
 from dermis.base.quantities import checked_integer
 from dermis.base.reading import checked_path, is_file, read_file, read_toml
 from dermis.human.expressions import EXPRESSIONS, expand_targets
@@ -52,6 +53,7 @@ _TargetWeight = Annotated[float, Field(ge=0, le=1)]
 _TOML_HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
 _MAX_MATCHING_FILES = 100_000
 _MAX_HASHED_BYTES = 4 << 30
+_MAX_KEY_LENGTH, _MIN_KEY_SIMILARITY = 80, 0.7  # of unknown keys, for suggestions
 _FILE_PARAMETERS = "person.head", "environment.name", "skin.profile"
 """Parameters whose values may be files."""
 P = TypeVar("P", bound=FrozenModel)
@@ -139,6 +141,11 @@ class Spec(FrozenModel):
         return self._sampler.distributions
 
     @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Return the names of all parameters that the images of this spec can have, in a fixed order."""
+        return self._sampler.parameter_names
+
+    @property
     def landmark_tables(self) -> Mapping[str, str]:
         """Return a dictionary from landmark set name to source: a preset name, or the path of a table."""
         return {name: name if name in LANDMARK_SETS else str(self.folder / name) for name in self.landmarks}
@@ -220,6 +227,7 @@ def parse_spec(toml_data: Mapping[str, object], folder: Path = Path()) -> Spec:
         actual = f"got {format_value(toml_data['generator'])}"
         advice = "Remove it to start another data set, or use the version of dermis that wrote it"
         refuse("generator", f"{GENERATOR_VERSION}, the generator number of this version", actual, advice)
+    _refuse_unknown_keys(toml_data)
     fields = {k: v if k == "files" else _expand_patterns(v, folder, k) for k, v in toml_data.items()}
     fields["render"] = _parse_render_table(fields.pop("size", (512, 512)), fields.get("render", {}))
     if isinstance(groups := fields.get("correlated", ()), list | tuple):
@@ -237,6 +245,35 @@ def parse_spec(toml_data: Mapping[str, object], folder: Path = Path()) -> Spec:
 def example_toml() -> str:
     """Return a commented example spec that can be rendered unchanged."""
     return resources.files(__package__).joinpath("example.toml").read_text("utf-8")
+
+
+def _refuse_unknown_keys(toml_data: Mapping[str, object]) -> None:
+    """Raise DermisError for an unknown key above all tables; the message names tables that have it."""
+    known = [name for name in ("size", *Spec.model_fields) if name != "folder"]
+    for key in toml_data:
+        if key in known:
+            continue
+        similar = difflib.get_close_matches(key[:_MAX_KEY_LENGTH], known, 1, _MIN_KEY_SIMILARITY)
+        owners = sorted(_tables_with_key(Spec, key))
+        if owners:
+            expected, actual = (
+                f"this key in {' or '.join(f'[{name}]' for name in owners)}",
+                "it is above all tables",
+            )
+        else:
+            expected = similar[0] if similar else f"one of {', '.join(known)}"
+            actual = "this name is unknown"
+        refuse(f"spec: {shorten(key, _MAX_KEY_LENGTH)}", expected, actual, "Correct it")
+
+
+def _tables_with_key(model: type[BaseModel], key: str, table_name: str = "") -> Iterator[str]:
+    """Yield the dotted names of the tables of a spec that have a key."""
+    for name, info in model.model_fields.items():
+        kind, path = info.annotation, f"{table_name}.{name}" if table_name else name
+        if isinstance(kind, type) and issubclass(kind, FrozenModel):
+            if key in kind.model_fields:
+                yield path
+            yield from _tables_with_key(kind, key, path)
 
 
 def _parse_render_table(picture_size: object, render_table: object) -> Settings:
@@ -269,6 +306,8 @@ def _build_model(model_class: type[P], table_name: str, toml_table: object) -> P
     try:
         return model_class(**values)
     except InvalidFieldsError as error:
+        if set(error.messages) <= {"size", "size.0", "size.1"}:  # a key above all tables, not of [render]
+            table_name = "spec"
         raise InvalidFieldsError(table_name or "spec", error.messages) from None
 
 

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 from dermis.apps.batch.atomic_files import remove_path
 from dermis.apps.batch.child_processes import LostProcessError
 from dermis.apps.batch.encoder_pool import EncodedImage, EncoderPool
+from dermis.apps.batch.image_facts import ImageFacts
 from dermis.apps.batch.parts import KeptImages, copy_images, join_parts, kept_images
 from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.sampling import Parameters
@@ -104,15 +105,20 @@ class WorkerEvent:
     refusal: str = ""
 
 
+_ObservedImage = tuple[int, Observation, Parameters, SkinTone | None, ImageFacts]
+
+
 class _PlannedImage(NamedTuple):
     """Image to render, with its scene and settings.
 
+    facts : person, gaze errors and boxes, for the record
     previous : scene of the preceding image, from which motion vectors are computed; None if no motion vectors
         can be computed
     """
 
     number: int
     parameters: Parameters
+    facts: ImageFacts
     scene: Scene
     settings: Settings
     previous: Scene | None
@@ -126,17 +132,20 @@ class Worker:
     The device is opened when the first image is rendered.
 
     adapter : name or number of the graphics adapter, as for `Renderer`
+    freezes_objects : whether all objects of the process are excluded from garbage collections when the first
+        image is rendered, which is useful in processes that only render
     """
 
-    def __init__(self, adapter: str, options: RunOptions) -> None:
-        self._options, self._adapter = options, adapter
+    def __init__(self, adapter: str, options: RunOptions, *, freezes_objects: bool = True) -> None:
+        self._options, self._adapter, self._freezes_objects = options, adapter, freezes_objects
         self._builder = SceneBuilder(options.spec)
         self._encoders = EncoderPool(options.encoders, partial(_encode_image, options.spec))
 
     @cached_property
     def _renderer(self) -> Renderer:
         renderer = Renderer(self._adapter, cache_ttl=_MAX_CACHED_FRAMES)
-        gc.freeze()  # excludes the objects created so far from collections, which would scan them each time
+        if self._freezes_objects:  # collections would scan the objects created so far each time
+            gc.freeze()
         return renderer
 
     def run_tasks(self, tasks: Iterable[Shard], send_event: Callable[[WorkerEvent], None]) -> None:
@@ -175,6 +184,13 @@ class Worker:
                 )
             )
 
+    def observe(self, image_numbers: Iterator[int]) -> Iterator[_ObservedImage]:
+        """Render images without files; yield number, observation, parameters, skin tone and facts of each.
+
+        Raises DermisError for images that cannot be rendered.
+        """
+        return self._encoder_jobs(image_numbers, [])
+
     def close(self) -> None:
         """Kill the encoder processes."""
         self._encoders.close()
@@ -211,8 +227,8 @@ class Worker:
 
     def _encoder_jobs(
         self, image_numbers: Iterator[int], failures: list[Failure]
-    ) -> Iterator[tuple[int, Observation, Parameters, SkinTone | None]]:
-        """Render images; yield the number, observation, parameters and skin tone of each, in order.
+    ) -> Iterator[_ObservedImage]:
+        """Render images; yield the number, observation, parameters, skin tone and facts of each, in order.
 
         An observation holds the picture and the output arrays of an image.
 
@@ -225,7 +241,8 @@ class Worker:
             try:
                 for observation in self._render_images(self._plan_images(image_numbers, in_flight, failures)):
                     done = in_flight.popleft()
-                    yield done.number, observation, done.parameters, _head_skin_tone(done.scene.head)
+                    tone = head_skin_tone(done.scene.head)
+                    yield done.number, observation, done.parameters, tone, done.facts
             except DeviceError:
                 raise
             except DermisError as fault:
@@ -251,7 +268,9 @@ class Worker:
             parameters = self._options.spec.parameters(number)
             try:
                 scene, settings = self._builder.build(parameters)
-                plan = _PlannedImage(number, parameters, scene, settings, self._previous_scene(number))
+                facts = self._builder.facts(parameters, scene)
+                previous = self._previous_scene(number)
+                plan = _PlannedImage(number, parameters, facts, scene, settings, previous)
             except DermisError as fault:
                 if not self._options.keep_going:
                     raise DermisError(f"image {number}: {fault}") from fault
@@ -334,7 +353,7 @@ def _forward_warnings(forward_message: Callable[[str], None]) -> None:
     warnings.showwarning = forward_or_show
 
 
-def _head_skin_tone(head: Head) -> SkinTone | None:
+def head_skin_tone(head: Head) -> SkinTone | None:
     """Return the description of the mean colour of a head's skin; None for a head without a skin colour."""
     colour = head.maps.mean_colour
     return None if colour is None else skin_tone(colour)
@@ -346,5 +365,6 @@ def _encode_image(
     observation: Observation,
     parameters: Parameters,
     skin_tone: SkinTone | None,
+    facts: ImageFacts,
 ) -> EncodedImage:
-    return image_number, encode_record(image_number, observation, parameters, spec, skin_tone)
+    return image_number, encode_record(image_number, observation, parameters, spec, skin_tone, facts)

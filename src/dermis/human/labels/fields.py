@@ -48,7 +48,7 @@ _MIN_BROW_Z_MM = -30.0  # minimum z of brows
 _HAIRLINE_MARGIN_MM = -8.0  # height relative to the hairline below which hair belongs to the beard
 _DENSE_SUBDIVISION_LEVELS = 2
 SIDE_NAMES = "right", "left"
-_CLASS_OF_MATERIAL = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "torso"}
+_CLASS_OF_MATERIAL = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue"}
 _MAX_CACHED_TOPOLOGIES = 3
 _LABEL_CACHE_LOCK = Lock()
 

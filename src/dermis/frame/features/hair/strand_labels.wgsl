@@ -1,6 +1,7 @@
 // Labels of hair, for passes that draw strands with or without labels.
 //#if HAIR_LABELS
-// Class of the strands that cover most of each pixel, where strands cover at least half of it in front of the surface.
+// Class of the strands that cover most of each pixel, where strands cover at least half of it in front of the surface, and
+// the fraction of the pixel that they cover.
 //#include "strand_fragments.wgsl"
 
 //#fill const RIGHT_BROW: u32 = {class_right_brow};
@@ -12,7 +13,7 @@ const HALF: u32 = 11356u; // `negative_log` of a cover of one half
 
 @group(0) @binding(51) var centres: texture_2d_array<u32>; // triangle + 1 at the centre of each pixel
 @group(0) @binding(56) var<storage, read> hair_classes: array<u32>; // of each strand
-@group(0) @binding(57) var<storage, read_write> hair_labels: array<u32>; // a byte for all strands, then one for all but lashes
+@group(0) @binding(57) var<storage, read_write> hair_labels: array<u32>; // bytes: class of all strands, class of all but lashes, cover by hair and beard, cover by all strands
 
 // Negative logarithm of the transmittance by class, in integers whose sum does not depend on the order.
 struct ClassSums {
@@ -57,11 +58,18 @@ fn class_of(sum: ClassSums) -> u32 {
     return select(LEFT_BROW, RIGHT_BROW, most == sum.brows.x);
 }
 
-// Label of all strands, then of all but lashes.
+// Fraction of a pixel that strands cover, as a byte.
+fn cover_byte(sum: u32) -> u32 {
+    return u32(round(255.0 * (1.0 - exp(-f32(sum) / FIXED_POINT))));
+}
+
+// Label of all strands, label of all but lashes, cover by hair and beard, and cover by all strands; a byte each.
 fn labels_of(sum: ClassSums) -> u32 {
     var without_lashes = sum;
     without_lashes.lashes = 0u;
-    return class_of(sum) | class_of(without_lashes) << 8u;
+    let occluders = sum.hair + sum.beard;
+    let all = occluders + sum.brows.x + sum.brows.y + sum.lashes;
+    return class_of(sum) | class_of(without_lashes) << 8u | cover_byte(occluders) << 16u | cover_byte(all) << 24u;
 }
 
 var<private> class_sums: ClassSums; // initially 0

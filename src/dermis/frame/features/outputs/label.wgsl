@@ -38,7 +38,15 @@ fn label_output(hit: SurfaceHit, found_hit: bool, hairs: u32) -> u32 {
 }
 
 fn label_face_synthetics_output(hit: SurfaceHit, found_hit: bool, hairs: u32) -> u32 {
-    return label_classes[label_at(hit, found_hit, hairs >> 8u)];
+    return label_classes[label_at(hit, found_hit, (hairs >> 8u) & 0xffu)];
+}
+
+fn label_amodal_output(hit: SurfaceHit, found_hit: bool, hairs: u32) -> u32 {
+    return label_at(hit, found_hit, 0u);
+}
+
+fn hair_alpha_output(hit: SurfaceHit, found_hit: bool, hairs: u32) -> f32 {
+    return f32(hairs >> 24u) / 255.0;
 }
 
 fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PixelSlot) {

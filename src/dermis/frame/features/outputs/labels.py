@@ -14,9 +14,10 @@ from dermis.gpu import Bindings, Buffer, Device, Memo, MutableBindings, Recorder
 from dermis.human.labels.classes import class_number, label_classes
 from dermis.human.labels.fields import MeshLabels, hair_classes, mesh_labels
 from dermis.mesh.head import Head
+from dermis.scene.outputs import OUTPUTS
 
 LABEL_STAGE = "label"
-"""Name of the stage that writes labels, and prefix of the names of label outputs."""
+"""Name of the stage that writes labels and the cover by hair."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +28,7 @@ class LabelBuffers:
     field_count : number of distance fields. A field holds the signed distance of each vertex to the border of
         a class, for borders that cross triangles
     hair_classes : buffer of the class of each strand, None if the head has no hair
-    hair_labels : buffer of the class of the hair in each pixel, written by the hair pass
+    hair_labels : buffer of the class and the cover of the hair in each pixel, written by the hair pass
     """
 
     tables: MutableBindings
@@ -50,9 +51,9 @@ class LabelBuffers:
 
 
 def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> LabelBuffers | None:
-    """Return the buffers for the requested label outputs, None if none are requested."""
+    """Return the buffers of labels and hair cover, None if neither labels nor landmarks are requested."""
     cached = memo.get
-    if not any(name.startswith(LABEL_STAGE) for name in request.outputs):
+    if not request.landmarks and all(OUTPUTS[name].stage != LABEL_STAGE for name in request.outputs):
         return None
     head, settings = request.head.without_maps, request.settings
     labels = cached(mesh_labels, head)

@@ -16,12 +16,16 @@ from dermis.human.landmarks.points import LandmarkPoints, check_landmarks, landm
 from dermis.mesh.head import Head
 
 LandmarkPositions = dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]
-"""For each set, the names of its n landmarks, and (n, 4) rows x, y, z [mm] and visibility (1 or 0)."""
+"""For each set, the names of its n landmarks, and (n, 4) rows x, y, z [mm] and what is in front.
+
+The last number is the fraction of the pixel that hair and beard cover, plus 2 if the mesh does not hide the
+landmark.
+"""
 LANDMARK_TOLERANCE_MM = 2.0
 """Largest depth by which the mesh may be in front of a landmark that counts as visible [mm]."""
 # Struct Landmark of landmarks.wgsl.
 _LANDMARK_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("material", "u4", 4)])
-_FLOATS_PER_LANDMARK = 4  # x, y, z and visibility
+_FLOATS_PER_LANDMARK = 4  # x, y, z, and what is in front
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +83,16 @@ def make_landmark_buffers(device: Device, head: Head, set_names: tuple[str, ...]
     return LandmarkBuffers(sets, table, results, len(rows))
 
 
-def draw_landmarks(graph: Recorder, buffers: LandmarkBuffers, inputs: StageInputs) -> None:
-    """Declare the pass that computes the positions and the visibility of the landmarks."""
-    shader = program(graph.device, "outputs/landmarks.wgsl", (("TOLERANCE_MM", LANDMARK_TOLERANCE_MM),))
-    bindings = inputs.bindings(shader) | {"landmarks": buffers.table}
+def draw_landmarks(
+    graph: Recorder, buffers: LandmarkBuffers, inputs: StageInputs, hair_labels: Buffer, has_hair: bool
+) -> None:
+    """Declare the pass that computes the positions and the visibility of the landmarks.
+
+    hair_labels : buffer with the cover of each pixel by hair, see `LabelBuffers`
+    has_hair : whether the hair pass writes `hair_labels`
+    """
+    constants = ("TOLERANCE_MM", LANDMARK_TOLERANCE_MM), ("HAIRS", has_hair)
+    shader = program(graph.device, "outputs/landmarks.wgsl", constants)
+    bindings = inputs.bindings(shader) | {"landmarks": buffers.table, "hair_labels": hair_labels}
     bindings |= {"points": inputs.shape.surface["points"], "results": buffers.results}
     graph.dispatch("outputs", shader, bindings, workgroup_grid(buffers.count))

@@ -3,6 +3,7 @@
 //#include "surface_hit.wgsl"
 
 override TOLERANCE_MM: f32; // depth by which the mesh may be in front of a visible landmark
+override HAIRS: bool = false; // whether hair is drawn
 
 struct Landmark {
     corner: vec4u, // points of the mesh
@@ -12,7 +13,9 @@ struct Landmark {
 
 @group(0) @binding(56) var<storage, read> points: array<f32>; // x, y, z [mm]
 @group(0) @binding(57) var<storage, read> landmarks: array<Landmark>;
-@group(0) @binding(58) var<storage, read_write> results: array<vec4f>; // position, and 1 if it is visible
+@group(0) @binding(58) var<storage, read_write> results: array<vec4f>; // position, and the cover by hair and beard, plus 2 if the mesh does not hide the landmark
+
+@group(0) @binding(59) var<storage, read> hair_labels: array<u32>; // see strand_labels.wgsl
 
 fn point_at(index: u32) -> vec3f {
     return vec3f(points[3u * index], points[3u * index + 1u], points[3u * index + 2u]);
@@ -30,22 +33,34 @@ fn is_unoccluded(pixel: vec2u, size: vec2u, p: vec3f, material: u32) -> bool {
     return dot(p - hit.point.position, camera.rays.forward) < TOLERANCE_MM;
 }
 
-// Whether a position is unoccluded in one of the four pixels around it.
-fn is_visible(p: vec3f, material: u32) -> bool {
+fn hair_cover(pixel: vec2u, size: vec2u) -> f32 {
+    if (!HAIRS) {
+        return 0.0;
+    }
+    return f32((hair_labels[pixel.y * size.x + pixel.x] >> 16u) & 0xffu) / 255.0;
+}
+
+// Cover by hair and beard, interpolated between the four pixels around a position, plus 2 if the position is unoccluded by
+// the mesh in one of them.
+fn seen_at(p: vec3f, material: u32) -> f32 {
     let size = textureDimensions(centres);
     let at = project_pixels(camera.rays, p, vec2f(size));
     let position = at.xy;
     if (at.z <= 0.0 || any(position < vec2f(0.0)) || any(position >= vec2f(size))) {
-        return false;
+        return 0.0;
     }
     let last = vec2i(size) - 1;
+    let share = fract(position - 0.5);
+    var visible = false;
+    var cover = 0.0;
     for (var k = 0; k < 4; k += 1) {
-        let pixel = clamp(vec2i(floor(position - 0.5)) + vec2i(k & 1, k >> 1u), vec2i(0), last);
-        if (is_unoccluded(vec2u(pixel), size, p, material)) {
-            return true;
-        }
+        let corner = vec2i(k & 1, k >> 1u);
+        let pixel = vec2u(clamp(vec2i(floor(position - 0.5)) + corner, vec2i(0), last));
+        visible = visible || is_unoccluded(pixel, size, p, material);
+        let weight = select(1.0 - share, share, corner == vec2i(1));
+        cover += weight.x * weight.y * hair_cover(pixel, size);
     }
-    return false;
+    return select(0.0, 2.0, visible) + cover;
 }
 
 @compute @workgroup_size(64)
@@ -57,5 +72,5 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let landmark = landmarks[index];
     let c = landmark.corner;
     let p = mat4x3f(point_at(c.x), point_at(c.y), point_at(c.z), point_at(c.w)) * landmark.weight;
-    results[index] = vec4f(p - camera.centre, select(0.0, 1.0, is_visible(p, landmark.material.x)));
+    results[index] = vec4f(p - camera.centre, seen_at(p, landmark.material.x));
 }

@@ -26,7 +26,7 @@ class Resources:
     centres : texture with the index of the triangle that covers each pixel centre; None without multisampling
     previous : shape of the head in the previous scene, None if no motion vectors are requested
     light : resources for outputs of light and skin
-    labels : buffers of the labels, None if no labels are requested
+    labels : buffers of the labels, None if neither labels nor landmarks are requested
     landmarks : buffers of the landmarks, None if no landmarks are requested
     """
 

@@ -42,7 +42,9 @@ def draw(graph: Graph, resources: Resources | None, inputs: StageInputs) -> None
     for images in resources.images:
         DRAW_STAGES[images.stage](graph, images, resources, inputs)
     if resources.landmarks:
-        draw_landmarks(graph, resources.landmarks, inputs)
+        assert resources.labels is not None
+        has_hair = _needs_hair_labels(resources, inputs)
+        draw_landmarks(graph, resources.landmarks, inputs, resources.labels.hair_labels, has_hair)
 
 
 def _needs_hair_labels(resources: Resources | None, inputs: StageInputs) -> bool:

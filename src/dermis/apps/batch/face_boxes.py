@@ -1,0 +1,85 @@
+"""Boxes around face and head in a picture, without regard to what hides them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.batch.cameras import extreme_points, face_hull_indices
+from dermis.base.arrays import Doubles
+from dermis.human.hair.density import height_above_hairline
+from dermis.human.labels.fields import HUMAN_FIELD_CLASSES, label_fields
+from dermis.human.regions.average import average_head, is_human
+from dermis.mesh.head import Head
+from dermis.mesh.rig import PoseArrays
+from dermis.scene.opencv import OpenCvCamera
+
+BOX_NAMES = "face", "head", "detector"
+"""Boxes of an image: see `face_boxes`."""
+_DIRECTION_COUNT = 256
+_MIN_FACE_Z_MM = -58.0  # just in front of the ears, on the average human
+_NOT_FACE = "right_ear", "left_ear", "mouth_interior", "neck", "torso"
+_NOT_HEAD = "mouth_interior", "neck", "torso"
+
+Box = tuple[float, float, float, float]
+"""Left, upper, right and lower edge, in the pixel coordinates of landmarks."""
+BoxPoints = Mapping[str, NDArray[np.int32]]
+"""Indices of the control points that bound the face and the head, by name of the box."""
+
+
+def box_points(head: Head) -> BoxPoints:
+    """Return the control points of a head that bound its face and its head."""
+    if is_human(head):
+        return _human_box_points()
+    face = face_hull_indices(head, _DIRECTION_COUNT)
+    heights = head.control_rig.positions_mm[:, 1]
+    above = np.flatnonzero(heights >= heights[face].min())
+    return {"face": face, "head": extreme_points(head.control_rig.positions_mm, above, _DIRECTION_COUNT)}
+
+
+def face_boxes(
+    head: Head, points: BoxPoints, pose_arrays: PoseArrays, camera: OpenCvCamera
+) -> dict[str, Box]:
+    """Return boxes by name; they can exceed the picture.
+
+    "face" contains forehead below the hairline, cheeks and chin, without ears, as in the annotations of WIDER
+    FACE; "head" the whole head above the neck with its ears, without hair; "detector" is the square around
+    the centre of "face" with its longer side, as face detectors return it.
+
+    points : points that bound face and head, from `box_points`
+    pose_arrays : pose of the head
+    """
+    boxes = {name: _projected_box(head, indices, pose_arrays, camera) for name, indices in points.items()}
+    left, top, right, bottom = boxes["face"]
+    x, y, half = 0.5 * (left + right), 0.5 * (top + bottom), 0.5 * max(right - left, bottom - top)
+    return boxes | {"detector": (x - half, y - half, x + half, y + half)}
+
+
+def _projected_box(
+    head: Head, point_indices: NDArray[np.int32], pose_arrays: PoseArrays, camera: OpenCvCamera
+) -> Box:
+    points: Doubles = head.control_rig.pose_points(point_indices, pose_arrays) - np.array(head.centre_mm)
+    projected = (points @ camera.R.T + camera.t) @ camera.K.T
+    pixels = projected[:, :2] / np.maximum(projected[:, 2:], 1e-3)
+    (left, top), (right, bottom) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
+    return left, top, right, bottom
+
+
+@cache
+def _human_box_points() -> BoxPoints:
+    head = average_head()
+    positions = head.positions_mm.astype(np.float64)
+    skin = np.zeros(len(positions), bool)
+    skin[np.unique(head.mesh.point[head.mesh.triangles[head.mesh.material == 0]])] = True
+    inside = dict(zip(HUMAN_FIELD_CLASSES, label_fields() > 0, strict=True))
+    face, whole = (
+        skin & ~np.any([inside[name] for name in names], axis=0) for names in (_NOT_FACE, _NOT_HEAD)
+    )
+    face &= (height_above_hairline(positions) < 0) & (positions[:, 2] > _MIN_FACE_Z_MM)
+    return {
+        name: extreme_points(positions, np.flatnonzero(mask), _DIRECTION_COUNT)
+        for name, mask in (("face", face), ("head", whole))
+    }

@@ -1,0 +1,95 @@
+"""Facts about an image that follow from its scene: the person, gaze errors and face boxes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import cache
+
+from dermis.apps.batch.face_boxes import Box
+from dermis.apps.batch.sampling import Parameters, hashed_uniform, round_significant
+from dermis.apps.batch.spec import Spec
+from dermis.human.person import Human
+
+SPLITS = ("train", 0.8), ("val", 0.1), ("test", 0.1)
+"""Names and fractions of the parts into which a data set is split by person."""
+_SEED_FIELD = "seed"
+_NO_FACTS: Mapping[str, float | str | None] = {}
+
+
+@dataclass(frozen=True)
+class ImageFacts:
+    """Facts about an image that its parameters do not state.
+
+    person : properties of the person by parameter name, such as "person.age", from `person_facts`
+    gaze_error_deg : angles by which the left and the right eye miss the target of the gaze [degrees]; None
+        for heads without eyes that turn
+    boxes : boxes around the face, see `face_boxes`; None if they are unknown
+    """
+
+    person: Mapping[str, float | str | None] = field(default_factory=lambda: _NO_FACTS)
+    gaze_error_deg: tuple[float, float] | None = None
+    boxes: Mapping[str, Box] | None = None
+
+
+def person_facts(person: Human) -> dict[str, float | str | None]:
+    """Return sex, age, ancestry, skin, eyes and hair of a person by parameter name, such as "person.age".
+
+    Numbers are rounded to six significant digits; None stands for a field without a value. Morph targets and
+    seeds are not included.
+    """
+    looks = {"skin": person.look, "eyes": person.iris, "hair": person.hair_look}
+    values = {f"person.{name}": value for name, value in _scalar_fields(person).items()}
+    for part, look in looks.items():
+        values |= {f"person.{part}.{name}": value for name, value in _scalar_fields(look).items()}
+    return values
+
+
+@cache
+def person_fact_names() -> tuple[str, ...]:
+    """Return the sorted names of all properties that `person_facts` returns."""
+    return tuple(sorted(person_facts(Human())))
+
+
+@cache
+def text_fact_names() -> frozenset[str]:
+    """Return the names of the properties of `person_facts` that are texts."""
+    return frozenset(name for name, value in person_facts(Human()).items() if isinstance(value, str))
+
+
+def record_parameters(
+    spec: Spec, parameters: Parameters, person: Mapping[str, float | str | None]
+) -> dict[str, float | int | str | None]:
+    """Return the parameters of an image with the same names for all images of a spec; None where unused.
+
+    person : properties of the person, which the sampled parameters replace
+    """
+    values: dict[str, float | int | str | None] = dict.fromkeys(spec.parameter_names)
+    values |= dict.fromkeys(person_fact_names())
+    return values | dict(person) | dict(parameters)
+
+
+def image_split(spec: Spec, parameters: Parameters) -> str:
+    """Return "train", "val" or "test"; it is the same for all images of a person.
+
+    The name of a file or a head counts as the person, as several numbers can share it.
+    """
+    key = f"split {parameters.get('person.head', '')}"
+    number = 0 if "person.head" in parameters else int(parameters["person.number"])
+    threshold = hashed_uniform(spec.seed, number, key)
+    for name, fraction in SPLITS:
+        if threshold < fraction:
+            return name
+        threshold -= fraction
+    return SPLITS[-1][0]
+
+
+def _scalar_fields(owner: object) -> dict[str, float | str | None]:
+    """Return the numbers and texts among the fields of a dataclass, by name."""
+    found: dict[str, float | str | None] = {}
+    for one in fields(owner):  # type: ignore[arg-type]
+        value = getattr(owner, one.name)
+        if one.name == _SEED_FIELD or not isinstance(value, int | float | str | None):
+            continue
+        found[one.name] = value if value is None or isinstance(value, str) else round_significant(value)
+    return {name: value for name, value in found.items() if name not in ("skin", "eyes", "hair")}

@@ -1,0 +1,20 @@
+"""Data sets in Python: specs, images as arrays, an endless stream, and exports of keypoints."""
+
+from dermis.apps.batch.keypoint_files import SPLIT_NAMES, export_keypoints
+from dermis.apps.batch.reader import decode_image, read_dataset
+from dermis.apps.batch.spec import Spec, load_spec, parse_spec
+from dermis.apps.batch.stream import stream
+from dermis.apps.batch.training_arrays import arrays, parameter_names
+
+__all__ = [
+    "SPLIT_NAMES",
+    "Spec",
+    "arrays",
+    "decode_image",
+    "export_keypoints",
+    "load_spec",
+    "parameter_names",
+    "parse_spec",
+    "read_dataset",
+    "stream",
+]
