@@ -13,6 +13,8 @@ from offscreen_input import InputDriver
 
 from dermis.scene.camera import camera_preset
 
+pytestmark = pytest.mark.usefixtures("separate_devices")  # some tests destroy them
+
 ON_HEAD, TO_THE_LEFT = (300.0, 240.0), (230.0, 240.0)
 
 
