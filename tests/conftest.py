@@ -9,17 +9,20 @@ from __future__ import annotations
 
 import gc
 import os
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from long_modules import LONG
 from rerun_modules import RERUN
 
 if TYPE_CHECKING:
     from dermis.gpu.device import Device
 
+TESTS = Path(__file__).parent
 _UNSET = "DERMIS_DATA is not set"
 
 
@@ -34,6 +37,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.stem in RERUN:
             item.add_marker(pytest.mark.flaky(reruns=1, reruns_delay=1))
+    test_counts = Counter(item.path for item in items)
+    items.sort(key=lambda item: (_starting_rank(item.path), -test_counts[item.path]))
+
+
+def _starting_rank(path: Path) -> int:
+    """Return the rank of a test module in LONG, or the largest rank for all other modules."""
+    name = path.relative_to(TESTS).as_posix() if path.is_relative_to(TESTS) else ""
+    return LONG.index(name) if name in LONG else len(LONG)
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
