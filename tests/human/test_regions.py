@@ -143,7 +143,7 @@ def test_landmarks_of_the_human_lie_on_its_outer_skin() -> None:
     ("person", "unlike"), [(AVERAGE_HUMAN, 0.05), (Human(sex=1, age=80), 0.05), (Human.sampled(4), 0.25)]
 )
 def test_people_have_all_regions_on_both_sides(person: Human, unlike: float) -> None:
-    right, left = _areas(person.head(), load_region_table("default"))
+    right, left = _areas(person.head(), load_region_table("default"), 1024)
     assert (np.minimum(left, right) > 300).all(), dict(zip(REGIONS, left, strict=True))
     np.testing.assert_allclose(left, right, rtol=unlike)
 
