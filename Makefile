@@ -1,6 +1,6 @@
 # Two commands are enough: `make demo` shows the package, `make test` checks it.
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-dev demo lint test adversity wheel docs lock clean
+.PHONY: help setup setup-dev demo lint test pytest adversity wheel docs lock clean
 
 PY := .venv/bin/python
 ARGS ?=
@@ -27,8 +27,12 @@ lint: setup-dev ## check style, types and import layers
 	$(PY) -m mypy
 	.venv/bin/lint-imports
 
-test: lint ## run lint and all tests (ARGS="-k blur" selects some)
-	$(PY) -m pytest -n 2 --dist loadfile --durations=10 $(ARGS)
+test: setup-dev ## run lint and all tests (ARGS="-k blur" selects some)
+	@$(PY) -m compileall -q src tests || true # for the processes that tests start
+	@$(MAKE) --no-print-directory -j 2 lint pytest
+
+pytest: setup-dev # run all tests without lint
+	$(PY) -m pytest -n 2 --dist loadfile --no-loadscope-reorder --durations=10 $(ARGS)
 
 adversity: setup-dev ## test damaged inputs of all kinds for MINUTES=60 (SEED=2 for others)
 	$(PY) -m tests.adversity --minutes $(MINUTES) --seed $(SEED) $(ARGS)

@@ -7,18 +7,22 @@
 
 from __future__ import annotations
 
+import gc
 import os
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from long_modules import LONG
 from rerun_modules import RERUN
 
 if TYPE_CHECKING:
     from dermis.gpu.device import Device
 
+TESTS = Path(__file__).parent
 _UNSET = "DERMIS_DATA is not set"
 
 
@@ -33,6 +37,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.stem in RERUN:
             item.add_marker(pytest.mark.flaky(reruns=1, reruns_delay=1))
+    test_counts = Counter(item.path for item in items)
+    items.sort(key=lambda item: (_starting_rank(item.path), -test_counts[item.path]))
+
+
+def _starting_rank(path: Path) -> int:
+    """Return the rank of a test module in LONG, or the largest rank for all other modules."""
+    name = path.relative_to(TESTS).as_posix() if path.is_relative_to(TESTS) else ""
+    return LONG.index(name) if name in LONG else len(LONG)
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    gc.collect()
+    gc.freeze()  # excludes modules and thousands of collected tests from all later collections
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
@@ -57,9 +74,47 @@ def sample_folder() -> Path:
 @pytest.fixture(scope="session")
 def device() -> Device:
     """Return the software adapter, opened once; a machine without one fails the test."""
+    from dermis.frame import renderer
+
+    return renderer.open_device(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def shared_devices() -> Iterator[None]:
+    """Open each adapter once in this process, because each device compiles all of its shaders again.
+
+    Tests that destroy a device use `separate_devices`.
+    """
+    from dermis.frame import renderer
+    from dermis.gpu import failures
     from dermis.gpu.device import open_device
 
-    return open_device(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
+    opened: dict[str, Device] = {}
+
+    def open_once(adapter: str = "auto") -> Device:
+        if adapter not in opened or opened[adapter].is_lost:
+            found = open_device(adapter)
+            same = [one for one in opened.values() if one.adapter.name == found.adapter.name]
+            opened[adapter] = next((one for one in same if not one.is_lost), found)
+        return opened[adapter]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(renderer, "open_device", open_once)
+        patch.setattr(failures, "open_device", open_once)
+        yield
+
+
+@pytest.fixture(scope="module")
+def separate_devices(shared_devices: None) -> Iterator[None]:
+    """Open a new device for each renderer."""
+    from dermis.frame import renderer
+    from dermis.gpu import failures
+    from dermis.gpu.device import open_device
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(renderer, "open_device", open_device)
+        patch.setattr(failures, "open_device", open_device)
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -81,6 +136,24 @@ def few_form_factor_lines() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(interreflection, "LINE_BUNDLE_COUNT", 24)
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def small_region_maps() -> Iterator[None]:
+    """Paint the regions of faces in small maps; tests of the maps themselves use `large_region_maps`."""
+    from dermis.human.regions import apply
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(apply, "MIN_MAP_SIDE", 256)
+        yield
+
+
+@pytest.fixture
+def large_region_maps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Paint the regions of faces in maps as large as those of the package."""
+    from dermis.human.regions import apply
+
+    monkeypatch.setattr(apply, "MIN_MAP_SIDE", 1024)
 
 
 @pytest.fixture

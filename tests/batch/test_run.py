@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from small_set import COUNT, HERE, PARTS, SHARD_SIZE, SHARDS, contents, drawn, read, write_spec
+from small_set import COUNT, HERE, PARTS, SHARD_SIZE, SHARDS, contents, drawn, drawn_here, read, write_spec
 
 from dermis.apps.batch.reader import shard_files
 from dermis.apps.batch.run import Progress, run
@@ -21,6 +21,7 @@ from dermis.apps.batch.worker_pool import ProcessPool
 from dermis.base.errors import DermisError
 
 Files = dict[str, bytes]
+pytestmark = pytest.mark.usefixtures("many_form_factor_lines")  # as in other processes
 
 
 def killing(moments: set[int], rng: random.Random) -> Callable[[Progress], None]:
@@ -58,9 +59,9 @@ def test_two_workers_that_have_encoders_write_the_same(
 def test_shares_of_shards_make_the_whole_in_any_order(
     small_spec: Spec, undisturbed: Files, tmp_path: Path
 ) -> None:
-    first = drawn(small_spec, tmp_path, shard_selection=(1, 2))
+    first = drawn_here(small_spec, tmp_path, shard_selection=(1, 2))
     assert not first.is_complete and "index.parquet" not in contents(tmp_path)
-    second = drawn(small_spec, tmp_path, shard_selection=(0, 2))
+    second = drawn_here(small_spec, tmp_path, shard_selection=(0, 2))
     assert second.is_complete and first.shards + second.shards == SHARDS
     assert contents(tmp_path) == undisturbed
 
@@ -79,7 +80,7 @@ def test_sets_of_another_generator_are_not_continued(
 def test_shares_of_parts_make_the_whole_in_any_order(
     small_spec: Spec, undisturbed: Files, tmp_path: Path
 ) -> None:
-    reports = [drawn(small_spec, tmp_path, part_selection=(share, 2)) for share in (1, 0)]
+    reports = [drawn_here(small_spec, tmp_path, part_selection=(share, 2)) for share in (1, 0)]
     assert [one.is_complete for one in reports] == [False, True]
     assert [one.images for one in reports] == [
         sum(stop - first for first, stop in PARTS[k::2]) for k in (1, 0)
@@ -91,9 +92,9 @@ def test_a_set_that_grows_is_the_one_made_at_once(
     small_spec: Spec, undisturbed: Files, tmp_path: Path
 ) -> None:
     """An interrupted run ends in the middle of a part, and other workers add to it."""
-    first = drawn(small_spec.replace(count=35), tmp_path, shard_selection=(1, 2))
+    first = drawn_here(small_spec.replace(count=35), tmp_path, shard_selection=(1, 2))
     assert (first.images, first.shards, first.is_complete) == (15, 1, False)
-    second = drawn(small_spec, tmp_path, 4)
+    second = drawn(small_spec, tmp_path, 2)
     assert (second.images, second.shards, second.is_complete) == (COUNT - 15, SHARDS, True)
     assert contents(tmp_path) == undisturbed
 
@@ -111,7 +112,7 @@ def test_images_that_are_there_keep_their_bytes(small_spec: Spec, undisturbed: F
         for key, files in list(images.items())[:18]:
             entries = {suffix: read() for suffix, read in files.items()}
             writer.add(int(key), {**entries, "normal.png": entries["normal.png"] + mark})
-    assert drawn(small_spec.replace(count=36), tmp_path / "out").images == 18
+    assert drawn_here(small_spec.replace(count=36), tmp_path / "out").images == 18
     pictures = [
         data.count(mark) for name, data in contents(tmp_path / "out").items() if name.endswith(".tar")
     ]
@@ -147,7 +148,7 @@ def test_a_shard_that_was_damaged_is_drawn_again(
     data = bytearray(undisturbed[name])
     data[700] ^= 1
     (tmp_path / name).write_bytes(data)
-    report = drawn(small_spec, tmp_path)
+    report = drawn_here(small_spec, tmp_path)
     assert (report.shards, report.skipped) == (1, SHARDS - 1)
     assert contents(tmp_path) == undisturbed
 
@@ -186,7 +187,7 @@ def test_another_data_set_is_refused(small_spec: Spec, undisturbed: Files, tmp_p
 def test_a_bad_head_is_refused_and_what_is_whole_stays(tmp_path: Path) -> None:
     spec = read(write_spec(tmp_path, "bad.obj"))
     with pytest.raises(DermisError, match=r"image \d: .*bad\.obj"):
-        drawn(spec, tmp_path / "out")
+        drawn_here(spec, tmp_path / "out")
     left = contents(tmp_path / "out")
     assert all(name == "spec.toml" or name.startswith(("shard-", "part-")) for name in left)
 
@@ -221,7 +222,7 @@ def test_a_full_disk_keeps_what_is_whole(small_spec: Spec, undisturbed: Files, t
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert contents(tmp_path).keys() == undisturbed.keys() - set(lost)
-    assert drawn(small_spec, tmp_path).skipped == SHARDS - 1
+    assert drawn_here(small_spec, tmp_path).skipped == SHARDS - 1
     assert contents(tmp_path) == undisturbed
 
 

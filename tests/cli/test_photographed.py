@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from conftest import Run
 
 from dermis.frame.features.post.meter import METERED_IRRADIANCE
 from dermis.images.io import read_image
 
+Run = Callable[..., Any]
 pytestmark = pytest.mark.photographed
 HAND = ("--exposure", "1", "--background", "none")
 

@@ -14,6 +14,7 @@ import pytest
 from dermis.apps.gallery.panels import first_frame, to_srgb8
 from dermis.apps.gallery.script import Script, find_scripts, read_script
 from dermis.apps.gallery.studio import Studio
+from dermis.apps.truths import slab_mc
 from dermis.base import citations as cite
 from dermis.base.errors import DermisError
 from dermis.human.person import Human
@@ -43,9 +44,20 @@ def coarse_people(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Human, "head", lambda self, **options: head(self, **{**options, "subdivide": 0}))
 
 
+@pytest.fixture
+def few_photons(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Simulate few photons, which is enough for small pictures."""
+    simulate = slab_mc.monte_carlo_profile
+    monkeypatch.setattr(
+        slab_mc,
+        "monte_carlo_profile",
+        lambda medium, **options: simulate(medium, **{**options, "photons": 20_000}),
+    )
+
+
 @pytest.mark.samples
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.name)
-def test_script_runs(script: Script, studio: Studio, coarse_people: None) -> None:
+def test_script_runs(script: Script, studio: Studio, coarse_people: None, few_photons: None) -> None:
     panels = script.draw(studio)
     for caption, panel in panels.items():
         picture = to_srgb8(first_frame(panel))

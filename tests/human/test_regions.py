@@ -160,7 +160,7 @@ def test_a_place_of_the_human_has_one_region_in_all_its_meshes() -> None:
     person = Human(asian=1, african=0, caucasian=0, sex=0, age=30)
     heads = [AVERAGE_HUMAN.head(layout="hm08"), AVERAGE_HUMAN.head(subdivide=0), person.head(subdivide=2)]
     for head in heads:
-        found = _at_landmarks(head, 1024)
+        found = _at_landmarks(head, 512)
         same = [found[place] == region for place, region in wanted.items()]
         assert np.mean(same) > 0.8  # those on a border may fall to either side
 
@@ -313,6 +313,7 @@ def test_the_command_refuses_before_it_loads() -> None:
         assemble_scene("nobody.obj", SceneOptions(head={"regions": "default"}, skin={"rho_s": 0.2}))
 
 
+@pytest.mark.usefixtures("large_region_maps")
 def test_the_command_gives_the_scan_its_regions(sample_folder: Path) -> None:
     scene, _ = assemble_scene(SCAN, SceneOptions(head={"regions": "default"}))
     low, high = (

@@ -19,6 +19,8 @@ from dermis.frame import renderer as renderer_module
 from dermis.gpu import Device
 from dermis.gpu.memory import allocated_bytes
 
+pytestmark = pytest.mark.usefixtures("separate_devices")  # some tests destroy them
+
 SIZE, ON_HEAD = (400, 480), (300.0, 240.0)
 PICTURE = slice(0, 380), slice(205, 400)  # neither the panel nor the text at the lower edge
 FEW_BYTES = 1.02  # of what was held: a picture of another size may have taken the place of a small one

@@ -18,6 +18,8 @@ from dermis.apps.viewer.view_renderer import ViewRenderer
 from dermis.base.errors import DermisError
 from dermis.scene.heads import load_head
 
+pytestmark = pytest.mark.usefixtures("separate_devices")  # some tests destroy them
+
 PICTURE = np.s_[:380, 205:]  # neither the panel nor the messages
 
 

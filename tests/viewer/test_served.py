@@ -22,6 +22,8 @@ from dermis.scene.model import Scene
 pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
 pytest.importorskip("websockets", reason="the extra `viewer` is not installed")
 
+pytestmark = pytest.mark.usefixtures("separate_devices")  # some tests destroy them
+
 _AT_ONCE = 2  # frames on the way to a page
 
 

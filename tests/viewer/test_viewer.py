@@ -176,6 +176,7 @@ def test_window_may_be_resized_or_minimised(driver: InputDriver) -> None:
     assert driver.settled().shape == (480, 400, 3)
 
 
+@pytest.mark.usefixtures("separate_devices")
 def test_lost_device_is_recreated(make_driver: Callable[[], InputDriver]) -> None:
     driver = make_driver()
     before = driver.settled()

@@ -57,23 +57,31 @@ def kernel_ratio_table() -> NDArray[np.float32]:
     A sampled and truncated Gaussian has a smaller variance than the Gaussian. Therefore q is determined
     numerically, such that the truncated kernel has exactly the desired variance.
     """
-    variance = np.arange(MAX_TABLE_VARIANCE * ROWS_PER_UNIT_VARIANCE + 2)[:, None] / ROWS_PER_UNIT_VARIANCE
-    n = np.arange(_MAX_TAPS_PER_SIDE + 1)
-    tap_mask = n[None, :] <= n[:, None]  # (column of the table, tap)
-    low, high = np.zeros((len(variance), len(n))), np.ones((len(variance), len(n)))
-    for _ in range(_KERNEL_BISECTION_COUNT):
-        middle = 0.5 * (low + high)
-        too_narrow = _kernel_variance(middle, tap_mask) < variance
-        low, high = np.where(too_narrow, middle, low), np.where(too_narrow, high, middle)
-    return (0.5 * (low + high)).astype(np.float32)
+    variance = np.arange(MAX_TABLE_VARIANCE * ROWS_PER_UNIT_VARIANCE + 2) / ROWS_PER_UNIT_VARIANCE
+    columns = [_weight_ratios(variance, taps) for taps in range(_MAX_TAPS_PER_SIDE + 1)]
+    return np.stack(columns, axis=1).astype(np.float32)
 
 
-def _kernel_variance(weight_ratio: Floats, tap_mask: NDArray[np.bool_]) -> Floats:
-    n2 = np.arange(tap_mask.shape[1], dtype=np.float64) ** 2
+def _weight_ratios(variance: Floats, taps_on_a_side: int) -> Floats:
+    """Return the ratio w(1) / w(0) of the kernels with the given variances, found by bisection."""
+    low, high = np.zeros(len(variance)), np.ones(len(variance))
     with np.errstate(under="ignore"):
-        weights = np.where(tap_mask, weight_ratio[..., None] ** n2, 0.0)
-    variance: Floats = 2.0 * (weights @ n2) / (2.0 * weights.sum(axis=-1) - 1.0)
-    return variance
+        for _ in range(_KERNEL_BISECTION_COUNT):
+            middle = 0.5 * (low + high)
+            too_narrow = _kernel_variance(middle, taps_on_a_side) < variance
+            low, high = np.where(too_narrow, middle, low), np.where(too_narrow, high, middle)
+    return 0.5 * (low + high)
+
+
+def _kernel_variance(weight_ratio: Floats, taps_on_a_side: int) -> Floats:
+    """Return the variances of the kernels w(n) = q^(n^2) with the given ratios q = w(1) / w(0)."""
+    total, second_moment = np.ones_like(weight_ratio), np.zeros_like(weight_ratio)
+    weight, factor, squared = np.ones_like(weight_ratio), weight_ratio, weight_ratio**2
+    for n in range(1, taps_on_a_side + 1):
+        weight, factor = weight * factor, factor * squared  # q^(n^2) and q^(2n + 1)
+        total += 2.0 * weight
+        second_moment += 2.0 * n**2 * weight
+    return second_moment / total
 
 
 def add_intermediate_levels(
