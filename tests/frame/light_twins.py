@@ -136,7 +136,7 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
     least = np.maximum(float(light["softness"]) / (1.0 if parallel else depth), 1.5 * texel)
 
     def on_line(step: float) -> Floats:
-        way = min(1.0, (step / 12) ** 2)
+        way = min(1.0, (step / 8) ** 2.5)
         if parallel:
             return np.asarray((1 - way) * depth + way * near)
         return np.asarray(1 / ((1 - way) / depth + way / near))
@@ -151,7 +151,7 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
         towards = np.array([*lateral, -1.0]) if parallel else np.column_stack([lateral - p[:, :2], -depth])
         heights.append(dot(n, np.broadcast_to(towards, n.shape)))
         blocked = np.zeros(len(points), bool)
-        for k in range(12):
+        for k in range(8):
             d = on_line(k + 0.5)
             lean = depth - d if parallel else 1 / d - 1 / depth
             line = place + lateral * lean[:, None] + spot * np.broadcast_to(least, depth.shape)[:, None]

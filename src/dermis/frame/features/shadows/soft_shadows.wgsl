@@ -1,6 +1,6 @@
 // Visibility of an area light from a point, by shadow rays that march through the light's shadow map.
 
-const STEPS: u32 = 12u; // steps of a shadow ray
+const STEPS: u32 = 8u; // steps of a shadow ray
 const NEAR_STEPS: u32 = 2u; // first steps, near the point's own surface
 const MIN_THICKNESS: f32 = 4.0; // least thickness of occluders [mm]
 const CROSSING_STEPS: f32 = 1.5; // number of steps that a ray may be behind a surface that it crosses
@@ -200,7 +200,8 @@ fn ray_step(light: Light, from_depth: f32, step: u32) -> RayStep {
 
 // Depth after a number of steps from the point towards the light; the first steps are shorter, as near occluders need precision.
 fn depth_on_ray(light: Light, from_depth: f32, step: f32) -> f32 {
-    let fraction = min(1.0, step * step / f32(STEPS * STEPS));
+    let part = step / f32(STEPS);
+    let fraction = min(1.0, part * part * sqrt(part));
     if (is_parallel(light)) {
         return mix(from_depth, light.map_near, fraction);
     }
