@@ -40,6 +40,7 @@ BANDS: dict[str, tuple[int, float, float]] = {
     "a*, 1.6 to 6.4 mm": (1, 1.6, 6.4),
 }
 """Channel of CIELAB and limits of the wavelengths of each band [mm]."""
+COMPARED_BANDS = "lightness, 0.4 to 1.6 mm", "a*, 1.6 to 6.4 mm"
 _LIGHTS = "window"
 _CHEEK_MM, _AZIMUTH_DEGREES, _DISTANCE_MM = (-40.0, -35.0), -20.0, 400.0
 
@@ -147,7 +148,10 @@ def page_texts(results: JsonObject) -> dict[str, object]:
         digits = 1 if name in ("hue", "chroma") else 2
         cells = " | ".join(f"{one[name]:.{digits}f}" for one in heads.values())
         lines.append(f"| {name}{unit} | {cells} |")
-    return {"adapter": results["adapter"], "atlas": results["atlas"], "figures": "\n".join(lines)}
+    scan = heads[SCAN]
+    worst = max(abs(one[name] / scan[name] - 1.0) for one in heads.values() for name in COMPARED_BANDS)
+    common = {"adapter": results["adapter"], "atlas": results["atlas"]}
+    return common | {"figures": "\n".join(lines), "difference": f"{worst:.0%}".replace("%", " %")}
 
 
 if __name__ == "__main__":

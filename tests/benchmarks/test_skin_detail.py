@@ -48,6 +48,8 @@ def test_figures_do_not_depend_on_the_exposure(detail: Any) -> None:
 
 def test_page_states_the_figures(detail: Any) -> None:
     figures = {"hue": 50.0, "chroma": 18.0, **dict.fromkeys(detail.BANDS, 0.5)}
-    results = {"adapter": "device", "atlas": 4096, "heads": {"human": figures, "scan": figures}}
+    other = figures | {detail.COMPARED_BANDS[0]: 0.4}
+    results = {"adapter": "device", "atlas": 4096, "heads": {"human": other, detail.SCAN: figures}}
     texts = detail.page_texts(results)
-    assert texts["figures"].count("| 0.50 | 0.50 |") == len(detail.BANDS)
+    assert texts["figures"].count("| 0.50 | 0.50 |") == len(detail.BANDS) - 1
+    assert texts["difference"] == "20 %"

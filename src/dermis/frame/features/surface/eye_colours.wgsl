@@ -93,8 +93,8 @@ fn white_colour(eye: Eye, p: vec3f) -> vec3f {
     let fine = abs(eye_noise(place * vec2f(17.0, 0.8), eye.seed + 6.0) - 0.5);
     let presence = smoothstep(0.35, 0.75, eye_noise(vec2f(turn * 4.0, bent * 0.4), eye.seed + 10.0));
     let thin = 0.5 + 0.5 * smoothstep(7.0, 12.0, off); // vessels are thinner and fainter near the limbus
-    let vessels = presence * (1.0 - smoothstep(0.0, 0.028 * thin, line)) + 0.55 * (1.0 - smoothstep(0.0, 0.022 * thin, fine));
-    let red = (0.2 + eye.redness) * (0.16 * aside + 1.5 * thin * vessels * smoothstep(6.2, 8.2, off));
+    let vessels = presence * (1.0 - smoothstep(0.02, 0.11 * thin, line)) + 0.55 * (1.0 - smoothstep(0.02, 0.12 * thin, fine));
+    let red = (0.2 + eye.redness) * (0.16 * aside + 1.1 * thin * vessels * smoothstep(6.2, 8.2, off));
     let uneven = 1.0 + 0.09 * (eye_noise(p.xy * 0.55, eye.seed + 11.0) - 0.5);
     let yellow = mix(vec3f(1.0), vec3f(0.96, 0.89, 0.79), aside);
     return mix(WHITE * yellow * uneven, VESSEL, clamp(red, 0.0, 0.8));
