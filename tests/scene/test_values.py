@@ -32,7 +32,7 @@ BAD = [
     (
         Settings,
         {"exposure": "bright"},
-        "auto or a number from 1e-06 to 1000000 (20 stops either way), but got 'bright'",
+        "auto, skin or a number from 1e-06 to 1000000 (20 stops either way), but got 'bright'",
     ),
     (Settings, {"background": (0, 0, -1)}, "background.2"),
     (Settings, {"background": "#12345"}, "none, gradient, environment or a colour: three linear numbers"),

@@ -16,12 +16,13 @@ const LOWER_MM: array<f32, TEETH_PER_SIDE> = array<f32, TEETH_PER_SIDE>(5.4, 5.9
 const CROWN_HEIGHT_MM: f32 = 9.8; // visible height of a tooth [mm]
 const BULGE_MM: f32 = 0.55; // of a tooth across its width
 const HEIGHT_BULGE_MM: f32 = 0.45; // of a tooth from its biting edge to the gum
-const ENAMEL: vec3f = vec3f(0.74, 0.68, 0.57);
-const NECK: vec3f = vec3f(0.66, 0.55, 0.40);
-const CLEAR_EDGE: vec3f = vec3f(0.58, 0.55, 0.50);
+const ENAMEL: vec3f = vec3f(0.63, 0.58, 0.49);
+const NECK: vec3f = vec3f(0.58, 0.48, 0.36);
+const CLEAR_EDGE: vec3f = vec3f(0.52, 0.50, 0.45);
 const GUM: vec3f = vec3f(0.42, 0.15, 0.14);
 const TOOTH_SHADOW_OFFSET_MM: f32 = 2.5; // light spreads as far in dentine, so lips cast no sharp shadows on teeth
 const SALIVA_ROUGHNESS: f32 = 0.12; // roughness of wet surfaces
+const TOOTH_SHADOW_SCATTER: vec3f = vec3f(0.22, 0.20, 0.17); // fraction of a light that reaches shadowed teeth through their lit parts and from the lips
 const MOUTH_SHADOW_SCATTER: vec3f = vec3f(0.04, 0.014, 0.008); // fraction of a light that enters through some 8 mm of cheeks and lips
 
 fn tooth_width(kind: f32, index: u32) -> f32 {
@@ -58,6 +59,11 @@ fn teeth_at(point: Point, kind: f32) -> Surface {
 fn tongue_at(point: Point, colour: vec3f) -> Surface {
     let noise = eye_noise(1.1 * point.position.xz, 1.0) + 0.5 * eye_noise(2.7 * point.position.xz, 2.0);
     return Surface(point.normal, colour * (0.75 + 0.35 * noise), 0.25, 1.0);
+}
+
+// Fraction of a light that reaches shadowed parts of the mouth, by the part.
+fn mouth_shadow_scatter(part: f32) -> vec3f {
+    return select(TOOTH_SHADOW_SCATTER, MOUTH_SHADOW_SCATTER, part == TONGUE);
 }
 
 // material: colour and part of the mouth

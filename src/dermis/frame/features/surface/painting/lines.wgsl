@@ -2,7 +2,7 @@
 //#include "spot.wgsl"
 
 // Artistic values.
-const MOVEMENT_DEPTH: f32 = 0.6; // depth that a full movement adds to a fold, relative to its depth in an old face
+const MOVEMENT_DEPTH: f32 = 0.45; // depth that a full movement adds to a fold, relative to its depth in an old face
 const MOVEMENT_DEPTH_AGE: f32 = 0.5;
 const MOVEMENT_WIDTH: f32 = 2.0; // width of a fold of moved skin relative to its width at rest: skin bulges softly
 const MOVEMENT_WIDTH_AGE: f32 = -0.5;
