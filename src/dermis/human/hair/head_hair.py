@@ -13,7 +13,7 @@ from dermis.human.hair.root_finder import RootFinder
 from dermis.human.hair.strand_roots import BEARD_STRANDS_PER_CM2, STRANDS_PER_CM2, strands_of_style
 from dermis.human.hair.styles import Style, beard_styles, styles
 from dermis.human.skin.face import hairline_heights
-from dermis.mesh.groom import Groom
+from dermis.mesh.groom import Groom, bend_radius_mm
 from dermis.specular.hair import absorption_per_mm
 
 MAX_HAIRS_PER_CM2 = 200.0
@@ -31,9 +31,8 @@ _COIL_PITCH_BY_CURL_MM = np.array([150.0, 130.0, 95.0, 34.0, 15.0, 7.5])
 _INCOHERENCE_BY_CURL = np.array([0.3, 0.3, 0.12, 0.2, 0.5, 1.0])
 _CLUMP_PHASES_BY_CURL = np.array([0.3, 0.3, 0.22, 0.5, 0.9, 1.0])
 _FRIZZ_BY_CURL_MM = np.array([0.25, 0.35, 0.6, 0.9, 0.8, 0.5])
-_ROPE_PITCH_RATIO = 7.0  # pitch of twists relative to their radius
 _MAX_SEGMENT_MM = 7.0  # length of the segments of straight hair
-_MAX_DEVIATION_MM = 0.06  # largest deviation of curls and twists from the segments that represent them
+_MAX_DEVIATION_MM = 0.07  # largest deviation of curls and twists from the segments that represent them
 _MIN_KNOTS, _MAX_KNOTS = 5, 96
 _FLOAT_FIELDS = (
     "density", "hairline", "thinning", "length_mm", "guide_mm", "fade", "layers", "clump", "clump_start_mm",
@@ -191,14 +190,10 @@ def _curl_parameters(hair_look: HairLook, length_mm: float, is_rope: bool) -> di
 def _knot_count(parameters: NDArray[np.void]) -> int:
     """Return a number of knots per strand that resolves the longest and most tightly curled strands.
 
-    A helix of radius r and pitch p has the radius of curvature R = r + p^2 / (4 pi^2 r); a chord of length c
-    deviates from it by c^2 / (8 R).
+    A chord of length c deviates from a curve with the radius of curvature R by c^2 / (8 R).
 
     parameters : (p,) rows of `HAIR_PARAMETERS_DTYPE`, for scalp hair and beard
     """
-    lengths, curls, ropes = (parameters[name].astype(float) for name in ("length_mm", "curl_mm", "rope_mm"))
-    radius = np.maximum(np.where(ropes > 0.0, ropes, curls), 1e-3)
-    pitch = np.where(ropes > 0.0, _ROPE_PITCH_RATIO * ropes, parameters["pitch_mm"])
-    bend = radius + (pitch / (2.0 * np.pi)) ** 2 / radius
-    segments = np.minimum(np.sqrt(8.0 * _MAX_DEVIATION_MM * bend), _MAX_SEGMENT_MM)
-    return int(np.clip(np.ceil((lengths / segments).max()) + _MIN_KNOTS, _MIN_KNOTS, _MAX_KNOTS))
+    segments = np.minimum(np.sqrt(8.0 * _MAX_DEVIATION_MM * bend_radius_mm(parameters)), _MAX_SEGMENT_MM)
+    knots = np.ceil((parameters["length_mm"] / segments).max()) + _MIN_KNOTS
+    return int(np.clip(knots, _MIN_KNOTS, _MAX_KNOTS))

@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from dermis.base.errors import refuse
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Buffer, Constants, Device, Memo, Texture, UniformRecord, make_texture
-from dermis.mesh.groom import ANCHORS_PER_GUIDE_KNOT, KNOTS_PER_GUIDE, Groom, Guides, StrandRoots
+from dermis.mesh.groom import (
+    ANCHORS_PER_GUIDE_KNOT,
+    KNOTS_PER_GUIDE,
+    Groom,
+    Guides,
+    StrandRoots,
+    bend_radius_mm,
+)
 from dermis.mesh.grown_strands import mean_hair_absorptance
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -47,9 +54,6 @@ _MIN_STRANDS_PER_PIXEL = 2.0  # where all strands are short; fewer would look li
 _HAIRY_SKIN_AREA_MM2 = 6e4  # approximate area of the skin on which scalp hair and beard grow
 _MAX_KNOT_FRACTION_FOR_SHORT_HAIR = 0.4  # largest fraction of `Detail.drawn_knots` that is spent against dots
 _MAX_BEND_MM = 35.0  # radius of curvature of the guides near the skin
-_ROPE_PITCH_RATIO = (
-    7.0  # pitch of twists relative to their radius; that of braids is 8, see strands_grow.wgsl
-)
 _DETAIL_LEVELS_PER_OCTAVE = 4  # levels of detail for each doubling of the size of a pixel
 KNOTS_PER_BOUNDS_WORKGROUP = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
@@ -340,7 +344,7 @@ class StrandTables:
             width_scale,
             self.absorptance,
             0.0,
-            (*(self.dye / width_scale), 0.0),
+            (*(self.dye / max(width_scale, 1e-6)), 0.0),
         )
         return np.array(values, _HAIRS_DTYPE)
 
@@ -439,7 +443,7 @@ def make_strand_tables(
         possible=0 if hair is None else len(hair.roots),
         centre_mm=np.zeros(3) if hair is None else hair.centre_mm,
         length_mm=0.0 if largest is None else float(largest["length_mm"]),
-        bend_mm=_MAX_BEND_MM if parts is None else _least_bend_mm(parts),
+        bend_mm=_MAX_BEND_MM if parts is None else float(bend_radius_mm(parts).min(initial=_MAX_BEND_MM)),
         shortest_mm=1.0 if parts is None else max(1.0, float(parts["length_mm"].min(initial=500.0))),
         width_mm=0.0 if largest is None else 2.0 * float(largest["radius_mm"]),
         cover=0.0 if largest is None else float(largest["cover"]),
@@ -455,20 +459,6 @@ def _dye_absorption(hair_parameters: NDArray[np.void]) -> NDArray[np.float64]:
     """
     dyed = hair_parameters[hair_parameters["dyed"] > 0.0]
     return np.asarray((dyed["dye"] / dyed["hairs_per_strand"][:, None]).sum(axis=0), np.float64)
-
-
-def _least_bend_mm(hair_parameters: NDArray[np.void]) -> float:
-    """Return the least radius of curvature of curls and twists [mm], at most that of the guides.
-
-    hair_parameters : rows of `Groom.parameters`, for scalp hair and beard
-
-    A helix of radius r and pitch p has the radius of curvature r + p^2 / (4 pi^2 r).
-    """
-    rope = hair_parameters["rope_mm"].astype(float)
-    radius = np.where(rope > 0.0, rope, hair_parameters["curl_mm"])
-    pitch = np.where(rope > 0.0, _ROPE_PITCH_RATIO * rope, hair_parameters["pitch_mm"])
-    bend = radius + (pitch / (2.0 * np.pi)) ** 2 / np.maximum(radius, 1e-3)
-    return float(min(bend.min(initial=_MAX_BEND_MM), _MAX_BEND_MM))
 
 
 def make_guide_tables(device: Device, guides: Guides) -> GuideTables:

@@ -72,16 +72,18 @@ fn incident_light(light: Light, p: vec3f) -> Incident {
     return sum;
 }
 
-// Fraction of a light above the horizon of the skin, which is lower for a higher knot; shadow maps are too coarse for this.
+// Fraction of a light above the horizon of the skin, which is lower for a higher knot; shadow maps are too coarse for this. Far from
+// the root, the skin there says nothing about the light, and only shadow maps count.
 fn above_horizon(knot: Knot, l: vec3f) -> f32 {
-    return smoothstep(-HORIZON_WIDTH - HORIZON_DROP * max(knot.height, 0.0), HORIZON_WIDTH, dot(knot.normal, l));
+    let above = smoothstep(-HORIZON_WIDTH - HORIZON_DROP * max(knot.height, 0.0), HORIZON_WIDTH, dot(knot.normal, l));
+    return mix(above, 1.0, smoothstep(HORIZON_REACH_MM.x, HORIZON_REACH_MM.y, knot.from_root));
 }
 
 fn light_visibility(light: Light, knot: Knot, l: vec3f) -> f32 {
     var point: Point;
     point.position = knot.position;
     point.lit_position = knot.position + SURFACE_OFFSET_MM * knot.normal;
-    point.normal = select(knot.normal, l, light.punctual == 0u); // a strand has no horizon
+    point.normal = select(knot.normal, l, light.punctual == 0u || knot.from_root > HORIZON_REACH_MM.x); // a strand has no horizon
     return above_horizon(knot, l) * visibility(light, point, l);
 }
 
