@@ -12,7 +12,7 @@ from dermis.frame.features.hair.swing import SWING_CELL_MM, SWING_CELLS
 Doubles = NDArray[np.float64]
 SUPPORT_HEIGHT_MM, SUPPORT_Y_MM, GRAVITY, CANTILEVER = 20.0, -60.0, 9810.0, 60000.0
 MAX_FREQUENCY, MIN_LEVER_MM, DAMPING_RATIO, DRAG, FRICTION = 1000.0, 5.0, 0.3, 1.0, 20.0
-BEND_STIFFNESS, CLEARANCE_MM, MAX_PUSH_MM, ITERATIONS = 2000.0, 0.5, 4.0, 3
+BEND_STIFFNESS, CLEARANCE_MM, MAX_PUSH_MM, ITERATIONS, LAST_ITERATIONS = 2000.0, 0.5, 4.0, 3, 5
 MAX_SPEED, FAR_MM, LEAST_PIVOT = 4000.0, 16.0, 1e-4
 
 
@@ -127,6 +127,12 @@ def advance(knots: Knots, shape_now: Doubles, grid: Grid, gravity: Doubles, subs
         speed = np.linalg.norm(moved, axis=-1, keepdims=True)
         v = shape_velocity + np.minimum(slowed, MAX_SPEED / np.maximum(speed, 1e-6)) * moved
         restore_lengths(p, knots.length)
+        for _ in range(LAST_ITERATIONS):
+            distance, normal = nearest_skin(grid, p, shape_now - shape, rest)
+            inside = np.clip(knots.clearance - distance, 0.0, MAX_PUSH_MM)
+            inside[:, 0] = 0.0
+            p = p + inside[..., None] * normal
+            restore_lengths(p, knots.length)
         x = p
     return knots._replace(position=x, velocity=v, shape=shape_now)
 

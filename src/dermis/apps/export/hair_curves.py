@@ -39,7 +39,8 @@ class CurveGroup(NamedTuple):
 
 def curve_groups(head: Head) -> Iterator[CurveGroup]:
     """Yield the brows, lashes and hair of a head in groups; nothing for a head without hair."""
-    hair = head.hair and grow_strands(head.hair, head.mesh, head.mesh.points_mm, MAX_CURVES)
+    groom, mesh = head.hair, head.mesh
+    hair = None if groom is None else grow_strands(groom, mesh, mesh.points_mm, MAX_CURVES)
     for name, strands in (("brows_and_lashes", head.strands), ("hair", hair)):
         if strands is not None and len(strands):
             yield from _groups_of(name, head, strands)

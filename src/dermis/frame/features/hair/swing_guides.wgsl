@@ -17,6 +17,7 @@ const LEAST_PIVOT: f32 = 1e-4;
 const CLEARANCE_MM: f32 = 0.5; // distance that knots keep from skin, if they had it in the first frame
 const MAX_PUSH_MM: f32 = 4.0; // by a collision, in one iteration
 const ITERATIONS: u32 = 3u; // of collisions and lengths
+const LAST_ITERATIONS: u32 = 5u; // of collisions and exact lengths, which do not change velocities
 const MAX_SPEED: f32 = 4000.0; // [mm/s]
 const FAR_MM: f32 = 16.0; // distance beyond which skin is not seen
 
@@ -77,6 +78,12 @@ fn nearest_skin(p: vec3f, shift: vec3f, rest: f32) -> Skin {
         return Skin(FAR_MM, vec3f(0.0));
     }
     return Skin(min(height / size, FAR_MM), normal / size);
+}
+
+// Displacement that takes a knot out of the skin, see `nearest_skin`.
+fn outward_push(p: vec3f, shift: vec3f, rest: f32, clearance: f32) -> vec3f {
+    let skin = nearest_skin(p, shift, rest);
+    return clamp(clearance - skin.distance, 0.0, MAX_PUSH_MM) * skin.normal;
 }
 
 // Distance of a knot at rest from the last place at which the head holds its guide [mm].
@@ -194,9 +201,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
         p += bend * mobility * errors;
         var pushed = vec3f(0.0);
         for (var i = 0u; i < ITERATIONS; i += 1u) {
-            let skin = nearest_skin(p, guide.xyz - shape, rest);
-            let inside = clamp(knot.clearance - skin.distance, 0.0, MAX_PUSH_MM);
-            let push = select(inside, 0.0, k == 0u) * skin.normal;
+            let push = select(outward_push(p, guide.xyz - shape, rest, knot.clearance), vec3f(0.0), k == 0u);
             pushed += push;
             p += push;
             workgroupBarrier();
@@ -215,10 +220,17 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
         moved -= min(dot(moved, outwards), 0.0) * outwards;
         let slowed = exp(-h * (damping + select(0.0, FRICTION, any(pushed != vec3f(0.0)))));
         knot.velocity = shape_velocity + min(slowed, MAX_SPEED / max(length(moved), 1e-6)) * moved;
-        if (lane == 0u) {
-            restore_lengths();
+        for (var i = 0u; i <= LAST_ITERATIONS; i += 1u) {
+            if (lane == 0u) {
+                restore_lengths();
+            }
+            workgroupBarrier();
+            let here = places[k];
+            if (is_knot && k > 0u && i < LAST_ITERATIONS) {
+                places[k] = here + outward_push(here, guide.xyz - shape, rest, knot.clearance);
+            }
+            workgroupBarrier();
         }
-        workgroupBarrier();
         knot.position = places[k];
     }
     if (is_knot) {
