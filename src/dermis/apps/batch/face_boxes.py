@@ -21,8 +21,8 @@ BOX_NAMES = "face", "head", "detector"
 """Boxes of an image: see `face_boxes`."""
 _DIRECTION_COUNT = 256
 _MIN_FACE_Z_MM = -58.0  # just in front of the ears, on the average human
-# Side and downward shift of the boxes of BlazeFace relative to the longer side of the box "face": means over 200
-# near-frontal people.
+# Side and downward shift of the boxes of BlazeFace relative to the longer side of the box "face": means over
+# 200 near-frontal people.
 _DETECTOR_SCALE, _DETECTOR_SHIFT = 0.8, 0.077
 _NOT_FACE = "right_ear", "left_ear", "mouth_interior", "neck", "torso"
 _NOT_HEAD = "mouth_interior", "neck", "torso"
