@@ -86,7 +86,7 @@ def test_the_stream_feeds_jax(folder: Path) -> None:
 
 def test_the_page_names_functions_that_exist() -> None:
     assert callable(export_keypoints) and len(BLOCKS) == 5
-    for name in re.findall(r"dermis\.dataset\.(\w+)", PAGE.read_text("utf-8")):
+    for name in re.findall(r"\bdataset\.(\w+)\(", PAGE.read_text("utf-8")):
         assert hasattr(dermis.dataset, name), name
     for block in BLOCKS:
         compile(block, str(PAGE), "exec")

@@ -21,6 +21,9 @@ BOX_NAMES = "face", "head", "detector"
 """Boxes of an image: see `face_boxes`."""
 _DIRECTION_COUNT = 256
 _MIN_FACE_Z_MM = -58.0  # just in front of the ears, on the average human
+# Side and downward shift of the boxes of BlazeFace relative to the longer side of the box "face": means over
+# 200 near-frontal people.
+_DETECTOR_SCALE, _DETECTOR_SHIFT = 0.8, 0.077
 _NOT_FACE = "right_ear", "left_ear", "mouth_interior", "neck", "torso"
 _NOT_HEAD = "mouth_interior", "neck", "torso"
 
@@ -46,15 +49,17 @@ def face_boxes(
     """Return boxes by name; they can exceed the picture.
 
     "face" contains forehead below the hairline, cheeks and chin, without ears, as in the annotations of WIDER
-    FACE; "head" the whole head above the neck with its ears, without hair; "detector" is the square around
-    the centre of "face" with its longer side, as face detectors return it.
+    FACE; "head" the whole head above the neck with its ears, without hair; "detector" is the square from the
+    brows to the chin that detectors such as BlazeFace return.
 
     points : points that bound face and head, from `box_points`
     pose_arrays : pose of the head
     """
     boxes = {name: _projected_box(head, indices, pose_arrays, camera) for name, indices in points.items()}
     left, top, right, bottom = boxes["face"]
-    x, y, half = 0.5 * (left + right), 0.5 * (top + bottom), 0.5 * max(right - left, bottom - top)
+    longer = max(right - left, bottom - top)
+    x, y, half = 0.5 * (left + right), 0.5 * (top + bottom), 0.5 * _DETECTOR_SCALE * longer
+    y += _DETECTOR_SHIFT * longer
     return boxes | {"detector": (x - half, y - half, x + half, y + half)}
 
 
