@@ -23,7 +23,8 @@ def test_all_classes_are_listed() -> None:
 @pytest.mark.parametrize("name", LANDMARK_SETS)
 def test_all_sets_are_listed_with_their_counts(name: str) -> None:
     rows = read_rows("dermis.human.landmarks", name)
-    assert f"| `{name}` | {len(rows)} |" in PAGE
+    count = len({row["landmark"] for row in rows})  # candidates of a silhouette share a name
+        assert f"| `{name}` | {count} |" in PAGE
     assert len({row["landmark"] for row in rows}) == len(rows)
 
 
