@@ -93,18 +93,16 @@ fn sky_transmittance_at(grid: SkyGrid, p: vec3f) -> SkyTransmittance {
     return SkyTransmittance(mix(sum.hair, clear, outside), mix(sum.all, clear, outside));
 }
 
-// Transmittance of hair from a surface to the sky, as a linear function of direction. It is read below the surface, so that
+// Fraction of the light of the sky that hair transmits to a surface. The transmittance is read below the surface, so that
 // directions from there pass through the whole layer of hair on it.
-fn sky_past_hair(p: vec3f, normal: vec3f) -> vec4f {
+// mean_direction: mean of the unit vectors of the directions from which light is collected
+fn sky_past_hair(p: vec3f, normal: vec3f, mean_direction: vec3f) -> f32 {
     if (!STRANDS) {
-        return vec4f(vec3f(0.0), 1.0);
+        return 1.0;
     }
     let grid = sky_grid();
-    return sky_transmittance_at(grid, p - grid.cell * normal).hair;
-}
-
-fn past_hair_along(transmittance: vec4f, direction: vec3f) -> f32 {
-    return saturate(transmittance.w + dot(transmittance.xyz, direction));
+    let hair = sky_transmittance_at(grid, p - grid.cell * normal).hair;
+    return clamp(hair.w + dot(hair.xyz, mean_direction), 0.0, 1.0);
 }
 
 // Fraction of a light that strands transmit to a point.

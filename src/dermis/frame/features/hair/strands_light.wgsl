@@ -7,7 +7,6 @@
 //#include "strand_view.wgsl"
 
 const SURFACE_OFFSET_MM: f32 = 0.4; // offset of shadow rays from the skin
-const COSINE_MEAN: f32 = 0.6667; // length of the mean of all directions above a surface, weighted by their cosines
 const HORIZON_WIDTH: f32 = 0.2; // half-width of the soft horizon of the skin, as a cosine
 const HORIZON_DROP: f32 = 0.3; // amount by which the horizon sinks per millimetre of height above the skin, as a cosine
 const REFLECTION_ROUGHNESS: f32 = 0.7; // roughness of the reflection of the environment by strands

@@ -17,8 +17,7 @@ override SKIPS_UNLIT: bool = false;
 
 const MIN_OBLIQUE_COSINE: f32 = -0.75; // least cosine of oblique light at the point where it enters
 
-const MIN_HAIR_SLOPE: f32 = 0.02; // variation of the transmittance of hair with direction below which it is a constant
-const SKY_PART_ROUGHNESS: f32 = 0.7; // roughness of a reflection that blurs the sky over a fifth of the hemisphere
+const COSINE_MEAN: f32 = 0.6667; // length of the mean of all directions above a surface, weighted by their cosines
 
 struct Lit {
     entered: vec3f, // irradiance that enters the skin, times its reflectance relative to normal incidence
@@ -79,37 +78,12 @@ fn total_visibility(light: Light, point: Point, l: vec3f) -> f32 {
     return visibility(light, point, l) * strand_transmittance(light, point.position);
 }
 
-// Transmittance of hair for light of the sky, as a linear function of direction; 1 without occlusion.
-fn sky_past_hair_at(point: Point) -> vec4f {
+// Fraction of the light of the sky that hair transmits to a point, see `sky_past_hair`; 1 without occlusion.
+fn sky_past_hair_at(point: Point, mean_direction: vec3f) -> f32 {
     if (environment.occluded == 0u) {
-        return vec4f(vec3f(0.0), 1.0);
+        return 1.0;
     }
-    return sky_past_hair(point.position, point.normal);
-}
-
-// Fraction of the irradiance of the sky that hair transmits, by colour: hair may hide the bright or the dark part of the sky. The
-// quadrature with one direction along the normal and four at 60 degrees is exact for quadratic functions of the cosine.
-fn sky_irradiance_past_hair(point: Point) -> vec3f {
-    let transmittance = sky_past_hair_at(point);
-    if (length(transmittance.xyz) < MIN_HAIR_SLOPE) {
-        return vec3f(past_hair_along(transmittance, point.normal));
-    }
-    let axes = beside(point.normal);
-    var passing = vec3f(0.0);
-    var total = vec3f(0.0);
-    var k = 0u;
-    loop {
-        let aside = select(axes[0], axes[1], k > 2u) * select(1.0, -1.0, k % 2u == 0u);
-        let direction = select(0.5 * point.normal + 0.8660254 * aside, point.normal, k == 0u);
-        let light = select(1.0 / 6.0, 1.0 / 3.0, k == 0u) * reflection(direction, SKY_PART_ROUGHNESS);
-        passing += light * (transmittance.w + dot(transmittance.xyz, direction));
-        total += light;
-        k++;
-        if (k >= 5u) {
-            break;
-        }
-    }
-    return saturate(passing / max(total, vec3f(1e-6)));
+    return sky_past_hair(point.position, point.normal, mean_direction);
 }
 
 // Irradiance that enters from the environment and from other skin. With interreflection, the fit of `ambient` to the light from
@@ -120,7 +94,7 @@ fn ambient_entering(point: Point, surface: Surface, open: f32) -> vec3f {
     if (ENVIRONMENT) {
         let albedo = select(surface.colour * environment.albedo, vec3f(0.0), has_cells);
         entering = ambient(surface.normal, open, albedo) * enters_uniform(surface.roughness, surface.rho_s);
-        entering *= sky_irradiance_past_hair(point);
+        entering *= sky_past_hair_at(point, COSINE_MEAN * point.normal);
     }
     if (has_cells) {
         // with occlusion, cells give only the brightness of the occluded part
@@ -203,7 +177,7 @@ fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f
         //#if PARTS
         albedo = mix(albedo, 1.0, metalness);
         //#end
-        lit.reflected += albedo * mirrored(point, mirror, v, surface.roughness, open) * past_hair_along(sky_past_hair_at(point), reflect(-v, mirror));
+        lit.reflected += albedo * mirrored(point, mirror, v, surface.roughness, open) * sky_past_hair_at(point, mirror);
     }
     return lit;
 }
