@@ -102,14 +102,14 @@ def deviation_between_neighbours(**look: Any) -> float:
 
 
 def clump_radius_mm(**look: Any) -> float:
-    """Return the root mean square distance of tips from the mean tip of their clump [mm]."""
+    """Return the median horizontal distance of tips from the mean tip of their clump [mm]."""
     hair, tips = head_with(**look).hair, grown(**look)[1][:, -1]
     assert hair is not None
     clump = hair.roots.clump[_growing_root_indices(hair, STRAND_COUNT)]
     _, index, count = np.unique(clump, return_inverse=True, return_counts=True)
-    mean = np.stack([np.bincount(index, tips[:, c]) / count for c in range(3)], axis=1)
-    several = count[index] > 3
-    return float(np.sqrt(((tips - mean[index])[several] ** 2).sum(axis=1).mean()))
+    mean = np.stack([np.bincount(index, tips[:, c]) / count for c in (0, 2)], axis=1)
+    distance = np.linalg.norm(tips[:, [0, 2]] - mean[index], axis=1)
+    return float(np.median(distance[count[index] > 3]))
 
 
 def test_clumps_gather_strands_and_frizz_and_flyaways_scatter_them() -> None:
