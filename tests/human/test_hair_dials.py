@@ -24,7 +24,8 @@ STRAND_COUNT = 2_500
 
 @cache
 def head_with(**look: Any) -> Head:
-    return Human(sex=1.0, hair=HairLook(**{"style": "short", "flyaways": 0.0} | look)).head(subdivide=0)
+    values: dict[str, Any] = {"style": "short", "flyaways": 0.0} | look
+    return Human(sex=1.0, hair=HairLook(**values)).head(subdivide=0)
 
 
 def strands_of(head: Head, knots: int = 0) -> Strands:
@@ -57,7 +58,7 @@ def test_each_dial_has_a_range_and_is_documented() -> None:
         assert field.name in documented
         if field.name not in ("style", "beard_style"):
             with pytest.raises(DermisError, match=field.name):
-                HairLook(**{field.name: -100.0})
+                HairLook(**{field.name: -100.0})  # type: ignore[arg-type]
 
 
 def test_diameter_widens_strands() -> None:
@@ -96,7 +97,7 @@ def deviation_between_neighbours(**look: Any) -> float:
     from scipy.spatial import cKDTree
 
     _, knots = grown(**look)
-    near = cKDTree(knots[:, 0]).query(knots[:, 0], k=2)[1][:, 1]
+    near = np.asarray(cKDTree(knots[:, 0]).query(knots[:, 0], k=2)[1])[:, 1]
     apart = np.linalg.norm(knots[near] - knots, axis=2)
     return float(np.median(apart[:, knots.shape[1] // 2]))
 
