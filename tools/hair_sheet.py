@@ -23,6 +23,7 @@ TONES = {"dark": (5.0, 0.3), "blond": (0.35, 0.4)}
 RIGS = "studio", "rim"
 ALL_STYLES = (*HAIR_STYLES[1:], *(f"beard-{name}" for name in BEARD_STYLES[1:]))
 SEEN_FROM_THE_SIDE = "ponytail", "bun", "cornrows"
+_ANCESTRIES = "african", "asian", "caucasian"
 _ANCESTRY_BY_TEXTURE = {"straight": "asian", "wavy": "caucasian", "coiled": "african"}
 
 
@@ -36,10 +37,12 @@ def panels(
     camera : name of a camera preset
     side : width and height of a picture [pixel]
     """
-    weights = {"african": 0.0, "asian": 0.0, "caucasian": 0.0} | {_ANCESTRY_BY_TEXTURE[texture]: 1.0}
+    african, asian, caucasian = (float(_ANCESTRY_BY_TEXTURE[texture] == name) for name in _ANCESTRIES)
     style = style_table().get(look.style)
     man = look.beard_mm > 0.0 or style is None or style.men > style.women
-    head = dermis.Human(**weights, sex=float(man), age=30.0, hair=look).head()
+    head = dermis.Human(
+        african=african, asian=asian, caucasian=caucasian, sex=float(man), age=30.0, hair=look
+    ).head()
     settings = Settings(size=(side, side), atlas=1024, **PHOTOGRAPHIC_SETTINGS)
     view = dermis.side(head) if camera == "side" else dermis.three_quarter(head)
     scenes = (Scene(head, camera=view, lights=load_lights(rig)) for rig in RIGS)

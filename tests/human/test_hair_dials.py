@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dermis import HairLook, Human
 from dermis.base.errors import DermisError
 from dermis.human.hair.look import BEARD_STYLES
-from dermis.mesh.grown_strands import grow_strands
+from dermis.mesh.grown_strands import _growing_root_indices, grow_strands
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Strands
 from dermis.specular.hair import absorption_per_mm
@@ -24,7 +24,8 @@ STRAND_COUNT = 2_500
 
 @cache
 def head_with(**look: Any) -> Head:
-    return Human(sex=1.0, hair=HairLook(**{"style": "short", "flyaways": 0.0} | look)).head(subdivide=0)
+    values: dict[str, Any] = {"style": "short", "flyaways": 0.0} | look
+    return Human(sex=1.0, hair=HairLook(**values)).head(subdivide=0)
 
 
 def strands_of(head: Head, knots: int = 0) -> Strands:
@@ -57,7 +58,7 @@ def test_each_dial_has_a_range_and_is_documented() -> None:
         assert field.name in documented
         if field.name not in ("style", "beard_style"):
             with pytest.raises(DermisError, match=field.name):
-                HairLook(**{field.name: -100.0})
+                HairLook(**{field.name: -100.0})  # type: ignore[arg-type]
 
 
 def test_diameter_widens_strands() -> None:
@@ -96,23 +97,26 @@ def deviation_between_neighbours(**look: Any) -> float:
     from scipy.spatial import cKDTree
 
     _, knots = grown(**look)
-    near = cKDTree(knots[:, 0]).query(knots[:, 0], k=2)[1][:, 1]
+    near = np.asarray(cKDTree(knots[:, 0]).query(knots[:, 0], k=2)[1])[:, 1]
     apart = np.linalg.norm(knots[near] - knots, axis=2)
     return float(np.median(apart[:, knots.shape[1] // 2]))
 
 
-def tip_spacing(**look: Any) -> float:
-    """Return the median distance between a tip and the nearest other tip [mm]."""
-    from scipy.spatial import cKDTree
-
-    tips = grown(**look)[1][:, -1]
-    return float(np.median(cKDTree(tips).query(tips, k=2)[0][:, 1]))
+def clump_radius_mm(**look: Any) -> float:
+    """Return the median horizontal distance of tips from the mean tip of their clump [mm]."""
+    hair, tips = head_with(**look).hair, grown(**look)[1][:, -1]
+    assert hair is not None
+    clump = hair.roots.clump[_growing_root_indices(hair, STRAND_COUNT)]
+    _, index, count = np.unique(clump, return_inverse=True, return_counts=True)
+    mean = np.stack([np.bincount(index, tips[:, c]) / count for c in (0, 2)], axis=1)
+    distance = np.linalg.norm(tips[:, [0, 2]] - mean[index], axis=1)
+    return float(np.median(distance[count[index] > 3]))
 
 
 def test_clumps_gather_strands_and_frizz_and_flyaways_scatter_them() -> None:
     style = {"style": "bob", "curl": 0.0, "frizz_mm": 0.0}
     large = style | {"clump_mm": 16.0}
-    assert tip_spacing(**large, clump=0.9) < 0.8 * tip_spacing(**large, clump=0.0)
+    assert clump_radius_mm(**large, clump=0.9) < 0.7 * clump_radius_mm(**large, clump=0.0)
     calm, frizzy = (grown(style="bob", curl=0.0, frizz_mm=f)[1][:, -1] for f in (0.0, 2.0))
     moved = np.linalg.norm(frizzy - calm, axis=1)
     assert 0.5 < np.median(moved) < 5.0

@@ -436,7 +436,8 @@ def _strand_absorption(
     place : (n, 4) rows of `StrandRoots.place`
     length_mm : (n,) lengths of the strands [mm]
     """
-    temple = _smoothstep(*_TEMPLE_HEIGHTS_MM, place[:, 1]) * _smoothstep(*_TEMPLE_DEGREES, place[:, 0])
+    angle, height = place[:, :2].astype(np.float64).T
+    temple = _smoothstep(*_TEMPLE_HEIGHTS_MM, height) * _smoothstep(*_TEMPLE_DEGREES, angle)
     greyed = hair_parameters["grey"] + hair_parameters["temple_grey"] * hair_parameters["hairline"] * temple
     white = (
         sum(_uniform_random(strand_seed, 20 + k) < greyed for k in range(_HAIRS_SAMPLED_PER_STRAND))

@@ -162,7 +162,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     rgb *= mix(vec3f(1.0), VEIN_COLOUR, veins());
     let bristles = 0.6 + 0.4 * dotted[DOT_STUBBLE];
     let beard = 0.55 * paint.beard * saturate(zone_of(ZONE_BEARD)) * (1.0 - lip) * (0.45 + 0.9 * dotted[DOT_STUBBLE]);
-    rgb = over(rgb, paint.stubble_colour, paint.stubble * scalp * bristles);
+    rgb = mix(rgb, paint.stubble_colour, paint.stubble * scalp * bristles);
     rgb = over(rgb, BEARD_COLOUR, beard);
     let wet = max(mucosa, 1.0 - smoothstep(0.2, 1.2, spot.fields.z));
     rgb = mix(rgb, INNER_LID * (1.0 + 0.15 * noise[NOISE_BLOTCHES]), 0.85 * inner);
