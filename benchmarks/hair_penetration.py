@@ -39,9 +39,7 @@ def main(
         ]
         share = 100.0 * sum(one.inside for one in found) / max(1, sum(one.knots for one in found))
         deepest = max(one.deepest_mm for one in found)
-        print_lines(
-            [f"{name:16} {share:7.3f} % of knots deeper than {LIMIT_MM} mm, deepest {deepest:.1f} mm"]
-        )
+        print_lines(f"{name:16} {share:7.3f} % of knots deeper than {LIMIT_MM} mm, deepest {deepest:.1f} mm")
 
 
 if __name__ == "__main__":

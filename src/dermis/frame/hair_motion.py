@@ -18,11 +18,11 @@ class HairFrame(NamedTuple):
     """Frame of an animation in which hair swings.
 
     motion : motion of the hair
-    index : index of the frame
+    frame_index : index of the frame
     """
 
     motion: HairMotion
-    index: int
+    frame_index: int
 
 
 class HairMotion:

@@ -147,7 +147,7 @@ class Renderer:
         readback = read_back(self.graph, inputs.resources.post.picture) if read_back else None
         frame, self._latest = self.graph.submit(timed), None
         if swing and hair_frame:
-            hair_frame.motion.mark_done(swing.buffers, hair_frame.index)
+            hair_frame.motion.mark_done(swing.buffers, hair_frame.frame_index)
         return frame, readback
 
     def _limit_frames_in_flight(self, frame: CommandList) -> None:

@@ -92,7 +92,7 @@ def dense_hair_reflectance(absorption: ArrayLike, radius_mm: float = _REFERENCE_
     """
     offsets = (np.arange(FIBRE_SAMPLE_COUNT) + 0.5) * 2 / FIBRE_SAMPLE_COUNT - 1
     depth = np.asarray(absorption, float) * radius_mm
-    albedo = np.mean([sum(lobe_fractions(0.0, depth, h)) for h in offsets], axis=0)
+    albedo = np.mean([np.sum(lobe_fractions(0.0, depth, h), axis=0) for h in offsets], axis=0)
     root = np.sqrt(np.maximum(1.0 - albedo, 0.0))
     return np.asarray((1.0 - root) / (1.0 + root))
 

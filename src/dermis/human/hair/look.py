@@ -255,7 +255,7 @@ def sample_recession(rng: np.random.Generator, demographics: Demographics) -> fl
     return float(np.clip(man * rng.beta(1.2, 1.8) * (0.15 + 1.1 * old), 0.0, 1.0))
 
 
-def scalp_shadow(hair: HairLook, shaved: float) -> dict[str, float]:
+def scalp_shadow(hair: HairLook, shaved: float) -> dict[str, Any]:
     """Return the fields of `SkinLook` that describe the shadow of the hair of the head in the scalp.
 
     shaved : strength of the shadow of shaved hair, 0 to 1; below hair that is worn, the density counts

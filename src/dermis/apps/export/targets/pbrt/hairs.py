@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dermis.apps.export.hair_curves import CurveGroup
-from dermis.apps.export.targets.pbrt.scene import Lines, format_directive
+from dermis.apps.export.targets.pbrt.scene import DirectiveParameters, Lines, format_directive
 from dermis.apps.truths.person.shapes import (
     AZIMUTHAL_ROUGHNESS,
     CUTICLE_TILT_DEGREES,
@@ -21,7 +21,7 @@ def hair_directives(curve_group: CurveGroup) -> Lines:
     pbrt's unit of length in the material is the radius of a fibre. The width of a curve varies linearly
     from its root to its tip.
     """
-    material = {
+    material: DirectiveParameters = {
         "rgb sigma_a": curve_group.optical_depth,
         "float eta": KERATIN_IOR,
         "float beta_m": LONGITUDINAL_ROUGHNESS,
