@@ -80,10 +80,10 @@ def simulated(renderer: Renderer, scene: Scene, motion: HairMotion) -> Simulated
         renderer.graph.begin()
         draw_swing_step(renderer.graph, inputs, step)
         renderer.graph.submit()
-    motion.mark_done(inputs.swing.buffers, frame.index)
+    motion.mark_done(inputs.swing.buffers, frame.frame_index)
     groom = inputs.resources.hair.tables.groom
     assert groom is not None
-    buffers, now = inputs.swing.buffers, frame.index % 2
+    buffers, now = inputs.swing.buffers, frame.frame_index % 2
 
     def read(buffer: object, *shape: int) -> Doubles:
         raw = renderer.device.handle.queue.read_buffer(buffer)
