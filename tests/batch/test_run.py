@@ -70,9 +70,9 @@ def test_sets_of_another_generator_are_not_continued(
     small_spec: Spec, undisturbed: Files, tmp_path: Path
 ) -> None:
     put(undisturbed, tmp_path)
-    assert "generator = 4" in small_spec.to_toml()
-    (tmp_path / "spec.toml").write_text(small_spec.to_toml().replace("generator = 4\n", ""))
-    with pytest.raises(DermisError, match=r"of generator number 4, but it was made with number 1"):
+    assert "generator = 5" in small_spec.to_toml()
+    (tmp_path / "spec.toml").write_text(small_spec.to_toml().replace("generator = 5\n", ""))
+    with pytest.raises(DermisError, match=r"of generator number 5, but it was made with number 1"):
         drawn(small_spec, tmp_path)
     assert b"generator" not in contents(tmp_path)["spec.toml"], "the folder is as it was"
 
