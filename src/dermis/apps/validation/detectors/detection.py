@@ -34,5 +34,5 @@ class Detector(Protocol):
     normaliser: tuple[str, str]
 
     def detect(self, picture: Bytes) -> Detection | None:
-        """Return the face in a picture (h, w, 3), None if there is none."""
+        """Return the most prominent face in a picture (h, w, 3); None if no face is found."""
         ...
