@@ -19,7 +19,7 @@ _PictureSide = Annotated[int, Field(ge=1, le=16384), BoundsReason("pixels: what 
 _MAX_SAMPLES_PER_PIXEL = 64
 MAX_SAMPLE_COUNT = 2**27
 METERED_EXPOSURES = "auto", "skin"
-"""Words for exposures that are metered in the picture."""
+"""Values of `exposure` for which the exposure is metered in the picture."""
 _HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 
 
