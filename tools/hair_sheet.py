@@ -17,9 +17,9 @@ from dermis.scene import Scene, Settings, load_lights
 from dermis.scene.settings import PHOTOGRAPHIC_SETTINGS
 
 TEXTURES = {"straight": 0.0, "wavy": 0.35, "coiled": 0.9}
-"""Name of a hair texture -> `HairLook.curl`."""
+"""Values of `HairLook.curl` by name of a hair texture."""
 TONES = {"dark": (5.0, 0.3), "blond": (0.35, 0.4)}
-"""Name of a hair colour -> eumelanin and pheomelanin."""
+"""Eumelanin and pheomelanin by name of a hair colour."""
 RIGS = "studio", "rim"
 ALL_STYLES = (*HAIR_STYLES[1:], *(f"beard-{name}" for name in BEARD_STYLES[1:]))
 SIDE_VIEW_STYLES = "ponytail", "bun", "cornrows"

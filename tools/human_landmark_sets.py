@@ -34,12 +34,13 @@ _OVAL_CM = {
     "378": (3.211, -8.533, 2.802), "400": (2.309, -8.974, 3.609), "377": (1.293, -9.296, 4.094),
 }  # fmt: skip
 _MOUTH_CORNER_CM, _INNER_CORNER_CM = 2.456, 2.153  # x of 291 and 308
-_INNER_UPPER_CM = {"415": 1.845, "310": 1.469, "311": 1.024, "312": 0.533, "13": 0.0}  # x
+_INNER_UPPER_CM = {"415": 1.845, "310": 1.469, "311": 1.024, "312": 0.533, "13": 0.0}  # x by name
 _INNER_LOWER_CM = {"324": 1.827, "318": 1.537, "402": 1.099, "317": 0.583, "14": 0.0}
 _UPPER_BROW_SHARES = 0.0, 0.315, 0.599, 0.829, 1.0  # x of 336, 296, 334, 293, 300, from the inner end
-_LOWER_BROW_SHARES = 0.0, 0.289, 0.541, 0.738, 0.892  # 285, 295, 282, 283, 276
+_LOWER_BROW_SHARES = 0.0, 0.289, 0.541, 0.738, 0.892  # x of 285, 295, 282, 283, 276, from the inner end
 _NOSE_SHARES = 0.0, 0.214, 0.413, 0.592, 0.778, 1.0  # y of 168, 6, 197, 195, 5, 4, from the first to the last
-_MODEL_NASION_Y, _BELOW_TIP_Y, _MODEL_WING = 4.2, -40.9, (12.8, -45.0)  # 168, 1 and 327 on the average human
+# Landmarks 168, 1 and 327 on the average human [mm].
+_MODEL_NASION_Y, _BELOW_TIP_Y, _MODEL_WING = 4.2, -40.9, (12.8, -45.0)
 # Silhouette: inner ends of the lines of candidates, which start at the outline of the face; x, y [mm]
 _INNER_END_MM = [(47.0, -4.0), (30.0, -21.0), (24.0, -42.0), (27.0, -60.0), (22.0, -76.0), (16.0, -88.0),
                  (12.0, -96.0), (7.0, -101.0)]  # fmt: skip
@@ -119,13 +120,13 @@ def _on_inner_lip(surface: Surface, upper: bool, share: float) -> int:
 
 
 def _at_x(path: Doubles, x: float) -> Doubles:
-    """Return the point (3,) of a path at a distance from the middle of the face [mm]."""
+    """Return the point (3,) of a path at a distance x from the middle of the face [mm]."""
     order = np.argsort(path[:, 0])
     return np.array([np.interp(x, path[order, 0], column) for column in path[order].T])
 
 
 def silhouette(surface: Surface) -> list[tuple[str, Anchor]]:
-    """Return the landmarks of iBUG with several candidates for each point of the outline.
+    """Return the names and anchors of iBUG's landmarks, with several candidates for each outline point.
 
     The candidates lie on a line that runs from the outline inwards over the cheek. The one that is farthest
     outwards in the picture is the point of the visible contour.

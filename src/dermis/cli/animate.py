@@ -44,7 +44,7 @@ class _AnimatedScene:
     clip : motion of the head
     rate : frame rate of the animation [1/s]
     first : number of the first frame, at which automatic exposure is metered and hair is at rest
-    hair_motion : whether hair swings
+    hair_motion : whether to simulate the swing of long hair
     """
 
     scene: Scene

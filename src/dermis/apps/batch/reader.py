@@ -292,10 +292,7 @@ def record_fields(record: Record, error_subject: object) -> ImageFields:
 def _decode_pose(record: Record) -> ImageFields:
     """Return the arrays of camera, head pose, gaze and boxes in a record."""
     camera, gaze = record["camera"], record["gaze"]
-    errors, boxes = (
-        record.get("gaze_error_deg"),
-        record.get("boxes"),
-    )  # may be missing in old data sets
+    errors, boxes = record.get("gaze_error_deg"), record.get("boxes")  # missing in old data sets
     K, R, t = _to_array(camera["K"], (3, 3)), _to_array(camera["R"], (3, 3)), _to_array(camera["t"], (3,))
     return {
         "camera": OpenCvCamera(K, R, t),

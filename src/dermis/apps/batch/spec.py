@@ -306,11 +306,7 @@ def _build_model(model_class: type[P], table_name: str, toml_table: object) -> P
     try:
         return model_class(**values)
     except InvalidFieldsError as error:
-        if set(error.messages) <= {
-            "size",
-            "size.0",
-            "size.1",
-        }:  # keys above all tables, not in [render]
+        if set(error.messages) <= {"size", "size.0", "size.1"}:  # above all tables, not in [render]
             table_name = "spec"
         raise InvalidFieldsError(table_name or "spec", error.messages) from None
 

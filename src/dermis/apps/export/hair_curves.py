@@ -16,8 +16,8 @@ from dermis.mesh.strands import Strands
 MAX_CURVES = 16_000
 """Largest number of curves of scalp hair and beard; larger numbers of hairs become fewer, wider curves."""
 HAIR_LIMITATIONS = (
-    f"Hair consists of at most {MAX_CURVES:,} curves in the rest pose; curves are wider if a head has more "
-    "hairs. Colours are averaged in 12 groups."
+    f"Scalp hair and beard are at most {MAX_CURVES:,} curves in the rest pose, which are wider if a head has "
+    "more hairs. The absorption of hairs is averaged in groups."
 )
 """Sentences about hair in `limitations` of export targets that write curves."""
 

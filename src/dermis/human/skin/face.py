@@ -43,7 +43,7 @@ _FOLD_SAMPLES_PER_SEGMENT = 4
 _MAX_CACHED_TABLES = 32  # number of results that each function caches
 _CROWN_ZONE = "crown"  # zone where hair thins first
 _TEMPLE_RECESSION_MM, _FOREHEAD_RECESSION_MM = 22.0, 16.0  # maximum recession of the hairline
-_PEAK_MM, _PEAK_WIDTH_DEGREES = 9.0, 8.0  # depth and width of a widow's peak of 1
+_PEAK_MM, _PEAK_WIDTH_DEGREES = 9.0, 8.0  # depth and width of the hairline's peak where `widows_peak` is 1
 _TEMPLE_DEGREES, _TEMPLE_WIDTH_DEGREES, _FOREHEAD_WIDTH_DEGREES = 33.0, 15.0, 38.0  # from the front
 
 
