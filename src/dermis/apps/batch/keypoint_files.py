@@ -71,7 +71,7 @@ def export_keypoints(
     if format not in ("coco", "pts"):
         refuse("format", "coco or pts", f"got {format!r}", "Choose one")
     if target.exists():
-        refuse(target, "a folder that does not exist", "it exists", "Choose another name")
+        refuse(target, "a folder that does not exist", "it exists", "Choose another folder")
     names, counts = _landmark_names(source, landmarks), dict[str, list[dict[str, Any]]]()
     try:
         for picture in _pictures(source, landmarks):

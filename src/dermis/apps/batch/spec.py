@@ -256,14 +256,12 @@ def _refuse_unknown_keys(toml_data: Mapping[str, object]) -> None:
         similar = difflib.get_close_matches(key[:_MAX_KEY_LENGTH], known, 1, _MIN_KEY_SIMILARITY)
         owners = sorted(_tables_with_key(Spec, key))
         if owners:
-            expected, actual = (
-                f"this key in {' or '.join(f'[{name}]' for name in owners)}",
-                "it is above all tables",
-            )
+            expected = f"this key in {' or '.join(f'[{name}]' for name in owners)}"
+            actual, advice = "it is above all tables", "Move it into a table"
         else:
             expected = similar[0] if similar else f"one of {', '.join(known)}"
-            actual = "this name is unknown"
-        refuse(f"spec: {shorten(key, _MAX_KEY_LENGTH)}", expected, actual, "Correct it")
+            actual, advice = "this name is unknown", "Correct the name"
+        refuse(f"spec: {shorten(key, _MAX_KEY_LENGTH)}", expected, actual, advice)
 
 
 def _tables_with_key(model: type[BaseModel], key: str, table_name: str = "") -> Iterator[str]:
