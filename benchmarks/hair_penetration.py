@@ -1,4 +1,4 @@
-"""Count knots of hair that are inside the skin, of sampled people in every hair style.
+"""Count the knots of hair that are inside the skin, for sampled people in every hair style.
 
 `python benchmarks/hair_penetration.py --people 1000` prints a line for each style.
 """
@@ -26,7 +26,7 @@ def main(
     Parameters
     ----------
     people:
-        Number of people, who are seeds from `first` on.
+        Number of people, with consecutive seeds.
     first:
         Seed of the first person.
     style:

@@ -1,9 +1,9 @@
-"""Measure the detail of the skin of a cheek, of the human and of the scan, in identical light.
+"""Measure the detail of the skin of cheeks of two humans and of a scan, in identical light.
 
 A crop of 24 mm of the cheek that faces the window of the light preset "window" is rendered at 0.1 mm per
-pixel, its colours are divided by the colour of the window and scaled to a mean L* of 60, and the standard
-deviations of lightness and of a* in bands of wavelengths are computed in CIELAB. docs/detail.md states the
-figures.
+pixel. Its colours are divided by the colour of the window and scaled to a mean L* of 60. The standard
+deviations of lightness and of a* in bands of spatial wavelengths are computed in CIELAB. docs/detail.md
+states the figures.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ SCAN = "lee_perry_smith"
 HUMANS: dict[str, Human] = {"human": Human(), "human, Caucasian": Human(caucasian=1, asian=0, african=0)}
 CROP_MM, PIXEL_MM = 24.0, 0.1
 MEAN_LIGHTNESS = 60.0
-"""Mean L* to which the exposure of a crop is scaled; the deviations of L* and a* grow with exposure."""
+"""Mean L* to which a crop is scaled, because the standard deviations of L* and a* grow with exposure."""
 BANDS: dict[str, tuple[int, float, float]] = {
     "lightness, 0.4 to 1.6 mm": (0, 0.4, 1.6),
     "lightness, 1.6 to 6.4 mm": (0, 1.6, 6.4),
     "a*, 0.4 to 1.6 mm": (1, 0.4, 1.6),
     "a*, 1.6 to 6.4 mm": (1, 1.6, 6.4),
 }
-"""Channel of CIELAB and limits of the wavelengths of each band [mm]."""
+"""Channel of CIELAB (0 for L*, 1 for a*) and limits of the spatial wavelengths of each band [mm]."""
 COMPARED_BANDS = "lightness, 0.4 to 1.6 mm", "a*, 1.6 to 6.4 mm"
 _LIGHTS = "window"
 _CHEEK_MM, _AZIMUTH_DEGREES, _DISTANCE_MM = (-40.0, -35.0), -20.0, 400.0
@@ -64,7 +64,7 @@ def main(
     crops:
         Folder to which the crops are written as PNG.
     atlas:
-        Side of the atlas, and of the maps that are painted [texel].
+        Side of the atlas and of the painted maps [texel].
     page:
         Write docs/detail.md from the last measurement, and measure nothing.
     """
@@ -82,7 +82,7 @@ def main(
         if crops is not None:
             crops.mkdir(parents=True, exist_ok=True)
             file_name = re.sub(r"\W+", "_", name)
-            write_png(crops / f"{file_name}.png", encode_srgb8(exposed(linear)))
+            write_png(crops / f"{file_name}.png", encode_srgb8(with_mean_lightness(linear)))
     write_results(output, found, 3)
     return 0
 
@@ -104,8 +104,8 @@ def cheek_crop(renderer: Renderer, head: Head, atlas: int) -> Doubles:
     return np.asarray(drawn.astype(float) / (white / luminance(white)))
 
 
-def exposed(linear: Doubles) -> Doubles:
-    """Return colours with an exposure at which their mean L* is `MEAN_LIGHTNESS`."""
+def with_mean_lightness(linear: Doubles) -> Doubles:
+    """Return linear colours, multiplied by a factor such that their mean L* is `MEAN_LIGHTNESS`."""
     factor = 1.0
     for _ in range(20):  # L* + 16 is proportional to the cube root of the exposure
         mean = lab(factor * linear)[..., 0].mean()
@@ -114,15 +114,15 @@ def exposed(linear: Doubles) -> Doubles:
 
 
 def crop_figures(linear: Doubles) -> JsonObject:
-    """Return hue [degrees], chroma, and the standard deviation of each band of a crop of linear colours."""
-    colours = lab(exposed(linear))
+    """Return hue [degrees], chroma, and the standard deviation in each band, of a crop of linear colours."""
+    colours = lab(with_mean_lightness(linear))
     a, b = colours[..., 1].mean(), colours[..., 2].mean()
     bands = {name: band_deviation(colours[..., one], low, high) for name, (one, low, high) in BANDS.items()}
     return {"hue": float(np.degrees(np.arctan2(b, a))), "chroma": float(np.hypot(a, b)), **bands}
 
 
 def band_deviation(channel: Doubles, shortest_mm: float, longest_mm: float) -> float:
-    """Return the standard deviation of a channel (n, n) in a band of wavelengths.
+    """Return the standard deviation of a channel (n, n) in a band of spatial wavelengths.
 
     A quadratic trend, which is shading by the shape of the face, is subtracted, and a Hann window avoids the
     jump between opposite sides.

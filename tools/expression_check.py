@@ -1,4 +1,4 @@
-"""Compare expressions of sampled people with a network that recognises expressions, and print the matrix.
+"""Count how often a network recognises the expressions of sampled people, and print the confusion matrix.
 
 NODE_MODULES is the folder filled by `npm install @vladmandic/face-api @tensorflow/tfjs
 @tensorflow/tfjs-backend-wasm`; node runs the networks.
@@ -40,8 +40,8 @@ NO_FACE = "no face"
 Picture = NDArray[np.uint8]
 
 
-def portraits(renderer: Renderer, seed: int, names: Iterable[str], side: int) -> list[Picture]:
-    """Return pictures (side, side, 3) of a sampled person from the front with named expressions."""
+def render_portraits(renderer: Renderer, seed: int, names: Iterable[str], side: int) -> list[Picture]:
+    """Render pictures (side, side, 3) of a sampled person from the front, one for each named expression."""
     person = Human.sampled(seed)
     head, camera = person.head(), Camera(position=(0, 0, 1400), target=(0, -5, 0), frame_mm=250)
     settings = Settings(size=(side, side), atlas=512, **PHOTOGRAPHIC_SETTINGS)
@@ -52,8 +52,8 @@ def portraits(renderer: Renderer, seed: int, names: Iterable[str], side: int) ->
     return [renderer.draw(scene, settings).srgb8() for scene in scenes]
 
 
-def recognised(node_modules: Path, pictures: Sequence[Picture]) -> list[str]:
-    """Return the most probable expression of the face in each picture, in the words of the network."""
+def recognised_expressions(node_modules: Path, pictures: Sequence[Picture]) -> list[str]:
+    """Return the most probable expression in each picture, as named by the network, or `NO_FACE`."""
     with tempfile.TemporaryDirectory() as folder:
         listed = []
         for number, picture in enumerate(pictures):
@@ -67,12 +67,12 @@ def recognised(node_modules: Path, pictures: Sequence[Picture]) -> list[str]:
 
 
 def main(node_modules: Path, *, people: int = 10, side: int = 256, adapter: str = "auto") -> None:
-    """Render seven expressions of people, and print how often the network recognises each as which.
+    """Render seven expressions of people, and print the confusion matrix of the network.
 
     Parameters
     ----------
     node_modules:
-        Folder with the packages of npm.
+        Folder with the npm packages.
     people:
         Number of people, with seeds from 0.
     side:
@@ -80,7 +80,7 @@ def main(node_modules: Path, *, people: int = 10, side: int = 256, adapter: str 
     """
     renderer, counts = Renderer(adapter), Counter[tuple[str, str]]()
     for seed in range(people):
-        words = recognised(node_modules, portraits(renderer, seed, EMOTIONS, side))
+        words = recognised_expressions(node_modules, render_portraits(renderer, seed, EMOTIONS, side))
         counts.update(zip(EMOTIONS, words, strict=True))
     columns = [*EMOTIONS.values(), NO_FACE]
     sys.stdout.write(" ".join([f"{'':9}", *(f"{column:>9}" for column in columns)]) + "\n")

@@ -2,8 +2,8 @@
 //
 // node face_expressions.mjs NODE_MODULES < pictures.json
 //
-// pictures.json: a list of {"path", "width", "height"}; each file holds 8-bit RGB. Prints, for each picture, null without
-// a face, or {"score", "expressions"} of the face with the highest score.
+// pictures.json: a list of {"path", "width", "height"}; each file contains 8-bit RGB. Prints a list with an entry
+// for each picture: {"score", "expressions"} of the face with the highest score, or null if no face is found.
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { resolve } from "node:path";

@@ -1,4 +1,4 @@
-"""Render contact sheets of all hair styles and beards: three textures, two tones and two lights each."""
+"""Render a contact sheet for each hair style and beard: three textures, two tones and two lights."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from dermis.scene import Scene, Settings, load_lights
 from dermis.scene.settings import PHOTOGRAPHIC_SETTINGS
 
 TEXTURES = {"straight": 0.0, "wavy": 0.35, "coiled": 0.9}
-"""Name of a hair texture -> `HairLook.curl`."""
+"""Values of `HairLook.curl` by name of a hair texture."""
 TONES = {"dark": (5.0, 0.3), "blond": (0.35, 0.4)}
-"""Name of a hair colour -> eumelanin and pheomelanin."""
+"""Eumelanin and pheomelanin by name of a hair colour."""
 RIGS = "studio", "rim"
 ALL_STYLES = (*HAIR_STYLES[1:], *(f"beard-{name}" for name in BEARD_STYLES[1:]))
-SEEN_FROM_THE_SIDE = "ponytail", "bun", "cornrows"
+SIDE_VIEW_STYLES = "ponytail", "bun", "cornrows"
 _ANCESTRIES = "african", "asian", "caucasian"
 _ANCESTRY_BY_TEXTURE = {"straight": "asian", "wavy": "caucasian", "coiled": "african"}
 
 
-def panels(
+def picture_column(
     renderer: Renderer, look: dermis.HairLook, texture: str, camera: str, side: int
 ) -> NDArray[np.uint8]:
-    """Return the pictures of one person in all lights, one above the other.
+    """Render a person in all lights, and return the pictures (n, side, 3), one above the other.
 
     look : hair of the person
     texture : name of the hair's texture, which selects the ancestry
@@ -58,7 +58,7 @@ def main(
     tones: str = "",
     adapter: str = "auto",
 ) -> None:
-    """Write one sheet for each style: a column for each texture and tone, a row for each light.
+    """Write a sheet for each style, with a column for each texture and tone, and a row for each light.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def main(
     side:
         Side of each picture [pixel].
     styles:
-        Names of styles of hair, or "beard-" and a style of beards, separated by commas; all by default.
+        Names of hair styles, or "beard-" and the name of a beard style, separated by commas; all by default.
     textures:
         Names of textures, separated by commas; all by default.
     tones:
@@ -89,8 +89,8 @@ def main(
                     eumelanin=eumelanin,
                     pheomelanin=pheomelanin,
                 )
-                camera = "side" if name in SEEN_FROM_THE_SIDE else "three-quarter"
-                columns.append(panels(renderer, look, texture, camera, side))
+                camera = "side" if name in SIDE_VIEW_STYLES else "three-quarter"
+                columns.append(picture_column(renderer, look, texture, camera, side))
         sheet = Image.fromarray(np.concatenate(columns, axis=1))
         sheet.save(output / f"{name}.webp", quality=85)
 

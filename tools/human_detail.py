@@ -1,6 +1,6 @@
 """Make src/dermis/human/data/detail.png: tiles of skin with pores, and with fine lines and follicles.
 
-Both tiles are drawn for a tension line along +u. Shaders turn them to the tension lines of each site.
+Both tiles are for tension lines along +u. Shaders rotate them to the tension lines of each site.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ Doubles = NDArray[np.float64]
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "detail.png"
 # Artist's values. Follicles: about 2 to 4 per square millimetre of face.
-PORES_A_SIDE, FOLLICLES_A_SIDE = 34, 58
+PORES_PER_SIDE, FOLLICLES_PER_SIDE = 34, 58
 PORE_MM, PORE_DEPTH_MM = (0.055, 0.20), (0.03, 0.105)
 """Radius and depth of the smallest and the largest pore [mm]."""
 FOLLICLE_MM, FOLLICLE_DEPTH_MM = (0.04, 0.075), (0.010, 0.03)
 COARSE_CELLS, FINE_CELLS = (24, 46), (56, 104)
-"""Cells of the coarse and the fine net of lines along a tension line and across."""
+"""Number of cells of the coarse and of the fine net of lines, along the tension lines and across them."""
 LINE_MM, LINE_DEPTH_MM = 0.085, 0.046
-"""Half width and depth of the deepest lines, which follow the tension."""
+"""Half width and depth of the deepest lines, which follow the tension lines [mm]."""
 CROSS_LINE_DEPTH = 0.45
-"""Depth of lines across the tension relative to those along it."""
+"""Depth of lines across the tension lines, relative to lines along them [-]."""
 MISSING_LINES = 0.3
-"""Fraction of the lines between cells that are missing."""
+"""Fraction of the borders between cells that have no line [-]."""
 CELL_MM = 0.012
-"""Height by which cells differ from each other."""
+"""Range of the random heights of cells [mm]."""
 FINE_FRACTION = 0.55  # height of the fine net relative to the coarse net
 BUMP_MM = 0.007
-"""Standard deviation of soft bumps."""
+"""Standard deviation of the height of soft bumps [mm]."""
 WARP_MM = 0.22
-"""Displacement of the nets, so that lines are not straight."""
-TURN_RADIANS = 0.4
-"""Standard deviation of the direction of long pores."""
+"""Standard deviation of the displacement of the nets, which makes lines uneven [mm]."""
+PIT_TURN_RADIANS = 0.4
+"""Standard deviation of the angle between elongated pits and the tension lines [rad]."""
 BLUR_TEXELS = 0.5
 """Standard deviation of the final blur [texels]."""
 
@@ -52,8 +52,8 @@ def main() -> None:
     rng = np.random.default_rng(0)
     across = (np.arange(TILE_SIDE) + 0.5) * TILE_LENGTH_MM / TILE_SIDE
     positions = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
-    pores = pits(positions, PORES_A_SIDE, PORE_MM, PORE_DEPTH_MM, rng)
-    fine = pits(positions, FOLLICLES_A_SIDE, FOLLICLE_MM, FOLLICLE_DEPTH_MM, rng)
+    pores = pits(positions, PORES_PER_SIDE, PORE_MM, PORE_DEPTH_MM, rng)
+    fine = pits(positions, FOLLICLES_PER_SIDE, FOLLICLE_MM, FOLLICLE_DEPTH_MM, rng)
     layers = [pores, fine + lines(positions, rng), np.zeros(len(positions))]
     heights = gaussian_filter(
         np.stack(layers, axis=-1).reshape(TILE_SIDE, TILE_SIDE, 3), (BLUR_TEXELS, BLUR_TEXELS, 0), mode="wrap"
@@ -79,16 +79,16 @@ def pits(
     depths_mm: tuple[float, float],
     rng: np.random.Generator,
 ) -> Doubles:
-    """Return the (n,) height of skin with pits of several sizes, most of them long along the tension [mm].
+    """Return the (n,) height of skin with pits of several sizes, elongated along the tension lines [mm].
 
     count : number of pits per side of the tile
-    radii_mm, depths_mm : of the smallest and the largest pit
+    radii_mm, depths_mm : radius and depth of the smallest and the largest pit
     """
     middle, _ = jittered_grid(count, count, rng)
-    share = rng.random(len(middle)) ** 1.8  # few are large
+    share = rng.random(len(middle)) ** 1.8  # few pits are large
     radius, depth = (low + share * (high - low) for low, high in (radii_mm, depths_mm))
     depth *= (rng.random(len(middle)) < 0.88) * rng.uniform(0.55, 1.0, len(middle))
-    turn, long = TURN_RADIANS * rng.normal(size=len(middle)), rng.uniform(1.0, 1.8, len(middle))
+    turn, long = PIT_TURN_RADIANS * rng.normal(size=len(middle)), rng.uniform(1.0, 1.8, len(middle))
     _, near = nearest(positions, middle, 3)
     height = np.zeros(len(positions))
     for which in near.T:
@@ -109,15 +109,15 @@ def lines(positions: Doubles, rng: np.random.Generator) -> Doubles:
 
 
 def smooth_noise(deviation: float, texels: float, rng: np.random.Generator) -> Doubles:
-    """Return periodic noise (n,) with the given standard deviation, smooth over a number of texels."""
+    """Return periodic noise (n,) with a standard deviation, smoothed by a Gaussian of a width in texels."""
     noise = gaussian_filter(rng.normal(size=(TILE_SIDE, TILE_SIDE)), texels, mode="wrap")
     return np.asarray((deviation / noise.std() * noise).ravel())
 
 
 def net(positions: Doubles, cells: tuple[int, int], width: float, rng: np.random.Generator) -> Doubles:
-    """Return the (n,) height of a net of lines between cells that are longer along the tension [mm].
+    """Return the (n,) height of a net of lines between cells that are elongated along the tension lines [mm].
 
-    cells : number of cells along the tension and across
+    cells : number of cells along the tension lines and across them
     width : width of the lines relative to `LINE_MM`
     """
     middle, size = jittered_grid(*cells, rng, 0.9)
@@ -125,13 +125,13 @@ def net(positions: Doubles, cells: tuple[int, int], width: float, rng: np.random
     distance, near = nearest(positions * stretch, middle * stretch, 2, TILE_LENGTH_MM * stretch)
     between = wrapped(middle[near[:, 1]] - middle[near[:, 0]])
     between /= np.linalg.norm(between, axis=1, keepdims=True)
-    along = np.abs(between[:, 1]) ** 2  # 1 for a line along the tension
+    along = np.abs(between[:, 1]) ** 2  # 1 for a line along the tension lines
     pair = np.sort(near, axis=1) @ np.array([7919, 104729]) % 8191
     uneven = rng.random(8191)[pair]
     depth = LINE_DEPTH_MM * np.clip((uneven - MISSING_LINES) / (1.0 - MISSING_LINES), 0.0, 1.0) ** 0.7
     depth *= CROSS_LINE_DEPTH + (1.0 - CROSS_LINE_DEPTH) * along
     gap = distance[:, 1] - distance[:, 0]
-    rise = 1.0 - np.exp(-((gap / (2.0 * width * LINE_MM)) ** 2))  # cells differ in height, without steps
+    rise = 1.0 - np.exp(-((gap / (2.0 * width * LINE_MM)) ** 2))  # 0 at borders, to avoid steps
     level = CELL_MM * (rng.random(len(middle)) - 0.5)[near[:, 0]]
     return np.asarray(rise * level - depth * np.exp(-((gap / (width * LINE_MM)) ** 2)))
 

@@ -19,9 +19,10 @@ _NASION_Y, _TIP_Y, _SUBNASALE_Y = 0.2, -36.3, -47.6  # on the average human [mm]
 # x, y on the front plane [mm]
 _WING, _NOSTRIL, _ALA = (14.6, -42.6), (8.0, -46.2), (17.6, -37.5)
 _BROW_EDGE = 0.9  # across the brow: just inside its upper edge
-# Positions in MediaPipe's canonical face model (canonical_face_model.obj, Apache-2.0) [cm], and where its
-# outer corner of the eye lies on the average human, with the ratio of both sizes [mm/cm], from the width
-# between these corners, the height from them to the chin, and the depth of chin and forehead.
+# Positions in MediaPipe's canonical face model (canonical_face_model.obj, Apache-2.0) [cm]. The outer corner
+# of the left eye of the model is mapped to that of the average human [mm], with a scale for each axis
+# [mm/cm]: from the distance of these corners, their height above the chin, and the depths of chin and
+# forehead.
 _EYE_CORNER_CM, _EYE_CORNER_MM = np.array([4.446, 2.664, 3.173]), np.array([40.5, -1.1, 7.3])
 _MODEL_SCALE = np.array([9.11, 8.76, 9.0])
 _OVAL_CM = {
@@ -33,19 +34,14 @@ _OVAL_CM = {
     "378": (3.211, -8.533, 2.802), "400": (2.309, -8.974, 3.609), "377": (1.293, -9.296, 4.094),
 }  # fmt: skip
 _MOUTH_CORNER_CM, _INNER_CORNER_CM = 2.456, 2.153  # x of 291 and 308
-_INNER_UPPER_CM = {"415": 1.845, "310": 1.469, "311": 1.024, "312": 0.533, "13": 0.0}  # x
+_INNER_UPPER_CM = {"415": 1.845, "310": 1.469, "311": 1.024, "312": 0.533, "13": 0.0}  # x by name
 _INNER_LOWER_CM = {"324": 1.827, "318": 1.537, "402": 1.099, "317": 0.583, "14": 0.0}
-_UPPER_BROW_SHARES = (
-    0.0,
-    0.315,
-    0.599,
-    0.829,
-    1.0,
-)  # x of 336, 296, 334, 293, 300 from inside
-_LOWER_BROW_SHARES = 0.0, 0.289, 0.541, 0.738, 0.892  # 285, 295, 282, 283, 276
-_NOSE_SHARES = 0.0, 0.214, 0.413, 0.592, 0.778, 1.0  # y of 168, 6, 197, 195, 5, 4 from the first to the last
-_MODEL_NASION_Y, _BELOW_TIP_Y, _MODEL_WING = 4.2, -40.9, (12.8, -45.0)  # 168, 1 and 327 on the average human
-# Silhouette: inner ends of the lines of candidates, which run inwards from the outline of the face [mm]
+_UPPER_BROW_SHARES = 0.0, 0.315, 0.599, 0.829, 1.0  # x of 336, 296, 334, 293, 300, from the inner end
+_LOWER_BROW_SHARES = 0.0, 0.289, 0.541, 0.738, 0.892  # x of 285, 295, 282, 283, 276, from the inner end
+_NOSE_SHARES = 0.0, 0.214, 0.413, 0.592, 0.778, 1.0  # y of 168, 6, 197, 195, 5, 4, from the first to the last
+# Landmarks 168, 1 and 327 on the average human [mm].
+_MODEL_NASION_Y, _BELOW_TIP_Y, _MODEL_WING = 4.2, -40.9, (12.8, -45.0)
+# Silhouette: inner ends of the lines of candidates, which start at the outline of the face; x, y [mm]
 _INNER_END_MM = [(47.0, -4.0), (30.0, -21.0), (24.0, -42.0), (27.0, -60.0), (22.0, -76.0), (16.0, -88.0),
                  (12.0, -96.0), (7.0, -101.0)]  # fmt: skip
 _CANDIDATES = 12
@@ -107,7 +103,7 @@ def _lips(surface: Surface) -> dict[str, int]:
     found = {name: surface.nearest(place) for name, place in wanted.items()}
     found |= {"lips": surface.mouth_corner()}
     found |= {"in corner": _on_inner_lip(surface, True, _INNER_CORNER_CM / _MOUTH_CORNER_CM)}
-    peak_share = float(upper[peak, 0] / upper[0, 0])  # the inner points lie below and above the peaks
+    peak_share = float(upper[peak, 0] / upper[0, 0])  # inner points are in line with the peaks
     for word, up in (("up", True), ("low", False)):
         found[f"in {word}"] = _on_inner_lip(surface, up, peak_share)
         found[f"in {word} middle"] = _on_inner_lip(surface, up, 0.0)
@@ -117,20 +113,20 @@ def _lips(surface: Surface) -> dict[str, int]:
 def _on_inner_lip(surface: Surface, upper: bool, share: float) -> int:
     """Return the index of the candidate on the inner edge of a lip.
 
-    share : distance from the middle, as a fraction of that of the corner
+    share : distance from the middle, as a fraction of the distance of the corner
     """
     inner = surface.inner_lip(upper)
     return surface.on_inner_lip(_at_x(inner, share * float(inner[0, 0])), upper)
 
 
 def _at_x(path: Doubles, x: float) -> Doubles:
-    """Return the point (3,) of a path at a distance from the middle of the face [mm]."""
+    """Return the point (3,) of a path at a distance x from the middle of the face [mm]."""
     order = np.argsort(path[:, 0])
     return np.array([np.interp(x, path[order, 0], column) for column in path[order].T])
 
 
 def silhouette(surface: Surface) -> list[tuple[str, Anchor]]:
-    """Return the landmarks of iBUG with several candidates for each point of the outline.
+    """Return the names and anchors of iBUG's landmarks, with several candidates for each outline point.
 
     The candidates lie on a line that runs from the outline inwards over the cheek. The one that is farthest
     outwards in the picture is the point of the visible contour.
@@ -169,7 +165,7 @@ def _pairs(left: str, right: str, candidates: list[int]) -> Pairs:
 
 
 def _oval(surface: Surface) -> Pairs:
-    """Return the outline: the nearest points of the face to those of the scaled canonical model."""
+    """Return the outline: the points of the face that are nearest to those of the scaled model."""
     left = "10 338 297 332 284 251 389 356 454 323 361 288 397 365 379 378 400 377"
     right = "10 109 67 103 54 21 162 127 234 93 132 58 172 136 150 149 176 148"
     wanted = {
@@ -190,7 +186,7 @@ def _eye(surface: Surface) -> Pairs:
 
 
 def _brows(surface: Surface) -> Pairs:
-    """Return the brows, at the heights of their edges and at the fractions of their width in the model."""
+    """Return the brows: points on their edges, at the fractions of their width that the model has."""
     upper, lower = surface.brow(_BROW_EDGE), surface.brow(-_BROW_EDGE)
     ends = upper[[0, -1], 0]
     above = [surface.nearest(_at_x(upper, float(ends @ [1 - s, s]))) for s in _UPPER_BROW_SHARES]

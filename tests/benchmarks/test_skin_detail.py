@@ -1,4 +1,4 @@
-"""`benchmarks/skin_detail.py`: deviations in bands of wavelengths, exposure and the page."""
+"""`benchmarks/skin_detail.py`: deviations in bands of spatial wavelengths, exposure and the page."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_figures_do_not_depend_on_the_exposure(detail: Any) -> None:
     dark, bright = (detail.crop_figures(factor * linear) for factor in (0.2, 1.0))
     for name, value in bright.items():
         assert dark[name] == pytest.approx(value, rel=1e-3), name
-    assert lab(detail.exposed(0.2 * linear))[..., 0].mean() == pytest.approx(60.0, abs=0.01)
+    assert lab(detail.with_mean_lightness(0.2 * linear))[..., 0].mean() == pytest.approx(60.0, abs=0.01)
     assert bright["hue"] == pytest.approx(np.degrees(np.arctan2(14.0, 12.0)), abs=0.5)
 
 

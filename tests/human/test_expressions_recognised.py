@@ -25,7 +25,7 @@ def test_network_recognises_clear_expressions() -> None:
     specification.loader.exec_module(tool)
     renderer = Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
     for seed in PEOPLE:
-        pictures = tool.portraits(renderer, seed, tool.EMOTIONS, SIDE)
-        words = tool.recognised(Path(NODE_MODULES), pictures)
+        pictures = tool.render_portraits(renderer, seed, tool.EMOTIONS, SIDE)
+        words = tool.recognised_expressions(Path(NODE_MODULES), pictures)
         found = dict(zip(tool.EMOTIONS, words, strict=True))
         assert {name: found[name] for name in CLEAR} == {name: tool.EMOTIONS[name] for name in CLEAR}

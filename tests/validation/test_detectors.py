@@ -12,7 +12,7 @@ from dermis.apps.validation.detectors import report
 from dermis.apps.validation.detectors.detection import Detection
 from dermis.apps.validation.detectors.dlib_models import Dlib
 from dermis.apps.validation.detectors.mediapipe_models import MediaPipe, _anchors, _Crop
-from dermis.apps.validation.detectors.report import Labelled, compare, report_lines
+from dermis.apps.validation.detectors.report import LabelledPicture, compare, report_lines
 from dermis.base.arrays import Bytes
 from dermis.base.errors import DermisError
 
@@ -41,12 +41,13 @@ def truth() -> dict[str, np.ndarray]:
 
 def test_errors_and_offsets_are_relative_to_the_eyes() -> None:
     places = truth()
-    images = [Labelled(np.full((4, 4, 3), level, np.uint8), {"ibug-68": places}) for level in (255, 0, 9)]
+    images = [
+        LabelledPicture(np.full((4, 4, 3), level, np.uint8), {"ibug-68": places}) for level in (255, 0, 9)
+    ]
     found = compare(Shifted(places), images)
     assert (found.pictures, found.found) == (3, 2)
-    assert found.errors(range(17)) == pytest.approx(0.06) and found.errors(range(60, 68)) == pytest.approx(
-        0.1
-    )
+    assert found.mean_error(range(17)) == pytest.approx(0.06)
+    assert found.mean_error(range(60, 68)) == pytest.approx(0.1)
     offsets = {name: (along, down) for name, along, down in found.mean_offsets()}
     assert offsets["61"] == pytest.approx((0.06, 0.08)) and offsets["3"] == pytest.approx((0.06, 0.0))
     text = "\n".join(report_lines(Shifted(places), found))
@@ -57,7 +58,7 @@ def test_offsets_turn_with_the_face() -> None:
     turned = {name: np.array([300 - place[1], place[0]]) for name, place in truth().items()}
     (along, down) = list(
         compare(
-            Shifted(turned), [Labelled(np.full((4, 4, 3), 9, np.uint8), {"ibug-68": turned})]
+            Shifted(turned), [LabelledPicture(np.full((4, 4, 3), 9, np.uint8), {"ibug-68": turned})]
         ).mean_offsets()
     )[3][1:]
     assert (along, down) == pytest.approx((0.0, -0.06))

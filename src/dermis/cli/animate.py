@@ -44,7 +44,7 @@ class _AnimatedScene:
     clip : motion of the head
     rate : frame rate of the animation [1/s]
     first : number of the first frame, at which automatic exposure is metered and hair is at rest
-    hair_motion : whether hair swings
+    hair_motion : whether to simulate the swing of long hair
     """
 
     scene: Scene
@@ -126,7 +126,8 @@ def animate(
     overwrite:
         Render all numbered images again, including those that exist.
     hair_motion:
-        Swing long hair, from rest at the first frame; otherwise hair follows the head stiffly.
+        Simulate the swing of long hair, which is at rest in the first frame. Otherwise hair moves rigidly
+        with the head.
     names:
         List the morph targets, bones and clips of the head without rendering.
     as_json:
@@ -196,7 +197,7 @@ def _render_frames(
 
 
 def _hair_motion(animated_scene: _AnimatedScene) -> HairMotion | None:
-    """Return the motion of hair from the first frame on; None if the head has no hair that swings."""
+    """Return the motion of hair, at rest in the first frame; None if no hair is to swing."""
     from dermis.frame.hair_motion import MAX_FRAMES_PER_S, HairMotion
 
     if not animated_scene.hair_motion or animated_scene.scene.head.hair is None:
@@ -207,7 +208,7 @@ def _hair_motion(animated_scene: _AnimatedScene) -> HairMotion | None:
 def _rendered_scenes(
     animated_scene: _AnimatedScene, frame_numbers: Sequence[int], motion: HairMotion | None
 ) -> Iterator[Scene]:
-    """Yield the scenes to render, and advance the motion of hair by the frames before and between them."""
+    """Yield the scenes to render, and advance the motion of hair over the frames that are not rendered."""
     if motion is None:
         yield from animated_scene.scenes(frame_numbers)
         return

@@ -146,7 +146,7 @@ def batch(
         with image_progress() as report_progress:
             report = run(work, pool, shards, parts, report_progress)
     except KeyboardInterrupt:
-        print_note(f"note: interrupted; complete parts remain in {output}, and the same command continues")
+        print_note(f"note: interrupted; complete parts remain in {output}. Run the same command to continue")
         raise
     _print_report(report, output, as_json)
     return 0

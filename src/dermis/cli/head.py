@@ -227,7 +227,7 @@ def _look_with_values(look: Look, option_values: list[str] | None, option_name: 
     return replace(look, **numbers)
 
 
-_WORD_FIELDS = "style=", "beard_style="
+_STRING_FIELD_PREFIXES = "style=", "beard_style="
 
 
 def _hair_look_with_values(look: HairLook, option_values: list[str] | None) -> HairLook:
@@ -237,8 +237,8 @@ def _hair_look_with_values(look: HairLook, option_values: list[str] | None) -> H
         `beard_style`, and a number for all other fields
     """
     pairs = [pair for pair in ",".join(option_values or []).split(",") if pair]
-    words: Options = dict(pair.split("=", 1) for pair in pairs if pair.startswith(_WORD_FIELDS))
-    numbers = [pair for pair in pairs if not pair.startswith(_WORD_FIELDS)]
+    words: Options = dict(pair.split("=", 1) for pair in pairs if pair.startswith(_STRING_FIELD_PREFIXES))
+    numbers = [pair for pair in pairs if not pair.startswith(_STRING_FIELD_PREFIXES)]
     if "beard_style" in words and not any(pair.startswith("beard_mm=") for pair in pairs):
         words["beard_mm"] = None  # the usual length of the style
     return replace(_look_with_values(look, numbers, "--hair"), **words)

@@ -150,14 +150,14 @@ def assemble_scene(
 
 
 def default_camera(head_or_scene: str) -> str:
-    """Return the camera preset that commands choose for a head that is named on the command line."""
+    """Return the default camera preset for a head or scene file as named on the command line."""
     from dermis.scene.heads import is_person_name
 
     return "headshot" if is_person_name(head_or_scene) else "portrait"
 
 
 def _is_default_view_of_person(head_or_scene: str, options: SceneOptions) -> bool:
-    """Return whether a person is seen by the default camera, with eyes and bones that no option turns."""
+    """Return whether the default camera shows a person whose eyes and bones no option turns."""
     poses = ",".join(options.pose or ())
     stated = options.camera is not None or options.bone or _GAZE_TARGET_PREFIX in poses
     return not stated and default_camera(head_or_scene) == "headshot"

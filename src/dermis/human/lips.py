@@ -17,20 +17,20 @@ Index = NDArray[np.int64]
 _RINGS = "vermilion lip crest rim contact inner wall"
 _RIM, _CONTACT, _INNER = 3, 4, 5  # columns of lip_rings.csv
 _RING_MOTION = np.array([0.0, 0.15, 0.4, 0.75, 1.0, 1.0, 0.4])
-"""Motion of each ring relative to the ring on which the lips touch [-]."""
+"""Displacement of each ring relative to that of the ring on which the lips touch [-]."""
 _NEIGHBOUR_WEIGHT = 1 / 6
-"""Weight of each of two neighbours in the smooth surface of a row of points [-]."""
+"""Weight of each of the two neighbours of a point when a row of points is smoothed [-]."""
 _OVERLAP_MM, _OVERLAP_TAPER_MM = 0.3, 3.0
-"""Overlap of the smooth lips, as soft lips press on each other, and its decrease towards the corners [mm]."""
+"""Overlap of the smooth lips, and the distance from the corners within which it decreases to 0 [mm]."""
 _VIEW_SLOPE = 0.22
-"""Slope of a view from above or below in which closed lips still hide the mouth [-]."""
+"""Largest slope of views from above or below in which closed lips hide the inside of the mouth [-]."""
 
 
 class _LipPairs(NamedTuple):
     """Points of half of the lips, and the opposite point of each.
 
     rings : (2, r, 7) indices of the points of the left and the right half
-    opposite : (r, r) weights of the points of the contact ring whose mean is opposite to each of them
+    opposite : (r, r) weights of the points of the contact ring; row k gives the point opposite to point k
     upper : (r,) 1 for points of the upper lip, -1 for points of the lower lip, 0 for the corner
     overlap_mm : (r,) overlap of closed lips [mm]
     """
@@ -45,7 +45,7 @@ def close_lips(points_mm: Points) -> Points:
     """Return the points (n, 3) of a person in the rest pose with lips that touch [mm].
 
     Upper and lower lip move towards each other by half of the gap between their smooth surfaces. The rings
-    around the gap follow less with their distance from it. Lips that touch already stay as they are.
+    around the gap follow, less with increasing distance from it. Lips that already touch are unchanged.
     """
     pairs, closed = _lip_pairs(), points_mm.copy()
     for rings in pairs.rings:
@@ -60,7 +60,7 @@ def close_lips(points_mm: Points) -> Points:
 
 
 def _smooth_motion() -> float:
-    """Return the motion of the smooth surface relative to that of the contact ring [-]."""
+    """Return the displacement of the smooth surface relative to that of the contact ring [-]."""
     beside = float(_RING_MOTION[_RIM] + _RING_MOTION[_INNER])
     return 1.0 - 2.0 * _NEIGHBOUR_WEIGHT + _NEIGHBOUR_WEIGHT * beside
 

@@ -19,7 +19,7 @@ from dermis.human.hair.look import (
     HairLook,
     sample_hair,
     sample_recession,
-    scalp_shadow,
+    scalp_shadow_fields,
     stubble_visibility,
     typical_hair,
 )
@@ -239,7 +239,7 @@ def _sample_hair_and_skin(
     hair = replace(hair, **fixed)
     visibility = stubble_visibility(hair)
     beard = visibility * max(skin.beard, _MIN_BEARD_SHADOW if hair.beard_mm else 0.0)
-    skin = replace(skin, **scalp_shadow(hair, skin.stubble), beard=beard, recession=recession)
+    skin = replace(skin, **scalp_shadow_fields(hair, skin.stubble), beard=beard, recession=recession)
     return {"hair": hair, "skin": replace(skin, **fixed_fields.get("skin", {}))}
 
 
@@ -504,7 +504,7 @@ class Human:
         if self.skin is not None:
             return self.skin
         typical, visibility = typical_skin(self._demographics), stubble_visibility(self.hair_look)
-        shadow = scalp_shadow(self.hair_look, typical.stubble)
+        shadow = scalp_shadow_fields(self.hair_look, typical.stubble)
         return replace(typical, **shadow, beard=visibility * typical.beard)
 
     @property

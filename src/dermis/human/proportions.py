@@ -1,4 +1,4 @@
-"""Random proportions of faces that vary more between adults than sampled morph targets of single parts do."""
+"""Random proportions of faces, which vary more among adults than independent morph targets of parts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class _Proportion(NamedTuple):
     """Opposite morph targets that change a proportion of the face.
 
     less, more : names of the targets that together decrease and increase it, with a weight of 1 each
-    spread : standard deviation of the weight [-]
+    spread : standard deviation of the weight before truncation [-]
     """
 
     less: tuple[str, ...]
@@ -24,19 +24,19 @@ class _Proportion(NamedTuple):
 
 
 _PROPORTIONS = (
-    # distance of the inner corners of the eyes: without this its standard deviation within a sex is 1.0 mm;
-    # published: 1.5 to 3.2 mm within groups [Bouhadana2022]
+    # distance of the inner corners of the eyes: without this entry, the standard deviation within a sex is
+    # 1.0 mm; published: 1.5 to 3.2 mm within groups [Bouhadana2022]
     _Proportion(
         ("eyes/l-eye-trans-in", "eyes/r-eye-trans-in"), ("eyes/l-eye-trans-out", "eyes/r-eye-trans-out"), 0.25
     ),
-    # width of the mouth: without this 2.4 mm; published: 3.3 mm (men) and 4.0 mm (women), table 9 of
+    # width of the mouth: without this entry 2.4 mm; published: 3.3 mm (men) and 4.0 mm (women), table 9 of
     # doi 10.1186/s40902-019-0191-7
     _Proportion(("mouth/mouth-scale-horiz-decr",), ("mouth/mouth-scale-horiz-incr",), 0.25),
 )
 
 
 def with_proportions(rng: np.random.Generator, target_weights: Mapping[str, float]) -> dict[str, float]:
-    """Return the weights of morph targets of a person, changed by random proportions of the face.
+    """Return weights of a person's morph targets with randomly changed proportions of the face.
 
     target_weights : weights of the person's morph targets by name [-]
     """

@@ -18,9 +18,9 @@ ANCHORS_PER_GUIDE_KNOT = 4
 """Number of quads that each knot of a guide follows."""
 # Pitch of twists relative to their radius; that of braids is 8, see strands_grow.wgsl.
 _ROPE_PITCH_RATIO = 7.0
-# Shorter wave of frizz, its amplitude relative to `frizz_mm`, the factor of flyaways (see `frizz_offset` in
-# strands_grow.wgsl), and the fraction of flyaways above which they count.
-_FRIZZ_WAVE_MM, _FRIZZ_WAVE_RATIO, _FLYAWAY_RATIO, _COMMON_FLYAWAYS = 31.0, 0.4, 5.0, 0.05
+# Length of the shorter wave of frizz, its amplitude relative to `frizz_mm`, the factor by which flyaways
+# exceed it (see `frizz_offset` in strands_grow.wgsl), and the fraction of flyaways from which they matter.
+_FRIZZ_WAVE_MM, _FRIZZ_WAVE_RATIO, _FLYAWAY_RATIO, _MIN_COUNTED_FLYAWAYS = 31.0, 0.4, 5.0, 0.05
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -117,8 +117,8 @@ class Groom(ShortRepr):
 def bend_radius_mm(hair_parameters: NDArray[np.void]) -> Doubles:
     """Return the least radius of curvature (p,) of curls, twists and frizz of scalp hair and beard [mm].
 
-    A helix of radius r and pitch p has the radius of curvature r + p^2 / (4 pi^2 r), a wave of amplitude a
-    and length w has w^2 / (4 pi^2 a).
+    The radius of curvature is r + p^2 / (4 pi^2 r) for a helix of radius r and pitch p, and at least
+    w^2 / (4 pi^2 a) for a sine wave of amplitude a and wavelength w.
 
     hair_parameters : (p,) rows of `Groom.parameters`
     """
@@ -126,7 +126,7 @@ def bend_radius_mm(hair_parameters: NDArray[np.void]) -> Doubles:
     radius = np.maximum(np.where(rope > 0.0, rope, hair_parameters["curl_mm"]), 1e-3)
     pitch = np.where(rope > 0.0, _ROPE_PITCH_RATIO * rope, hair_parameters["pitch_mm"])
     bend = radius + (pitch / (2.0 * np.pi)) ** 2 / radius
-    flying = hair_parameters["flyaways"] > _COMMON_FLYAWAYS
+    flying = hair_parameters["flyaways"] > _MIN_COUNTED_FLYAWAYS
     frizz = _FRIZZ_WAVE_RATIO * hair_parameters["frizz_mm"] * np.where(flying, _FLYAWAY_RATIO, 1.5)
     waved = (_FRIZZ_WAVE_MM / (2.0 * np.pi)) ** 2 / np.maximum(frizz, 1e-3)
     return np.asarray(np.minimum(bend, waved))

@@ -20,7 +20,9 @@ _SMOOTHING_KNOTS, _SMOOTH_HEIGHTS_MM = 8, (2.0, 18.0)
 _MIN_HEIGHT_ABOVE_SKIN_MM, _RISE_LENGTH_MM = 0.35, 4.0
 # Constants near the hairline, as in strands_grow.wgsl.
 _HAIRLINE_FADE_MM, _SHORT_HAIR_HEIGHTS_MM, _HAIRLINE_NOISE_MM = (-5.0, 7.0), (-4.0, 14.0), 2.0
-_SHORTEST, _THINNEST, _LOOSEST, _LOOSE_HEIGHTS_MM = 0.55, 0.35, 0.25, (0.0, 22.0)
+# Length, thickness and pull into clumps at the hairline, relative to those elsewhere.
+_MIN_HAIRLINE_LENGTH, _MIN_HAIRLINE_THICKNESS, _MIN_HAIRLINE_CLUMPING = 0.55, 0.35, 0.25
+_CLUMPING_HEIGHTS_MM = 0.0, 22.0
 _BABY_DROP_MM, _BABY_HEIGHTS_MM, _BABY_LENGTHS_MM = 4.0, (4.0, 24.0), (3.0, 17.0)
 _BABY_THICKNESS, _BABY_TURN = 0.42, 0.35
 _TEMPLE_HEIGHTS_MM, _TEMPLE_DEGREES = (90.0, -10.0), (140.0, 95.0)
@@ -156,7 +158,9 @@ def _grow_chunk(
     s = u * _parameter_column(part, "guide_mm")
     near = 1.0 - np.exp(-((s / _parameter_column(part, "clump_start_mm")) ** 1.5))
     rope = _parameter_column(part, "rope_mm") > 0
-    loosened = _LOOSEST + (1.0 - _LOOSEST) * _smoothstep(*_LOOSE_HEIGHTS_MM, edge.above_mm)
+    loosened = _MIN_HAIRLINE_CLUMPING + (1.0 - _MIN_HAIRLINE_CLUMPING) * _smoothstep(
+        *_CLUMPING_HEIGHTS_MM, edge.above_mm
+    )
     loose = 1.0 + part["hairline"] * (loosened - 1.0)
     grown, pulled = 1.0 - edge.baby[:, None], (0.6 + 0.4 * _uniform_random(strand_seed, 2)) * loose
     pull = _parameter_column(part, "clump") * near * grown * np.where(rope, 1.0, pulled[:, None])
@@ -177,7 +181,9 @@ def _grow_chunk(
     least = _MIN_HEIGHT_ABOVE_SKIN_MM * np.minimum(s / _RISE_LENGTH_MM, 1.0)
     positions = own.position + to_middle + varied + np.maximum(least - height, 0.0)[..., None] * own.normal
     taper = 1.0 - (1.0 - _TIP_WIDTH_RATIO) * _smoothstep(1.0 - _TIP_FRACTION, 1.0, t)
-    thinned = _THINNEST + (1.0 - _THINNEST) * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, edge.above_mm)
+    thinned = _MIN_HAIRLINE_THICKNESS + (1.0 - _MIN_HAIRLINE_THICKNESS) * _smoothstep(
+        *_SHORT_HAIR_HEIGHTS_MM, edge.above_mm
+    )
     thickness = 1.0 + part["hairline"] * (
         np.minimum(thinned, 1.0 + edge.baby * (_BABY_THICKNESS - 1.0)) - 1.0
     )
@@ -221,9 +227,9 @@ def _heights_above_hairline(groom: Groom, strand_index: Ints) -> Doubles:
 
 
 class _HairlineEffects(NamedTuple):
-    """How n strands differ from others because they grow near the hairline.
+    """Properties of n strands that depend on the distance of their roots from the hairline.
 
-    above_mm : (n,) heights of the roots above the hairline, with a random part [mm]
+    above_mm : (n,) heights of the roots above the hairline, with a random variation [mm]
     baby : (n,) 1 for baby hairs, 0 for others
     part, seed : (n,) row of `Groom.parameters` for each strand, and its random seed for `_uniform_random`
     """
@@ -258,12 +264,14 @@ def _length_fractions(groom: Groom, strand_index: Ints, hairline_effects: _Hairl
     """Return the length (n,) of each strand as a fraction of the length of its guides.
 
     strand_index : (n,) indices of the strands
-    hairline_effects : effects of the hairline on the strands
+    hairline_effects : properties of the strands that depend on the hairline
     """
     roots, (above_mm, baby, part, seed) = groom.roots, hairline_effects
     cut = (roots.guide_weight[strand_index] * groom.guides.cut[roots.guide[strand_index]]).sum(axis=1)
     sides = 1.0 - part["fade"] * (1.0 - roots.place[strand_index, 3])
-    shortened = _SHORTEST + (1.0 - _SHORTEST) * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_mm)
+    shortened = _MIN_HAIRLINE_LENGTH + (1.0 - _MIN_HAIRLINE_LENGTH) * _smoothstep(
+        *_SHORT_HAIR_HEIGHTS_MM, above_mm
+    )
     whole = 1.0 + part["hairline"] * (shortened - 1.0)
     length = np.minimum(cut, part["length_mm"] / part["guide_mm"] * sides) * whole
     shortest, longest = _BABY_LENGTHS_MM
@@ -320,7 +328,7 @@ def _interpolate_guides(
 
 
 def _spline_weights(t: Doubles) -> tuple[Doubles, Doubles]:
-    """Return weights (4, n, k) of four knots in a Catmull-Rom spline and in its derivative.
+    """Return the weights (4, n, k) of four knots in a Catmull-Rom spline, and those in its derivative.
 
     t : (n, k) positions between the second and the third knot, 0 to 1
     """
@@ -428,8 +436,8 @@ def _strand_absorption(
 ) -> Doubles:
     """Return the absorption coefficients (n, 3) of strands [1/mm].
 
-    Each strand represents several hairs, some of which may be white. A dyed strand gets the mean along its
-    length.
+    Each strand represents several hairs, some of which may be white. The absorption of a dyed strand is
+    the mean over its length.
 
     strand_seed : (n,) random seeds of the strands, for `_uniform_random`
     hair_parameters : (n,) row of `Groom.parameters` for each strand

@@ -22,7 +22,7 @@ _DEFAULT_DISTANCE_MM = 1100.0  # as in portrait photography; from closer, the no
 _MIN_DISTANCE_PER_MESH_SIZE = 3.0  # least distance relative to the size of a mesh that is shown completely
 _FRAME_SIZE_PER_MESH_SIZE = 1.08  # size of the frame relative to a mesh that is shown completely
 _WORLD_UP = (0.0, 1.0, 0.0)
-# of the preset "headshot": from the left of the front and slightly above, with space where the face looks
+# Preset "headshot": from the front left and slightly above, with free space on the side where the face looks
 _HEADSHOT_AZIMUTH_DEGREES, _HEADSHOT_ELEVATION_DEGREES, _HEADSHOT_FRAME_MM = 26.0, 3.0, 208.0
 _HEADSHOT_DISTANCE_MM, _HEADSHOT_TARGET_MM = 1500.0, (-13.0, -10.0, 14.0)
 

@@ -43,7 +43,7 @@ def gaze_directions(scene: Scene) -> Doubles | None:
 
 
 def gaze_errors_deg(scene: Scene, target_mm: ArrayLike) -> tuple[float, float] | None:
-    """Return the angles by which the left and the right eye miss a point [degrees].
+    """Return the angles between the gaze of the left and right eye and the direction to a point [degrees].
 
     The result is None for heads without anatomical eyes.
 

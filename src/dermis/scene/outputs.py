@@ -255,7 +255,7 @@ _BUILT_IN_OUTPUTS = (
         "A",
         _FLOAT_CHANNEL,
         "",
-        "coverage of the pixel's centre by hair",
+        "coverage by hair at the centre of the pixel",
         0.0,
         _FRACTION_QUANTISATION,
     ),

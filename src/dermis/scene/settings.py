@@ -19,7 +19,7 @@ _PictureSide = Annotated[int, Field(ge=1, le=16384), BoundsReason("pixels: what 
 _MAX_SAMPLES_PER_PIXEL = 64
 MAX_SAMPLE_COUNT = 2**27
 METERED_EXPOSURES = "auto", "skin"
-"""Words for exposures that are metered in the picture."""
+"""Values of `exposure` for which the exposure is metered in the picture."""
 _HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 
 
@@ -97,8 +97,8 @@ class Settings(FrozenModel):
     interreflection: bool = True
     """Light reflected from skin to skin: in ears, around the eyes, under chin and nose."""
     exposure: Exposure = 1.0
-    """Factor from radiance to picture values; "auto" meters the irradiance of the visible skin, "skin" also
-    how much light it reflects, and exposes dark skin longer, as for portraits."""
+    """Factor from radiance to picture values; "auto" meters the irradiance on the visible skin, "skin" also
+    its reflectance, and exposes dark skin longer, as is usual in portraits."""
     bloom: Annotated[float, Field(ge=0, le=1, json_schema_extra=slider(0, 0.5))] = 0.0
     """Fraction of the light that the lens scatters."""
     tone: Literal["none", "filmic", "neutral"] = "none"

@@ -36,13 +36,13 @@ def face_hull_indices(head: Head, direction_count: int = 64) -> NDArray[np.int32
     inside = np.flatnonzero(((positions > low) & (positions < high)).all(axis=1))
     if not len(inside):
         inside = np.arange(len(positions))
-    return extreme_points(positions, inside, direction_count)
+    return extreme_point_indices(positions, inside, direction_count)
 
 
-def extreme_points(
+def extreme_point_indices(
     positions_mm: ArrayLike, candidates: NDArray[np.integer], direction_count: int
 ) -> NDArray[np.int32]:
-    """Return the sorted indices of the points that lie farthest in evenly distributed directions.
+    """Return the sorted indices of the points that are farthest in evenly distributed directions.
 
     candidates : (n,) indices of the points to choose from
     """

@@ -194,5 +194,5 @@ def landmark_names(set_name: str, spec: Spec) -> list[str]:
     """
     if set_name in LANDMARK_SETS:
         rows = read_rows("dermis.human.landmarks", set_name)
-        return list(dict.fromkeys(row["landmark"] for row in rows))  # without further candidates
+        return list(dict.fromkeys(row["landmark"] for row in rows))  # candidates share a name
     return [landmark for landmark, _ in read_landmark_table(spec.landmark_tables[set_name])]

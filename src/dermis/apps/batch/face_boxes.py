@@ -1,4 +1,4 @@
-"""Boxes around face and head in a picture, without regard to what hides them."""
+"""Boxes around face and head in a picture, whether or not hair or other surfaces hide them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.batch.cameras import extreme_points, face_hull_indices
+from dermis.apps.batch.cameras import extreme_point_indices, face_hull_indices
 from dermis.base.arrays import Doubles
 from dermis.human.hair.density import height_above_hairline
 from dermis.human.labels.fields import HUMAN_FIELD_CLASSES, label_fields
@@ -18,14 +18,14 @@ from dermis.mesh.rig import PoseArrays
 from dermis.scene.opencv import OpenCvCamera
 
 BOX_NAMES = "face", "head", "detector"
-"""Boxes of an image: see `face_boxes`."""
+"""Names of the boxes of an image, see `face_boxes`."""
 _DIRECTION_COUNT = 256
 _MIN_FACE_Z_MM = -58.0  # just in front of the ears, on the average human
-# Side and downward shift of the boxes of BlazeFace relative to the longer side of the box "face": means over
-# 200 near-frontal people.
+# Side and downward shift of BlazeFace's boxes, divided by the longer side of the box "face": means over 200
+# near-frontal people.
 _DETECTOR_SCALE, _DETECTOR_SHIFT = 0.8, 0.077
-_NOT_FACE = "right_ear", "left_ear", "mouth_interior", "neck", "torso"
-_NOT_HEAD = "mouth_interior", "neck", "torso"
+_NON_FACE_CLASSES = "right_ear", "left_ear", "mouth_interior", "neck", "torso"
+_NON_HEAD_CLASSES = "mouth_interior", "neck", "torso"
 
 Box = tuple[float, float, float, float]
 """Left, upper, right and lower edge, in the pixel coordinates of landmarks."""
@@ -34,23 +34,26 @@ BoxPoints = Mapping[str, NDArray[np.int32]]
 
 
 def box_points(head: Head) -> BoxPoints:
-    """Return the control points of a head that bound its face and its head."""
+    """Return the indices of the control points of a head that bound its face and the whole head."""
     if is_human(head):
         return _human_box_points()
     face = face_hull_indices(head, _DIRECTION_COUNT)
     heights = head.control_rig.positions_mm[:, 1]
     above = np.flatnonzero(heights >= heights[face].min())
-    return {"face": face, "head": extreme_points(head.control_rig.positions_mm, above, _DIRECTION_COUNT)}
+    return {
+        "face": face,
+        "head": extreme_point_indices(head.control_rig.positions_mm, above, _DIRECTION_COUNT),
+    }
 
 
 def face_boxes(
     head: Head, points: BoxPoints, pose_arrays: PoseArrays, camera: OpenCvCamera
 ) -> dict[str, Box]:
-    """Return boxes by name; they can exceed the picture.
+    """Return boxes by name [pixel]; boxes can extend beyond the picture.
 
-    "face" contains forehead below the hairline, cheeks and chin, without ears, as in the annotations of WIDER
-    FACE; "head" the whole head above the neck with its ears, without hair; "detector" is the square from the
-    brows to the chin that detectors such as BlazeFace return.
+    "face" contains the forehead below the hairline, cheeks and chin, without ears, as in the annotations of
+    WIDER FACE; "head" contains the whole head above the neck with its ears, without hair; "detector" is the
+    square from the brows to the chin that detectors such as BlazeFace return.
 
     points : points that bound face and head, from `box_points`
     pose_arrays : pose of the head
@@ -81,10 +84,11 @@ def _human_box_points() -> BoxPoints:
     skin[np.unique(head.mesh.point[head.mesh.triangles[head.mesh.material == 0]])] = True
     inside = dict(zip(HUMAN_FIELD_CLASSES, label_fields() > 0, strict=True))
     face, whole = (
-        skin & ~np.any([inside[name] for name in names], axis=0) for names in (_NOT_FACE, _NOT_HEAD)
+        skin & ~np.any([inside[name] for name in names], axis=0)
+        for names in (_NON_FACE_CLASSES, _NON_HEAD_CLASSES)
     )
     face &= (height_above_hairline(positions) < 0) & (positions[:, 2] > _MIN_FACE_Z_MM)
     return {
-        name: extreme_points(positions, np.flatnonzero(mask), _DIRECTION_COUNT)
+        name: extreme_point_indices(positions, np.flatnonzero(mask), _DIRECTION_COUNT)
         for name, mask in (("face", face), ("head", whole))
     }

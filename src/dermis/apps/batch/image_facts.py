@@ -23,7 +23,7 @@ class ImageFacts:
 
     person : properties of the person by parameter name, such as "person.age", from `person_facts`
     gaze_error_deg : angles by which the left and the right eye miss the target of the gaze [degrees]; None
-        for heads without eyes that turn
+        for heads whose eyes cannot turn
     boxes : boxes around the face, see `face_boxes`; None if they are unknown
     """
 
@@ -53,16 +53,18 @@ def person_fact_names() -> tuple[str, ...]:
 
 @cache
 def text_fact_names() -> frozenset[str]:
-    """Return the names of the properties of `person_facts` that are texts."""
+    """Return the names of the properties of `person_facts` whose values are strings."""
     return frozenset(name for name, value in person_facts(Human()).items() if isinstance(value, str))
 
 
 def record_parameters(
     spec: Spec, parameters: Parameters, person: Mapping[str, float | str | None]
 ) -> dict[str, float | int | str | None]:
-    """Return the parameters of an image with the same names for all images of a spec; None where unused.
+    """Return the parameters of an image by name, with the same names for all images of a spec.
 
-    person : properties of the person, which the sampled parameters replace
+    The value is None for parameters that the image does not use.
+
+    person : properties of the person; a sampled parameter of the same name takes precedence
     """
     values: dict[str, float | int | str | None] = dict.fromkeys(spec.parameter_names)
     values |= dict.fromkeys(person_fact_names())
@@ -70,9 +72,10 @@ def record_parameters(
 
 
 def image_split(spec: Spec, parameters: Parameters) -> str:
-    """Return "train", "val" or "test"; it is the same for all images of a person.
+    """Return "train", "val" or "test", the same for all images of a person.
 
-    The name of a file or a head counts as the person, as several numbers can share it.
+    If the spec names heads or files, images of the same head are in the same part, because several person
+    numbers can share a head.
     """
     key = f"split {parameters.get('person.head', '')}"
     number = 0 if "person.head" in parameters else int(parameters["person.number"])
@@ -85,7 +88,7 @@ def image_split(spec: Spec, parameters: Parameters) -> str:
 
 
 def _scalar_fields(owner: object) -> dict[str, float | str | None]:
-    """Return the numbers and texts among the fields of a dataclass, by name."""
+    """Return the numbers and strings among the fields of a dataclass, by name."""
     found: dict[str, float | str | None] = {}
     for one in fields(owner):  # type: ignore[arg-type]
         value = getattr(owner, one.name)

@@ -43,9 +43,9 @@ def write_index(dataset_folder: Path, spec: Spec) -> Path:
 
     The columns "number", "key" and "shard" identify the image and its file; "split" is "train", "val" or
     "test", by person; "camera.K", "camera.R", "camera.t", "head_pose" and "gaze" are flattened matrices;
-    "gaze_error_deg" has a number for each eye, and columns that begin with "box." the edges of a box; columns
-    that begin with "skin_tone." describe the colour of the skin; all other columns are parameters, with null
-    for images without the parameter.
+    "gaze_error_deg" contains a number for each eye; columns that begin with "box." contain the edges of a
+    box; columns that begin with "skin_tone." describe the colour of the skin; all other columns are
+    parameters, with null for images without the parameter.
 
     Identical shards give an identical index.
 

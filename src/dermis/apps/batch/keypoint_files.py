@@ -1,4 +1,4 @@
-"""Pictures and landmarks of data sets in the formats of COCO keypoints and 300-W."""
+"""Export of the pictures and landmarks of data sets to the formats of COCO keypoints and 300-W."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SPLIT_NAMES = tuple(name for name, _ in SPLITS)
 KeypointFormat = Literal["coco", "pts"]
 _COCO_HIDDEN, _COCO_VISIBLE = 1, 2  # keypoint flags of COCO; 0 is "not labelled"
 _OCCLUDED = 2
-_UNKNOWN_SPLIT = "all"  # images of earlier versions
+_UNKNOWN_SPLIT = "all"  # folder of images without a split, from earlier versions
 
 
 class _Picture(NamedTuple):
@@ -36,7 +36,7 @@ class _Picture(NamedTuple):
 def export_keypoints(
     dataset: str | Path, output: str | Path, format: KeypointFormat = "coco", landmarks: str = "ibug-68"
 ) -> Path:
-    """Write the pictures and landmarks of a data set as files for tools that read COCO keypoints or 300-W.
+    """Export the pictures and landmarks of a data set for tools that read COCO keypoints or 300-W.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ def export_keypoints(
         Folder to write, which must not exist.
     format : {"coco", "pts"}
         "coco" writes the pictures to the folders train, val and test, and a file
-        annotations/face_keypoints_SPLIT.json for each; the box is "face", and a keypoint has the flag 2 where
-        it is seen, 1 where hair or the mesh hide it, and 0 outside the picture. "pts" writes a file .pts
-        beside each picture, whose coordinates start at 1 as in 300-W.
+        annotations/face_keypoints_SPLIT.json for each of them. The box is "face". The flag of a keypoint is 2
+        where it is visible, 1 where hair or the mesh hides it, and 0 outside the picture. "pts" writes a file
+        .pts beside each picture; its coordinates start at 1, as in 300-W.
     landmarks : str
         Name of the landmark set.
 
@@ -60,7 +60,7 @@ def export_keypoints(
     Raises
     ------
     DermisError
-        For a landmark set that the data set does not have, an existing folder, and damaged shards.
+        For a landmark set that the data set does not have, an output folder that exists, and damaged shards.
 
     Examples
     --------
@@ -71,7 +71,7 @@ def export_keypoints(
     if format not in ("coco", "pts"):
         refuse("format", "coco or pts", f"got {format!r}", "Choose one")
     if target.exists():
-        refuse(target, "a folder that does not exist", "it exists", "Choose another name")
+        refuse(target, "a folder that does not exist", "it exists", "Choose another folder")
     names, counts = _landmark_names(source, landmarks), dict[str, list[dict[str, Any]]]()
     try:
         for picture in _pictures(source, landmarks):
@@ -115,7 +115,7 @@ def _pts_text(pixels: np.ndarray[Any, np.dtype[np.float64]]) -> str:
 
 
 def _coco_entry(picture: _Picture, landmark_set: str) -> dict[str, Any]:
-    """Return the entries "image" and "annotation" of a picture, and its licence."""
+    """Return the COCO entries "image" and "annotation" of a picture, and the licence of the picture."""
     number, points = int(picture.key), picture.fields["landmarks"][landmark_set]
     width, height = _png_size(picture.png)
     x, y = points.pixels.T
@@ -125,7 +125,7 @@ def _coco_entry(picture: _Picture, landmark_set: str) -> dict[str, Any]:
     keypoints = np.column_stack([np.where(flags > 0, points.pixels.T, 0.0).T, flags])
     boxes = picture.fields["boxes"]
     left, top, right, bottom = (x.min(), y.min(), x.max(), y.max()) if boxes is None else boxes["face"]
-    box = [left + 0.5, top + 0.5, right - left, bottom - top]  # from the corner of the picture
+    box = [left + 0.5, top + 0.5, right - left, bottom - top]  # COCO measures from the corner of the picture
     annotation = {
         "id": number + 1,
         "image_id": number + 1,

@@ -19,10 +19,10 @@ _OWNER_LICENCE = "set by its owner: state it here"
 class Asset(NamedTuple):
     """Asset with its author and licence.
 
-    part : parameter and name, such as "environment.name lebombo"
+    name : parameter and value, such as "environment.name lebombo"
     """
 
-    part: str
+    name: str
     author: str
     licence: str
 

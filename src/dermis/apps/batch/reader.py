@@ -46,7 +46,7 @@ _RESERVED_IMAGE_KEYS = frozenset(
     )
 )
 UNKNOWN_OCCLUSION = 255
-"""Occlusion of landmarks in data sets that earlier versions have written."""
+"""Occlusion of landmarks in data sets of earlier versions, which do not state it."""
 
 
 class LandmarkPoints(NamedTuple):
@@ -55,8 +55,8 @@ class LandmarkPoints(NamedTuple):
     pixels : (n, 2) positions in the picture, x to the right and y down, from the centre of the first pixel
     positions_mm : (n, 3) positions relative to the head's centre [mm]
     visible : (n,) whether the mesh does not occlude the landmark
-    occlusion : (n,) 0 where the landmark is seen, 1 where hair or beard partially occlude it, 2 where hair,
-        beard or the mesh occlude it, and outside the picture; 255 in data sets of earlier versions
+    occlusion : (n,) 0 where the landmark is visible, 1 where hair or beard partially occludes it, 2 where
+        hair, beard or the mesh occludes it, and outside the picture; 255 in data sets of earlier versions
     """
 
     pixels: NDArray[np.float64]
@@ -86,11 +86,12 @@ def read_dataset(
         "number"; "picture", sRGB bytes (h, w, 3 or 4); "parameters", by name, with None for parameters that
         the image does not use; "camera", with K, R and t in OpenCV's convention; "head_pose" (3, 4), rotation
         and translation [mm] from the head at rest to the camera; "gaze" (2, 3), unit vectors of the left and
-        the right eye in camera axes, or None; "gaze_error_deg" (2,), angles by which they miss the target of
-        the spec, or None; "boxes", left, upper, right and lower edge of each box by name, or None;
-        "landmarks", `LandmarkPoints` by the name of the set; "skin_tone", a dictionary that describes the
-        colour of the skin, or None; "split", "train", "val" or "test" by person; and "licence". The last two
-        are "" in data sets of earlier versions. `dermis.dataset.arrays` converts the image for batches.
+        the right eye in camera axes, or None; "gaze_error_deg" (2,), angles between these vectors and the
+        directions to the target of the spec, or None; "boxes", left, upper, right and lower edge of each box
+        by name, or None; "landmarks", `LandmarkPoints` by the name of the set; "skin_tone", a dictionary that
+        describes the colour of the skin, or None; "split", "train", "val" or "test" by person; and "licence".
+        The last two are "" in data sets of earlier versions. `dermis.dataset.arrays` converts an image into
+        arrays for batches.
 
     Raises
     ------
@@ -291,7 +292,7 @@ def record_fields(record: Record, error_subject: object) -> ImageFields:
 def _decode_pose(record: Record) -> ImageFields:
     """Return the arrays of camera, head pose, gaze and boxes in a record."""
     camera, gaze = record["camera"], record["gaze"]
-    errors, boxes = record.get("gaze_error_deg"), record.get("boxes")  # earlier versions wrote none
+    errors, boxes = record.get("gaze_error_deg"), record.get("boxes")  # missing in old data sets
     K, R, t = _to_array(camera["K"], (3, 3)), _to_array(camera["R"], (3, 3)), _to_array(camera["t"], (3,))
     return {
         "camera": OpenCvCamera(K, R, t),

@@ -78,7 +78,7 @@ def encode_record(
     observation : sRGB picture and output arrays of the image
     parameters : sampled parameters of the image
     skin_tone : description of the colour of the skin; None if this colour is unknown
-    facts : person, gaze errors and boxes
+    facts : properties of the person, gaze errors and boxes
 
     The suffixes are "png" for the picture, with an alpha channel if the picture has no background;
     "NAME.png", "NAME.exr" or "NAME.npy" for each output, see `output_encoding.storage_description`; and

@@ -50,7 +50,7 @@ class _Person:
     """Head and skin of a person, with all data that does not change between the person's images.
 
     points : indices of points that must stay in the picture, see `face_hull_indices`
-    boxes : indices of points that bound the face and the head, see `box_points`
+    boxes : indices of the points that bound the face and the head, see `box_points`
     bones : fraction of the head's rotation that each bone performs, by bone name
     skin : skin of the person, before the [skin] table of the spec is applied
     facts : properties of the person, see `person_facts`; empty for meshes from files
@@ -99,7 +99,7 @@ class SceneBuilder:
         return scene, self.spec.render.replace(**_background_settings(parameters))
 
     def facts(self, parameters: Parameters, scene: Scene) -> ImageFacts:
-        """Return the facts about an image that its record states besides the parameters.
+        """Return the facts about an image that its record contains in addition to the parameters.
 
         scene : scene of the image, from `build`
         """
@@ -242,7 +242,7 @@ def _has_turning_eyes(head: Head) -> bool:
 def _gaze_target(
     parameters: Parameters, camera_position_mm: tuple[float, float, float]
 ) -> NDArray[np.float64]:
-    """Return the point (3,) at which the eyes of an image are to look, relative to the head's centre [mm]."""
+    """Return the target (3,) of the gaze in an image, relative to the head's centre [mm]."""
     if parameters["gaze.at"] != GAZE_ANGLES:
         return np.array(camera_position_mm)
     gaze = table_numbers(parameters, "gaze")

@@ -53,7 +53,7 @@ _TargetWeight = Annotated[float, Field(ge=0, le=1)]
 _TOML_HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
 _MAX_MATCHING_FILES = 100_000
 _MAX_HASHED_BYTES = 4 << 30
-_MAX_KEY_LENGTH, _MIN_KEY_SIMILARITY = 80, 0.7  # of unknown keys, for suggestions
+_MAX_KEY_LENGTH, _MIN_KEY_SIMILARITY = 80, 0.7  # limits for suggestions to unknown keys
 _FILE_PARAMETERS = "person.head", "environment.name", "skin.profile"
 """Parameters whose values may be files."""
 P = TypeVar("P", bound=FrozenModel)
@@ -248,7 +248,7 @@ def example_toml() -> str:
 
 
 def _refuse_unknown_keys(toml_data: Mapping[str, object]) -> None:
-    """Raise DermisError for an unknown key above all tables; the message names tables that have it."""
+    """Raise DermisError for an unknown key above all tables; the message names tables that have the key."""
     known = [name for name in ("size", *Spec.model_fields) if name != "folder"]
     for key in toml_data:
         if key in known:
@@ -256,14 +256,12 @@ def _refuse_unknown_keys(toml_data: Mapping[str, object]) -> None:
         similar = difflib.get_close_matches(key[:_MAX_KEY_LENGTH], known, 1, _MIN_KEY_SIMILARITY)
         owners = sorted(_tables_with_key(Spec, key))
         if owners:
-            expected, actual = (
-                f"this key in {' or '.join(f'[{name}]' for name in owners)}",
-                "it is above all tables",
-            )
+            expected = f"this key in {' or '.join(f'[{name}]' for name in owners)}"
+            actual, advice = "it is above all tables", "Move it into a table"
         else:
             expected = similar[0] if similar else f"one of {', '.join(known)}"
-            actual = "this name is unknown"
-        refuse(f"spec: {shorten(key, _MAX_KEY_LENGTH)}", expected, actual, "Correct it")
+            actual, advice = "this name is unknown", "Correct the name"
+        refuse(f"spec: {shorten(key, _MAX_KEY_LENGTH)}", expected, actual, advice)
 
 
 def _tables_with_key(model: type[BaseModel], key: str, table_name: str = "") -> Iterator[str]:
@@ -306,7 +304,7 @@ def _build_model(model_class: type[P], table_name: str, toml_table: object) -> P
     try:
         return model_class(**values)
     except InvalidFieldsError as error:
-        if set(error.messages) <= {"size", "size.0", "size.1"}:  # a key above all tables, not of [render]
+        if set(error.messages) <= {"size", "size.0", "size.1"}:  # above all tables, not in [render]
             table_name = "spec"
         raise InvalidFieldsError(table_name or "spec", error.messages) from None
 

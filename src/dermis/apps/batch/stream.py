@@ -30,9 +30,9 @@ def stream(
 ) -> Iterator[ImageArrays]:
     """Return an endless iterator of rendered images with their ground truth, as arrays with fixed keys.
 
-    A thread renders the next images while the caller uses the last ones. The images are those that `dermis
-    batch` writes for the same spec; `count` is ignored. Each array is new and writable, so that it can be
-    passed on by DLPack without a copy.
+    A thread renders the next images while the caller uses earlier ones. The images are those that `dermis
+    batch` writes for the same spec; `count` is ignored. Each array is new and writable, so that DLPack can
+    pass it to other libraries without a copy.
 
     Parameters
     ----------
@@ -41,10 +41,10 @@ def stream(
     adapter : str
         "auto", "cpu" or part of the name of an adapter.
     first, step : int
-        Number of the first person, and number of persons to the next one: worker i of n takes `first=i,
-        step=n`. Each person has `images_per_person` consecutive images.
+        Number of the first person, and difference between the numbers of successive persons: worker i of n
+        takes `first=i, step=n`. Each person has `images_per_person` consecutive images.
     prefetch : int
-        Largest number of images that wait for the caller.
+        Largest number of rendered images that wait for the caller.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def stream(
 
 
 def _image_numbers(first_person: int, step: int, images_per_person: int) -> Iterator[int]:
-    """Yield the numbers of all images of every step-th person, again from the first one at the end."""
+    """Yield the numbers of all images of every step-th person; after the last person, start again."""
     while True:
         for person in range(first_person, MAX_IMAGES // images_per_person, step):
             yield from range(person * images_per_person, (person + 1) * images_per_person)
@@ -100,7 +100,7 @@ def _consume(spec: Spec, adapter: str, numbers: Iterator[int], prefetch: int) ->
 def _produce(
     spec: Spec, adapter: str, numbers: Iterator[int], ready: _ReadyImages, stop: threading.Event
 ) -> None:
-    """Render images and append them to the queue, until `stop` is set; an error is appended as well."""
+    """Render images and append them to a queue until `stop` is set; append an exception if one is raised."""
     try:
         with closing(Worker(adapter, RunOptions(spec, Path()), freezes_objects=False)) as worker:
             for number, observation, parameters, tone, facts in worker.observe(numbers):

@@ -1,4 +1,4 @@
-"""Images of data sets as dictionaries of NumPy arrays with fixed keys, types and shapes, for batches."""
+"""Conversion of images of data sets to NumPy arrays with fixed keys, types and shapes, for batches."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def parameter_names(spec: Spec) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Sorted names, such as "camera.yaw_deg" and "person.age"; parameters with texts are omitted.
+        Sorted names, such as "camera.yaw_deg" and "person.age"; parameters with strings are omitted.
 
     Examples
     --------
@@ -64,12 +64,13 @@ def arrays(image: ImageFields) -> ImageArrays:
     Returns
     -------
     dict of ndarray
-        "number" and "person"; "split" (0 train, 1 val, 2 test); "picture" (h, w, 3) and "picture_alpha"
-        (h, w), bytes; the outputs by their names; "camera.K", "camera.R", "camera.t", "head_pose", "gaze",
-        "gaze_error_deg", "box.face", "box.head", "box.detector" (left, upper, right, lower edge); "skin_tone"
-        (L, a, b, hue and ITA in degrees); "parameters", the numbers named by `parameter_names`; and for each
-        landmark set "landmarks.SET.pixels", ".positions_mm", ".visible" and ".occlusion". Floats are float32,
-        with NaN for what the image does not have.
+        "number" and "person", numbers of the image and of the person; "split" (0 train, 1 val, 2 test);
+        "picture" (h, w, 3) and "picture_alpha" (h, w), bytes; the outputs by their names; "camera.K",
+        "camera.R", "camera.t", "head_pose", "gaze", "gaze_error_deg"; "box.face", "box.head", "box.detector"
+        (left, upper, right, lower edge [pixel]); "skin_tone" (L, a, b, hue and ITA in degrees); "parameters",
+        numbers in the order of `parameter_names`; and for each landmark set "landmarks.SET.pixels",
+        ".positions_mm", ".visible" and ".occlusion". Floats are float32, with NaN for values that the image
+        does not have. An unknown split or person is -1.
 
     Examples
     --------
@@ -119,7 +120,7 @@ def _parameter_vector(parameters: Mapping[str, float | int | str | None]) -> NDA
 
 
 def _floats(values: object, missing_shape: tuple[int, ...] = ()) -> NDArray[np.float32]:
-    """Return a new float32 array; NaN in the given shape for None."""
+    """Return values as a new float32 array; for None, an array of NaN with the shape `missing_shape`."""
     if values is None:
         return np.full(missing_shape, np.nan, np.float32)
     return np.array(values, np.float32)

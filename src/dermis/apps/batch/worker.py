@@ -111,7 +111,7 @@ _ObservedImage = tuple[int, Observation, Parameters, SkinTone | None, ImageFacts
 class _PlannedImage(NamedTuple):
     """Image to render, with its scene and settings.
 
-    facts : person, gaze errors and boxes, for the record
+    facts : properties of the person, gaze errors and boxes, for the record
     previous : scene of the preceding image, from which motion vectors are computed; None if no motion vectors
         can be computed
     """
@@ -132,8 +132,8 @@ class Worker:
     The device is opened when the first image is rendered.
 
     adapter : name or number of the graphics adapter, as for `Renderer`
-    freezes_objects : whether all objects of the process are excluded from garbage collections when the first
-        image is rendered, which is useful in processes that only render
+    freezes_objects : whether to exclude all objects of the process from garbage collection once the renderer
+        exists, which saves time in processes that only render
     """
 
     def __init__(self, adapter: str, options: RunOptions, *, freezes_objects: bool = True) -> None:
@@ -144,7 +144,7 @@ class Worker:
     @cached_property
     def _renderer(self) -> Renderer:
         renderer = Renderer(self._adapter, cache_ttl=_MAX_CACHED_FRAMES)
-        if self._freezes_objects:  # collections would scan the objects created so far each time
+        if self._freezes_objects:  # otherwise each garbage collection scans the objects created so far
             gc.freeze()
         return renderer
 
@@ -185,7 +185,7 @@ class Worker:
             )
 
     def observe(self, image_numbers: Iterator[int]) -> Iterator[_ObservedImage]:
-        """Render images without files; yield number, observation, parameters, skin tone and facts of each.
+        """Render images without writing files; yield number, observation, parameters, skin tone and facts.
 
         Raises DermisError for images that cannot be rendered.
         """

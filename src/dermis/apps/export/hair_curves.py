@@ -1,4 +1,4 @@
-"""Hair of a head as curves, for renderers with a shape for curves and a material of hair fibres."""
+"""Hair of a head as curves, for renderers that have curve shapes and hair materials."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from dermis.mesh.head import Head
 from dermis.mesh.strands import Strands
 
 MAX_CURVES = 16_000
-"""Largest number of curves of scalp hair and beard; more hairs are represented by fewer, wider ones."""
+"""Largest number of curves of scalp hair and beard; larger numbers of hairs become fewer, wider curves."""
 HAIR_LIMITATIONS = (
-    f"Hair consists of at most {MAX_CURVES:,} curves in the pose of rest, which are wider where a head has "
-    "more hairs; their colours are averaged in 12 groups."
+    f"Scalp hair and beard are at most {MAX_CURVES:,} curves in the rest pose, which are wider if a head has "
+    "more hairs. The absorption of hairs is averaged in groups."
 )
-"""Sentence on hair in the limitations of targets that write curves."""
+"""Sentences about hair in `limitations` of export targets that write curves."""
 
 
 class CurveGroup(NamedTuple):

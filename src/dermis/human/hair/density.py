@@ -115,7 +115,7 @@ def scalp_density(recession: float, margin_mm: float = 0.0) -> HairDensity:
     """Return the relative density of scalp hair, which fades at the hairline and is thin on a receding crown.
 
     recession : recession of hairline and crown, 0 to 1, see `SkinLook`
-    margin_mm : distance by which the hairline is lowered, for roots of people whose hair begins lower [mm]
+    margin_mm : distance by which the hairline is lowered, for roots of baby hairs and widow's peaks [mm]
     """
     column = _amount_column("hair")
     receding = zone_table(recession)[:, column] != zone_table()[:, column]
@@ -141,23 +141,23 @@ def beard_density(area: BeardArea = "all") -> HairDensity:
     return HairDensity(lambda points: _beard_amount(points) * _BEARD_AREAS[area](points), _beard_point_mask())
 
 
-def _lip_weight(points: Doubles) -> Doubles:
-    """Return weights (n,) of points: 1 where a moustache grows, 0 elsewhere."""
+def _moustache_weight(points: Doubles) -> Doubles:
+    """Return weights (n,) of points, from 1 where a moustache grows to 0 elsewhere."""
     x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     return smoothstep(34.0, 27.0, x) * smoothstep(-71.0, -66.0, y - 0.12 * x) * (z > 0.0)
 
 
-def _chin_weight(points: Doubles) -> Doubles:
-    """Return weights (n,) of points: 1 where a moustache or a goatee grows, 0 elsewhere."""
+def _goatee_weight(points: Doubles) -> Doubles:
+    """Return weights (n,) of points, from 1 where a moustache or a goatee grows to 0 elsewhere."""
     x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     chin = smoothstep(33.0, 26.0, x) * smoothstep(-116.0, -108.0, y) * (z > 0.0)
-    return np.asarray(np.maximum(chin * (y < -60.0), _lip_weight(points)))
+    return np.asarray(np.maximum(chin * (y < -60.0), _moustache_weight(points)))
 
 
 _BEARD_AREAS: dict[BeardArea, Callable[[Doubles], Doubles]] = {
     "all": lambda points: np.ones(len(points)),
-    "lip": _lip_weight,
-    "chin": _chin_weight,
+    "lip": _moustache_weight,
+    "chin": _goatee_weight,
 }
 
 
@@ -177,7 +177,7 @@ def _beard_amount(points: Doubles) -> Doubles:
 
 
 def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
-    """Return a smooth cubic transition of x from 0 at `low` to 1 at `high`, which may be the lower one."""
+    """Return a smooth cubic transition of x from 0 at `low` to 1 at `high`; `low` may exceed `high`."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
 

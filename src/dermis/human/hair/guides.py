@@ -28,8 +28,8 @@ _ROUND_CUT_RADII_MM = np.array([75.0, 96.0, 92.0])  # semi-axes of the skull
 # heights between which it begins [mm].
 _FACE_CENTRE_Z, _FACE_RADII_MM, _FACE_TOP_MM = -60.0, (74.0, 118.0), (78.0, 40.0)
 _ANCHOR_SOFTENING_MM = 6.0  # distance below which the quads that a knot follows have about equal weights
-_RESTING_ABOVE_CUT_MM = 45.0  # height above a level cut below which hair that lies on the shoulders is cut
-_NAPE_TRIM_MM = -70.0, 25.0  # heights of roots between which standing hair is cut less and less round
+_RESTING_ABOVE_CUT_MM = 45.0  # height above a level cut, below which hair on the shoulders is cut off
+_NAPE_TRIM_MM = -70.0, 25.0  # heights of roots between which round cuts grow to their full size
 _COMBS_OVER_EARS = "fall", "twist"  # combs of hair that bulges over the ears
 _EAR_CENTRE_MM = np.array([75.0, -22.0, -76.0])
 _EAR_SPREAD_MM = np.array([1.0, 42.0, 34.0])
@@ -386,12 +386,13 @@ def cut_fractions(knots: Doubles, style: Style) -> Doubles:
 
 
 def _first_resting_fractions(knots: Doubles, below_y_mm: float) -> Doubles:
-    """Return where each curve first lies on the shoulders or the back, as a fraction (g,) of its length.
+    """Return where each curve first rests on the shoulders or the back, as a fraction (g,) of its length.
 
-    A curve lies there where it descends by less than two thirds of its length. The fraction is 1 for others.
+    A curve rests where its segments descend by less than two thirds of their length. The fraction is 1 for
+    curves that rest nowhere.
 
     knots : (g, k, 3) knots of the curves [mm]
-    below_y_mm : height below which curves may lie [mm]
+    below_y_mm : height below which curves can rest [mm]
     """
     steps = np.diff(knots, axis=1)
     flat = -steps[..., 1] < 2.0 / 3.0 * np.linalg.norm(steps, axis=2)

@@ -20,8 +20,8 @@ MAX_HAIRS_PER_CM2 = 200.0
 """Density of the densest hair of the head [1/cm2]."""
 BEARD_HAIRS_PER_CM2 = 90.0
 """Density of beards [1/cm2]."""
-_MIN_BEARD_CURL, _BEARD_FRIZZ = 0.45, 0.025  # least curl; amplitude of frizz relative to the length
-_BEARD_RADIUS_RATIO = 1.25  # of hairs of the beard, relative to those of the head
+_MIN_BEARD_CURL, _BEARD_FRIZZ_RATIO = 0.45, 0.025  # least curl; amplitude of frizz relative to the length
+_BEARD_RADIUS_RATIO = 1.25  # radius of hairs of the beard, relative to hairs of the head
 _MIN_EUMELANIN = 0.07  # white hair is not quite white
 _SEED_COUNT = 1 << 24  # seeds are exact as float32
 # Radius and pitch of the curls of hair, by the dial `HairLook.curl` [mm].
@@ -31,7 +31,7 @@ _COIL_PITCH_BY_CURL_MM = np.array([150.0, 130.0, 95.0, 34.0, 15.0, 7.5])
 _INCOHERENCE_BY_CURL = np.array([0.3, 0.3, 0.12, 0.2, 0.5, 1.0])
 _CLUMP_PHASES_BY_CURL = np.array([0.3, 0.3, 0.22, 0.5, 0.9, 1.0])
 _FRIZZ_BY_CURL_MM = np.array([0.25, 0.35, 0.6, 0.9, 0.8, 0.5])
-_MAX_SEGMENT_MM = 7.0  # length of the segments of straight hair
+_MAX_SEGMENT_MM = 7.0  # largest length of segments, which straight hair has
 _MAX_DEVIATION_MM = 0.07  # largest deviation of curls and twists from the segments that represent them
 _MIN_KNOTS, _MAX_KNOTS = 5, 96
 _FLOAT_FIELDS = (
@@ -68,11 +68,12 @@ def make_groom(
     hair_fraction : fraction of the strands to grow; the strands are widened by the inverse of this fraction,
         so that coverage stays the same
     """
-    scalp, beard = _worn_style(hair_look), beard_styles().get(hair_look.beard_style)
+    scalp, beard = _scalp_style(hair_look), beard_styles().get(hair_look.beard_style)
     if scalp is None and beard is None:
         return None
-    grown = beard and replace(beard, length_mm=beard.max_length_mm)  # beards of all lengths have one table
-    tables = strands_of_style(scalp, grown, root_finder, subdivision_levels)
+    # One table serves beards of all lengths.
+    longest_beard = beard and replace(beard, length_mm=beard.max_length_mm)
+    tables = strands_of_style(scalp, longest_beard, root_finder, subdivision_levels)
     parts = [_scalp_parameters(scalp, hair_look, recession)] if scalp else []
     parts += [_beard_parameters(beard, hair_look)] if beard else []
     parameters, strands = np.array(parts, HAIR_PARAMETERS_DTYPE), round(hair_fraction * len(tables.roots))
@@ -81,8 +82,8 @@ def make_groom(
     return Groom(tables.guides, tables.roots, parameters, strands, knots, heights, tables.centre_mm)
 
 
-def _worn_style(hair_look: HairLook) -> Style | None:
-    """Return the style of a person's hair, with the person's parting and clumps; None for a bald head."""
+def _scalp_style(hair_look: HairLook) -> Style | None:
+    """Return the style of scalp hair with the parting and clumps of the look; None for a bald head."""
     style = styles().get(hair_look.style) if hair_look.density > 0.0 else None
     changes = {name: getattr(hair_look, name) for name in ("parting_mm", "clump_mm")}
     given = {name: round(value, 1) for name, value in changes.items() if value is not None}
@@ -114,7 +115,7 @@ def _beard_parameters(style: Style, hair_look: HairLook) -> tuple[object, ...]:
     )
     wavy = replace(hair_look, curl=max(hair_look.curl, _MIN_BEARD_CURL))
     values = _shared_parameters(style, wavy, length, densities, _BEARD_RADIUS_RATIO)
-    values |= {"fade": style.fade, "frizz_mm": _BEARD_FRIZZ * length}
+    values |= {"fade": style.fade, "frizz_mm": _BEARD_FRIZZ_RATIO * length}
     return tuple(values[name] for name in HAIR_PARAMETERS_DTYPE.names or ())
 
 
@@ -127,7 +128,7 @@ def _shared_parameters(
 ) -> dict[str, object]:
     """Return the parameters that scalp hair and beards share, by the names of `HAIR_PARAMETERS_DTYPE`.
 
-    The parameters of scalp hair alone have the values by which they have no effect.
+    Parameters that apply only to scalp hair have values without an effect.
 
     length_mm : length of the hair where it is longest [mm]
     densities : number of strand roots per area [1/cm2], number of real hairs per area [1/cm2], and fraction
@@ -167,22 +168,22 @@ def _shared_parameters(
 
 
 def _curl_parameters(hair_look: HairLook, length_mm: float, is_rope: bool) -> dict[str, object]:
-    """Return the parameters of curls and frizz; those that the look leaves out follow from its curl.
+    """Return the parameters of curls and frizz; values that the look omits follow from its `curl`.
 
     length_mm : length of the hair where it is longest [mm]
     is_rope : whether the hair is twisted or braided
     """
 
-    def given(value: float | None, by_curl: Doubles) -> float:
+    def value_or_default(value: float | None, by_curl: Doubles) -> float:
         return float(np.interp(hair_look.curl, _CURL_NODES, by_curl)) if value is None else value
 
     incoherence = None if hair_look.curl_coherence is None else 1.0 - hair_look.curl_coherence
-    frizz_mm = given(hair_look.frizz_mm, _FRIZZ_BY_CURL_MM)
+    frizz_mm = value_or_default(hair_look.frizz_mm, _FRIZZ_BY_CURL_MM)
     return {
-        "curl_mm": min(given(hair_look.curl_radius_mm, _COIL_RADIUS_BY_CURL_MM), 0.35 * length_mm),
-        "pitch_mm": given(hair_look.curl_pitch_mm, _COIL_PITCH_BY_CURL_MM),
-        "incoherence": given(incoherence, _INCOHERENCE_BY_CURL),
-        "clump_phases": given(incoherence, _CLUMP_PHASES_BY_CURL),
+        "curl_mm": min(value_or_default(hair_look.curl_radius_mm, _COIL_RADIUS_BY_CURL_MM), 0.35 * length_mm),
+        "pitch_mm": value_or_default(hair_look.curl_pitch_mm, _COIL_PITCH_BY_CURL_MM),
+        "incoherence": value_or_default(incoherence, _INCOHERENCE_BY_CURL),
+        "clump_phases": value_or_default(incoherence, _CLUMP_PHASES_BY_CURL),
         "frizz_mm": frizz_mm * min(1.0, length_mm / 60.0) * (0.3 if is_rope else 1.0),
     }
 

@@ -44,8 +44,8 @@ _FALLBACK_STYLE = Style("up", max_length_mm=500.0, length_mm=6.0)
 _MAX_SAMPLED_BEARD_MM = 14.0
 _FULL_BEARD = "full"
 _BEARD_CHANCES = (("goatee", 0.06), ("moustache", 0.10), (_FULL_BEARD, 0.5))
-"""Cumulative chances of beard styles among men; the length decides whether "full" is stubble. Chosen."""
-_EXTRA_STREAM = 3  # of the random generator of dials that were added to sampled people
+"""Artist's values: cumulative chances of beard styles among men. Short "full" beards look like stubble."""
+_ADDED_FIELDS_STREAM = 3  # random stream of fields added later, so that older fields keep their samples
 _DARK_EUMELANIN = 3.0  # eumelanin above which shaved hair has full visibility
 
 
@@ -70,22 +70,23 @@ class HairLook:
     curl_radius_mm : float, optional
         Radius of the curls, 0 to 20; by default it follows from `curl` [mm].
     curl_pitch_mm : float, optional
-        Length of a hair in one turn of its curl, 4 to 300; by default it follows from `curl` [mm].
+        Length of a hair per turn of its curl, 4 to 300; by default it follows from `curl` [mm].
     curl_coherence : float, optional
         Agreement of the phases of curls, from 0 (random for each hair) to 1 (waves run across neighbouring
         hairs); by default it follows from `curl` [-].
     clump : float, optional
-        Pull of hairs towards the middle of their clump, 0 to 1; by default that of the style [-].
+        Strength with which hairs are drawn to the middle of their clump, 0 to 1; by default that of the
+        style [-].
     clump_mm : float, optional
-        Size of the clumps at the roots, 2 to 40; by default that of the style. Another size takes up to a
-        second once, because clumps are computed once for a style [mm].
+        Size of the clumps at the roots, 2 to 40; by default that of the style. A new size costs up to a
+        second, because clumps are computed for it and then cached [mm].
     frizz_mm : float, optional
         Amplitude of the random displacement of hairs, 0 to 5; by default it follows from `curl` [mm].
     flyaways : float
         Fraction of hairs that are displaced much more than others, 0 to 1 [-].
     parting_mm : float, optional
-        Position of the parting to the left of the middle, -60 to 60; by default that of the style. Has an
-        effect in styles with a parting. Another position takes up to a second once [mm].
+        Distance of the parting from the middle, positive to the left, -60 to 60; by default that of the
+        style. Has an effect only in styles with a parting. A new position costs up to a second [mm].
     widows_peak : float
         How far the middle of the hairline reaches down the forehead, from 0 (rounded) to 1 [-].
     baby_hairs : float
@@ -107,10 +108,10 @@ class HairLook:
     eumelanin, pheomelanin : float
         Concentrations of pigments, 0 to 10, see `dermis.specular.hair.absorption_per_mm` [-].
     dye_eumelanin, dye_pheomelanin : float, optional
-        Concentrations of pigments in dyed hair of the head, 0 to 10; None for hair that is not dyed. One that
-        is missing beside the other is 0 [-].
+        Concentrations of pigments in dyed hair of the head, 0 to 10; None for hair that is not dyed. If only
+        one of them is given, the other is 0 [-].
     roots_mm : float
-        Length of dyed hair that has grown since it was dyed, and has the natural colour, 0 to 500 [mm].
+        Length of hair in the natural colour that has grown since the hair was dyed, 0 to 500 [mm].
     seed : int
         Seed of the variation between hairs, 0 to 2**32 - 1.
 
@@ -155,7 +156,7 @@ class HairLook:
     roots_mm: float = 0.0
 
     def __post_init__(self) -> None:
-        """Replace a missing length or fade by the usual value of the style, and complete a beard.
+        """Replace a missing length or fade by the usual value of the style, and complete the beard.
 
         Raises DermisError for an unknown style, for values out of range, and for hair too long for its style.
         """
@@ -216,7 +217,7 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
     beard = float(np.exp(rng.uniform(np.log(0.8), np.log(_MAX_SAMPLED_BEARD_MM))))
     beard_style = next((name for name, chance in _BEARD_CHANCES if man and beard_chance < chance), "none")
     seed = int(rng.integers(2**31))
-    extra = np.random.default_rng((seed, _EXTRA_STREAM)).random(4)
+    extra = np.random.default_rng((seed, _ADDED_FIELDS_STREAM)).random(4)
     return replace(
         typical,
         style=name,
@@ -256,12 +257,15 @@ def sample_recession(rng: np.random.Generator, demographics: Demographics) -> fl
     return float(np.clip(man * rng.beta(1.2, 1.8) * (0.15 + 1.1 * old), 0.0, 1.0))
 
 
-def scalp_shadow(hair: HairLook, shaved: float) -> dict[str, Any]:
-    """Return the fields of `SkinLook` that describe the shadow of the hair of the head in the scalp.
+def scalp_shadow_fields(hair: HairLook, shaved_strength: float) -> dict[str, Any]:
+    """Return the fields of `SkinLook` that describe how the hair of the head darkens the scalp.
 
-    shaved : strength of the shadow of shaved hair, 0 to 1; below hair that is worn, the density counts
+    shaved_strength : strength of this effect for shaved hair, 0 to 1; for other hair it follows from its
+        density
     """
-    strength = shaved * stubble_visibility(hair) if hair.style == "none" else 0.55 + 0.45 * hair.density
+    strength = (
+        shaved_strength * stubble_visibility(hair) if hair.style == "none" else 0.55 + 0.45 * hair.density
+    )
     pigmented = 1.0 - hair.grey
     return {
         "stubble": strength,

@@ -35,8 +35,8 @@ _CACHE_VERSION = 13  # of this module's algorithm, part of the keys of cached ta
 _MAX_CACHED_STYLES, _MAX_CACHED_LOOKS = 4, 24  # single styles; hair styles with or without a beard
 # Distances between guides from which strands are less, and then not at all, interpolated between them [mm].
 _GUIDE_SEPARATION_MM = 25.0, 55.0
-_HAIRLINE_MARGIN_MM = 12.0  # distance below the hairline at which widow's peaks and baby hairs begin
-_BEARD_EDGE_DENSITY = 0.05, 0.9  # relative densities between which a beard reaches its length
+_HAIRLINE_MARGIN_MM = 12.0  # distance below the hairline to which widow's peaks and baby hairs reach
+_BEARD_EDGE_DENSITY = 0.05, 0.9  # relative densities between which hairs of a beard reach full length
 _SEED = 20
 _CENTRE_ROOT_COUNT = 2000  # number of roots whose mean is the centre of the hair
 _GUIDE_FIELDS = "corner", "local_mm", "weight", "rest_mm", "cut"

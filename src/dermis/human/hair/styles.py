@@ -43,7 +43,7 @@ class Style:
     women, men : relative probabilities of the style among women and among men
     tight : whether tightly coiled hair is worn in this style
     loose : whether hair that is not tightly coiled is worn in this style
-    area : where the hair of a beard grows: "all", only above the upper "lip", or there and around the "chin"
+    area : part of the face that a beard covers: "all" of it, above the upper "lip", or that and the "chin"
     """
 
     comb: Comb

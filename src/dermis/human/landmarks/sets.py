@@ -8,4 +8,4 @@ LANDMARK_SETS = {
 }
 """Sets of landmarks of the parametric human, with descriptions."""
 SILHOUETTE_SUFFIX = "-silhouette"
-"""End of the names of sets that have several candidates for some landmarks."""
+"""Suffix of the names of sets with several candidate points for some landmarks."""

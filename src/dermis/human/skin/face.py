@@ -34,7 +34,7 @@ ZONE_AMOUNTS = (
     "sun", "level", "around", "hair", "beard", "veins", "flush",
     "oxygen", "tension", "capillaries",
 )  # fmt: skip
-"""Quantities that zones of the face change, see zones.csv; their number is a multiple of four."""
+"""Quantities that zones of the face change, see zones.csv; shaders read them in groups of four."""
 _REFERENCE_SITE = "cheek"
 HAIRLINE_STEP_DEGREES = 2
 """Angle between samples of `hairline_heights` [degrees]."""
@@ -43,7 +43,7 @@ _FOLD_SAMPLES_PER_SEGMENT = 4
 _MAX_CACHED_TABLES = 32  # number of results that each function caches
 _CROWN_ZONE = "crown"  # zone where hair thins first
 _TEMPLE_RECESSION_MM, _FOREHEAD_RECESSION_MM = 22.0, 16.0  # maximum recession of the hairline
-_PEAK_MM, _PEAK_WIDTH_DEGREES = 9.0, 8.0  # depth and width of the strongest widow's peak
+_PEAK_MM, _PEAK_WIDTH_DEGREES = 9.0, 8.0  # depth and width of the hairline's peak where `widows_peak` is 1
 _TEMPLE_DEGREES, _TEMPLE_WIDTH_DEGREES, _FOREHEAD_WIDTH_DEGREES = 33.0, 15.0, 38.0  # from the front
 
 
@@ -93,8 +93,8 @@ def zone_table(recession: float = 0.0, site_differences: SiteDifferences | None 
 
 
 @cache
-def lowest_zone_oxygen() -> float:
-    """Return the largest reduction of the oxygen saturation by a zone, as a negative number [-]."""
+def lowest_zone_oxygen_change() -> float:
+    """Return the most negative change of the oxygen saturation by a zone, at most 0 [-]."""
     return float(min(float_columns(read_rows(__package__, "zones"), "oxygen").min(), 0.0))
 
 

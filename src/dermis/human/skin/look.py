@@ -34,7 +34,7 @@ SITES_FIELD = "sites"
 # Artist's values.
 _TYPICAL_FRECKLES = {"african": 0.02, "asian": 0.06, "caucasian": 0.16}
 _TYPICAL_IRIS_EUMELANIN = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
-_NO_BLEMISHES_YEARS = 45.0  # age from which there are no inflamed spots [years]
+_NO_BLEMISHES_YEARS = 45.0  # age from which sampled people have no inflamed spots [years]
 _AGE_SPOTS_FROM_YEARS = 45.0  # age from which there are age spots [years]
 _FOLD_STRENGTH_AT_90_YEARS = 1.0  # `SkinLook.age` of people of 90 years
 
@@ -71,7 +71,7 @@ class SkinLook:
     veins : float
         Visibility of veins at temples, lids and neck, 0 to 1 [-].
     stubble : float
-        Shadow of the hair of the head on and in the scalp, 0 to 1 [-].
+        Darkening of the scalp by hair of the head, shaved or not, 0 to 1 [-].
     recession : float
         Recession of the hair at temples, forehead and crown, 0 to 1 [-].
     beard : float
@@ -90,7 +90,7 @@ class SkinLook:
         Differences in pigments between other sites of the head and the cheek; by default the medians of
         measured people.
     stubble_eumelanin, stubble_pheomelanin : float
-        Pigments of the hair of which `stubble` is the shadow, 0 to 10, see `HairLook` [-].
+        Concentrations of pigments in the hair that darkens the scalp, 0 to 10, see `HairLook` [-].
 
     Raises
     ------

@@ -459,7 +459,7 @@ def _ita_scores(ita: Doubles, quantiles: Doubles) -> Doubles:
 
 def standard_normal_quantiles(probabilities: Doubles) -> Doubles:
     """Return quantiles (k,) of the standard normal distribution for probabilities (k,) between 0 and 1."""
-    quantile = NormalDist().inv_cdf  # scipy.special takes half a second to import
+    quantile = NormalDist().inv_cdf  # avoids the import of scipy.special, which takes half a second
     return np.array([quantile(float(one)) for one in probabilities])
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.human.skin.colours import skin_colour_table
-from dermis.human.skin.face import lowest_zone_oxygen
+from dermis.human.skin.face import lowest_zone_oxygen_change
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.maps import Maps
 
@@ -32,7 +32,7 @@ def oxygen_range(skin_look: SkinLook) -> tuple[float, float]:
     differences = skin_look.sites.as_array()[:, 2]
     low, high = (
         skin_look.oxygen + float(one)
-        for one in (min(differences.min(), 0.0) + lowest_zone_oxygen(), max(differences.max(), 0.0))
+        for one in (min(differences.min(), 0.0) + lowest_zone_oxygen_change(), max(differences.max(), 0.0))
     )
     low = min(max(low, 0.0), 1.0 - _MIN_OXYGEN_RANGE)
     return low, max(min(high, 1.0), low + _MIN_OXYGEN_RANGE)

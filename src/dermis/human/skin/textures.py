@@ -33,7 +33,7 @@ TILE_LENGTH_MM = 32.0
 """Length of the tile on the skin [mm]."""
 MAX_TILE_HEIGHT_MM = 0.2
 """Full scale of the heights of the tile [mm]."""
-_CAVITY_DEPTH_MM = 0.08  # depth below the median height of the tile at which a cavity is dark
+_CAVITY_DEPTH_MM = 0.08  # depth below the median height of the tile at which a cavity reaches 1
 
 
 class Noise(NamedTuple):
@@ -194,10 +194,10 @@ def detail_slopes() -> NDArray[np.float32]:
 
 @cache
 def detail_cavities() -> NDArray[np.float32]:
-    """Return the cavities (TILE_SIDE, TILE_SIDE, 2) of the periodic tiles of pores and of lines [-].
+    """Return cavity values (TILE_SIDE, TILE_SIDE, 2) of the periodic tiles of pores and of lines [-].
 
-    A cavity is 0 above the median height and 1 far below it, less the mean over the tile, so that cavities
-    do not change the mean colour of the skin.
+    A value rises from 0 at the median height to 1 at `_CAVITY_DEPTH_MM` below it. The mean over the tile is
+    subtracted, so that cavities do not change the mean colour of the skin.
     """
     heights = np.stack(detail_heights_mm(), axis=-1)
     depth = np.clip((np.median(heights, axis=(0, 1)) - heights) / np.float32(_CAVITY_DEPTH_MM), 0.0, 1.0)

@@ -345,7 +345,7 @@ def group_by_optical_depth(optical_depth: NDArray[np.floating]) -> list[NDArray[
 
 
 def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating]) -> None:
-    """Write the text of `curves_text` to a file."""
+    """Write B-spline curves for Mitsuba to a file, in the format of `curves_text`."""
     path.write_text(curves_text(knots_mm, radius_mm), encoding="ascii")
 
 

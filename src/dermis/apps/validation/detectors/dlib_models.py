@@ -34,7 +34,7 @@ class Dlib:
         return _DEBIAN_WEIGHTS if find_spec("dlib") and _DEBIAN_WEIGHTS.is_file() else None
 
     def detect(self, picture: Bytes) -> Detection | None:
-        """Return the largest face in a picture (h, w, 3), None if there is none."""
+        """Return the largest face in a picture (h, w, 3); None if no face is found."""
         found = max(self._find(picture, 1), key=lambda box: box.area(), default=None)
         if found is None:
             return None

@@ -1,4 +1,4 @@
-"""MediaPipe's models BlazeFace, face mesh and iris, run by LiteRT without MediaPipe."""
+"""MediaPipe's models for faces, face meshes and irises, run by LiteRT without the package MediaPipe."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ class _Crop(NamedTuple):
     angle: float
 
     def pixels(self, picture: Bytes, size: int, flip: bool = False) -> Floats:
-        """Return the crop (size, size, 3), with values 0 to 1."""
+        """Return the crop, resampled to (size, size, 3), with values from 0 to 1."""
         step = self.side / size * np.array([-1.0 if flip else 1.0, 1.0])
         c, s = cos(self.angle), sin(self.angle)
         (a, b), (d, e) = np.array([[c, -s], [s, c]]) * step
         half = 0.5 * (size - 1)
         x, y = self.centre
-        # positions of Pillow are at corners of pixels
+        # Pillow measures positions from the corner of the first pixel
         matrix = (
             a,
             b,
@@ -52,7 +52,7 @@ class _Crop(NamedTuple):
         return np.asarray(crop, np.float32) / 255.0
 
     def to_picture(self, points: Floats, size: int, flip: bool = False) -> Doubles:
-        """Return positions in the picture (n, 2) of positions in the crop (n, 2) [pixel]."""
+        """Convert positions (n, 2) in the crop to positions (n, 2) in the picture [pixel]."""
         local = (points.astype(np.float64) - 0.5 * size) * self.side / size
         local[:, 0] *= -1.0 if flip else 1.0
         c, s = cos(self.angle), sin(self.angle)
@@ -85,7 +85,7 @@ class MediaPipe:
         return Path(next(iter(found.submodule_search_locations or ()))) / "data"
 
     def detect(self, picture: Bytes) -> Detection | None:
-        """Return the face with the highest score in a square picture, None if there is none."""
+        """Return the face with the highest score in a square picture; None if no face is found."""
         size = picture.shape[0]
         boxes, scores = self._face(_Crop(((size - 1) / 2,) * 2, size, 0.0).pixels(picture, 256) * 2 - 1)
         best = int(scores[0, :, 0].argmax())
@@ -117,7 +117,7 @@ def _angle(first: Floats | Doubles, second: Floats | Doubles) -> float:
 
 
 def _model(interpreter_class: Any, path: Path) -> Callable[[Floats], list[Floats]]:
-    """Return a function from an input (h, w, 3) to the outputs of a model."""
+    """Load a model, and return a function from its input (h, w, 3) to its outputs."""
     interpreter = interpreter_class(model_path=str(path))
     interpreter.allocate_tensors()
     source = interpreter.get_input_details()[0]["index"]
@@ -132,7 +132,7 @@ def _model(interpreter_class: Any, path: Path) -> Callable[[Floats], list[Floats
 
 
 def _anchors() -> Floats:
-    """Return the positions (896, 2) to which the boxes are relative, 0 to 1."""
+    """Return the positions (896, 2) to which predicted boxes are relative, as fractions of the picture."""
     rows = []
     for cells, count in _ANCHOR_GRIDS:
         middle = (np.arange(cells) + 0.5) / cells

@@ -48,18 +48,19 @@ _MEDIAPIPE_PARTS: Mapping[str, Sequence[int]] = {
 _PARTS: Mapping[str, Mapping[str, Sequence[int]]] = {"ibug-68": _IBUG_PARTS, "mediapipe": _MEDIAPIPE_PARTS}
 
 
-class Labelled(NamedTuple):
-    """Picture with the true landmarks: for each set, (n, 2) positions by name [pixel]."""
+class LabelledPicture(NamedTuple):
+    """Picture with its true landmarks: for each set, positions (2,) by name [pixel]."""
 
     picture: Bytes
     landmarks: Mapping[str, Mapping[str, Doubles]]
 
 
 class Comparison(NamedTuple):
-    """Differences of a detector's landmarks from the truth, over the pictures with a found face.
+    """Differences of a detector's landmarks from the truth, in pictures in which it finds the face.
 
     pictures : number of pictures
-    found : number of pictures with a found face, within a third of the eye distance of the true face
+    found : number of pictures in which the middle of the true eyes is in the detected box, which is enlarged
+        on each side by a third of the distance of the outer eye corners
     offsets : (found, n, 2) offsets along the line of the eyes and downwards, relative to the distance of the
         outer eye corners [-]
     names : names of the n landmarks
@@ -70,13 +71,13 @@ class Comparison(NamedTuple):
     offsets: Doubles
     names: tuple[str, ...]
 
-    def errors(self, numbers: Iterable[int] | None = None) -> float:
-        """Return the normalised mean error of some landmarks, or of all [-]."""
+    def mean_error(self, numbers: Iterable[int] | None = None) -> float:
+        """Return the normalised mean error of landmarks by number; of all landmarks by default [-]."""
         chosen = slice(None) if numbers is None else [self.names.index(str(number)) for number in numbers]
         return float(np.linalg.norm(self.offsets[:, chosen], axis=2).mean())
 
     def mean_offsets(self) -> Iterator[tuple[str, float, float]]:
-        """Yield name, mean offset along the line of the eyes and mean offset downwards of each landmark."""
+        """Yield the name of each landmark, and its mean offsets along the eye line and downwards [-]."""
         for name, (along, down) in zip(self.names, self.offsets.mean(axis=0).tolist(), strict=True):
             yield name, along, down
 
@@ -102,7 +103,8 @@ def print_detector_report(dataset: Path, /, *, count: int = 200, dlib_weights: P
         )
     for detector in detectors:
         if any(detector.landmark_set not in image.landmarks for image in images):
-            print_note(f"note: {detector.name} is left out: the data set lacks {detector.landmark_set}")
+            missing = detector.landmark_set
+            print_note(f"note: {detector.name} is skipped: the data set has no landmarks {missing}")
             continue
         print_lines(*report_lines(detector, compare(detector, images)))
     return 0
@@ -120,7 +122,7 @@ def installed_detectors(dlib_weights: Path | None = None) -> Iterator[Detector]:
             yield kind(weights)
 
 
-def compare(detector: Detector, images: Iterable[Labelled]) -> Comparison:
+def compare(detector: Detector, images: Iterable[LabelledPicture]) -> Comparison:
     """Return the differences of a detector's landmarks from the truth."""
     pictures, rows, names = 0, list[Doubles](), tuple[str, ...]()
     for image in images:
@@ -140,15 +142,15 @@ def compare(detector: Detector, images: Iterable[Labelled]) -> Comparison:
 
 
 def report_lines(detector: Detector, comparison: Comparison) -> Iterator[str]:
-    """Yield the lines of the report: found faces, error of each part, and mean offsets above 2 %."""
+    """Yield the lines of the report: number of found faces, error of each part, mean offsets above 2 %."""
     yield f"{detector.name}; weights: {detector.licence}"
     yield f"  found {comparison.found} of {comparison.pictures} faces"
     if not comparison.found:
         return
     yield "  normalised mean error (by the distance of the outer eye corners)"
     for part, numbers in _PARTS[detector.landmark_set].items():
-        yield f"    {part:14s}{100 * comparison.errors(numbers):6.1f} %"
-    yield f"    {'all':14s}{100 * comparison.errors():6.1f} %"
+        yield f"    {part:14s}{100 * comparison.mean_error(numbers):6.1f} %"
+    yield f"    {'all':14s}{100 * comparison.mean_error():6.1f} %"
     yield "  mean offsets of detected points above 2 % (along the line of the eyes, downwards)"
     for name, along, down in comparison.mean_offsets():
         if np.hypot(along, down) > _MIN_LISTED_OFFSET:
@@ -162,14 +164,14 @@ def _is_same_face(found: Detection, eyes_middle: Doubles, distance: float) -> bo
     return bool(left - margin < x < right + margin and top - margin < y < bottom + margin)
 
 
-def _labelled_images(dataset_folder: Path, count: int) -> Iterator[Labelled]:
+def _labelled_images(dataset_folder: Path, count: int) -> Iterator[LabelledPicture]:
     for image, _ in zip(read_dataset(dataset_folder), range(count), strict=False):
         landmarks = {
             name: dict(zip(_set_names(name), points.pixels, strict=True))
             for name, points in image["landmarks"].items()
             if name in _PARTS
         }
-        yield Labelled(np.ascontiguousarray(image["picture"][..., :3]), landmarks)
+        yield LabelledPicture(np.ascontiguousarray(image["picture"][..., :3]), landmarks)
 
 
 def _set_names(set_name: str) -> list[str]:

@@ -15,11 +15,11 @@ from dermis.mesh.grown_strands import grow_strands
 _MAX_DEPTH_MM = 40.0  # knots deeper than this are on the other side of a thin part or below the bust
 
 
-class Penetration(NamedTuple):
+class HairPenetration(NamedTuple):
     """Knots of hair inside the skin.
 
     knots : number of knots, without those at the roots
-    inside : number of knots further inside than the limit
+    inside : number of knots deeper inside the skin than the limit
     deepest_mm : depth of the deepest of them, 0 if there is none [mm]
     """
 
@@ -34,27 +34,27 @@ def with_style(person: Human, style: str) -> Human:
     return replace(person, hair=look)
 
 
-def hair_penetration(person: Human, limit_mm: float, max_strands: int = 3000) -> Penetration:
-    """Return how many knots of a person's hair are further inside the skin than a limit, at rest.
+def hair_penetration(person: Human, limit_mm: float, max_strands: int = 3000) -> HairPenetration:
+    """Count the knots of a person's hair that are deeper inside the skin than a limit, in the rest pose.
 
-    The depth is that below the tangent planes of the nearest vertices of the person's own skin.
+    The depth of a knot is its distance below the tangent planes of the nearest vertices of the skin.
 
-    limit_mm : depth up to which knots are not counted [mm]
+    limit_mm : depth above which knots are counted [mm]
     max_strands : number of strands that are checked
     """
     head = person.head()
     if head.hair is None:
-        return Penetration(0, 0, 0.0)
+        return HairPenetration(0, 0, 0.0)
     mesh = head.mesh
     skin = np.unique(mesh.triangles[mesh.material == 0])
     strands = grow_strands(head.hair, mesh, mesh.points_mm, max_strands)
     knots = strands.knot_positions_mm(mesh, mesh.points_mm)[:, 1:].reshape(-1, 3)
     depth = _depths(SkinSurface(mesh.positions[skin], mesh.normals[skin]), knots)
     inside = depth[(depth > limit_mm) & (depth < _MAX_DEPTH_MM)]
-    return Penetration(len(knots), len(inside), float(inside.max(initial=0.0)))
+    return HairPenetration(len(knots), len(inside), float(inside.max(initial=0.0)))
 
 
 def _depths(surface: SkinSurface, points_mm: Doubles) -> Doubles:
-    """Return the depths (n,) of points below a skin; negative outside [mm]."""
+    """Return the depths (n,) of points below the skin; depths are negative outside [mm]."""
     base, normal = surface.project(points_mm)
     return np.asarray(((base - points_mm) * normal).sum(axis=1))

@@ -1,4 +1,4 @@
-"""Hair as B-spline curves of Mitsuba, with its material of hair fibres."""
+"""Hair as Mitsuba's B-spline curves with Mitsuba's hair material."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from dermis.apps.truths.scene_description import SceneDict
 
 
 def hair_shape(curve_group: CurveGroup) -> SceneDict:
-    """Return Mitsuba's description of a group of hairs, whose curves are in `hair_file`."""
+    """Return Mitsuba's description of a group of hairs; the curves are in the file `hair_file`."""
     bsdf = fibre_bsdf(curve_group.optical_depth)
     return {"type": "bsplinecurve", "filename": hair_file(curve_group.name), "bsdf": bsdf}
 
 
 def hair_files(curve_groups: Sequence[CurveGroup]) -> dict[str, bytes]:
-    """Return a dictionary from name to content of the files of curves."""
+    """Return the files of curves, as a dictionary from file name to content."""
     return {
         hair_file(group.name): curves_text(group.knots_mm, group.radius_mm).encode("ascii")
         for group in curve_groups
@@ -24,5 +24,5 @@ def hair_files(curve_groups: Sequence[CurveGroup]) -> dict[str, bytes]:
 
 
 def hair_file(group_name: str) -> str:
-    """Return the name of the file with the curves of a group."""
+    """Return the path of the file with the curves of a group, relative to the scene file."""
     return f"hairs/{group_name}.txt"

@@ -1,4 +1,4 @@
-"""Hair as B-spline curves of pbrt, with its material `hair`."""
+"""Hair as pbrt's B-spline curves with pbrt's material `hair`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dermis.apps.truths.person.shapes import (
 def hair_directives(curve_group: CurveGroup) -> Lines:
     """Return the directives of a group of hairs: a material, and a shape for each hair.
 
-    pbrt's unit of length in the material is the radius of a fibre. The width of a curve varies linearly
+    The material measures lengths in radii of a fibre. The width of a curve varies linearly
     from its root to its tip.
     """
     material: DirectiveParameters = {
