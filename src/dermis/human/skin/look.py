@@ -80,10 +80,6 @@ class SkinLook:
         Shininess, 0 to 1 [-].
     age : float
         Depth of folds and lines, from youth to old age, 0 to 1 [-].
-    blemishes : float
-        Density of inflamed spots, 0 to 1 [-].
-    scars : float
-        Density of pitted scars of acne, 0 to 1 [-].
     seed : int
         Seed of the pattern of spots and lines, 0 to 2**32 - 1.
     sites : SiteDifferences or mapping
@@ -91,6 +87,10 @@ class SkinLook:
         measured people.
     stubble_eumelanin, stubble_pheomelanin : float
         Concentrations of pigments in the hair that darkens the scalp, 0 to 10, see `HairLook` [-].
+    blemishes : float
+        Density of inflamed spots, 0 to 1 [-].
+    scars : float
+        Density of pitted scars of acne, 0 to 1 [-].
 
     Raises
     ------
@@ -120,12 +120,12 @@ class SkinLook:
     beard: float = 0.0
     oil: float = 0.4
     age: float = 0.1
-    blemishes: float = 0.0
-    scars: float = 0.0
     seed: int = 0
     sites: SiteDifferences = field(default_factory=typical_site_differences)
     stubble_eumelanin: float = 4.0
     stubble_pheomelanin: float = 0.3
+    blemishes: float = 0.0
+    scars: float = 0.0
 
     def __post_init__(self) -> None:
         """Raise DermisError for fields out of range."""
