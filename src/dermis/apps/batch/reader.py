@@ -39,12 +39,13 @@ _RESTORE_ADVICE = "Copy or download it again, or render the shard again"
 _MAX_SHARD_NUMBER = 10**9
 _IMAGE_FILE_PATTERN = re.compile(r"(\d{9})\.([a-z0-9_]{1,40}(?:\.[a-z0-9]{1,10})?)")
 _OUTPUT_FILE_PATTERN = re.compile(r"([a-z0-9_]+)\.(png|exr|npy)")
-_RESERVED_IMAGE_KEYS = frozenset(
+FIELDS_WITHOUT_OUTPUTS = frozenset(
     (
         *("number", "picture", "parameters", "camera", "head_pose", "gaze", "landmarks", "skin_tone"),
         *("gaze_error_deg", "boxes", "split", "licence"),
     )
 )
+"""Keys of an image that are not names of outputs."""
 UNKNOWN_OCCLUSION = 255
 """Occlusion of landmarks in data sets that earlier versions have written."""
 
@@ -139,7 +140,7 @@ def decode_image(files: Mapping[str, object], error_subject: object = "") -> Ima
         refuse(source, "an 8-bit picture", f"it has {picture.dtype}", "Copy or download it again")
     for suffix, content in sorted(data.items()):
         match = _OUTPUT_FILE_PATTERN.fullmatch(suffix)
-        if match is None or match[1] in _RESERVED_IMAGE_KEYS:
+        if match is None or match[1] in FIELDS_WITHOUT_OUTPUTS:
             refuse(source, "files of outputs", f"found .{suffix}", "Remove it")
         values = _decode_picture(f"{source}.{suffix}", match[1], match[2], content)
         if values.shape[:2] != picture.shape[:2]:
