@@ -13,6 +13,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.batch.image_facts import SPLIT_NAMES
 from dermis.apps.batch.output_encoding import Array, decode_output, decode_png
 from dermis.apps.batch.records import PICTURE_SUFFIX, RECORD_SUFFIX, LandmarksRecord, NestedNumbers, Record
 from dermis.apps.batch.shard_formats import MANIFEST_NAME, TarMember, tar_members
@@ -283,6 +284,8 @@ def record_fields(record: Record, error_subject: object) -> ImageFields:
     """
     with _refuse_malformed_record(error_subject):
         landmarks = {name: _decode_landmarks(one) for name, one in record["landmarks"].items()}
+        if record.get("split", "") not in ("", *SPLIT_NAMES):  # exports use it as the name of a folder
+            raise ValueError(f"its split is none of {', '.join(SPLIT_NAMES)}")
     image = {"number": record["number"], "parameters": record["parameters"]}
     image["skin_tone"] = record.get("skin_tone")
     image |= {name: str(record.get(name, "")) for name in ("split", "licence")}

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.batch.face_boxes import BOX_NAMES
-from dermis.apps.batch.image_facts import SPLITS, person_fact_names, text_fact_names
+from dermis.apps.batch.image_facts import SPLIT_NAMES, person_fact_names, text_fact_names
 from dermis.apps.batch.reader import FIELDS_WITHOUT_OUTPUTS, ImageFields
 from dermis.apps.batch.spec import Spec
 
@@ -78,8 +78,8 @@ def arrays(image: ImageFields) -> ImageArrays:
     height, width = picture.shape[:2]
     has_alpha = picture.shape[2] == 4
     alpha = picture[..., 3].copy() if has_alpha else np.full((height, width), _OPAQUE, np.uint8)
-    splits, boxes = [name for name, _ in SPLITS], image.get("boxes") or {}
-    split = splits.index(image["split"]) if image.get("split") else _UNKNOWN
+    boxes = image.get("boxes") or {}
+    split = SPLIT_NAMES.index(image["split"]) if image.get("split") else _UNKNOWN
     tone = image.get("skin_tone") or {}
     result: ImageArrays = {
         "number": np.array(image["number"], np.int64),
