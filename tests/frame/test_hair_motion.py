@@ -180,6 +180,13 @@ def test_all_frames_show_one_head(renderer: Renderer, long_haired: Head) -> None
         renderer.prepare(motion.scene(1), SETTINGS, hair_frame=frame)
 
 
+def test_a_frame_has_the_pose_of_its_scene(renderer: Renderer, long_haired: Head) -> None:
+    motion = HairMotion(RATE)
+    frames = [motion.advance(turned(long_haired, angle)) for angle in (0.0, 10.0)]
+    with pytest.raises(DermisError, match="hair_frame: expected a frame with the pose of the scene"):
+        renderer.prepare(motion.scene(1), SETTINGS, hair_frame=frames[0])
+
+
 def test_gravity_turns_relative_to_the_head() -> None:
     c, s = np.cos(0.3), np.sin(0.3)
     rolled = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
