@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dermis.apps.truths.person.shapes import group_by_optical_depth
+from dermis.apps.truths.person.shapes import MAX_HAIR_GROUPS, group_by_optical_depth
 from dermis.base.arrays import Doubles, Floats
 from dermis.mesh.grown_strands import grow_strands
 from dermis.mesh.head import Head
@@ -17,7 +17,7 @@ MAX_CURVES = 16_000
 """Largest number of curves of scalp hair and beard; more hairs are represented by fewer, wider ones."""
 HAIR_LIMITATIONS = (
     f"Hair consists of at most {MAX_CURVES:,} curves in the pose of rest, which are wider where a head has "
-    "more hairs; their colours are averaged in 12 groups."
+    f"more hairs; their colours are averaged in {MAX_HAIR_GROUPS} groups."
 )
 """Sentence on hair in the limitations of targets that write curves."""
 
