@@ -130,7 +130,8 @@ def test_hair_lags_behind_a_turning_head_and_then_comes_to_rest(turn: list[Simul
 def test_hair_does_not_enter_the_skin_further_than_at_rest(turn: list[Simulated]) -> None:
     for before, frame in pairwise(turn):
         distance, _ = twin.nearest_skin(grid_of(before, frame), frame.knots.position, 0.0, 0.0)
-        assert (np.minimum(frame.knots.clearance, 0.0) - distance).max() <= 0.5
+        entered = np.minimum(frame.knots.clearance, 0.0) - distance
+        assert entered[:, 1:].max() < SWUNG_KNOTS_MM  # roots follow the skin, and are not simulated
 
 
 def grid_of(before: Simulated, now: Simulated) -> twin.Grid:
