@@ -167,7 +167,7 @@ SWUNG_LENGTHS = 1e-5
 """Lengths of the segments of guides that swing, relative: float32."""
 
 SWUNG_KNOTS_MM = 0.01
-"""Knots of guides that swing, at rest and against a twin in float64 after a few frames [mm]."""
+"""Knots of guides that swing: at rest, against a twin in float64 after a few frames, and in the skin [mm]."""
 
 WRITTEN_CURVES_MM = 1e-3
 """Knots of hair in files of other programs against the head's, by seven digits [mm]."""

@@ -1,6 +1,7 @@
 """Data sets in Python: specs, images as arrays, an endless stream, and exports of keypoints."""
 
-from dermis.apps.batch.keypoint_files import SPLIT_NAMES, export_keypoints
+from dermis.apps.batch.image_facts import SPLIT_NAMES
+from dermis.apps.batch.keypoint_files import export_keypoints
 from dermis.apps.batch.reader import decode_image, read_dataset
 from dermis.apps.batch.spec import Spec, load_spec, parse_spec
 from dermis.apps.batch.stream import stream

@@ -15,6 +15,7 @@ from dermis.apps.batch.licences import image_licence
 from dermis.apps.batch.reader import UNKNOWN_OCCLUSION, decode_image
 from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.scenes import sampled_person
+from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.human.hair.look import HairLook
 from dermis.human.labels.classes import class_number
@@ -110,3 +111,12 @@ def test_records_of_earlier_versions_are_read() -> None:
     assert found["boxes"] is None and found["gaze_error_deg"] is None
     assert found["split"] == found["licence"] == ""
     assert found["landmarks"]["ibug-68"].occlusion.tolist() == [UNKNOWN_OCCLUSION] * 2
+
+
+def test_an_unknown_split_is_refused() -> None:
+    """Exports use the split as the name of a folder."""
+    spec = small_spec()
+    files = encode_record(1, observation(1), spec.parameters(1), spec)
+    record = json.loads(files["json"]) | {"split": "../other"}
+    with pytest.raises(DermisError, match="its split is none of train, val, test"):
+        decode_image(files | {"json": json.dumps(record).encode()})

@@ -120,3 +120,4 @@ def test_pts_files_count_from_one(faces: Path, tmp_path: Path) -> None:
         dermis.dataset.export_keypoints(faces, out, "pts")
     with pytest.raises(DermisError, match="one of ibug-68"):
         dermis.dataset.export_keypoints(faces, tmp_path / "other", "pts", "mediapipe")
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["pts"], "nothing is left of a refused export"

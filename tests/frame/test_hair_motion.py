@@ -130,7 +130,8 @@ def test_hair_lags_behind_a_turning_head_and_then_comes_to_rest(turn: list[Simul
 def test_hair_does_not_enter_the_skin_further_than_at_rest(turn: list[Simulated]) -> None:
     for before, frame in pairwise(turn):
         distance, _ = twin.nearest_skin(grid_of(before, frame), frame.knots.position, 0.0, 0.0)
-        assert (np.minimum(frame.knots.clearance, 0.0) - distance).max() <= 0.5
+        entered = np.minimum(frame.knots.clearance, 0.0) - distance
+        assert entered[:, 1:].max() < SWUNG_KNOTS_MM  # roots follow the skin, and are not simulated
 
 
 def grid_of(before: Simulated, now: Simulated) -> twin.Grid:
@@ -178,6 +179,13 @@ def test_all_frames_show_one_head(renderer: Renderer, long_haired: Head) -> None
     frame = motion.advance(turned(long_haired, 0.0))
     with pytest.raises(DermisError, match="scenes of one head"):
         renderer.prepare(motion.scene(1), SETTINGS, hair_frame=frame)
+
+
+def test_a_frame_has_the_pose_of_its_scene(renderer: Renderer, long_haired: Head) -> None:
+    motion = HairMotion(RATE)
+    frames = [motion.advance(turned(long_haired, angle)) for angle in (0.0, 10.0)]
+    with pytest.raises(DermisError, match="hair_frame: expected a frame with the pose of the scene"):
+        renderer.prepare(motion.scene(1), SETTINGS, hair_frame=frames[0])
 
 
 def test_gravity_turns_relative_to_the_head() -> None:

@@ -28,8 +28,9 @@ class HairFrame(NamedTuple):
 class HairMotion:
     """Swing of long hair over the frames of one animation, by a simulation of its guides on the device.
 
-    Hair is at rest in the first frame. Each further frame advances the simulation by its time in fixed
-    substeps, so the frames depend only on the poses, not on which of them are rendered, or when.
+    Hair is at rest in the first frame. Each further frame advances the simulation by its time, in equal
+    substeps of at most 1/240 s, or 60 longer ones below 4 frames per second. Frames depend only on the poses,
+    not on which of them are rendered, or when. Heads without scalp hair and beard are rendered as without it.
 
     Parameters
     ----------
@@ -86,7 +87,10 @@ class HairMotion:
         return self._scenes[index]
 
     def buffers(self, device: Device, guides: Buffer) -> SwingBuffers | None:
-        """Return the buffers of the simulation; None before its first step and for another device."""
+        """Return the buffers of the simulation; None before its first step, and for another device or size.
+
+        guides : buffer of the guides of the hair style, to which the size of the buffers must fit
+        """
         found = self._buffers
         usable = found is not None and found.device is device and found.guides.size == guides.size
         return found if usable else None

@@ -109,7 +109,7 @@ class Preparation:
         if "motion" in outputs:
             inputs = replace(inputs, previous=self._previous_scene(scene, previous or scene, inputs))
         if hair_frame is not None:
-            inputs = replace(inputs, swing=self._swing(inputs.resources, hair_frame))
+            inputs = replace(inputs, swing=self._swing(scene, inputs.resources, hair_frame))
         self.memo.end_frame()
         return inputs
 
@@ -222,12 +222,15 @@ class Preparation:
         view = with_camera(inputs.resources.view, camera, None)
         return PreviousScene(None if pose_bytes == inputs.pose_bytes else pose_bytes, view)
 
-    def _swing(self, resources: Resources, hair_frame: HairFrame) -> Swing | None:
+    def _swing(self, scene: Scene, resources: Resources, hair_frame: HairFrame) -> Swing | None:
         """Return the simulation of hair up to a frame; None for heads without scalp hair or beard.
 
-        Raises DermisError if the frames show different heads.
+        Raises DermisError if the scene has another pose than the frame, or if frames show different heads.
         """
         motion, index = hair_frame
+        if not are_equal(scene.pose_arrays, motion.scene(index).pose_arrays):
+            advice = "Pass the frame that HairMotion.advance returned for this scene"
+            refuse("hair_frame", "a frame with the pose of the scene", f"frame {index} has another", advice)
         if resources.hair is None or resources.hair.tables.groom is None:
             return None
         head, guides = motion.scene(index).head.without_maps, resources.hair.tables.groom.style.guides

@@ -128,7 +128,8 @@ class Renderer:
     ) -> tuple[CommandList, T | None]:
         """Declare the passes of a frame, run those whose inputs have changed, and start a readback.
 
-        All passes are in one submission. Returns the submitted commands, and the result of `read_back`.
+        All passes of the frame are in one submission; earlier steps of the swing of hair that are missing are
+        submitted before it. Returns the submitted commands of the frame, and the result of `read_back`.
 
         timed : whether stages or the whole frame are timed, see `draw`
         run_all_passes : whether to run all passes, instead of only the passes whose inputs have changed
@@ -138,10 +139,12 @@ class Renderer:
         if run_all_passes:
             self.graph.invalidate()
         swing = inputs.swing
-        for step in swing.steps[:-1] if swing else ():
-            self.graph.begin()
-            draw_swing_step(self.graph, inputs, step)
-            self.graph.submit()
+        if swing and hair_frame:
+            for step in swing.steps[:-1]:
+                self.graph.begin()
+                draw_swing_step(self.graph, inputs, step)
+                self.graph.submit()
+                hair_frame.motion.mark_done(swing.buffers, step.frame)
         self.graph.begin()
         draw_frame(self.graph, inputs, TECHNIQUES[inputs.settings.technique])
         readback = read_back(self.graph, inputs.resources.post.picture) if read_back else None

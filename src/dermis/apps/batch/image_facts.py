@@ -13,6 +13,8 @@ from dermis.human.person import Human
 
 SPLITS = ("train", 0.8), ("val", 0.1), ("test", 0.1)
 """Names and fractions of the parts into which a data set is split by person."""
+SPLIT_NAMES = tuple(name for name, _ in SPLITS)
+"""Names of the splits, in the order of their numbers in `dermis.dataset.arrays`."""
 _SEED_FIELD = "seed"
 _NO_FACTS: Mapping[str, float | str | None] = {}
 

@@ -10,15 +10,12 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from dermis.apps.batch.datasheet import DESCRIPTION_FILE
-from dermis.apps.batch.image_facts import SPLITS
 from dermis.apps.batch.reader import ImageFields, read_record, record_fields, select_shards, shard_files
 from dermis.apps.batch.records import PICTURE_SUFFIX, RECORD_SUFFIX
-from dermis.base.atomic_write import refuse_output
+from dermis.base.atomic_write import refuse_output, temporary_folder
 from dermis.base.errors import refuse
 from dermis.base.reading import checked_path, parse_json, read_text
 
-SPLIT_NAMES = tuple(name for name, _ in SPLITS)
-"""Names of the splits, in the order of their numbers in `dermis.dataset.arrays`."""
 KeypointFormat = Literal["coco", "pts"]
 _COCO_HIDDEN, _COCO_VISIBLE = 1, 2  # keypoint flags of COCO; 0 is "not labelled"
 _OCCLUDED = 2
@@ -72,22 +69,25 @@ def export_keypoints(
         refuse("format", "coco or pts", f"got {format!r}", "Choose one")
     if target.exists():
         refuse(target, "a folder that does not exist", "it exists", "Choose another folder")
-    names, counts = _landmark_names(source, landmarks), dict[str, list[dict[str, Any]]]()
+    names, by_split = _landmark_names(source, landmarks), dict[str, list[dict[str, Any]]]()
     try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        refuse_output(target, fault)
+    with temporary_folder(target) as unfinished:
         for picture in _pictures(source, landmarks):
             split = picture.fields["split"] or _UNKNOWN_SPLIT
-            folder = target / split
-            folder.mkdir(parents=True, exist_ok=True)
+            folder = unfinished / split
+            folder.mkdir(exist_ok=True)
             (folder / f"{picture.key}.png").write_bytes(picture.png)
             if format == "pts":
                 text = _pts_text(picture.fields["landmarks"][landmarks].pixels)
                 (folder / f"{picture.key}.pts").write_text(text, encoding="ascii")
             else:
-                counts.setdefault(split, []).append(_coco_entry(picture, landmarks))
-        for split, entries in counts.items():
-            _write_coco(target / "annotations" / f"face_keypoints_{split}.json", entries, names)
-    except OSError as fault:
-        refuse_output(target, fault)
+                by_split.setdefault(split, []).append(_coco_entry(picture, landmarks))
+        for split, entries in by_split.items():
+            _write_coco(unfinished / "annotations" / f"face_keypoints_{split}.json", entries, names)
+        unfinished.replace(target)
     return target
 
 

@@ -13,6 +13,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.batch.image_facts import SPLIT_NAMES
 from dermis.apps.batch.output_encoding import Array, decode_output, decode_png
 from dermis.apps.batch.records import PICTURE_SUFFIX, RECORD_SUFFIX, LandmarksRecord, NestedNumbers, Record
 from dermis.apps.batch.shard_formats import MANIFEST_NAME, TarMember, tar_members
@@ -39,12 +40,13 @@ _RESTORE_ADVICE = "Copy or download it again, or render the shard again"
 _MAX_SHARD_NUMBER = 10**9
 _IMAGE_FILE_PATTERN = re.compile(r"(\d{9})\.([a-z0-9_]{1,40}(?:\.[a-z0-9]{1,10})?)")
 _OUTPUT_FILE_PATTERN = re.compile(r"([a-z0-9_]+)\.(png|exr|npy)")
-_RESERVED_IMAGE_KEYS = frozenset(
+FIELDS_WITHOUT_OUTPUTS = frozenset(
     (
         *("number", "picture", "parameters", "camera", "head_pose", "gaze", "landmarks", "skin_tone"),
         *("gaze_error_deg", "boxes", "split", "licence"),
     )
 )
+"""Keys of an image that are not names of outputs."""
 UNKNOWN_OCCLUSION = 255
 """Occlusion of landmarks in data sets of earlier versions, which do not state it."""
 
@@ -140,7 +142,7 @@ def decode_image(files: Mapping[str, object], error_subject: object = "") -> Ima
         refuse(source, "an 8-bit picture", f"it has {picture.dtype}", "Copy or download it again")
     for suffix, content in sorted(data.items()):
         match = _OUTPUT_FILE_PATTERN.fullmatch(suffix)
-        if match is None or match[1] in _RESERVED_IMAGE_KEYS:
+        if match is None or match[1] in FIELDS_WITHOUT_OUTPUTS:
             refuse(source, "files of outputs", f"found .{suffix}", "Remove it")
         values = _decode_picture(f"{source}.{suffix}", match[1], match[2], content)
         if values.shape[:2] != picture.shape[:2]:
@@ -283,6 +285,8 @@ def record_fields(record: Record, error_subject: object) -> ImageFields:
     """
     with _refuse_malformed_record(error_subject):
         landmarks = {name: _decode_landmarks(one) for name, one in record["landmarks"].items()}
+        if record.get("split", "") not in ("", *SPLIT_NAMES):  # exports use it as the name of a folder
+            raise ValueError(f"its split is none of {', '.join(SPLIT_NAMES)}")
     image = {"number": record["number"], "parameters": record["parameters"]}
     image["skin_tone"] = record.get("skin_tone")
     image |= {name: str(record.get(name, "")) for name in ("split", "licence")}

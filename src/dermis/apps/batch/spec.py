@@ -33,8 +33,8 @@ MAX_IMAGES = 10**9
 GENERATOR_VERSION = 5
 """Number of the rules that turn seeds into people and pictures; with other rules, a seed gives other people.
 
-Number 1 stands for the people of version 0.1, number 2 for people with the skin of measured people, and
-number 3 for people whose hair has also changed.
+Number 1 stands for the people of version 0.1, number 2 for people with the skin of measured people, number 3
+for people whose hair has also changed, and later numbers for further changes of people, hair and records.
 """
 COUNT_LINE_PATTERN = re.compile(r"(?m)^count = (\d+)\n")
 """Line of a canonical spec with the number of images, which may be raised to let a data set grow."""

@@ -9,20 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.batch.face_boxes import BOX_NAMES
-from dermis.apps.batch.image_facts import SPLITS, person_fact_names, text_fact_names
-from dermis.apps.batch.reader import ImageFields
+from dermis.apps.batch.image_facts import SPLIT_NAMES, person_fact_names, text_fact_names
+from dermis.apps.batch.reader import FIELDS_WITHOUT_OUTPUTS, ImageFields
 from dermis.apps.batch.spec import Spec
 
 ImageArrays = dict[str, NDArray[Any]]
 _OPAQUE = 255
-_UNKNOWN_SPLIT = -1
+_UNKNOWN = -1  # split or person that an image does not state
 _SKIN_TONE_NUMBERS = "L", "a", "b", "hue_degrees", "ita_degrees"
-_FIELDS_WITHOUT_OUTPUTS = frozenset(
-    (
-        *("number", "picture", "parameters", "camera", "head_pose", "gaze", "gaze_error_deg", "boxes"),
-        *("landmarks", "skin_tone", "split", "licence"),
-    )
-)
 
 
 def parameter_names(spec: Spec) -> tuple[str, ...]:
@@ -85,16 +79,16 @@ def arrays(image: ImageFields) -> ImageArrays:
     height, width = picture.shape[:2]
     has_alpha = picture.shape[2] == 4
     alpha = picture[..., 3].copy() if has_alpha else np.full((height, width), _OPAQUE, np.uint8)
-    splits, boxes = [name for name, _ in SPLITS], image.get("boxes") or {}
-    split = splits.index(image["split"]) if image.get("split") else _UNKNOWN_SPLIT
+    boxes = image.get("boxes") or {}
+    split = SPLIT_NAMES.index(image["split"]) if image.get("split") else _UNKNOWN
     tone = image.get("skin_tone") or {}
     result: ImageArrays = {
         "number": np.array(image["number"], np.int64),
-        "person": np.array(parameters.get("person.number", _UNKNOWN_SPLIT), np.int64),
+        "person": np.array(parameters.get("person.number", _UNKNOWN), np.int64),
         "split": np.array(split, np.int64),
         "picture": np.ascontiguousarray(picture[..., :3]),
         "picture_alpha": alpha,
-        **{name: np.array(value) for name, value in image.items() if name not in _FIELDS_WITHOUT_OUTPUTS},
+        **{name: np.array(value) for name, value in image.items() if name not in FIELDS_WITHOUT_OUTPUTS},
         **{f"camera.{name}": _floats(getattr(image["camera"], name)) for name in ("K", "R", "t")},
         "head_pose": _floats(image["head_pose"]),
         "gaze": _floats(image["gaze"], (2, 3)),

@@ -241,7 +241,7 @@ class Worker:
             try:
                 for observation in self._render_images(self._plan_images(image_numbers, in_flight, failures)):
                     done = in_flight.popleft()
-                    tone = head_skin_tone(done.scene.head)
+                    tone = _head_skin_tone(done.scene.head)
                     yield done.number, observation, done.parameters, tone, done.facts
             except DeviceError:
                 raise
@@ -353,7 +353,7 @@ def _forward_warnings(forward_message: Callable[[str], None]) -> None:
     warnings.showwarning = forward_or_show
 
 
-def head_skin_tone(head: Head) -> SkinTone | None:
+def _head_skin_tone(head: Head) -> SkinTone | None:
     """Return the description of the mean colour of a head's skin; None for a head without a skin colour."""
     colour = head.maps.mean_colour
     return None if colour is None else skin_tone(colour)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dermis.apps.truths.person.shapes import group_by_optical_depth
+from dermis.apps.truths.person.shapes import MAX_HAIR_GROUPS, group_by_optical_depth
 from dermis.base.arrays import Doubles, Floats
 from dermis.mesh.grown_strands import grow_strands
 from dermis.mesh.head import Head
@@ -17,7 +17,7 @@ MAX_CURVES = 16_000
 """Largest number of curves of scalp hair and beard; larger numbers of hairs become fewer, wider curves."""
 HAIR_LIMITATIONS = (
     f"Scalp hair and beard are at most {MAX_CURVES:,} curves in the rest pose, which are wider if a head has "
-    "more hairs. The absorption of hairs is averaged in groups."
+    f"more hairs. The absorption of hairs is averaged in {MAX_HAIR_GROUPS} groups."
 )
 """Sentences about hair in `limitations` of export targets that write curves."""
 

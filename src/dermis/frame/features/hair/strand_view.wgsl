@@ -18,9 +18,9 @@ struct StrandView {
 struct ProjectedKnot {
     position: vec2f, // [pixel]
     depth: f32, // along the view [mm]
-    width: f32, // [pixel], negative behind the eye
+    width: f32, // [pixel], negative behind the eye, and where the head hides the whole strand
     radiance: vec3f,
-    covered: u32, // whether other hair hides the segment that begins here
+    covered: u32, // whether other hair or the head hides the segment that begins here
 }
 
 @group(0) @binding(40) var<uniform> strand_view: StrandView;

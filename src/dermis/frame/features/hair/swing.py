@@ -24,7 +24,8 @@ SUBSTEPS_PER_S = 240.0
 _MAX_SUBSTEPS = 60
 _COLLIDER_SPACING_MM = 4.0  # at most one collider for each cube with this side
 _GRAVITY_MM_PER_S2 = np.array([0.0, -9810.0, 0.0])
-_KNOT_WORDS = 12
+_KNOT_BYTES = 48  # struct Knot of swing_guides.wgsl
+_COLLIDER_BYTES = _GUIDE_KNOT_BYTES = 32  # two rows of vec4f
 
 
 class SwingStep(NamedTuple):
@@ -113,14 +114,18 @@ def make_swing_buffers(device: Device, guide_buffer: Buffer, collider_count: int
 
     guide_buffer : buffer of the guides of the hair style, `GuideTables.guides`
     """
-    knots = guide_buffer.size // 32
-    first, second, *around = (
-        device.storage_buffer(4 * words)
-        for words in (*2 * (_KNOT_WORDS * knots,), *2 * (8 * collider_count,))
+    knot_count = guide_buffer.size // _GUIDE_KNOT_BYTES
+
+    def pair(byte_count: int) -> tuple[Buffer, Buffer]:
+        return device.storage_buffer(byte_count), device.storage_buffer(byte_count)
+
+    return SwingBuffers(
+        device,
+        knots=pair(_KNOT_BYTES * knot_count),
+        colliders=pair(_COLLIDER_BYTES * collider_count),
+        cells=device.storage_buffer(4 * int(np.prod(SWING_CELLS))),
+        guides=device.storage_buffer(guide_buffer.size),
     )
-    cells = device.storage_buffer(4 * int(np.prod(SWING_CELLS)))
-    guides = device.storage_buffer(guide_buffer.size)
-    return SwingBuffers(device, (first, second), (around[0], around[1]), cells, guides)
 
 
 def gravity_change(rotation: NDArray[np.float64], first_rotation: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -215,6 +215,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
             workgroupBarrier();
             p = places[k];
         }
+        workgroupBarrier(); // before `restore_lengths` writes `places` again
         let outwards = pushed / max(length(pushed), 1e-9); // 0 if the knot touches no skin
         var moved = (p - knot.position - pushed) / h - shape_velocity;
         moved -= min(dot(moved, outwards), 0.0) * outwards;

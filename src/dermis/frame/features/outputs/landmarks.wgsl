@@ -14,7 +14,6 @@ struct Landmark {
 @group(0) @binding(56) var<storage, read> points: array<f32>; // x, y, z [mm]
 @group(0) @binding(57) var<storage, read> landmarks: array<Landmark>;
 @group(0) @binding(58) var<storage, read_write> results: array<vec4f>; // position, and the cover by hair and beard, plus 2 if the mesh does not hide the landmark
-
 @group(0) @binding(59) var<storage, read> hair_labels: array<u32>; // see strand_labels.wgsl
 
 fn point_at(index: u32) -> vec3f {
