@@ -197,12 +197,18 @@ def _render_frames(
 
 
 def _hair_motion(animated_scene: _AnimatedScene) -> HairMotion | None:
-    """Return the motion of hair, at rest in the first frame; None if no hair is to swing."""
+    """Return the motion of hair, at rest in the first frame; None if no hair is to swing.
+
+    Print a note if the frame rate is too high for the simulation.
+    """
     from dermis.frame.hair_motion import MAX_FRAMES_PER_S, HairMotion
 
     if not animated_scene.hair_motion or animated_scene.scene.head.hair is None:
         return None
-    return HairMotion(min(float(animated_scene.rate), MAX_FRAMES_PER_S))
+    if animated_scene.rate > MAX_FRAMES_PER_S:
+        print_note(f"note: hair does not swing at more than {MAX_FRAMES_PER_S:g} frames a second")
+        return None
+    return HairMotion(float(animated_scene.rate))
 
 
 def _rendered_scenes(

@@ -132,7 +132,7 @@ fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f
         if (part < parts_of(light)) {
             let seen = total_visibility(light, offset_point(point, offset), incident(light, position, part).direction);
             let rough = 1.0 - smoothness * f32(1u - light.punctual);
-            if (EYES && SHAPES) {
+            if (EYES && SHAPES && smoothness > 0.0) {
                 let radiance = seen * mirrored_radiance(light, point.position, reflect(-v, mirror));
                 lit.reflected += (1.0 - rough) * surface.rho_s * surface_albedo(dot(mirror, v), surface.roughness).x * radiance;
             }
