@@ -31,6 +31,7 @@ _BEARD_FADE = (0.2, 0.6)  # zone amounts between which the density of the beard 
 _HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # wave vectors of the hairline [rad/mm]
 
 _SCALP_MARGIN_MM = 25.0  # distance below the hairline down to which quads may have hair
+_EAR_TOP_MM = (73.0, 3.0, -78.0)  # where the left ear meets the scalp, on the mean person
 _BROW_MARGIN_MM = 8.0  # distance from quads of the brows within which their hairs may touch the skin
 _MIN_BEARD_AMOUNT = 0.02  # zone amount above which quads may have a beard
 
@@ -115,13 +116,14 @@ def scalp_density(recession: float, margin_mm: float = 0.0) -> HairDensity:
     """Return the relative density of scalp hair, which fades at the hairline and is thin on a receding crown.
 
     recession : recession of hairline and crown, 0 to 1, see `SkinLook`
-    margin_mm : distance by which the hairline is lowered, for roots of baby hairs and widow's peaks [mm]
+    margin_mm : distance by which the hairline is lowered, for roots of baby hairs and widow's peaks; it
+        decreases to 0 above the ears, which these hairs would enter [mm]
     """
     column = _amount_column("hair")
     receding = zone_table(recession)[:, column] != zone_table()[:, column]
 
     def relative_density(points: Doubles) -> Doubles:
-        above = height_above_hairline(points, recession) + margin_mm
+        above = height_above_hairline(points, recession) + margin_mm * _distance_weight_from_ears(points)
         low, high = _HAIRLINE_FADE_MM
         margin = len(_HAIRLINE_WAVES)
         near = np.flatnonzero((above > low - margin) & (above < high + margin))
@@ -131,6 +133,12 @@ def scalp_density(recession: float, margin_mm: float = 0.0) -> HairDensity:
         return np.asarray(fraction * np.clip(1.0 + thinned, 0.0, 1.0))
 
     return HairDensity(relative_density, _scalp_point_mask())
+
+
+def _distance_weight_from_ears(points: Doubles) -> Doubles:
+    """Return weights (n,) of points, from 0 where an ear begins at its top to 1 at a distance of 25 mm."""
+    offsets = np.column_stack([np.abs(points[:, 0]), points[:, 1:3]]) - _EAR_TOP_MM
+    return smoothstep(10.0, 25.0, np.linalg.norm(offsets, axis=1))
 
 
 def beard_density(area: BeardArea = "all") -> HairDensity:

@@ -31,7 +31,7 @@ STRANDS_PER_CM2 = 150.0
 """Density of the strand roots on the scalp; strands grow from all or some of them [1/cm2]."""
 BEARD_STRANDS_PER_CM2 = 220.0
 """Density of the strand roots in beards [1/cm2]."""
-_CACHE_VERSION = 13  # of this module's algorithm, part of the keys of cached tables
+_CACHE_VERSION = 14  # of this module's algorithm, part of the keys of cached tables
 _MAX_CACHED_STYLES, _MAX_CACHED_LOOKS = 4, 24  # single styles; hair styles with or without a beard
 # Distances between guides from which strands are less, and then not at all, interpolated between them [mm].
 _GUIDE_SEPARATION_MM = 25.0, 55.0
