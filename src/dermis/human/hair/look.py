@@ -171,8 +171,9 @@ class HairLook:
         if self.beard_mm is None:
             usual = beard_styles().get(self.beard_style)
             object.__setattr__(self, "beard_mm", usual.length_mm if usual else 0.0)
-        numbers = (name for name in (field.name for field in fields(self)) if name not in _NAMES_BY_FIELD)
-        given = (name for name in numbers if getattr(self, name) is not None or name == "length_mm")
+        optional = {field.name for field in fields(self) if field.default is None}
+        numbers = (field.name for field in fields(self) if field.name not in _NAMES_BY_FIELD)
+        given = (name for name in numbers if getattr(self, name) is not None or name not in optional)
         check_fields(self, {name: FIELD_RANGES.get(name, (0.0, 1.0)) for name in given})
         if (self.beard_mm == 0.0) != (self.beard_style == "none"):
             object.__setattr__(self, "beard_style", _FULL_BEARD if self.beard_mm else "none")
