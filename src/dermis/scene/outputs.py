@@ -248,7 +248,7 @@ _BUILT_IN_OUTPUTS = (
     ),
     Output("label", "label", "I", "uint8", "", "class of the surface, see docs/labels.md"),
     Output("label_face_synthetics", "label", "I", "uint8", "", "class as in FaceSynthetics"),
-    Output("label_amodal", "label", "I", "uint8", "", "class of the surface behind all hair"),
+    Output("label_amodal", "label", "I", "uint8", "", "class of the surface, as if hair were transparent"),
     Output(
         "hair_alpha",
         "label",

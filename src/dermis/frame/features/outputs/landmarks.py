@@ -16,16 +16,16 @@ from dermis.human.landmarks.points import LandmarkPoints, check_landmarks, landm
 from dermis.mesh.head import Head
 
 LandmarkPositions = dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]
-"""For each set, the names of its n landmarks, and (n, 4) rows x, y, z [mm] and what is in front.
+"""For each set, the names of its n landmarks, and (n, 4) rows x, y, z [mm] and a visibility code.
 
-The last number is the fraction of the pixel that hair and beard cover, plus 2 if the mesh does not hide the
+The visibility code is the fraction of the pixel that hair and beard cover, plus 2 if the mesh does not hide the
 landmark.
 """
 LANDMARK_TOLERANCE_MM = 2.0
 """Largest depth by which the mesh may be in front of a landmark that counts as visible [mm]."""
 # Struct Landmark of landmarks.wgsl.
 _LANDMARK_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("material", "u4", 4)])
-_FLOATS_PER_LANDMARK = 4  # x, y, z, and what is in front
+_FLOATS_PER_LANDMARK = 4  # x, y, z, and the visibility code
 
 
 @dataclass(frozen=True, eq=False)
