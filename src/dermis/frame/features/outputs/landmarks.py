@@ -18,8 +18,8 @@ from dermis.mesh.head import Head
 LandmarkPositions = dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]
 """For each set, the names of its n landmarks, and (n, 4) rows x, y, z [mm] and a visibility code.
 
-The visibility code is the fraction of the pixel that hair and beard cover, plus 2 if the mesh does not hide the
-landmark.
+The visibility code is the fraction of the pixel that hair and beard cover, plus 2 if the mesh does not hide
+the landmark.
 """
 LANDMARK_TOLERANCE_MM = 2.0
 """Largest depth by which the mesh may be in front of a landmark that counts as visible [mm]."""
