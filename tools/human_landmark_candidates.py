@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.base.tables import read_rows
 from dermis.human.hair import brows
 from dermis.human.model import MATERIAL_OF_GROUP
 from dermis.human.regions.average import AVERAGE_HUMAN, average_head, quads_of_parts
@@ -22,7 +23,6 @@ _UPPER, _LOWER = np.arange(13), np.r_[12:28, 0]  # rows of lid_rings.csv, from c
 _EDGE, _CREST = 1, 2  # columns of lid_rings.csv
 _SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])  # x, y where the lips meet
 _CORNER_MM = 22.2
-_DEPTH_WEIGHT = 0.4  # weight of z relative to height in the search for the edge of a lip
 _NEAR_MM = 1.2  # search radius around a position in the front plane
 # Artist's values on the average human, seen from the front and the side: the outline of the face from in
 # front of the ear at the height of the eyes, over the angle of the jaw, to the chin [mm].
@@ -125,24 +125,18 @@ class Surface:
         return self.frontmost(x, y)
 
     def inner_lip(self, upper: bool) -> Doubles:
-        """Return the (n, 3) inner edge of the upper or lower lip, from the corner inwards [mm]."""
-        seam = np.interp(np.abs(self.at_mm[:, 0]), *_SEAM_MM.T)
-        above = self.at_mm[:, 1] - seam
-        side = (above > 0) & (above < 3) if upper else (above < 0) & (above > -3)
-        those = np.flatnonzero(self.skin & side & (self.mouth > 15) & (self.at_mm[:, 2] > 14))
-        rows = []
-        for x in np.linspace(20.0, 0.0, 21):
-            near = those[np.abs(self.at_mm[those, 0] - x) < 0.5]
-            height = self.at_mm[near, 1] if upper else -self.at_mm[near, 1]
-            edge = near[(height - _DEPTH_WEIGHT * self.at_mm[near, 2]).argmin()]
-            rows.append(self.at_mm[edge] * [0, 1, 1] + [x, 0, 0])
-        return np.concatenate([self.at_mm[[self.mouth_corner()]], np.stack(rows)])
+        """Return the (n, 3) rim of the upper or lower lip, from the corner inwards [mm].
+
+        The rim lies in front of the line on which closed lips touch, and is seen whether they are closed or open.
+        """
+        return np.asarray(self.points_mm[_lip_rim(upper)])
 
     def on_inner_lip(self, position: Doubles, upper: bool) -> int:
-        """Return the index of the candidate on a lip nearest to a position on its inner edge."""
-        seam = np.interp(np.abs(self.at_mm[:, 0]), *_SEAM_MM.T)
-        side = (self.at_mm[:, 1] > seam) == upper
-        return self.nearest(position, self.skin & side & (self.mouth > 15))
+        """Return the index of the candidate nearest to a position on the rim of the upper or lower lip."""
+        mesh = average_head().mesh
+        corners = quad_corners(mesh, np.arange(len(mesh.quads)))
+        own = np.isin(corners, _lip_rim(upper)[1:]).any(axis=1)
+        return self.nearest(position, self.skin & own[self.quad])
 
     def jaw(self) -> Doubles:
         """Return the (n, 3) outline of the face, from the height of the eyes to the chin [mm]."""
@@ -176,3 +170,10 @@ def points_along(path: Doubles, shares: Doubles) -> Doubles:
     """Return (n, 3) points at fractions (n,) of the length of a path."""
     run = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     return np.stack([np.interp(shares * run[-1], run, column) for column in path.T], axis=-1)
+
+
+def _lip_rim(upper: bool) -> Index:
+    """Return the points of the left half of the rim of a lip, from the corner inwards."""
+    rim = np.array([int(row["rim"]) for row in read_rows("dermis.human", "lip_rings")])
+    corner = int(average_surface()[0][rim, 0].argmax())
+    return rim[corner::-1] if upper else rim[corner:]

@@ -115,8 +115,8 @@ def _on_inner_lip(surface: Surface, upper: bool, share: float) -> int:
 
     share : distance from the middle, as a fraction of the distance of the corner
     """
-    inner = surface.inner_lip(upper)
-    return surface.on_inner_lip(_at_x(inner, share * float(inner[0, 0])), upper)
+    corner_x = float(surface.at_mm[surface.mouth_corner(), 0])
+    return surface.on_inner_lip(_at_x(surface.inner_lip(upper), share * corner_x), upper)
 
 
 def _at_x(path: Doubles, x: float) -> Doubles:

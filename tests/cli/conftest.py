@@ -62,6 +62,15 @@ def opened(monkeypatch: pytest.MonkeyPatch, device: object) -> None:
 
 
 @pytest.fixture
+def unopened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make commands open a device themselves, instead of the one that tests share."""
+    from dermis.gpu.device import open_device
+
+    monkeypatch.setattr("dermis.frame.renderer.open_device", open_device)
+    monkeypatch.setattr("dermis.gpu.failures.open_device", open_device)
+
+
+@pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a folder with head.obj that is also the current folder."""
     write_head(tmp_path / "head.obj")

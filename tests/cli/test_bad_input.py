@@ -108,6 +108,7 @@ def test_unknown_adapter(refused: Run) -> None:
     assert message["error_subject"] == "adapter 'voodoo'" and "auto, cpu" in message[0]
 
 
+@pytest.mark.usefixtures("unopened")
 def test_no_adapter(refused: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dermis.gpu.adapters.list_adapters", list)
     message = refused("head.obj")

@@ -86,6 +86,7 @@ def test_a_wrongly_lit_test_frame_is_reported(
     assert "NOT healthy: the brightness of the test frame" in ended.stdout
 
 
+@pytest.mark.usefixtures("unopened")
 @pytest.mark.parametrize(
     ("adapters", "problem"),
     [
@@ -106,6 +107,7 @@ def test_machine_that_cannot_render(
     assert [adapter["name"] for adapter in report["adapters"]] == [a.name for a in adapters]
 
 
+@pytest.mark.usefixtures("unopened")
 def test_broken_adapter_is_named_by_render_too(
     run: Run, folder: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -40,7 +40,7 @@ class SkinPrior:
         i = PRIOR_NAMES.index(parameter_name)
         mean = float(self.weight @ self.mean[:, i])
         second = float(self.weight @ (self.covariance[:, i, i] + self.mean[:, i] ** 2))
-        return mean, float(np.sqrt(second - mean**2))
+        return mean, float(np.sqrt(max(second - mean**2, 0.0)))
 
     def conditioned_on(self, melanin: float, blood: float) -> SkinPrior:
         """Return the distribution of skins with given fractions of melanin and blood [-]."""

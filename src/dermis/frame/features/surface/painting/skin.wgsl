@@ -160,7 +160,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let p = pigments(spot, lip, mucosa);
     var rgb = mix(skin_colour(p.x, p.y), colour_of(LIPS, p.x, p.y), lip);
     rgb *= mix(vec3f(1.0), VEIN_COLOUR, veins());
-    let bristles = 0.6 + 0.4 * dotted[DOT_STUBBLE];
+    let bristles = 0.85 + 0.15 * dotted[DOT_STUBBLE];
     let beard = 0.55 * paint.beard * saturate(zone_of(ZONE_BEARD)) * (1.0 - lip) * (0.45 + 0.9 * dotted[DOT_STUBBLE]);
     rgb = mix(rgb, paint.stubble_colour, paint.stubble * scalp * bristles);
     rgb = over(rgb, BEARD_COLOUR, beard);
