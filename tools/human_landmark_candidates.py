@@ -127,7 +127,8 @@ class Surface:
     def inner_lip(self, upper: bool) -> Doubles:
         """Return the (n, 3) rim of the upper or lower lip, from the corner inwards [mm].
 
-        The rim lies in front of the line on which closed lips touch, and is seen whether they are closed or open.
+        The rim lies in front of the line on which closed lips touch, so it is visible whether the mouth is
+        open or closed.
         """
         return np.asarray(self.points_mm[_lip_rim(upper)])
 

@@ -20,6 +20,7 @@ from dermis.gpu.textures import texture_from_array
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.scene.environment import Environment
+from dermis.scene.lights import Light, PointLight, RectangleLight
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
@@ -169,6 +170,30 @@ def test_hairs_shade_the_skin_softly(renderer: Renderer) -> None:
     cover = 0.05 / 0.1 * np.sqrt(2.0)  # and texels are as wide as hairs are apart
     assert share[27:29] == pytest.approx(np.full(2, np.exp(-cover)), abs=0.04)  # 8 mm below it
     assert share[32:] == pytest.approx(1.0, abs=TWIN) and share[:17] == pytest.approx(1.0, abs=TWIN)
+
+
+def test_area_lights_soften_shadows_of_hairs(renderer: Renderer) -> None:
+    """A rectangle shades like many point lights all over it."""
+    y = np.arange(-1.95, 2.0, 0.1)
+    begins = np.column_stack([np.full(40, -30.0), y, np.full(40, 8.0)])
+    head = hairy(begins, begins * [-1, 1, 1], 0.025, BLACK)
+    centre, along = np.array([0.0, 283.0, 283.0]), np.array([0.0, 1.0, -1.0]) / np.sqrt(2.0)
+    offsets = np.linspace(-90.0, 90.0, 10)
+    points = [PointLight(position=tuple(centre + each * along), irradiance=(1, 1, 1)) for each in offsets]
+    area = RectangleLight(position=tuple(centre), irradiance=(1, 1, 1), width_mm=40, height_mm=200)
+
+    def share(*lights: Light) -> Floats:
+        pictures = [
+            sum(
+                picture(renderer, replace(lit(head), lights=(light,)), strands=on, shadow_size=512)
+                for light in lights
+            )
+            for on in (True, False)
+        ]
+        return np.asarray(pictures[0] / pictures[1])[:, 20, 0]
+
+    one, soft, exact = share(points[4]), share(area), share(*points)
+    assert np.abs(soft - exact).max() < 0.3 * np.abs(one - exact).max()
 
 
 @pytest.mark.parametrize("behind_mm", [20.0, 60.0])

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from functools import cache
 from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,17 +32,31 @@ from dermis.scene.model import Scene
 Floats = NDArray[np.float64]
 _MAX_LIGHTS = 64
 _MAX_SHADOW_FILTER_TEXELS = 6  # largest half width of a shadow filter [shadow texels]
-_LIGHT_SAMPLES_PER_SIDE = 4  # an area light is sampled by 4 x 4 points
 _PART_SAMPLES_PER_SIDE = 2  # each of several parts of a light is sampled by 2 x 2 points
-_SHADOW_RAY_COUNT = 64  # shadow rays to an area light that is not divided
+_MAX_SHADOW_RAY_COUNT = 64
 _MIN_SHADOW_RAY_COUNT = 12  # least number of shadow rays to a part of a light
 _SUN_SHADOW_RAY_COUNT = 32  # shadow rays to a sun
+
+
+class _LightSampling(NamedTuple):
+    """Sampling of area lights that are not divided.
+
+    points_per_side : square root of the number of points at which the light itself is sampled
+    shadow_ray_count : number of shadow rays
+    """
+
+    points_per_side: int
+    shadow_ray_count: int
+
+
+_GPU_SAMPLING = _LightSampling(4, _MAX_SHADOW_RAY_COUNT)
+_SOFTWARE_SAMPLING = _LightSampling(2, 16)
 _FIRST_SAMPLE_POINT = 2016  # with it, the first 12, 16, 32 and 64 points have nearly the variance of a square
 
 
 def light_shader_constants() -> dict[str, float]:
     """Return the named values that `//#fill` lines insert into lights.wgsl and soft_shadows.wgsl."""
-    return {"max_lights": _MAX_LIGHTS, "max_rays": _SHADOW_RAY_COUNT, "min_rays": _MIN_SHADOW_RAY_COUNT}
+    return {"max_lights": _MAX_LIGHTS, "max_rays": _MAX_SHADOW_RAY_COUNT, "min_rays": _MIN_SHADOW_RAY_COUNT}
 
 
 def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[DirectionalLight, ...]:
@@ -142,9 +157,10 @@ def light_records(
     each = [KINDS[light.kind].light_parts(light) for light in scene.lights]
     divided = [(part, len(parts)) for parts in each for part in parts]
     none, layers = dict.fromkeys(lights.dtype.names or (), 0), count()
+    sampling = _SOFTWARE_SAMPLING if shading_program.device.adapter.kind == "CPU" else _GPU_SAMPLING
     rows = []
     for (light, siblings), view in zip(divided, shadow_views, strict=True):
-        members = _light_members(light, scene.head.centre_mm, view, siblings)
+        members = _light_members(light, scene.head.centre_mm, view, siblings, sampling)
         one = {**none, **members, "layer": next(layers) if view else -1}
         rows.append(tuple(one.values()))
     lights[: len(rows)] = rows  # in one assignment, as each access to a record is slow
@@ -158,16 +174,20 @@ def light_sample_points() -> Floats:
     A row holds two points: x and y on the unit disc, then x and y on the square from -1 to 1. Points come in
     opposite pairs, so that the mean of the first n points is the centre of the light for every even n.
     """
-    pairs = _FIRST_SAMPLE_POINT + np.arange(_SHADOW_RAY_COUNT // 2)
+    pairs = _FIRST_SAMPLE_POINT + np.arange(_MAX_SHADOW_RAY_COUNT // 2)
     even = (0.5 + pairs[:, None] * [0.7548776662, 0.5698402910]) % 1.0
     phi = 2.0 * np.pi * even[:, 1]
     disc = np.sqrt(even[:, :1]) * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
     half = np.hstack([disc, 2.0 * even - 1.0])
-    return np.stack([half, -half], axis=1).reshape(_SHADOW_RAY_COUNT, 4)
+    return np.stack([half, -half], axis=1).reshape(_MAX_SHADOW_RAY_COUNT, 4)
 
 
 def _light_members(
-    light: Light, centre: Triple, shadow_view: ShadowView | None, part_count: int
+    light: Light,
+    centre: Triple,
+    shadow_view: ShadowView | None,
+    part_count: int,
+    sampling: _LightSampling,
 ) -> StructMembers:
     """Return the members of the shader struct `Light` for a light; members that are left out are 0.
 
@@ -175,6 +195,7 @@ def _light_members(
     centre : centre of the head, the origin of light positions [mm]
     shadow_view : view for the light's shadow map, None if the light has no shadows
     part_count : number of parts of the light, 1 if it is not divided
+    sampling : sampling of area lights on this adapter
     """
     kind, parallel = KINDS[light.kind], isinstance(light, DirectionalLight)
     distance, texel, position = 1.0, 1.0, (0.0, 0.0, 0.0)
@@ -204,8 +225,12 @@ def _light_members(
         "half_width": min(max(half_width, 1), _MAX_SHADOW_FILTER_TEXELS),
         "rays": _SUN_SHADOW_RAY_COUNT
         if parallel
-        else max(_MIN_SHADOW_RAY_COUNT, _SHADOW_RAY_COUNT // part_count),
-        "side": 1 if kind.punctual else _PART_SAMPLES_PER_SIDE if part_count > 1 else _LIGHT_SAMPLES_PER_SIDE,
+        else max(_MIN_SHADOW_RAY_COUNT, sampling.shadow_ray_count // part_count),
+        "side": 1
+        if kind.punctual
+        else _PART_SAMPLES_PER_SIDE
+        if part_count > 1
+        else sampling.points_per_side,
         **shadow,
         **kind.shader_members(light, centre, distance),
     }

@@ -4,6 +4,7 @@
 override STRANDS: bool = false; // whether there are strands
 
 const FADING_MM: f32 = 100.0; // distance from the grid of the sky beyond which hair hides no sky
+const PENUMBRA_POINTS: u32 = 16u; // points of an area light whose light past hair is averaged
 const AMONG_MM: f32 = 0.25; // strands that are nearer to a point cast no shadow on it: it lies among them
 
 @group(0) @binding(26) var<storage, read> strand_shadows: array<u32>; // see strand_window.wgsl
@@ -105,7 +106,60 @@ fn sky_past_hair(p: vec3f, normal: vec3f, mean_direction: vec3f) -> f32 {
     return clamp(hair.w + dot(hair.xyz, mean_direction), 0.0, 1.0);
 }
 
+// Distance on a light's map between the rays from a point to the edge and to the centre of the light, where they pass a depth;
+// times the half sides of the light.
+fn ray_spread_at(light: Light, depth: f32, from_depth: f32) -> f32 {
+    if (is_parallel(light)) {
+        return max(from_depth - depth, 0.0);
+    }
+    return max(1.0 / max(depth, 1.0) - 1.0 / max(from_depth, 1.0), 0.0);
+}
+
+// Depth behind the nearest strand of a window of the strands before a point, on average over the light; negative if there are none.
+// reach: half sides of the area that is searched [texel]
+fn blocker_depth(light: Light, at: vec3f, reach: vec2f) -> f32 {
+    var sum = 0.0;
+    var count = 0.0;
+    for (var k = 0u; k < PENUMBRA_POINTS; k += 1u) {
+        let texel = vec2i(floor(at.xy + reach * sample_point(k, light.round != 0u)));
+        let nearest = strand_shadows[texel_word(light.layer, vec2u(clamp(texel, vec2i(0), vec2i(window_size()) - 1)))];
+        let depth = f32(nearest) / DEPTH_SCALE;
+        if (nearest != NO_HAIR && depth + AMONG_MM < at.z) {
+            sum += depth;
+            count += 1.0;
+        }
+    }
+    return select(-1.0, sum / count, count > 0.0);
+}
+
+// Fraction of an area light that strands transmit to a point: the penumbra is as wide as the light seen past the strands before
+// the point. Source: [Fernando2005].
+fn soft_strand_transmittance(light: Light, p: vec3f) -> f32 {
+    let window = window_of(light.layer);
+    let at = project_to_map(light, p);
+    if (any(window.size <= vec2f(0.0)) || at.z < window.depth) {
+        return 1.0;
+    }
+    let position = to_window(window, at);
+    let clip_per_spread = 2.0 * light.extent / (light.texel * vec2f(textureDimensions(shadow_maps)));
+    let texels_per_spread = clip_per_spread / window.size * vec2f(window_size());
+    let blocker = blocker_depth(light, position, ray_spread_at(light, window.depth, at.z) * texels_per_spread);
+    if (blocker < 0.0) {
+        return 1.0;
+    }
+    let reach = ray_spread_at(light, window.depth + blocker, at.z) * texels_per_spread;
+    var sum = 0.0;
+    for (var k = 0u; k < PENUMBRA_POINTS; k += 1u) {
+        let texel = vec2i(floor(position.xy + reach * sample_point(k, light.round != 0u)));
+        sum += exp(-cover_before(light.layer, texel, position.z - AMONG_MM));
+    }
+    return sum / f32(PENUMBRA_POINTS);
+}
+
 // Fraction of a light that strands transmit to a point.
 fn strand_transmittance(light: Light, p: vec3f) -> f32 {
+    if (SHAPES && STRANDS && light.layer >= 0 && any(light.extent > vec2f(0.0))) {
+        return soft_strand_transmittance(light, p);
+    }
     return exp(-strand_cover(light, p));
 }
