@@ -56,7 +56,7 @@ _FIRST_SAMPLE_POINT = 2016  # with it, the first 12, 16, 32 and 64 points have n
 
 def light_shader_constants() -> dict[str, float]:
     """Return the named values that `//#fill` lines insert into lights.wgsl and soft_shadows.wgsl."""
-    return {"max_lights": _MAX_LIGHTS, "max_rays": _MAX_SHADOW_RAY_COUNT, "min_rays": _MIN_SHADOW_RAY_COUNT}
+    return {"max_lights": _MAX_LIGHTS, "max_rays": _MAX_SHADOW_RAY_COUNT}
 
 
 def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[DirectionalLight, ...]:

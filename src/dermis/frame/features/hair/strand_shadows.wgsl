@@ -5,6 +5,7 @@ override STRANDS: bool = false; // whether there are strands
 
 const FADING_MM: f32 = 100.0; // distance from the grid of the sky beyond which hair hides no sky
 const PENUMBRA_POINTS: u32 = 16u; // points of an area light whose light past hair is averaged
+const BLOCKER_POINTS: u32 = 8u; // points of an area light towards which hair is searched
 const AMONG_MM: f32 = 0.25; // strands that are nearer to a point cast no shadow on it: it lies among them
 
 @group(0) @binding(26) var<storage, read> strand_shadows: array<u32>; // see strand_window.wgsl
@@ -120,7 +121,7 @@ fn ray_spread_at(light: Light, depth: f32, from_depth: f32) -> f32 {
 fn blocker_depth(light: Light, at: vec3f, reach: vec2f) -> f32 {
     var sum = 0.0;
     var count = 0.0;
-    for (var k = 0u; k < PENUMBRA_POINTS; k += 1u) {
+    for (var k = 0u; k < BLOCKER_POINTS; k += 1u) {
         let texel = vec2i(floor(at.xy + reach * sample_point(k, light.round != 0u)));
         let nearest = strand_shadows[texel_word(light.layer, vec2u(clamp(texel, vec2i(0), vec2i(window_size()) - 1)))];
         let depth = f32(nearest) / DEPTH_SCALE;

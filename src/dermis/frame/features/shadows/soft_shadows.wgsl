@@ -4,9 +4,9 @@ const STEPS: u32 = 8u; // steps of a shadow ray
 const NEAR_STEPS: u32 = 2u; // first steps, near the point's own surface
 const MIN_THICKNESS: f32 = 4.0; // least thickness of occluders [mm]
 const CROSSING_STEPS: f32 = 1.5; // number of steps that a ray may be behind a surface that it crosses
-//#fill const MIN_RAYS: u32 = {min_rays}u; // least number of rays per light
-const MIN_PROBES: u32 = 8u; // number of rays after which the others are skipped if all agree
 override RAY_STRIDE: u32 = 1u; // number of rays of which one is traced, above 1 in passes that do not show edges of shadows
+const MIN_STRIDED_RAYS: u32 = 8u; // least number of rays per light in such passes
+const MIN_PROBES: u32 = 8u; // number of rays after which the others are skipped if all agree
 
 const MIN_EDGE_TEXELS: f32 = 1.5; // half width of the sharpest edge of a soft shadow
 
@@ -44,7 +44,7 @@ fn soft_visibility(light: Light, point: Point) -> f32 {
         return 1.0;
     }
     let steps = occupied_steps(light, at);
-    let rays = min(light.rays, max(light.rays / RAY_STRIDE, MIN_RAYS));
+    let rays = select(max(light.rays / RAY_STRIDE, MIN_STRIDED_RAYS), light.rays, RAY_STRIDE == 1u);
     let probes = max(rays / 4u, MIN_PROBES);
     var traced = 0u;
     var hidden = 0u;
