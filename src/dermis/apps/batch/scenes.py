@@ -134,7 +134,8 @@ class SceneBuilder:
         else:
             head, skin = load_head(name, subdivide=SmoothOutlineLevels(size=size)), Skin()
             if is_person_name(name):
-                facts = person_facts(load_person(name))
+                human = load_person(name)
+                facts, skin = person_facts(human), skin_of(human)
         bones = find_rotation_bones(head.control_rig.skeleton).head
         return _Person(head, face_hull_indices(head), bones, skin, box_points(head), facts)
 
