@@ -61,12 +61,12 @@ def test_head_is_exported_with_lights_and_camera(tmp_path: Path) -> None:
         PointLight(position=(0.0, 300.0, 900.0)),
         RectangleLight(position=(500.0, 0.0, 900.0)),
         SphereLight(position=(-500.0, 0.0, 900.0)),
-        DirectionalLight(direction=(0.0, -1.0, 0.0)),
+        DirectionalLight(direction=(0.0, -1.0, 0.0), angle_degrees=0.5),
         StripeLight(direction=(0.0, 0.0, -1.0)),
     ]
     scene = Scene(subject.scene.head, lights=lights, environment=Environment(name="uniform"))
     lit = Subject(subject.name, subject.curve, subject.albedo, subject.model, subject.tissue, scene)
-    with pytest.warns(DermisWarning, match="stripe"):
+    with pytest.warns(DermisWarning, match="stripe"), pytest.warns(DermisWarning, match="light 4 are sharp"):
         export_skin(lit, "pbrt", tmp_path / "face.pbrt")
     found = read((tmp_path / "face.pbrt").read_text())
     point = one_of(found, "LightSource", "point").parameters

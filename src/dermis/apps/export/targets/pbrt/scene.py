@@ -88,6 +88,8 @@ def light_directives(lights: Iterable[Light], environment: Environment | None) -
         if PBRT_LIGHTS[light.kind] is _omit_unsupported_light:
             notify(f"pbrt has no {light.kind} light, so light {number} is omitted")
             continue
+        if isinstance(light, DirectionalLight) and light.angle_degrees > 0.0:
+            notify(f"pbrt has no parallel light with an angle, so the shadows of light {number} are sharp")
         lines += ["AttributeBegin", *PBRT_LIGHTS[light.kind](light), "AttributeEnd"]
     if environment is not None and environment.name != UNIFORM_PANORAMA:
         notify(f"the panorama {environment.name} is omitted, as pbrt uses another projection")
