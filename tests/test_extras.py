@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from png_bytes import png
 from small_head import write_head
 
 from dermis.base.errors import DermisError
-from dermis.base.extras import EXTRAS, distribution_name, import_extra
+from dermis.base.extras import EXTRAS, distribution_name, extra_advice, import_extra
 from dermis.images.codecs import decode_with_pillow, encode_png
 from dermis.images.io import read_image
 
@@ -53,7 +54,7 @@ def test_missing_package_error_names_the_extra(options: tuple[str, ...], extra: 
     write_moving_head(tmp_path / "face.glb")
     made = run(*options, folder=tmp_path)
     assert made.returncode == 2, made.stdout + made.stderr
-    assert f"dermis[{extra}]" in " ".join(made.stderr.split()) and "Traceback" not in made.stderr
+    assert f'[{extra}]".' in " ".join(made.stderr.split()) and "Traceback" not in made.stderr
 
 
 def test_picture_that_needs_an_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -73,8 +74,27 @@ def test_each_extra_is_declared_by_the_package() -> None:
 
 def test_missing_package_is_named() -> None:
     sys.modules["matplotlib.nothing"] = None  # type: ignore[assignment]
-    with pytest.raises(DermisError, match=r"plots: expected the package matplotlib, .*dermis\[plots\]"):
+    with pytest.raises(
+        DermisError, match=r"plots: expected the package matplotlib, .* install .*\[plots\]\"\."
+    ):
         import_extra("matplotlib.nothing", "plots")
+
+
+def test_advice_runs_the_installer_of_this_interpreter(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another interpreter's pip could install a stranger's package of the same name."""
+    monkeypatch.setattr(sys, "executable", "/my folder/bin/python")
+    monkeypatch.setattr("dermis.base.extras.metadata.distribution", lambda name: None)
+    assert extra_advice("plots") == 'Install it: "/my folder/bin/python" -m pip install "dermis[plots]"'
+    monkeypatch.setattr("dermis.base.extras.find_spec", lambda name: None)
+    assert extra_advice("plots").endswith('uv pip install --python "/my folder/bin/python" "dermis[plots]"')
+
+
+def test_advice_without_an_installed_package_names_the_checkout(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> None:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr("dermis.base.extras.metadata.distribution", missing)
+    assert extra_advice("plots").endswith(f'install -e "{SOURCE.parent}[plots]"')
 
 
 @pytest.mark.parametrize("channels", [1, 3, 4])

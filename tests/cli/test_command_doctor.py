@@ -90,7 +90,7 @@ def test_a_wrongly_lit_test_frame_is_reported(
 @pytest.mark.parametrize(
     ("adapters", "problem"),
     [
-        ([], "mesa-vulkan-drivers"),
+        ([], "this machine shows none"),
         ([BROKEN], "Voodoo 3: expected it to open, but its driver reports: vkCreateDevice failed"),
     ],
 )
@@ -105,6 +105,28 @@ def test_machine_that_cannot_render(
     report = json.loads(written.stdout)
     assert report["healthy"] is False and report["used"] is None and problem in report["problem"]
     assert [adapter["name"] for adapter in report["adapters"]] == [a.name for a in adapters]
+    assert ("drivers" in report) == ("graphics drivers:" in spoken.stdout) == (not adapters)
+
+
+@pytest.mark.usefixtures("unopened")
+def test_machine_without_drivers_is_told_what_to_install_on_each_system(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dermis.gpu.adapters.list_adapters", list)
+    spoken = run("doctor").stdout
+    lines = spoken.partition("graphics drivers:\n")[2].partition("python ")[0].splitlines()
+    places = "Debian", "Fedora", "Arch", "other", "Windows", "macOS", "container", "WSL2", "Colab"
+    for place, line in zip(places, lines, strict=True):
+        assert place in line.partition(": ")[0] and line.partition(": ")[2]
+
+
+@pytest.mark.usefixtures("unopened")
+def test_drivers_are_listed_if_only_the_software_adapter_is_missing(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dermis.gpu.adapters.list_adapters", lambda: [BROKEN])
+    assert "drivers" not in json.loads(run("doctor", "--json").stdout)
+    assert "drivers" in json.loads(run("doctor", "--adapter", "cpu", "--json").stdout)
 
 
 @pytest.mark.usefixtures("unopened")

@@ -17,11 +17,11 @@ from dermis.gpu import adapters as module
 from dermis.gpu import list_adapters, open_device
 from dermis.gpu.adapters import (
     DEFAULT_LIMITS,
-    DRIVER_INSTALL_HINT,
     OPTIONAL_FEATURES,
     adapters_like_best_match,
     select_adapters,
 )
+from dermis.gpu.drivers import driver_advice
 
 
 def fake(name: str, kind: str, backend: str = "Vulkan", features: tuple[str, ...] = OPTIONAL_FEATURES) -> Any:
@@ -104,7 +104,7 @@ def test_missing_adapter_is_refused(machine: Any, wanted: str) -> None:
     machine()
     with pytest.raises(DermisError, match="Vulkan") as caught:
         select_adapters(wanted)
-    assert DRIVER_INSTALL_HINT in str(caught.value)
+    assert driver_advice() in str(caught.value)
 
 
 @pytest.mark.parametrize("wanted", ["auto", "cpu"])
@@ -112,7 +112,7 @@ def test_opengl_alone_is_taken_only_by_its_name(machine: Any, wanted: str) -> No
     machine(fake("Mesa", "CPU", "OpenGL"))
     with pytest.raises(DermisError, match="OpenGL") as caught:
         select_adapters(wanted)
-    assert DRIVER_INSTALL_HINT in str(caught.value)
+    assert driver_advice() in str(caught.value)
     assert select_adapters("mesa")[0][0].backend == "OpenGL"
 
 
@@ -120,7 +120,7 @@ def test_missing_software_adapter_is_refused(machine: Any) -> None:
     machine(GPU)
     with pytest.raises(DermisError, match="GeForce") as caught:
         select_adapters("cpu")
-    assert DRIVER_INSTALL_HINT in str(caught.value)
+    assert driver_advice() in str(caught.value)
 
 
 def test_unknown_adapter_name_lists_known_ones() -> None:
@@ -177,4 +177,4 @@ def test_a_machine_without_drivers_is_told_what_to_install(tmp_path: Path, words
     )
     said = ended.stdout + ended.stderr
     assert ended.returncode == 2 and "Traceback" not in said and not list(tmp_path.iterdir())
-    assert "adapter: expected a Vulkan, Metal or DX12 adapter, but" in said and DRIVER_INSTALL_HINT in said
+    assert "adapter: expected a Vulkan, Metal or DX12 adapter, but" in said and driver_advice() in said

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from importlib import import_module
+import sys
+from importlib import import_module, metadata
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 from dermis.base.errors import refuse
@@ -23,6 +26,7 @@ EXTRAS = {
     "DracoPy": "formats",
 }
 """Name of the extra that installs each optional module."""
+_CHECKOUT = Path(__file__).parents[3]
 _DISTRIBUTION_OF_MODULE = {"pxr": "usd-core"}  # distributions with other names than their modules
 
 
@@ -37,11 +41,26 @@ def import_extra(module_name: str, task_noun: str) -> Any:
     try:
         return import_module(module_name)
     except ImportError as fault:
-        advice = (
-            f'Install it: pip install "dermis[{EXTRAS[package]}]", or -e ".[{EXTRAS[package]}]" in a clone'
-        )
         name = distribution_name(package)
-        refuse(task_noun, f"the package {name}", f"it cannot be imported ({fault})", advice)
+        problem = f"it cannot be imported ({fault})"
+        refuse(task_noun, f"the package {name}", problem, extra_advice(EXTRAS[package]))
+
+
+def extra_advice(extra_name: str) -> str:
+    """Return advice to install an extra of this package, as a command for the running interpreter.
+
+    If dermis is installed, pip keeps it and adds the packages of the extra, whether it came from an index, a
+    wheel or a checkout. Otherwise the command installs the checkout that contains this module.
+    """
+    python = sys.executable or "python"
+    python = f'"{python}"' if " " in python else python
+    command = f"{python} -m pip install" if find_spec("pip") else f"uv pip install --python {python}"
+    try:
+        metadata.distribution("dermis")
+        requirement = f'"dermis[{extra_name}]"'
+    except metadata.PackageNotFoundError:
+        requirement = f'-e "{_CHECKOUT}[{extra_name}]"'
+    return f"Install it: {command} {requirement}"
 
 
 def distribution_name(module_name: str) -> str:

@@ -19,7 +19,7 @@ _REPORTED_PACKAGES = ("dermis", "wgpu", "numpy", "scipy", "pydantic", "OpenEXR",
 def doctor(*, adapter: AdapterOption = "auto", as_json: JsonOption = False) -> int:
     """List graphics adapters, versions and sample data, and render a test frame.
 
-    The command also reports which adapter is used, and why.
+    The command also reports which adapter is used, and why; without one, what to install on each system.
 
     The exit status is 0 if everything works, otherwise 2.
 
@@ -40,10 +40,14 @@ def doctor(*, adapter: AdapterOption = "auto", as_json: JsonOption = False) -> i
 
 
 def diagnose(adapter: str) -> Options:
-    """Return the diagnosis of this machine for JSON: adapters, library versions, test frame and samples."""
+    """Return the diagnosis of this machine for JSON: adapters, library versions, test frame and samples.
+
+    The entry "drivers" says what to install on each system; it is left out if it is not needed.
+    """
     from dermis.base.private import cache_folder
     from dermis.formats.samples import SAMPLES, is_available
     from dermis.gpu.adapters import OPTIONAL_FEATURES, list_adapters
+    from dermis.gpu.drivers import all_driver_advice
 
     adapters = [
         {"number": one.number, "name": one.name, "driver": one.driver, "kind": one.kind}
@@ -51,8 +55,12 @@ def diagnose(adapter: str) -> Options:
         | {"features": {feature: feature in one.features for feature in OPTIONAL_FEATURES}}
         for one in list_adapters()
     ]
+    kinds = [one["kind"] for one in adapters if one["backend"] != "OpenGL"]
+    has_driver = "CPU" in kinds if adapter == "cpu" else bool(kinds)
+    tested = _test_adapter(adapter)
     return {
-        **_test_adapter(adapter),
+        **tested,
+        **({} if has_driver or tested["healthy"] else {"drivers": all_driver_advice()}),
         "adapters": adapters,
         "python": platform.python_version(),
         "platform": platform.platform(),
@@ -130,6 +138,8 @@ def _report_lines(report: Options) -> list[str]:
         lines.append(f"half-float stores round: {used['half_store_rounding']}")
         result = "passed" if test["passed"] else "FAILED"
         lines.append(f"test frame: {result} in {test['frame_ms']:.0f} ms, centre {test['centre']:.3f} of 1")
+    if advice := report.get("drivers"):
+        lines += ["graphics drivers:", *(f"  {system}: {action}" for system, action in advice.items())]
     libraries = ", ".join(f"{name} {version}" for name, version in report["libraries"].items())
     lines.append(f"python {report['python']} on {report['platform']}; {libraries}")
     state = {True: "available", False: "not downloaded"}

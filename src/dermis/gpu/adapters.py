@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from dermis.base.errors import refuse
+from dermis.gpu.drivers import driver_advice
 from dermis.gpu.memory import check_driver_address_space
 from dermis.gpu.types import Untyped
 
@@ -21,7 +22,6 @@ _C_TYPEDEF_PREFIX = "typedef "
 _C_INTEGER_TYPES = ("char", "uint8_t", "uint32_t", "uintptr_t", "intptr_t")
 OPTIONAL_FEATURES = ("timestamp-query",)
 """Optional features of WebGPU that are requested where the adapter has them."""
-DRIVER_INSTALL_HINT = "On Debian or Ubuntu: sudo apt-get install mesa-vulkan-drivers"
 DEFAULT_LIMITS = {
     "max-texture-dimension-1d": 8192,
     "max-texture-dimension-2d": 8192,
@@ -174,7 +174,7 @@ def list_adapters() -> list[Adapter]:
         with _silenced_stderr():
             adapters = [_describe_adapter(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
     except Exception as error:  # a broken driver may raise anything
-        refuse("graphics drivers", "a list of adapters", f"they fail: {error}", DRIVER_INSTALL_HINT)
+        refuse("graphics drivers", "a list of adapters", f"they fail: {error}", driver_advice())
     adapters.sort(key=lambda a: (_adapter_kind_rank(a.kind), -len(a.features), a.backend == "OpenGL"))
     return [replace(one, number=number) for number, one in enumerate(adapters)]
 
@@ -191,7 +191,7 @@ def select_adapters(selector: str) -> tuple[list[Adapter], str]:
     reliable = [a for a in adapters if a.backend != "OpenGL"]
     if not adapters or (selector in ("auto", "cpu") and not reliable):
         actual = "this machine shows only OpenGL's" if adapters else "this machine shows none"
-        refuse("adapter", "a Vulkan, Metal or DX12 adapter", actual, DRIVER_INSTALL_HINT)
+        refuse("adapter", "a Vulkan, Metal or DX12 adapter", actual, driver_advice())
     if match := re.fullmatch(r"#(\d{1,4})", selector):
         number = int(match[1])
         fitting, reason = adapters[number : number + 1], f"it is the one with the number {number}"
@@ -205,9 +205,7 @@ def select_adapters(selector: str) -> tuple[list[Adapter], str]:
     if not fitting:
         names = ", ".join(f"#{a.number} {a.name} ({a.backend})" for a in adapters)
         advice = (
-            DRIVER_INSTALL_HINT
-            if selector == "cpu"
-            else "Choose auto, cpu, part of one of these names, or #0"
+            driver_advice() if selector == "cpu" else "Choose auto, cpu, part of one of these names, or #0"
         )
         refuse(f"adapter {selector!r}", "one of this machine's adapters", f"it has {names}", advice)
     return fitting, reason

@@ -51,7 +51,7 @@ PICTURE_PROPERTIES = (
     drawn_property(
         ", ".join(dict.fromkeys((*_FORMATS_BY_SIGNATURE.values(), "WebP", *_FORMATS_BY_BRAND.values()))),
         "AVIF and WebP need a Pillow that has them, as its wheels do; HEIC needs "
-        '`pip install "dermis[formats]"`, 16-bit colour `"dermis[video]"`',
+        "the extra `formats`, 16-bit colour the extra `video`",
     ),
     drawn_property("8 and 16 bits, palettes"),
     drawn_property_with_note("grey, with or without alpha", "repeated in all channels of colours"),

@@ -16,6 +16,7 @@ from dermis.apps.viewer.player import MotionFile
 from dermis.apps.viewer.state import ViewerState, make_state
 from dermis.apps.viewer.viewer import Viewer
 from dermis.base.errors import refuse
+from dermis.base.extras import distribution_name, extra_advice
 from dermis.base.renamed import renamed_keywords
 from dermis.human.person import Human
 from dermis.mesh.head import Head
@@ -184,8 +185,8 @@ def _load_backend(module_name: str, required_packages: tuple[str, ...], extra_na
         try:
             importlib.import_module(package)
         except ImportError:
-            advice = f'Install it: pip install "dermis[{extra_name}]"'
-            refuse("viewer", f"the package {package.replace('_', '-')}", "it is not installed", advice)
+            name = distribution_name(package)
+            refuse("viewer", f"the package {name}", "it is not installed", extra_advice(extra_name))
     return importlib.import_module(f"rendercanvas.{module_name}")
 
 

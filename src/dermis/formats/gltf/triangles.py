@@ -60,7 +60,7 @@ GLTF_PROPERTIES = (
     ),
     drawn_property(
         f"`{draco.DRACO_EXTENSION}`",
-        'with `pip install "dermis[formats]"` ([DracoPy](https://github.com/seung-lab/DracoPy)): positions, '
+        "with the extra `formats` ([DracoPy](https://github.com/seung-lab/DracoPy)): positions, "
         "normals, uv, colours, joints and weights; refused if the data does not have the size that its "
         "accessors state",
         draco.DRACO_EXTENSION,
