@@ -37,7 +37,7 @@ RUN useradd --uid 1000 --create-home dermis \
     && install -d -o dermis -g dermis -m 0700 /var/cache/dermis
 ENV DERMIS_CACHE=/var/cache/dermis \
     NVIDIA_DRIVER_CAPABILITIES=graphics,utility
-USER dermis
+USER 1000
 WORKDIR /pictures
 ENTRYPOINT ["dermis"]
 CMD ["--help"]

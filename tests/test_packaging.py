@@ -72,7 +72,7 @@ def test_image_has_a_supported_python_the_drivers_and_the_command() -> None:
     assert set(DRIVER_PACKAGES.split()) <= set(shlex.split(apt))
     (entry,) = docker("ENTRYPOINT")
     assert entry == '["dermis"]' and "dermis" in PROJECT["scripts"]
-    assert docker("USER") == ["dermis"] and any("useradd" in command for command in docker("RUN"))
+    assert docker("USER") == ["1000"] and any("useradd --uid 1000" in command for command in docker("RUN"))
     ((name, _, extras),) = (line.partition("=") for line in docker("ARG"))
     assert name == "EXTRAS" and set(extras.split(",")) <= set(PROJECT["optional-dependencies"])
     assert all(f"`{extra}`" in section("Docker") for extra in extras.split(","))
