@@ -136,7 +136,7 @@ class Surface:
         """Return the index of the candidate nearest to a position on the rim of the upper or lower lip."""
         mesh = average_head().mesh
         corners = quad_corners(mesh, np.arange(len(mesh.quads)))
-        own = np.isin(corners, _lip_rim(upper)[1:]).any(axis=1)
+        own = np.asarray(np.isin(corners, _lip_rim(upper)[1:]).any(axis=1))
         return self.nearest(position, self.skin & own[self.quad])
 
     def jaw(self) -> Doubles:
