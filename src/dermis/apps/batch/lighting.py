@@ -10,12 +10,15 @@ import numpy as np
 
 from dermis.apps.batch.sampling import Parameters, table_numbers
 from dermis.apps.batch.spec_tables import LAMP_RIG
+from dermis.environment.panorama import load_panorama, mean_radiance
 from dermis.images.colour import luminance
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.scene.lights import Light, RectangleLight, preset_lights
+from dermis.scene.model import Scene
 
 _PLANCK_C2_NM_K = 1.438777e7  # second radiation constant, hc / k
-_WHITE_TEMPERATURE_K = 6500.0
+WHITE_TEMPERATURE_K = 6500.0
+"""Temperature of a black body that is white in Rec. 709 [K]."""
 _LIGHT_VECTOR_FIELDS = "position", "target", "direction", "up"
 _LAMP_NAMES = "key", "fill", "rim"
 _rgb_weights = cache(rgb_weights)
@@ -47,10 +50,31 @@ def blackbody_colour(temperature_k: float) -> tuple[float, float, float]:
     temperature_k : temperature [K]
     """
     white, body = (
-        np.expm1(_PLANCK_C2_NM_K / (WAVELENGTHS_NM * T)) for T in (_WHITE_TEMPERATURE_K, temperature_k)
+        np.expm1(_PLANCK_C2_NM_K / (WAVELENGTHS_NM * T)) for T in (WHITE_TEMPERATURE_K, temperature_k)
     )
     colour = np.maximum(_rgb_weights() @ (white / body), 0.0)
     red, green, blue = map(float, colour / luminance(colour))
+    return red, green, blue
+
+
+def light_colour(scene: Scene) -> tuple[float, float, float]:
+    """Return the colour of all light of a scene in linear Rec. 709 with luminance 1; white without light.
+
+    It is that of the sum of the irradiances on surfaces that face each light, and of the mean irradiance by
+    the environment.
+    """
+    total = np.sum([light.irradiance for light in scene.lights] or [(0.0, 0.0, 0.0)], axis=0)
+    if scene.environment is not None:
+        mean = np.array(_mean_panorama_radiance(scene.environment.name))
+        total = total + pi * scene.environment.exposure * mean
+    brightness = float(luminance(total))
+    red, green, blue = map(float, total / brightness if brightness > 0.0 else np.ones(3))
+    return red, green, blue
+
+
+@lru_cache(maxsize=64)
+def _mean_panorama_radiance(panorama_name: str) -> tuple[float, float, float]:
+    red, green, blue = map(float, mean_radiance(load_panorama(panorama_name)))
     return red, green, blue
 
 

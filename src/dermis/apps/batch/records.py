@@ -10,7 +10,12 @@ from numpy.typing import ArrayLike
 
 from dermis.apps.batch.image_facts import ImageFacts, image_split, record_parameters
 from dermis.apps.batch.licences import image_licence
-from dermis.apps.batch.output_encoding import encode_output, file_format
+from dermis.apps.batch.output_encoding import (
+    LINEAR_PICTURE,
+    encode_linear_picture,
+    encode_output,
+    file_format,
+)
 from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.spec import Spec
 from dermis.frame.observation import Observation
@@ -81,13 +86,16 @@ def encode_record(
     facts : properties of the person, gaze errors and boxes
 
     The suffixes are "png" for the picture, with an alpha channel if the picture has no background;
-    "NAME.png", "NAME.exr" or "NAME.npy" for each output, see `output_encoding.storage_description`; and
-    "json" for the `Record`. Equal arguments give identical bytes.
+    "NAME.png", "NAME.exr" or "NAME.npy" for each output, see `output_encoding.storage_description`;
+    "linear.exr" for the linear picture, if the spec keeps it; and "json" for the `Record`. Equal arguments
+    give identical bytes.
     """
     files = {PICTURE_SUFFIX: encode_png(observation.picture, use_isal=True)}
     for name in spec.outputs:
         suffix = f"{name}.{file_format(name, spec.encoding)}"
         files[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
+    if spec.keep_linear:
+        files[f"{LINEAR_PICTURE}.exr"] = encode_linear_picture(observation.outputs[LINEAR_PICTURE])
     record = make_record(image_number, observation, parameters, spec, skin_tone, facts)
     text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     files[RECORD_SUFFIX] = f"{text}\n".encode()
@@ -109,7 +117,7 @@ def make_record(
         "number": image_number,
         "split": image_split(spec, parameters),
         "licence": image_licence(parameters),
-        "parameters": record_parameters(spec, parameters, facts.person),
+        "parameters": record_parameters(spec, parameters, facts),
         "skin_tone": None if skin_tone is None else skin_tone.as_json(),
         "camera": {
             "K": _rounded_list(camera.K, _MM_DECIMALS),

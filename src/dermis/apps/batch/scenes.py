@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from dermis.apps.batch.cameras import face_hull_indices, sampled_camera
 from dermis.apps.batch.face_boxes import BoxPoints, box_points, face_boxes
 from dermis.apps.batch.image_facts import ImageFacts, person_facts
-from dermis.apps.batch.lighting import direction_from_angles, sampled_lights
+from dermis.apps.batch.lighting import direction_from_angles, light_colour, sampled_lights
 from dermis.apps.batch.sampling import Parameters, table_numbers
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import GAZE_ANGLES, NO_ENVIRONMENT, table_values
@@ -107,7 +107,13 @@ class SceneBuilder:
         pose = scene.head.control_rig.rest if scene.pose_arrays is None else scene.pose_arrays
         errors = gaze_errors_deg(scene, _gaze_target(parameters, camera.position))
         boxes = face_boxes(scene.head, person.boxes, pose, camera.to_opencv(self.spec.size))
-        return ImageFacts(person.facts, errors if _has_turning_eyes(scene.head) else None, boxes)
+        balanced = parameters.get("sensor.white_balance") == "lights"
+        return ImageFacts(
+            person.facts,
+            errors if _has_turning_eyes(scene.head) else None,
+            boxes,
+            light_colour(scene) if balanced else None,
+        )
 
     def _cached_person(self, parameters: Parameters) -> _Person:
         values = table_values(parameters, "person")

@@ -11,13 +11,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, Field, PrivateAttr
+from pydantic import AfterValidator, BaseModel, Field, PrivateAttr
 
 from dermis.apps.batch import spec_tables as tables
-from dermis.apps.batch.distributions import Distribution, FileChoice
+from dermis.apps.batch.distributions import Constant, Distribution, FileChoice
 from dermis.apps.batch.output_encoding import Encoding
 from dermis.apps.batch.sampling import Parameters, Sampler
-from dermis.apps.batch.spec_checks import check_landmarks, check_spec
+from dermis.apps.batch.sensor.model import Sensor
+from dermis.apps.batch.spec_checks import check_landmarks, check_sensor, check_spec
 from dermis.base.errors import error_context, format_value, refuse, shorten
 from dermis.base.quantities import checked_integer
 from dermis.base.reading import checked_path, is_file, read_file, read_toml
@@ -57,6 +58,16 @@ _MAX_KEY_LENGTH, _MIN_KEY_SIMILARITY = 80, 0.7  # limits for suggestions to unkn
 _FILE_PARAMETERS = "person.head", "environment.name", "skin.profile"
 """Parameters whose values may be files."""
 P = TypeVar("P", bound=FrozenModel)
+_SensorTable = dict[str, Annotated[Distribution, tables.DistributionField()]]
+
+
+def _with_sensor_defaults(table: _SensorTable | None) -> _SensorTable | None:
+    """Return the table [sensor] with the defaults of omitted keys, in the order of the fields of `Sensor`."""
+    if table is None:
+        return None
+    sensor = Sensor()
+    complete = {name: table.get(name, Constant(getattr(sensor, name))) for name in Sensor.model_fields}
+    return complete | table  # unknown keys are refused later
 
 
 class Spec(FrozenModel):
@@ -84,6 +95,8 @@ class Spec(FrozenModel):
     """Shards as tar files (webdataset) or as folders."""
     encoding: Encoding = "png"
     """File format of the outputs: png (16 bits, where sufficient), exr or npy (all bits)."""
+    keep_linear: Annotated[bool | None, AfterValidator(lambda keep: keep or None)] = None
+    """Whether the linear picture before the model of the sensor is also stored; needs [sensor]."""
     render: Settings = Field(default_factory=lambda: Settings(size=(512, 512), **RENDER_DEFAULTS))
     """Render settings, without `size` and the background, which have their own keys."""
     person: tables.PersonTable = tables.PersonTable()
@@ -108,6 +121,8 @@ class Spec(FrozenModel):
     """Environment light."""
     background: tables.BackgroundTable = tables.BackgroundTable()
     """Background."""
+    sensor: Annotated[_SensorTable | None, AfterValidator(_with_sensor_defaults)] = None
+    """Sensor and processing of the camera; without this table, pictures are as rendered."""
     correlated: tuple[tables.CorrelationGroup, ...] = ()
     """Correlated parameters."""
     files: dict[str, str] = Field(default_factory=dict)
@@ -126,6 +141,11 @@ class Spec(FrozenModel):
             check_outputs(self.outputs)
         check_landmarks(self.landmarks, self.folder)
         check_spec(distributions, expressions, self.correlated, self.folder)
+        if self.sensor is not None:
+            check_sensor(distributions, self.render)
+        elif self.keep_linear:
+            actual, advice = "there is none", "Add a table [sensor], or remove keep_linear"
+            refuse("keep_linear", "a table [sensor], whose pictures are not linear", actual, advice)
         rows = {name: row for group in self.correlated for name, row in group.cholesky_rows().items()}
         sampler = Sampler(self.seed, self.images_per_person, distributions, rows, expressions)
         BaseModel.__setattr__(self, "_sampler", sampler)

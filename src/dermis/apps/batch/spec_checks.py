@@ -7,6 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from dermis.apps.batch.distributions import Distribution
+from dermis.apps.batch.sensor.model import MIN_DEMOSAICED_SIDE, Sensor
 from dermis.apps.batch.spec_tables import NO_ENVIRONMENT, RANDOM_EXPRESSION, CorrelationGroup, table_values
 from dermis.base.errors import DermisError, refuse, shorten
 from dermis.base.reading import is_file
@@ -23,6 +24,7 @@ from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.pose import MAX_WEIGHT
 from dermis.scene.heads import HUMAN
 from dermis.scene.lights import NO_LIGHTS
+from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
 _UNSAMPLED_SKIN_FIELDS = "pigments", "layers", "profile_map", "other_profiles"  # fields of `Skin`
@@ -31,6 +33,8 @@ _LOOK_MODELS: Mapping[str, type] = {"skin": SkinLook, "eyes": EyeLook, "hair": H
 _ANCESTRY_PARAMETERS = "person.african", "person.asian", "person.caucasian"
 _ITA_PARAMETER, _MELANIN_PARAMETER = "person.ita", "person.skin.melanin"
 _HEAD_PARAMETER = "person.head"
+_SENSOR_RENDER_SETTINGS = {"tone": "none", "gamma": "right"}
+"""Settings of the renderer's tone curve and encoding, which [sensor] replaces, with their neutral values."""
 _MAX_FILE_NAME_LENGTH = 100  # characters
 
 
@@ -68,6 +72,26 @@ def check_landmarks(set_names: Sequence[str], folder: Path) -> None:
             )
             refuse("landmarks", expected, f"got {shorten(name, _MAX_FILE_NAME_LENGTH)!r}", "Correct it")
         read_landmark_table(str(folder / name))
+
+
+def check_sensor(distributions: Mapping[str, Distribution], render: Settings) -> None:
+    """Raise DermisError for values of the table [sensor] that are invalid, or contradict other tables.
+
+    distributions : distribution of each parameter by its dotted name
+    render : settings of the table [render]
+    """
+    _check_table("sensor", distributions, list(Sensor.model_fields), Sensor)
+    if "none" in distributions["background.kind"].support:
+        advice = 'Exclude "none", or remove [sensor]'
+        refuse("background: kind", "a background, as photographs have no alpha", 'it can be "none"', advice)
+    for name, value in _SENSOR_RENDER_SETTINGS.items():
+        if getattr(render, name) != value:
+            expected, actual = f"{value!r} with [sensor]", f"got {getattr(render, name)!r}"
+            refuse(f"render: {name}", expected, actual, "Use tone_curve of [sensor] instead")
+    filtered = set(distributions["sensor.demosaicing"].support) != {"none"}
+    if filtered and min(render.size) < MIN_DEMOSAICED_SIDE:
+        expected = f"{MIN_DEMOSAICED_SIDE} pixels or more along each side for demosaicing"
+        refuse("size", expected, f"got {list(render.size)}", "Correct it")
 
 
 def _check_person(distributions: Mapping[str, Distribution]) -> None:
