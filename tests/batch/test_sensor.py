@@ -1,11 +1,13 @@
-"""Stages of the camera model against independent truths: statistics, exact interpolation, rays, fixed points."""
+"""Stages of the camera model against statistics, exactly interpolated pictures, rays and fixed points."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from small_head import write_head
 
 import dermis
 from dermis.apps.batch.lighting import blackbody_colour, light_colour
@@ -47,9 +49,6 @@ def test_variance_and_mean_are_on_the_photon_transfer_line(electrons: float, rea
     means, variances = samples.mean(axis=0), samples.var(axis=0)
     np.testing.assert_allclose(means, levels * electrons / 2.0, rtol=0.02)
     np.testing.assert_allclose(variances, means + read_noise**2, rtol=0.04)
-    slope, offset = np.polyfit(means, variances, 1)
-    assert slope == pytest.approx(1, abs=0.04)
-    assert offset == pytest.approx(read_noise**2, abs=0.02 * electrons**0.5 + 0.05 * electrons * 0.1)
 
 
 def test_noise_grows_with_the_iso_by_the_number_of_electrons() -> None:
@@ -87,10 +86,13 @@ def test_linear_channels_with_different_slopes_are_exact() -> None:
         np.testing.assert_allclose(demosaic(mosaic(ramp))[2:-2, 2:-2], ramp[2:-2, 2:-2], atol=1e-6)
 
 
-def test_malvar_interpolates_edges_of_grey_better() -> None:
-    edge = np.repeat(np.where(np.arange(24) < 11, 0.1, 0.8)[None, :, None], 16, 0).repeat(3, 2)
-    errors = {name: np.abs(one(mosaic(edge)) - edge).mean() for name, one in DEMOSAICING.items()}
-    assert errors["malvar"] < 0.75 * errors["bilinear"]
+def test_malvar_interpolates_fine_grey_patterns_better() -> None:
+    """By 4 dB or more; the publication finds 5.5 dB for photographs."""
+    y, x = np.mgrid[:64, :64]
+    pattern = (0.5 + 0.2 * np.sin(0.9 * x + 0.3 * y) + 0.2 * np.cos(0.5 * x - 0.8 * y)).astype(np.float32)
+    grey = np.repeat(pattern[..., None], 3, axis=2)
+    errors = {name: ((one(mosaic(grey)) - grey) ** 2).mean() for name, one in DEMOSAICING.items()}
+    assert 10 * np.log10(errors["bilinear"] / errors["malvar"]) > 4
 
 
 def test_pixels_keep_the_colour_of_their_own_filter() -> None:
@@ -174,16 +176,14 @@ def test_quality_of_jpeg_limits_the_error() -> None:
     seen = np.stack([x, y, 0.5 * x + 0.5 * y], axis=-1).astype(np.float32)
     seen[20:40, 20:40] = [0.8, 0.1, 0.1]
     exact = photograph(seen, Sensor()).picture.astype(int)
-    errors = [
-        np.abs(photograph(seen, Sensor(jpeg_quality=q)).picture - exact).mean() for q in (100, 75, 20)
-    ]
+    errors = [np.abs(photograph(seen, Sensor(jpeg_quality=q)).picture - exact).mean() for q in (100, 75, 20)]
     assert 0 < errors[0] < errors[1] < errors[2] < 20
     np.testing.assert_array_equal(photograph(seen, Sensor(jpeg_quality=0.3)).picture, exact)
 
 
-def test_light_of_a_scene_is_the_sum_of_its_lights() -> None:
+def test_light_of_a_scene_is_the_sum_of_its_lights(tmp_path: Path) -> None:
     scene = dermis.Scene(
-        dermis.Human(seed=1).head(subdivide=0) if False else _ball(),
+        dermis.load_head(write_head(tmp_path / "head.obj")),
         lights=(
             dermis.DirectionalLight((0, 0, -1), irradiance=(2, 1, 0)),
             dermis.PointLight((0, 0, 900), irradiance=(0, 1, 2)),
@@ -193,9 +193,8 @@ def test_light_of_a_scene_is_the_sum_of_its_lights() -> None:
     np.testing.assert_allclose(light_colour(scene), 1, atol=1e-9)
     warm = scene.replace(environment=dermis.Environment("uniform"), lights=scene.lights[:1])
     red, green, blue = light_colour(warm)
-    assert red / blue == pytest.approx((2 + np.pi) / np.pi) and green / blue == pytest.approx(
-        (1 + np.pi) / np.pi
-    )
+    expected = (np.array([2, 1]) + np.pi) / np.pi
+    np.testing.assert_allclose([red / blue, green / blue], expected, rtol=1e-5)
 
 
 @pytest.mark.parametrize(

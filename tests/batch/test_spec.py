@@ -72,6 +72,13 @@ REFUSED = {
     "[[correlated]]\nof = ['a', 'b']\ncorrelation = [[1, 0.2], [0.3, 1]]": "correlated: .*symmetric",
     "[[correlated]]\nof = ['camera.yaw_deg', 'person.age']\ncorrelation = 0.5\n[person]\nage = 30": "first",
     "correlated = 3": "correlated",
+    "[sensor]\nISO = 3": "sensor: ISO: expected one of vignetting",
+    "[sensor]\niso = {uniform = [100, 1e6]}": "sensor: .*iso: expected a number from 0 to 51200",
+    "[sensor]\ndemosaicing = {choice = ['malvar', 'best']}": "sensor: .*demosaicing: expected .*malvar",
+    "[sensor]\n[background]\nkind = 'none'": "background: kind: expected a background, as photographs",
+    "[sensor]\n[render]\ntone = 'filmic'": "render: tone: expected 'none' with",
+    "size = [1, 8]\n[sensor]\ndemosaicing = 'malvar'": "size: expected 2 pixels or more",
+    "keep_linear = true": "keep_linear: expected a table",
 }
 FIRST = {
     "person.seed": 489798491,

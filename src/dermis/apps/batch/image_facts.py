@@ -16,13 +16,17 @@ SPLITS = ("train", 0.8), ("val", 0.1), ("test", 0.1)
 SPLIT_NAMES = tuple(name for name, _ in SPLITS)
 """Names of the splits, in the order of their numbers in `dermis.dataset.arrays`."""
 SENSOR_FACT_NAMES = (
+    "sensor.light_red",
+    "sensor.light_green",
+    "sensor.light_blue",
     "sensor.white_red",
     "sensor.white_green",
     "sensor.white_blue",
     "sensor.clipped_fraction",
 )
-"""Facts about the exposure of an image: the linear Rec. 709 colour, with luminance 1, of the light that the
-white balance makes white, and the fraction of the pixels in which the sensor is saturated."""
+"""Facts about the exposure of an image: the linear Rec. 709 colours, with luminance 1, of the lights of the
+scene together and of the light that the white balance makes white, and the fraction of the pixels in which
+the sensor is saturated."""
 _SEED_FIELD = "seed"
 _NO_FACTS: Mapping[str, float | str | None] = {}
 
@@ -35,7 +39,7 @@ class ImageFacts:
     gaze_error_deg : angles by which the left and the right eye miss the target of the gaze [degrees]; None
         for heads whose eyes cannot turn
     boxes : boxes around the face, see `face_boxes`; None if they are unknown
-    light_colour : colour of the lights, see `lighting.light_colour`; None for a camera that does not use it
+    light_colour : colour of the lights, see `lighting.light_colour`; None for a spec without [sensor]
     sensor : facts about the exposure, by the names of `SENSOR_FACT_NAMES`; empty for a spec without [sensor]
     """
 
@@ -77,17 +81,18 @@ def fact_names(spec: Spec) -> tuple[str, ...]:
 
 
 def record_parameters(
-    spec: Spec, parameters: Parameters, facts: ImageFacts
+    spec: Spec, parameters: Parameters, facts: Mapping[str, float | str | None]
 ) -> dict[str, float | int | str | None]:
     """Return the parameters of an image by name, with the same names for all images of a spec.
 
     The value is None for parameters that the image does not use.
 
-    facts : facts about the image; a sampled parameter takes precedence over a fact of the same name
+    facts : properties of the person and facts about the exposure; a sampled parameter of the same name takes
+        precedence
     """
     values: dict[str, float | int | str | None] = dict.fromkeys(spec.parameter_names)
     values |= dict.fromkeys(fact_names(spec))
-    return values | dict(facts.person) | dict(facts.sensor) | dict(parameters)
+    return values | dict(facts) | dict(parameters)
 
 
 def image_split(spec: Spec, parameters: Parameters) -> str:

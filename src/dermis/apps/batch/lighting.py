@@ -8,7 +8,7 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 
-from dermis.apps.batch.sampling import Parameters, table_numbers
+from dermis.apps.batch.sampling import Parameters, round_significant, table_numbers
 from dermis.apps.batch.spec_tables import LAMP_RIG
 from dermis.environment.panorama import load_panorama, mean_radiance
 from dermis.images.colour import luminance
@@ -20,7 +20,7 @@ _PLANCK_C2_NM_K = 1.438777e7  # second radiation constant, hc / k
 WHITE_TEMPERATURE_K = 6500.0
 """Temperature of a black body that is white in Rec. 709 [K]."""
 _LIGHT_VECTOR_FIELDS = "position", "target", "direction", "up"
-_LAMP_NAMES = "key", "fill", "rim"
+LAMP_NAMES = "key", "fill", "rim"
 _rgb_weights = cache(rgb_weights)
 
 
@@ -31,7 +31,7 @@ def sampled_lights(parameters: Parameters) -> tuple[Light, ...]:
     if not strength:
         return ()
     if parameters["light.kind"] == LAMP_RIG:
-        lamps = (table_numbers(parameters, f"light.{lamp}") for lamp in _LAMP_NAMES)
+        lamps = (table_numbers(parameters, f"light.{lamp}") for lamp in LAMP_NAMES)
         return tuple(_area_lamp(lamp, turn_deg, strength) for lamp in lamps)
     presets = _preset_lights(str(parameters["light.kind"]))
     return tuple(_rotate_light(light, turn_deg, strength) for light in presets)
@@ -58,17 +58,18 @@ def blackbody_colour(temperature_k: float) -> tuple[float, float, float]:
 
 
 def light_colour(scene: Scene) -> tuple[float, float, float]:
-    """Return the colour of all light of a scene in linear Rec. 709 with luminance 1; white without light.
+    """Return the linear Rec. 709 colour of all light of a scene with luminance 1, rounded to six digits.
 
-    It is that of the sum of the irradiances on surfaces that face each light, and of the mean irradiance by
-    the environment.
+    It is the colour of the sum of the irradiances on surfaces that face each light, and of the mean
+    irradiance by the environment; white without light.
     """
     total = np.sum([light.irradiance for light in scene.lights] or [(0.0, 0.0, 0.0)], axis=0)
     if scene.environment is not None:
         mean = np.array(_mean_panorama_radiance(scene.environment.name))
         total = total + pi * scene.environment.exposure * mean
     brightness = float(luminance(total))
-    red, green, blue = map(float, total / brightness if brightness > 0.0 else np.ones(3))
+    colour = total / brightness if brightness > 0.0 else np.ones(3)
+    red, green, blue = map(round_significant, map(float, colour))
     return red, green, blue
 
 

@@ -75,8 +75,13 @@ def encode_output(output_name: str, output_array: Array, encoding: Encoding) -> 
 
 def encode_linear_picture(linear_picture: Array) -> bytes:
     """Return a linear picture (h, w, 3) as the bytes of an OpenEXR file of 16-bit floats."""
+    return encode_exr(half_precision(linear_picture).astype(np.float16))
+
+
+def half_precision(linear_picture: Array) -> NDArray[np.float32]:
+    """Return a linear picture as it is stored, rounded to 16-bit floats."""
     limited = np.clip(linear_picture, -_MAX_HALF_FLOAT, _MAX_HALF_FLOAT)
-    return encode_exr(limited.astype(np.float16))
+    return np.asarray(limited.astype(np.float16), np.float32)
 
 
 def decode_output(output_name: str, format_name: str, file_bytes: bytes) -> Array:

@@ -27,7 +27,8 @@ PICTURE_SUFFIX, RECORD_SUFFIX = "png", "json"
 NestedNumbers = list[Union["NestedNumbers", float, None]]
 """Array as nested lists; null where a number is not finite."""
 _PIXEL_DECIMALS = 3
-_MM_DECIMALS = 4
+MM_DECIMALS = 4
+"""Decimals of lengths and of the camera's intrinsic matrix in records."""
 _DIRECTION_DECIMALS = 8  # rotations and directions
 _DEGREE_DECIMALS = 3
 _NO_FACTS = ImageFacts()
@@ -117,12 +118,12 @@ def make_record(
         "number": image_number,
         "split": image_split(spec, parameters),
         "licence": image_licence(parameters),
-        "parameters": record_parameters(spec, parameters, facts),
+        "parameters": record_parameters(spec, parameters, {**facts.person, **facts.sensor}),
         "skin_tone": None if skin_tone is None else skin_tone.as_json(),
         "camera": {
-            "K": _rounded_list(camera.K, _MM_DECIMALS),
+            "K": _rounded_list(camera.K, MM_DECIMALS),
             "R": _rounded_list(camera.R, _DIRECTION_DECIMALS),
-            "t": _rounded_list(camera.t, _MM_DECIMALS),
+            "t": _rounded_list(camera.t, MM_DECIMALS),
         },
         "head_pose": _rounded_list(observation.head_pose, _DIRECTION_DECIMALS),
         "gaze": None if gaze is None else _rounded_list(gaze, _DIRECTION_DECIMALS),
@@ -133,7 +134,7 @@ def make_record(
         "landmarks": {
             names.get(path, path): {
                 "pixels": _rounded_list(one.pixels, _PIXEL_DECIMALS),
-                "positions_mm": _rounded_list(one.positions_mm, _MM_DECIMALS),
+                "positions_mm": _rounded_list(one.positions_mm, MM_DECIMALS),
                 "visible": np.asarray(one.visible, bool).tolist(),
                 "occlusion": one.occlusion.tolist(),
             }

@@ -107,12 +107,11 @@ class SceneBuilder:
         pose = scene.head.control_rig.rest if scene.pose_arrays is None else scene.pose_arrays
         errors = gaze_errors_deg(scene, _gaze_target(parameters, camera.position))
         boxes = face_boxes(scene.head, person.boxes, pose, camera.to_opencv(self.spec.size))
-        balanced = parameters.get("sensor.white_balance") == "lights"
         return ImageFacts(
             person.facts,
             errors if _has_turning_eyes(scene.head) else None,
             boxes,
-            light_colour(scene) if balanced else None,
+            None if self.spec.sensor is None else light_colour(scene),
         )
 
     def _cached_person(self, parameters: Parameters) -> _Person:

@@ -18,7 +18,12 @@ from dermis.apps.batch.distributions import Constant, Distribution, FileChoice
 from dermis.apps.batch.output_encoding import Encoding
 from dermis.apps.batch.sampling import Parameters, Sampler
 from dermis.apps.batch.sensor.model import Sensor
-from dermis.apps.batch.spec_checks import check_landmarks, check_sensor, check_spec
+from dermis.apps.batch.spec_checks import (
+    check_landmarks,
+    check_sensor,
+    check_spec,
+    note_lamps_without_blue,
+)
 from dermis.base.errors import error_context, format_value, refuse, shorten
 from dermis.base.quantities import checked_integer
 from dermis.base.reading import checked_path, is_file, read_file, read_toml
@@ -253,6 +258,8 @@ def parse_spec(toml_data: Mapping[str, object], folder: Path = Path()) -> Spec:
     if isinstance(groups := fields.get("correlated", ()), list | tuple):
         fields["correlated"] = tuple(_build_model(tables.CorrelationGroup, "correlated", g) for g in groups)
     spec = _build_model(Spec, "", fields | {"folder": folder})
+    if spec.sensor is not None:
+        note_lamps_without_blue(spec.distributions)
     names = [name for name in spec.landmarks if name not in LANDMARK_SETS]
     for parameter in spec.distributions.keys() & set(_FILE_PARAMETERS):
         names += map(str, spec.distributions[parameter].support)

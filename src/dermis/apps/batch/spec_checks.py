@@ -7,9 +7,17 @@ from dataclasses import fields
 from pathlib import Path
 
 from dermis.apps.batch.distributions import Distribution
+from dermis.apps.batch.lighting import LAMP_NAMES
 from dermis.apps.batch.sensor.model import MIN_DEMOSAICED_SIDE, Sensor
-from dermis.apps.batch.spec_tables import NO_ENVIRONMENT, RANDOM_EXPRESSION, CorrelationGroup, table_values
-from dermis.base.errors import DermisError, refuse, shorten
+from dermis.apps.batch.sensor.white_balance import lamp_appearance
+from dermis.apps.batch.spec_tables import (
+    LAMP_RIG,
+    NO_ENVIRONMENT,
+    RANDOM_EXPRESSION,
+    CorrelationGroup,
+    table_values,
+)
+from dermis.base.errors import DermisError, notify, refuse, shorten
 from dermis.base.reading import is_file
 from dermis.environment.panorama import UNIFORM_PANORAMA
 from dermis.formats.samples import SAMPLES
@@ -35,6 +43,7 @@ _ITA_PARAMETER, _MELANIN_PARAMETER = "person.ita", "person.skin.melanin"
 _HEAD_PARAMETER = "person.head"
 _SENSOR_RENDER_SETTINGS = {"tone": "none", "gamma": "right"}
 """Settings of the renderer's tone curve and encoding, which [sensor] replaces, with their neutral values."""
+_MIN_VISIBLE_BLUE = 1e-3  # linear light that rounds to the level 3 of 255
 _MAX_FILE_NAME_LENGTH = 100  # characters
 
 
@@ -92,6 +101,24 @@ def check_sensor(distributions: Mapping[str, Distribution], render: Settings) ->
     if filtered and min(render.size) < MIN_DEMOSAICED_SIDE:
         expected = f"{MIN_DEMOSAICED_SIDE} pixels or more along each side for demosaicing"
         refuse("size", expected, f"got {list(render.size)}", "Correct it")
+
+
+def note_lamps_without_blue(distributions: Mapping[str, Distribution]) -> None:
+    """Notify the user of sampled lamps whose light has no blue in the pictures after the white balance.
+
+    distributions : distribution of each parameter by its dotted name, with the parameters of [sensor]
+    """
+    fixed = "kelvin" in distributions["sensor.white_balance"].support
+    if not fixed or LAMP_RIG not in distributions["light.kind"].support:
+        return
+    assumed = max(float(bound) for bound in distributions["sensor.white_kelvin"].support)
+    for lamp in LAMP_NAMES:
+        lowest = min(float(bound) for bound in distributions[f"light.{lamp}.kelvin"].support)
+        if lamp_appearance(Sensor(white_kelvin=assumed), lowest).min() < _MIN_VISIBLE_BLUE:
+            notify(
+                f"light.{lamp}: lamps of {lowest:g} K have no blue with a white balance of {assumed:g} K, so "
+                f'pictures can be orange; write white_balance = "lights" in [sensor] to balance their light'
+            )
 
 
 def _check_person(distributions: Mapping[str, Distribution]) -> None:

@@ -48,6 +48,16 @@ def assumed_white(sensor: Sensor, light_colour: Colour | None) -> Colour:
     return red, green, blue
 
 
+def lamp_appearance(sensor: Sensor, lamp_kelvin: float) -> Doubles:
+    """Return the linear Rec. 709 colour (3,) of a white surface in the light of a lamp, after white balance.
+
+    lamp_kelvin : colour temperature of the lamp [K]
+    """
+    light = sensor_matrix() @ blackbody_colour(lamp_kelvin)
+    balanced = white_balance_gains(assumed_white(sensor, blackbody_colour(lamp_kelvin))) * light
+    return np.asarray(np.linalg.solve(sensor_matrix(), balanced))
+
+
 def white_balance_gains(white: Colour) -> Doubles:
     """Return the gains (3,) of the sensor's channels that make light of a colour white, with its luminance.
 
