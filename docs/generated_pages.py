@@ -12,6 +12,7 @@ from typing import Any
 
 import dermis
 from dermis.apps.batch.distributions import Distribution
+from dermis.apps.batch.sensor.lens import Lens
 from dermis.apps.batch.sensor.model import Sensor
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import (
@@ -64,6 +65,7 @@ SPEC_TABLES: dict[str, type[FrozenModel]] = {
     "[light.key], [light.fill], [light.rim]": LampTable,
     "[environment]": EnvironmentTable,
     "[background]": BackgroundTable,
+    "[lens]": Lens,
     "[sensor]": Sensor,
     "[[correlated]]": CorrelationGroup,
 }

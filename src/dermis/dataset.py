@@ -3,6 +3,7 @@
 from dermis.apps.batch.image_facts import SPLIT_NAMES
 from dermis.apps.batch.keypoint_files import export_keypoints
 from dermis.apps.batch.reader import decode_image, read_dataset
+from dermis.apps.batch.sensor.lens import Lens
 from dermis.apps.batch.sensor.model import Sensor
 from dermis.apps.batch.sensor.photograph import Photograph, photograph
 from dermis.apps.batch.spec import Spec, load_spec, parse_spec
@@ -11,6 +12,7 @@ from dermis.apps.batch.training_arrays import arrays, parameter_names
 
 __all__ = [
     "SPLIT_NAMES",
+    "Lens",
     "Photograph",
     "Sensor",
     "Spec",

@@ -12,13 +12,19 @@ from small_set import contents, drawn, drawn_here, read, write_spec
 from test_stream import first
 
 import dermis
+from dermis.apps.batch.face_boxes import box_points
 from dermis.apps.batch.preview import contact_sheet
 from dermis.apps.batch.spec import Spec, parse_spec
 from dermis.base.errors import DermisWarning
 from dermis.dataset import Sensor, load_spec, photograph
+from dermis.scene.smoothness import SmoothOutlineLevels
 
 COUNT = 10
 SENSOR = """
+[lens]
+k1 = {choice = [0, {uniform = [-2, 2]}], weights = [1, 3]}
+p1 = {choice = [0, {uniform = [-0.02, 0.02]}]}
+
 [sensor]
 vignetting = {uniform = [0, 4]}
 white_balance = {choice = ["kelvin", "lights"]}
@@ -37,6 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("photographs")
     path = write_spec(made)
     text = path.read_text().replace("shard_size = 20", "shard_size = 20\nkeep_linear = true")
+    text = text.replace('["depth", "normal"]', '["depth", "label", "normal", "position"]')
     path.write_text(text + SENSOR)
     return made
 
@@ -85,6 +92,46 @@ def test_records_and_linear_pictures_reproduce_the_photographs(folder: Path, fil
         assert found.clipped_fraction == pytest.approx(clipped, rel=1e-5)
         seen |= {(sensor.demosaicing, bool(sensor.iso)), sensor.tone_curve, sensor.white_balance}
     assert len(seen) >= 7
+
+
+def opencv_pixels(image: dict[str, Any], positions_mm: Any) -> Any:
+    """Project points by OpenCV's formula, written for one point at a time."""
+    camera, pixels = image["camera"], []
+    k1, k2, p1, p2, k3 = (image["parameters"][f"lens.{name}"] for name in ("k1", "k2", "p1", "p2", "k3"))
+    for point in positions_mm.reshape(-1, 3).astype(float):
+        X, Y, Z = camera.R @ point + camera.t
+        a, b = X / Z, Y / Z
+        r2 = a * a + b * b
+        d = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
+        u = a * d + 2 * p1 * a * b + p2 * (r2 + 2 * a * a)
+        v = b * d + p1 * (r2 + 2 * b * b) + 2 * p2 * a * b
+        pixels.append((camera.K @ [u, v, 1])[:2])
+    return np.array(pixels)
+
+
+def test_outputs_landmarks_and_boxes_are_behind_the_lens(folder: Path, files: dict[str, bytes]) -> None:
+    """Each pixel's position is imaged at this pixel, except near outlines, where classes are not mixed."""
+    moved = []
+    for image in images(folder, files):
+        seen = image["depth"] > 0
+        np.testing.assert_array_equal(seen, image["label"] > 0)
+        y, x = np.nonzero(seen)
+        errors = np.linalg.norm(opencv_pixels(image, image["position"][seen]) - np.stack([x, y], -1), axis=1)
+        assert np.median(errors) < 0.05 and errors.max() < 0.8
+        assert np.linalg.norm(image["normal"][seen], axis=-1) == pytest.approx(1, abs=1e-3)
+        points = image["landmarks"]["points.csv"]
+        found = opencv_pixels(image, points.positions_mm)
+        np.testing.assert_allclose(points.pixels, found, atol=2e-3)
+        pinhole = (points.positions_mm @ image["camera"].R.T + image["camera"].t) @ image["camera"].K.T
+        moved.append(np.abs(pinhole[:, :2] / pinhole[:, 2:] - points.pixels).max())
+        path = folder / image["parameters"]["person.head"]
+        head = dermis.load_head(path, subdivide=SmoothOutlineLevels(size=(32, 32)))
+        for name, indices in box_points(head).items():
+            vertices = head.control_rig.positions_mm[indices] - np.array(head.centre_mm)
+            corners = opencv_pixels(image, vertices)
+            expected = [*corners.min(axis=0), *corners.max(axis=0)]
+            np.testing.assert_allclose(image["boxes"][name], expected, atol=2e-3)
+    assert max(moved) > 0.4 and min(moved) < 0.01  # pixels, of 32
 
 
 def test_the_index_and_the_sheet_describe_the_photographs(folder: Path, files: dict[str, bytes]) -> None:
@@ -137,7 +184,7 @@ def test_an_empty_table_has_all_defaults_and_leaves_pictures_unchanged(
 
 def test_lamps_that_the_white_balance_leaves_without_blue_are_noted() -> None:
     lamps = {"kind": "rig", "rim": {"kelvin": {"uniform": [1750, 4000]}}}
-    with pytest.warns(DermisWarning, match=r"light\.rim: lamps of 1750 K .* white_balance = \"lights\""):
+    with pytest.warns(DermisWarning, match=r"light\.rim: lamps down to 1750 K .* white_balance = \"lights\""):
         parse_spec({"light": lamps, "sensor": {"white_kelvin": {"uniform": [3000, 6500]}}})
     parse_spec({"light": lamps, "sensor": {"white_balance": "lights"}})  # warnings are errors in tests
     parse_spec({"light": lamps, "sensor": {"white_kelvin": 3000}})

@@ -79,6 +79,10 @@ REFUSED = {
     "[sensor]\n[render]\ntone = 'filmic'": "render: tone: expected 'none' with",
     "size = [1, 8]\n[sensor]\ndemosaicing = 'malvar'": "size: expected 2 pixels or more",
     "keep_linear = true": "keep_linear: expected a table",
+    "[lens]\nk1 = 0.1": "lens: expected a table",
+    "[sensor]\n[lens]\nk4 = 1": "lens: k4: expected one of k1",
+    "[sensor]\n[lens]\np1 = {normal = [0, 0.1]}": "lens: .*p1: expected a number from -0.1",
+    "outputs = ['motion']\n[sensor]\n[lens]": "outputs: expected outputs without motion",
 }
 FIRST = {
     "person.seed": 489798491,

@@ -9,6 +9,7 @@ from functools import cache
 from dermis.apps.batch.face_boxes import Box
 from dermis.apps.batch.sampling import Parameters, hashed_uniform, round_significant
 from dermis.apps.batch.spec import Spec
+from dermis.base.arrays import Doubles
 from dermis.human.person import Human
 
 SPLITS = ("train", 0.8), ("val", 0.1), ("test", 0.1)
@@ -40,6 +41,7 @@ class ImageFacts:
         for heads whose eyes cannot turn
     boxes : boxes around the face, see `face_boxes`; None if they are unknown
     light_colour : colour of the lights, see `lighting.light_colour`; None for a spec without [sensor]
+    picture_K : intrinsic matrix (3, 3) of the picture, without the distortion of its lens; None if unknown
     sensor : facts about the exposure, by the names of `SENSOR_FACT_NAMES`; empty for a spec without [sensor]
     """
 
@@ -47,6 +49,7 @@ class ImageFacts:
     gaze_error_deg: tuple[float, float] | None = None
     boxes: Mapping[str, Box] | None = None
     light_colour: tuple[float, float, float] | None = None
+    picture_K: Doubles | None = None
     sensor: Mapping[str, float] = field(default_factory=dict)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.batch.distributions import Constant
-from dermis.apps.batch.observed_photographs import as_photograph
+from dermis.apps.batch.observed_photographs import as_photograph, rendered_outputs
 from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.scenes import SceneBuilder
 from dermis.apps.batch.shards import Part
@@ -153,7 +153,7 @@ def _sheet_pictures(
         if spec.sensor is None:
             yield renderer.draw(scene, settings, timed=False).srgb8()
             continue
-        (observation,) = renderer.observe([scene], settings, linear=True)
+        (observation,) = renderer.observe([scene], settings, linear=True, outputs=rendered_outputs(spec))
         photo, _ = as_photograph(observation, parameters, builder.facts(parameters, scene))
         yield photo.picture.astype(np.uint8, copy=False)
 

@@ -7,6 +7,7 @@ import hashlib
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -17,9 +18,11 @@ from dermis.apps.batch import spec_tables as tables
 from dermis.apps.batch.distributions import Constant, Distribution, FileChoice
 from dermis.apps.batch.output_encoding import Encoding
 from dermis.apps.batch.sampling import Parameters, Sampler
+from dermis.apps.batch.sensor.lens import Lens
 from dermis.apps.batch.sensor.model import Sensor
 from dermis.apps.batch.spec_checks import (
     check_landmarks,
+    check_lens,
     check_sensor,
     check_spec,
     note_lamps_without_blue,
@@ -63,15 +66,15 @@ _MAX_KEY_LENGTH, _MIN_KEY_SIMILARITY = 80, 0.7  # limits for suggestions to unkn
 _FILE_PARAMETERS = "person.head", "environment.name", "skin.profile"
 """Parameters whose values may be files."""
 P = TypeVar("P", bound=FrozenModel)
-_SensorTable = dict[str, Annotated[Distribution, tables.DistributionField()]]
+_DeviceTable = dict[str, Annotated[Distribution, tables.DistributionField()]]
 
 
-def _with_sensor_defaults(table: _SensorTable | None) -> _SensorTable | None:
-    """Return the table [sensor] with the defaults of omitted keys, in the order of the fields of `Sensor`."""
+def _with_defaults(model: type[FrozenModel], table: _DeviceTable | None) -> _DeviceTable | None:
+    """Return the table of a lens or sensor with the defaults of omitted keys, in the order of its model."""
     if table is None:
         return None
-    sensor = Sensor()
-    complete = {name: table.get(name, Constant(getattr(sensor, name))) for name in Sensor.model_fields}
+    defaults = model()
+    complete = {name: table.get(name, Constant(getattr(defaults, name))) for name in model.model_fields}
     return complete | table  # unknown keys are refused later
 
 
@@ -126,7 +129,9 @@ class Spec(FrozenModel):
     """Environment light."""
     background: tables.BackgroundTable = tables.BackgroundTable()
     """Background."""
-    sensor: Annotated[_SensorTable | None, AfterValidator(_with_sensor_defaults)] = None
+    lens: Annotated[_DeviceTable | None, AfterValidator(partial(_with_defaults, Lens))] = None
+    """Distortion of the camera's lens; needs [sensor]."""
+    sensor: Annotated[_DeviceTable | None, AfterValidator(partial(_with_defaults, Sensor))] = None
     """Sensor and processing of the camera; without this table, pictures are as rendered."""
     correlated: tuple[tables.CorrelationGroup, ...] = ()
     """Correlated parameters."""
@@ -148,9 +153,12 @@ class Spec(FrozenModel):
         check_spec(distributions, expressions, self.correlated, self.folder)
         if self.sensor is not None:
             check_sensor(distributions, self.render)
-        elif self.keep_linear:
-            actual, advice = "there is none", "Add a table [sensor], or remove keep_linear"
-            refuse("keep_linear", "a table [sensor], whose pictures are not linear", actual, advice)
+        for name in ("keep_linear", "lens"):
+            if getattr(self, name) is not None and self.sensor is None:
+                actual, advice = "there is none", "Add [sensor], which can be empty, or remove this key"
+                refuse(name, "a table [sensor]", actual, advice)
+        if self.lens is not None:
+            check_lens(distributions, self.outputs)
         rows = {name: row for group in self.correlated for name, row in group.cholesky_rows().items()}
         sampler = Sampler(self.seed, self.images_per_person, distributions, rows, expressions)
         BaseModel.__setattr__(self, "_sampler", sampler)

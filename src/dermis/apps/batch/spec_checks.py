@@ -8,6 +8,7 @@ from pathlib import Path
 
 from dermis.apps.batch.distributions import Distribution
 from dermis.apps.batch.lighting import LAMP_NAMES
+from dermis.apps.batch.sensor.lens import Lens
 from dermis.apps.batch.sensor.model import MIN_DEMOSAICED_SIDE, Sensor
 from dermis.apps.batch.sensor.white_balance import lamp_appearance
 from dermis.apps.batch.spec_tables import (
@@ -103,6 +104,18 @@ def check_sensor(distributions: Mapping[str, Distribution], render: Settings) ->
         refuse("size", expected, f"got {list(render.size)}", "Correct it")
 
 
+def check_lens(distributions: Mapping[str, Distribution], outputs: Sequence[str]) -> None:
+    """Raise DermisError for invalid values of the table [lens], and for outputs that do not support it.
+
+    distributions : distribution of each parameter by its dotted name
+    outputs : outputs of the spec
+    """
+    _check_table("lens", distributions, list(Lens.model_fields), Lens)
+    if "motion" in outputs:
+        expected = "outputs without motion, which is that of a pinhole camera"
+        refuse("outputs", expected, "the spec has a table [lens]", "Remove motion or [lens]")
+
+
 def note_lamps_without_blue(distributions: Mapping[str, Distribution]) -> None:
     """Notify the user of sampled lamps whose light has no blue in the pictures after the white balance.
 
@@ -112,13 +125,18 @@ def note_lamps_without_blue(distributions: Mapping[str, Distribution]) -> None:
     if not fixed or LAMP_RIG not in distributions["light.kind"].support:
         return
     assumed = max(float(bound) for bound in distributions["sensor.white_kelvin"].support)
-    for lamp in LAMP_NAMES:
-        lowest = min(float(bound) for bound in distributions[f"light.{lamp}.kelvin"].support)
-        if lamp_appearance(Sensor(white_kelvin=assumed), lowest).min() < _MIN_VISIBLE_BLUE:
-            notify(
-                f"light.{lamp}: lamps of {lowest:g} K have no blue with a white balance of {assumed:g} K, so "
-                f'pictures can be orange; write white_balance = "lights" in [sensor] to balance their light'
-            )
+    lowest = {
+        f"light.{lamp}": min(float(bound) for bound in distributions[f"light.{lamp}.kelvin"].support)
+        for lamp in LAMP_NAMES
+    }
+    sensor = Sensor(white_kelvin=assumed)
+    orange = [name for name, T in lowest.items() if lamp_appearance(sensor, T).min() < _MIN_VISIBLE_BLUE]
+    if orange:
+        T = min(lowest[name] for name in orange)
+        notify(
+            f"{', '.join(orange)}: lamps down to {T:g} K have no blue with a white balance of {assumed:g} K, "
+            f'so pictures can be orange; write white_balance = "lights" in [sensor] to balance their light'
+        )
 
 
 def _check_person(distributions: Mapping[str, Distribution]) -> None:

@@ -19,7 +19,7 @@ from dermis.apps.batch.atomic_files import remove_path
 from dermis.apps.batch.child_processes import LostProcessError
 from dermis.apps.batch.encoder_pool import EncodedImage, EncoderPool
 from dermis.apps.batch.image_facts import ImageFacts
-from dermis.apps.batch.observed_photographs import as_photograph
+from dermis.apps.batch.observed_photographs import as_photograph, rendered_outputs
 from dermis.apps.batch.parts import KeptImages, copy_images, join_parts, kept_images
 from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.sampling import Parameters
@@ -299,7 +299,7 @@ class Worker:
                 linear=spec.sensor is not None,
                 # motion is relative to these scenes, not to the frame rendered before
                 previous=(plan.previous for plan in copies[2]),
-                outputs=spec.outputs,
+                outputs=rendered_outputs(spec),
                 landmarks=spec.landmark_tables.values(),
             )
 
