@@ -17,8 +17,9 @@ from dermis.apps.batch.sensor.photograph import photograph
 from dermis.apps.batch.sensor.warping import Neighbours, find_neighbours, sample_bilinear, sample_nearest
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import table_values
-from dermis.base.arrays import Doubles
+from dermis.base.arrays import Doubles, Floats
 from dermis.frame.features.outputs.output_images import OutputArray
+from dermis.frame.features.post.background import studio_backdrop
 from dermis.frame.observation import Landmarks, Observation
 
 _CLASS_OUTPUTS = "label", "label_amodal"
@@ -27,12 +28,15 @@ _NEAREST_OUTPUTS = "uv", "barycentric", "normal_geometric"
 """Outputs of floats that differ between triangles or charts of one surface."""
 _COVERAGE_OUTPUTS = "alpha", "hair_alpha"
 """Outputs that are interpolated across edges."""
+_COVERAGE_OUTPUT = "alpha"  # coverage by head and hair, with which the background is blended
 _OUTSIDE = 2  # occlusion of landmarks outside the picture
 
 
 def rendered_outputs(spec: Spec) -> tuple[str, ...]:
-    """Return the outputs to render for the images of a spec: its own, and those that a lens needs."""
-    return tuple(dict.fromkeys((*spec.outputs, *(_CLASS_OUTPUTS if spec.lens is not None else ()))))
+    """Return the outputs to render for the images of a spec: its own, and those that photographs need."""
+    coverage = (_COVERAGE_OUTPUT,) if spec.sensor is not None else ()
+    classes = _CLASS_OUTPUTS if spec.lens is not None else ()
+    return tuple(dict.fromkeys((*spec.outputs, *coverage, *classes)))
 
 
 def as_photograph(
@@ -43,10 +47,13 @@ def as_photograph(
     The linear picture becomes the output "linear" of the observation. It is rounded to 16-bit floats, and the
     camera to the decimals of records, so that the files of an image reproduce its photograph exactly.
 
-    observation : observation with a linear picture
+    Backgrounds of the kinds "gradient" and "colour", which emit no light, are coloured by the lights.
+
+    observation : observation with a linear picture, and the outputs of `rendered_outputs`
     parameters : sampled parameters of the image, with those of the table [sensor]
     """
-    lens = sampled_lens(parameters)
+    light, lens = facts.light_colour or (1.0, 1.0, 1.0), sampled_lens(parameters)
+    observation = replace(observation, picture=_with_lit_background(observation, parameters, light))
     if lens is not None:
         assert facts.picture_K is not None
         observation = through_lens(observation, lens, facts.picture_K)
@@ -58,13 +65,30 @@ def as_photograph(
         light_colour=facts.light_colour,
         seed=int(values.get("seed", 0)),
     )
-    light = facts.light_colour or (1.0, 1.0, 1.0)
     numbers = map(round_significant, (*light, *photo.white, photo.clipped_fraction))
     outputs = {**observation.outputs, LINEAR_PICTURE: linear}
     return (
         replace(observation, picture=photo.picture, outputs=outputs),
         replace(facts, sensor=dict(zip(SENSOR_FACT_NAMES, numbers, strict=True))),
     )
+
+
+def _with_lit_background(
+    observation: Observation, parameters: Parameters, light_colour: tuple[float, float, float]
+) -> Floats:
+    """Return the linear picture with its background multiplied by the colour of the lights."""
+    picture = np.asarray(observation.picture, np.float32)
+    tint = np.array(light_colour, np.float32) - np.float32(1.0)
+    kind = parameters["background.kind"]
+    if kind == "colour":
+        channels = (float(parameters[f"background.{one}"]) for one in ("red", "green", "blue"))
+        background = np.array(list(channels), np.float32)
+    elif kind == "gradient":
+        background = studio_backdrop((picture.shape[1], picture.shape[0]))
+    else:
+        return picture
+    uncovered = 1.0 - observation.outputs[_COVERAGE_OUTPUT][..., None]
+    return np.asarray(picture + uncovered * background * tint, np.float32)
 
 
 def through_lens(observation: Observation, lens: Lens, picture_K: Doubles) -> Observation:
