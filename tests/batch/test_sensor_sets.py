@@ -18,9 +18,10 @@ from dermis.apps.batch.face_boxes import box_points
 from dermis.apps.batch.preview import contact_sheet
 from dermis.apps.batch.spec import Spec, parse_spec
 from dermis.base.errors import DermisWarning
-from dermis.dataset import Sensor, load_spec, photograph
+from dermis.dataset import Lens, Sensor, load_spec, photograph
 from dermis.frame.features.post.background import studio_backdrop
 from dermis.images.colour import decode_srgb_levels, encode_srgb8
+from dermis.scene.frozen_model import FrozenModel, accepted_values, format_default
 from dermis.scene.smoothness import SmoothOutlineLevels
 
 COUNT = 10
@@ -184,10 +185,9 @@ def test_an_empty_table_has_all_defaults_and_leaves_pictures_unchanged(
     for ours, theirs in zip(dermis.read_dataset(tmp_path / "out"), plain, strict=False):
         difference = np.abs(ours["picture"].astype(int) - theirs["picture"])
         skin = ndimage.binary_erosion(ours["depth"] > 0)
-        assert (
-            skin.sum() > 100 and difference[skin].max() <= 1
-        )  # the background is in the light of the studio
+        assert skin.sum() > 100 and difference[skin].max() <= 1
         np.testing.assert_array_equal(ours["depth"], theirs["depth"])
+        # the background has the colour of the lights
         light = [ours["parameters"][f"sensor.light_{channel}"] for channel in ("red", "green", "blue")]
         ratio = decode_srgb_levels(ours["picture"][0, 0]) / decode_srgb_levels(theirs["picture"][0, 0])
         np.testing.assert_allclose(ratio, light, rtol=0.06)  # rounding to 8 bits
@@ -222,9 +222,8 @@ def test_backgrounds_of_grey_walls_are_grey_in_balanced_light(
         assert len(seen) > 100
         expected = encode_srgb8(0.3) if kind == "colour" else encode_srgb8(studio_backdrop((32, 32)))
         expected = np.broadcast_to(expected, image["picture"].shape)[image["alpha"] == 0]
-        assert np.abs(seen - expected).max() <= (
-            1 if kind == "colour" else 3
-        )  # the backdrop is not quite grey
+        tolerance = 1 if kind == "colour" else 3  # the backdrop is not quite grey
+        assert np.abs(seen - expected).max() <= tolerance
 
 
 def test_the_contact_sheet_shows_photographs(small_spec: Spec) -> None:
@@ -232,6 +231,18 @@ def test_the_contact_sheet_shows_photographs(small_spec: Spec) -> None:
     plain, balanced = contact_sheet(small_spec.replace(count=1), "cpu"), contact_sheet(blue, "cpu")
     ratio = [sheet[..., 2].mean() / sheet[..., 0].mean() for sheet in (plain, balanced)]
     assert ratio[1] > 1.5 * ratio[0]
+
+
+@pytest.mark.parametrize("model", [Sensor, Lens])
+def test_the_page_lists_all_keys_with_their_bounds(model: type[FrozenModel]) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "batch.md").read_text(encoding="utf-8")
+    table = page.partition(f"| key of `[{model.__name__.lower()}]` |")[2].partition("\n\n")[0]
+    listed = [tuple(cell.strip() for cell in row.split("|")[1:4]) for row in table.splitlines()[2:]]
+    defaults = model()
+    assert listed == [
+        (f"`{name}`", accepted_values(model, name), format_default(getattr(defaults, name)))
+        for name in model.model_fields
+    ]
 
 
 def test_the_canonical_text_gives_the_same_spec(spec: Spec, tmp_path: Path) -> None:

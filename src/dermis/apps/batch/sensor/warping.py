@@ -15,14 +15,13 @@ Array = NDArray[Any]
 class Neighbours(NamedTuple):
     """Four nearest pixels of each sampled position, for a picture of the size of the samples.
 
-    rows, columns : (h, w, 4) indices of the pixels
-    weights : (h, w, 4) weights of bilinear interpolation, which sum to 1 [-]
-    nearest : (h, w, 1) which of the four pixels is the nearest
+    indices : four arrays (h, w), indices of the pixels in the flattened picture
+    weights : four arrays (h, w), weights of bilinear interpolation, which sum to 1 [-]
+    nearest : (h, w) index of the nearest of the four pixels
     """
 
-    rows: Index
-    columns: Index
-    weights: Floats
+    indices: tuple[Index, ...]
+    weights: tuple[Floats, ...]
     nearest: Index
 
 
@@ -32,13 +31,12 @@ def find_neighbours(positions: Doubles) -> Neighbours:
     x, y = np.clip(positions[..., 0], 0.0, width - 1.0), np.clip(positions[..., 1], 0.0, height - 1.0)
     left, top = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
-    s, t = x - left, y - top
-    weights = np.stack([(1 - s) * (1 - t), s * (1 - t), (1 - s) * t, s * t], axis=-1)
+    s, t = (x - left).astype(np.float32), (y - top).astype(np.float32)
+    nearest = np.where(t > 0.5, bottom, top) * width + np.where(s > 0.5, right, left)
     return Neighbours(
-        np.stack([top, top, bottom, bottom], axis=-1),
-        np.stack([left, right, left, right], axis=-1),
-        weights.astype(np.float32),
-        weights.argmax(axis=-1)[..., None],
+        (top * width + left, top * width + right, bottom * width + left, bottom * width + right),
+        ((1 - s) * (1 - t), s * (1 - t), (1 - s) * t, s * t),
+        nearest,
     )
 
 
@@ -48,19 +46,25 @@ def sample_bilinear(picture: Array, neighbours: Neighbours, classes: Array | Non
     classes : (h, w) class of each pixel; pixels of other classes than the nearest one have no weight. None
         for all pixels
     """
-    weights = neighbours.weights
+    weights: tuple[Floats, ...] = neighbours.weights
     if classes is not None:
-        found = classes[neighbours.rows, neighbours.columns]
-        weights = weights * (found == np.take_along_axis(found, neighbours.nearest, axis=-1))
-        weights = weights / weights.sum(axis=-1, keepdims=True)
-    values = picture[neighbours.rows, neighbours.columns]
-    extra = (None,) * (picture.ndim - 2)
-    return np.asarray((values * weights[(..., *extra)]).sum(axis=2), picture.dtype)
+        own = classes.ravel()[neighbours.nearest]
+        weights = tuple(
+            weight * (classes.ravel()[index] == own)
+            for index, weight in zip(neighbours.indices, weights, strict=True)
+        )
+        total = np.sum(weights, axis=0)
+        weights = tuple(weight / total for weight in weights)
+    flat, extra = _flattened(picture), (None,) * (picture.ndim - 2)
+    parts = zip(neighbours.indices, weights, strict=True)
+    sampled = sum(flat.take(index, axis=0) * weight[(..., *extra)] for index, weight in parts)
+    return np.asarray(sampled, picture.dtype)
 
 
 def sample_nearest(picture: Array, neighbours: Neighbours) -> Array:
     """Return a picture (h, w) or (h, w, c), sampled at the nearest pixels."""
-    rows, columns = (
-        np.take_along_axis(indices, neighbours.nearest, axis=-1)[..., 0] for indices in neighbours[:2]
-    )
-    return np.asarray(picture[rows, columns])
+    return np.asarray(_flattened(picture).take(neighbours.nearest, axis=0))
+
+
+def _flattened(picture: Array) -> Array:
+    return np.ascontiguousarray(picture).reshape(-1, *picture.shape[2:])
