@@ -12,6 +12,8 @@ from typing import Any
 
 import dermis
 from dermis.apps.batch.distributions import Distribution
+from dermis.apps.batch.sensor.lens import Lens
+from dermis.apps.batch.sensor.model import Sensor
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import (
     BackgroundTable,
@@ -63,6 +65,8 @@ SPEC_TABLES: dict[str, type[FrozenModel]] = {
     "[light.key], [light.fill], [light.rim]": LampTable,
     "[environment]": EnvironmentTable,
     "[background]": BackgroundTable,
+    "[lens]": Lens,
+    "[sensor]": Sensor,
     "[[correlated]]": CorrelationGroup,
 }
 _FIELD = re.compile(r"^(?P<names>\w+(?:, \w+)*) : (?P<meaning>.*)$")

@@ -72,6 +72,17 @@ REFUSED = {
     "[[correlated]]\nof = ['a', 'b']\ncorrelation = [[1, 0.2], [0.3, 1]]": "correlated: .*symmetric",
     "[[correlated]]\nof = ['camera.yaw_deg', 'person.age']\ncorrelation = 0.5\n[person]\nage = 30": "first",
     "correlated = 3": "correlated",
+    "[sensor]\nISO = 3": "sensor: ISO: expected one of vignetting",
+    "[sensor]\niso = {uniform = [100, 1e6]}": "sensor: .*iso: expected a number from 0 to 51200",
+    "[sensor]\ndemosaicing = {choice = ['malvar', 'best']}": "sensor: .*demosaicing: expected .*malvar",
+    "[sensor]\n[background]\nkind = 'none'": "background: kind: expected a background, as photographs",
+    "[sensor]\n[render]\ntone = 'filmic'": "render: tone: expected 'none' with",
+    "size = [1, 8]\n[sensor]\ndemosaicing = 'malvar'": "size: expected 2 pixels or more",
+    "keep_linear = true": "keep_linear: expected a table",
+    "[lens]\nk1 = 0.1": "lens: expected a table",
+    "[sensor]\n[lens]\nk4 = 1": "lens: k4: expected one of k1",
+    "[sensor]\n[lens]\np1 = {normal = [0, 0.1]}": "lens: .*p1: expected a number from -0.1",
+    "outputs = ['motion']\n[sensor]\n[lens]": "outputs: expected outputs without motion",
 }
 FIRST = {
     "person.seed": 489798491,

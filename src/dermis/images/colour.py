@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.base.arrays import Bytes, Doubles, Floats
 
 REC709_LUMINANCE = (0.2126, 0.7152, 0.0722)
-_XYZ_OF_REC709 = np.array(
+XYZ_OF_REC709 = np.array(
     [[0.4123908, 0.3575843, 0.1804808], [0.2126390, 0.7151687, 0.0721923], [0.0193308, 0.1191948, 0.9505322]]
 )
-_WHITE_XYZ = _XYZ_OF_REC709.sum(axis=1)
+_WHITE_XYZ = XYZ_OF_REC709.sum(axis=1)
 _CIELAB_DELTA = 6.0 / 29.0  # constant delta of the CIELAB function
 
 
@@ -75,7 +75,7 @@ def _as_float(numbers: ArrayLike) -> NDArray[np.floating]:
 
 def lab(linear_colours: ArrayLike) -> Doubles:
     """Convert linear Rec. 709 colours (..., 3) to CIE L*a*b* (..., 3) with the white point D65."""
-    t = np.asarray(linear_colours, np.float64) @ _XYZ_OF_REC709.T / _WHITE_XYZ
+    t = np.asarray(linear_colours, np.float64) @ XYZ_OF_REC709.T / _WHITE_XYZ
     f = np.where(t > _CIELAB_DELTA**3, np.cbrt(t), t / (3.0 * _CIELAB_DELTA**2) + 4.0 / 29.0)
     X, Y, Z = np.moveaxis(f, -1, 0)
     return np.stack([116.0 * Y - 16.0, 500.0 * (X - Y), 200.0 * (Y - Z)], axis=-1)
@@ -87,7 +87,7 @@ def linear_of_xyz(xyz_over_white: ArrayLike) -> Doubles:
     xyz_over_white : (..., 3) X, Y and Z of the colours, divided by X, Y and Z of white in the same light
     """
     xyz = np.asarray(xyz_over_white, np.float64) * _WHITE_XYZ
-    return np.asarray(xyz @ np.linalg.inv(_XYZ_OF_REC709).T)
+    return np.asarray(xyz @ np.linalg.inv(XYZ_OF_REC709).T)
 
 
 def linear_of_lab(cielab: ArrayLike) -> Doubles:

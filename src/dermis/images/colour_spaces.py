@@ -35,7 +35,7 @@ _CURVE_LEVEL_COUNT, _MAX_CURVE_LEVEL = 65536, 65535
 _CURVE_SAMPLE_LEVELS = np.linspace(0.0, 1.0, _CURVE_LEVEL_COUNT)
 _SRGB_CURVE_TOLERANCE = 5e-3  # a matrix or curve that differs less from that of sRGB is replaced by it
 _D50_XYZ = np.array([0.9642, 1.0, 0.8249])
-_BRADFORD_MATRIX = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+BRADFORD_MATRIX = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 _ICC_HEADER_BYTES, _MAX_ICC_TAGS = 128, 200
 _MAX_PROFILE_NAME_LENGTH = 60  # characters
 
@@ -188,8 +188,8 @@ def _matrix_to_xyz(primaries: Sequence[float]) -> Doubles:
     if not (np.isfinite(xyz).all() and y[3] > 0.0 and abs(np.linalg.det(xyz[:, :3])) > 1e-6):
         raise ValueError("its primaries span no colours")
     white = xyz[:, 3] / y[3]
-    adapted = _BRADFORD_MATRIX @ _D50_XYZ / (_BRADFORD_MATRIX @ white)
-    adaptation = np.linalg.inv(_BRADFORD_MATRIX) @ (adapted[:, None] * _BRADFORD_MATRIX)
+    adapted = BRADFORD_MATRIX @ _D50_XYZ / (BRADFORD_MATRIX @ white)
+    adaptation = np.linalg.inv(BRADFORD_MATRIX) @ (adapted[:, None] * BRADFORD_MATRIX)
     return np.asarray(adaptation @ (xyz[:, :3] * np.linalg.solve(xyz[:, :3], white)))
 
 

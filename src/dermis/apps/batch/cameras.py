@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.batch.lighting import direction_from_angles
 from dermis.apps.batch.sampling import Parameters, table_numbers
+from dermis.apps.batch.sensor.lens import Lens, view_scale
 from dermis.mesh.head import Head
 from dermis.mesh.rig import PoseArrays
 from dermis.scene.camera import Camera
@@ -98,6 +99,23 @@ def sampled_camera(
         low, high = (fraction, high) if inside else (low, fraction)
         fraction = 0.5 * (low + high)
     return _aim_camera(centre, axes, distance, frame, scaled_aim_offset(low))
+
+
+def sampled_lens(parameters: Parameters) -> Lens | None:
+    """Return the lens with an image's sampled parameters; None for a lens without distortion."""
+    values = table_numbers(parameters, "lens")
+    return Lens.model_validate(values) if any(values.values()) else None
+
+
+def camera_behind_lens(camera: Camera, lens: Lens, picture_size: tuple[int, int]) -> Camera:
+    """Return the pinhole camera that shows just what a camera with a distorting lens shows.
+
+    picture_size : width and height [pixel]
+
+    Raises DermisError if the lens cannot image the corners of the picture.
+    """
+    scale = view_scale(lens, camera.to_opencv(picture_size).K, picture_size)
+    return camera.replace(frame_mm=scale * camera.frame_mm)
 
 
 def _aim_camera(

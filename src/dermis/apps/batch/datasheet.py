@@ -14,7 +14,7 @@ from dermis.apps.batch.atomic_files import atomic_write
 from dermis.apps.batch.goodness_of_fit import FitTest, fit_tests
 from dermis.apps.batch.index import parameter_summaries
 from dermis.apps.batch.licences import asset_licences
-from dermis.apps.batch.output_encoding import file_format, storage_description
+from dermis.apps.batch.output_encoding import LINEAR_PICTURE, file_format, storage_description
 from dermis.apps.batch.shard_formats import ShardManifest
 from dermis.apps.batch.shards import list_shards, read_manifest, shard_exists, shard_path
 from dermis.apps.batch.spec import Spec
@@ -86,12 +86,13 @@ def _readme_text(dataset_folder: Path, spec: Spec, manifests: Sequence[ShardMani
 
 def _files_table(spec: Spec) -> str:
     alpha = ", with alpha" if "none" in spec.background.kind.support else ""
+    sensor = ", as the camera of [sensor] stores it (decoded, if that is JPEG)" if spec.sensor else ""
     outputs = [
         (f"{name}.{one['file']}", one["description"], one["unit"], one["stored"], f"{one['background']:g}")
         for name, one in output_formats(spec).items()
     ]
     rows = [
-        ("png", f"picture, sRGB{alpha}", "", "8-bit PNG", ""),
+        ("png", f"picture, sRGB{alpha}{sensor}", "", "8-bit PNG", ""),
         *outputs,
         ("json", "parameters, camera, head_pose, gaze, boxes, landmarks, split, licence", "", "", ""),
     ]
@@ -171,6 +172,16 @@ def output_formats(spec: Spec) -> dict[str, OutputFormat]:
             "unit": output.unit,
             "description": output.description.partition(", see ")[0],  # without links to the documentation
             "background": output.background,
+        }
+    if spec.keep_linear:
+        formats[LINEAR_PICTURE] = {
+            "file": "exr",
+            "stored": "OpenEXR, 16-bit floats",
+            "step": 1.0,
+            "zero": 0,
+            "unit": "",
+            "description": "linear Rec. 709 picture before the model of the sensor",
+            "background": 0.0,
         }
     return formats
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.batch.cameras import extreme_point_indices, face_hull_indices
+from dermis.apps.batch.sensor.lens import Lens
 from dermis.base.arrays import Doubles
 from dermis.human.hair.density import height_above_hairline
 from dermis.human.labels.fields import HUMAN_FIELD_CLASSES, label_fields
@@ -47,7 +48,7 @@ def box_points(head: Head) -> BoxPoints:
 
 
 def face_boxes(
-    head: Head, points: BoxPoints, pose_arrays: PoseArrays, camera: OpenCvCamera
+    head: Head, points: BoxPoints, pose_arrays: PoseArrays, camera: OpenCvCamera, lens: Lens | None = None
 ) -> dict[str, Box]:
     """Return boxes by name [pixel]; boxes can extend beyond the picture.
 
@@ -57,8 +58,11 @@ def face_boxes(
 
     points : points that bound face and head, from `box_points`
     pose_arrays : pose of the head
+    lens : lens of the camera; None for a pinhole. Points that it cannot image are ignored
     """
-    boxes = {name: _projected_box(head, indices, pose_arrays, camera) for name, indices in points.items()}
+    boxes = {
+        name: _projected_box(head, indices, pose_arrays, camera, lens) for name, indices in points.items()
+    }
     left, top, right, bottom = boxes["face"]
     longer = max(right - left, bottom - top)
     x, y, half = 0.5 * (left + right), 0.5 * (top + bottom), 0.5 * _DETECTOR_SCALE * longer
@@ -67,11 +71,20 @@ def face_boxes(
 
 
 def _projected_box(
-    head: Head, point_indices: NDArray[np.int32], pose_arrays: PoseArrays, camera: OpenCvCamera
+    head: Head,
+    point_indices: NDArray[np.int32],
+    pose_arrays: PoseArrays,
+    camera: OpenCvCamera,
+    lens: Lens | None,
 ) -> Box:
     points: Doubles = head.control_rig.pose_points(point_indices, pose_arrays) - np.array(head.centre_mm)
     projected = (points @ camera.R.T + camera.t) @ camera.K.T
     pixels = projected[:, :2] / np.maximum(projected[:, 2:], 1e-3)
+    if lens is not None:
+        pixels = lens.distort_pixels(pixels, camera.K)
+        pixels = pixels[np.isfinite(pixels).all(axis=1)]
+        if not len(pixels):
+            return np.nan, np.nan, np.nan, np.nan
     (left, top), (right, bottom) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
     return left, top, right, bottom
 

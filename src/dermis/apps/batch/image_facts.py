@@ -9,12 +9,25 @@ from functools import cache
 from dermis.apps.batch.face_boxes import Box
 from dermis.apps.batch.sampling import Parameters, hashed_uniform, round_significant
 from dermis.apps.batch.spec import Spec
+from dermis.base.arrays import Doubles
 from dermis.human.person import Human
 
 SPLITS = ("train", 0.8), ("val", 0.1), ("test", 0.1)
 """Names and fractions of the parts into which a data set is split by person."""
 SPLIT_NAMES = tuple(name for name, _ in SPLITS)
 """Names of the splits, in the order of their numbers in `dermis.dataset.arrays`."""
+SENSOR_FACT_NAMES = (
+    "sensor.light_red",
+    "sensor.light_green",
+    "sensor.light_blue",
+    "sensor.white_red",
+    "sensor.white_green",
+    "sensor.white_blue",
+    "sensor.clipped_fraction",
+)
+"""Facts about the exposure of an image: the linear Rec. 709 colours, with luminance 1, of the lights of the
+scene together and of the light that the white balance makes white, and the fraction of the pixels in which
+the sensor is saturated."""
 _SEED_FIELD = "seed"
 _NO_FACTS: Mapping[str, float | str | None] = {}
 
@@ -27,11 +40,17 @@ class ImageFacts:
     gaze_error_deg : angles by which the left and the right eye miss the target of the gaze [degrees]; None
         for heads whose eyes cannot turn
     boxes : boxes around the face, see `face_boxes`; None if they are unknown
+    light_colour : colour of the lights, see `lighting.light_colour`; None for a spec without [sensor]
+    picture_K : intrinsic matrix (3, 3) of the picture, without the distortion of its lens; None if unknown
+    sensor : facts about the exposure, by the names of `SENSOR_FACT_NAMES`; empty for a spec without [sensor]
     """
 
     person: Mapping[str, float | str | None] = field(default_factory=lambda: _NO_FACTS)
     gaze_error_deg: tuple[float, float] | None = None
     boxes: Mapping[str, Box] | None = None
+    light_colour: tuple[float, float, float] | None = None
+    picture_K: Doubles | None = None
+    sensor: Mapping[str, float] = field(default_factory=dict)
 
 
 def person_facts(person: Human) -> dict[str, float | str | None]:
@@ -59,18 +78,24 @@ def text_fact_names() -> frozenset[str]:
     return frozenset(name for name, value in person_facts(Human()).items() if isinstance(value, str))
 
 
+def fact_names(spec: Spec) -> tuple[str, ...]:
+    """Return the names of all facts that records list among the parameters of an image of a spec."""
+    return (*person_fact_names(), *(SENSOR_FACT_NAMES if spec.sensor is not None else ()))
+
+
 def record_parameters(
-    spec: Spec, parameters: Parameters, person: Mapping[str, float | str | None]
+    spec: Spec, parameters: Parameters, facts: Mapping[str, float | str | None]
 ) -> dict[str, float | int | str | None]:
     """Return the parameters of an image by name, with the same names for all images of a spec.
 
     The value is None for parameters that the image does not use.
 
-    person : properties of the person; a sampled parameter of the same name takes precedence
+    facts : properties of the person and facts about the exposure; a sampled parameter of the same name takes
+        precedence
     """
     values: dict[str, float | int | str | None] = dict.fromkeys(spec.parameter_names)
-    values |= dict.fromkeys(person_fact_names())
-    return values | dict(person) | dict(parameters)
+    values |= dict.fromkeys(fact_names(spec))
+    return values | dict(facts) | dict(parameters)
 
 
 def image_split(spec: Spec, parameters: Parameters) -> str:

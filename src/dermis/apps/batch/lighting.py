@@ -8,16 +8,19 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 
-from dermis.apps.batch.sampling import Parameters, table_numbers
+from dermis.apps.batch.sampling import Parameters, round_significant, table_numbers
 from dermis.apps.batch.spec_tables import LAMP_RIG
+from dermis.environment.panorama import load_panorama, mean_radiance
 from dermis.images.colour import luminance
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.scene.lights import Light, RectangleLight, preset_lights
+from dermis.scene.model import Scene
 
 _PLANCK_C2_NM_K = 1.438777e7  # second radiation constant, hc / k
-_WHITE_TEMPERATURE_K = 6500.0
+WHITE_TEMPERATURE_K = 6500.0
+"""Temperature of a black body that is white in Rec. 709 [K]."""
 _LIGHT_VECTOR_FIELDS = "position", "target", "direction", "up"
-_LAMP_NAMES = "key", "fill", "rim"
+LAMP_NAMES = "key", "fill", "rim"
 _rgb_weights = cache(rgb_weights)
 
 
@@ -28,7 +31,7 @@ def sampled_lights(parameters: Parameters) -> tuple[Light, ...]:
     if not strength:
         return ()
     if parameters["light.kind"] == LAMP_RIG:
-        lamps = (table_numbers(parameters, f"light.{lamp}") for lamp in _LAMP_NAMES)
+        lamps = (table_numbers(parameters, f"light.{lamp}") for lamp in LAMP_NAMES)
         return tuple(_area_lamp(lamp, turn_deg, strength) for lamp in lamps)
     presets = _preset_lights(str(parameters["light.kind"]))
     return tuple(_rotate_light(light, turn_deg, strength) for light in presets)
@@ -47,10 +50,32 @@ def blackbody_colour(temperature_k: float) -> tuple[float, float, float]:
     temperature_k : temperature [K]
     """
     white, body = (
-        np.expm1(_PLANCK_C2_NM_K / (WAVELENGTHS_NM * T)) for T in (_WHITE_TEMPERATURE_K, temperature_k)
+        np.expm1(_PLANCK_C2_NM_K / (WAVELENGTHS_NM * T)) for T in (WHITE_TEMPERATURE_K, temperature_k)
     )
     colour = np.maximum(_rgb_weights() @ (white / body), 0.0)
     red, green, blue = map(float, colour / luminance(colour))
+    return red, green, blue
+
+
+def light_colour(scene: Scene) -> tuple[float, float, float]:
+    """Return the linear Rec. 709 colour of all light of a scene with luminance 1, rounded to six digits.
+
+    It is the colour of the sum of the irradiances on surfaces that face each light, and of the mean
+    irradiance by the environment; white without light.
+    """
+    total = np.sum([light.irradiance for light in scene.lights] or [(0.0, 0.0, 0.0)], axis=0)
+    if scene.environment is not None:
+        mean = np.array(_mean_panorama_radiance(scene.environment.name))
+        total = total + pi * scene.environment.exposure * mean
+    brightness = float(luminance(total))
+    colour = total / brightness if brightness > 0.0 else np.ones(3)
+    red, green, blue = map(round_significant, map(float, colour))
+    return red, green, blue
+
+
+@lru_cache(maxsize=64)
+def _mean_panorama_radiance(panorama_name: str) -> tuple[float, float, float]:
+    red, green, blue = map(float, mean_radiance(load_panorama(panorama_name)))
     return red, green, blue
 
 

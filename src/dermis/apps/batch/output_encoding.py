@@ -17,6 +17,8 @@ from dermis.scene.outputs import OUTPUTS, Output
 
 Array = NDArray[Any]
 Encoding = Literal["png", "exr", "npy"]
+LINEAR_PICTURE = "linear"
+"""Name of the linear picture before the model of the sensor, as an output of an image."""
 _NPY_MAGIC = b"\x93NUMPY\x01\x00"
 _MAX_HALF_FLOAT = 65504.0
 
@@ -69,6 +71,17 @@ def encode_output(output_name: str, output_array: Array, encoding: Encoding) -> 
     picture = np.atleast_3d(limited)
     padded = np.pad(picture, ((0, 0), (0, 0), (0, 1))) if picture.shape[2] == 2 else picture
     return encode_exr(padded.astype(np.float32 if dtype.itemsize > 2 else np.float16))
+
+
+def encode_linear_picture(linear_picture: Array) -> bytes:
+    """Return a linear picture (h, w, 3) as the bytes of an OpenEXR file of 16-bit floats."""
+    return encode_exr(half_precision(linear_picture).astype(np.float16))
+
+
+def half_precision(linear_picture: Array) -> NDArray[np.float32]:
+    """Return a linear picture as it is stored, rounded to 16-bit floats."""
+    limited = np.clip(linear_picture, -_MAX_HALF_FLOAT, _MAX_HALF_FLOAT)
+    return np.asarray(limited.astype(np.float16), np.float32)
 
 
 def decode_output(output_name: str, format_name: str, file_bytes: bytes) -> Array:

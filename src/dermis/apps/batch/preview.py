@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.batch.distributions import Constant
+from dermis.apps.batch.observed_photographs import as_photograph, rendered_outputs
 from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.scenes import SceneBuilder
 from dermis.apps.batch.shards import Part
@@ -134,12 +135,27 @@ def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
     sheet = Image.new("RGB", size, (20, 20, 20))
     draw = ImageDraw.Draw(sheet)
     builder, renderer = SceneBuilder(spec), Renderer(adapter)
-    for k in range(count):
-        picture = renderer.draw(*builder.build(spec.parameters(k)), timed=False).srgb8()
+    pictures = _sheet_pictures(spec, count, builder, renderer)
+    for k, picture in enumerate(pictures):
         x, y = (k % columns) * (width + _SHEET_GAP), (k // columns) * (height + _SHEET_GAP)
         sheet.paste(Image.fromarray(picture), (x, y))
         draw.text((x + 4, y + 2), str(k), fill=(255, 255, 255), stroke_width=1, stroke_fill=(0, 0, 0))
     return np.array(sheet)
+
+
+def _sheet_pictures(
+    spec: Spec, count: int, builder: SceneBuilder, renderer: Renderer
+) -> Iterator[NDArray[np.uint8]]:
+    """Yield the first pictures of a data set as sRGB bytes (h, w, 3)."""
+    for k in range(count):
+        parameters = spec.parameters(k)
+        scene, settings = builder.build(parameters)
+        if spec.sensor is None:
+            yield renderer.draw(scene, settings, timed=False).srgb8()
+            continue
+        (observation,) = renderer.observe([scene], settings, linear=True, outputs=rendered_outputs(spec))
+        photo, _ = as_photograph(observation, parameters, builder.facts(parameters, scene))
+        yield photo.picture.astype(np.uint8, copy=False)
 
 
 def _parameter_row(spec: Spec, parameter: str, samples: Sequence[Parameters]) -> ParameterRow:

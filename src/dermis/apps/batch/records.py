@@ -10,7 +10,12 @@ from numpy.typing import ArrayLike
 
 from dermis.apps.batch.image_facts import ImageFacts, image_split, record_parameters
 from dermis.apps.batch.licences import image_licence
-from dermis.apps.batch.output_encoding import encode_output, file_format
+from dermis.apps.batch.output_encoding import (
+    LINEAR_PICTURE,
+    encode_linear_picture,
+    encode_output,
+    file_format,
+)
 from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.spec import Spec
 from dermis.frame.observation import Observation
@@ -22,7 +27,8 @@ PICTURE_SUFFIX, RECORD_SUFFIX = "png", "json"
 NestedNumbers = list[Union["NestedNumbers", float, None]]
 """Array as nested lists; null where a number is not finite."""
 _PIXEL_DECIMALS = 3
-_MM_DECIMALS = 4
+MM_DECIMALS = 4
+"""Decimals of lengths and of the camera's intrinsic matrix in records."""
 _DIRECTION_DECIMALS = 8  # rotations and directions
 _DEGREE_DECIMALS = 3
 _NO_FACTS = ImageFacts()
@@ -81,13 +87,16 @@ def encode_record(
     facts : properties of the person, gaze errors and boxes
 
     The suffixes are "png" for the picture, with an alpha channel if the picture has no background;
-    "NAME.png", "NAME.exr" or "NAME.npy" for each output, see `output_encoding.storage_description`; and
-    "json" for the `Record`. Equal arguments give identical bytes.
+    "NAME.png", "NAME.exr" or "NAME.npy" for each output, see `output_encoding.storage_description`;
+    "linear.exr" for the linear picture, if the spec keeps it; and "json" for the `Record`. Equal arguments
+    give identical bytes.
     """
     files = {PICTURE_SUFFIX: encode_png(observation.picture, use_isal=True)}
     for name in spec.outputs:
         suffix = f"{name}.{file_format(name, spec.encoding)}"
         files[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
+    if spec.keep_linear:
+        files[f"{LINEAR_PICTURE}.exr"] = encode_linear_picture(observation.outputs[LINEAR_PICTURE])
     record = make_record(image_number, observation, parameters, spec, skin_tone, facts)
     text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     files[RECORD_SUFFIX] = f"{text}\n".encode()
@@ -109,12 +118,12 @@ def make_record(
         "number": image_number,
         "split": image_split(spec, parameters),
         "licence": image_licence(parameters),
-        "parameters": record_parameters(spec, parameters, facts.person),
+        "parameters": record_parameters(spec, parameters, {**facts.person, **facts.sensor}),
         "skin_tone": None if skin_tone is None else skin_tone.as_json(),
         "camera": {
-            "K": _rounded_list(camera.K, _MM_DECIMALS),
+            "K": _rounded_list(camera.K, MM_DECIMALS),
             "R": _rounded_list(camera.R, _DIRECTION_DECIMALS),
-            "t": _rounded_list(camera.t, _MM_DECIMALS),
+            "t": _rounded_list(camera.t, MM_DECIMALS),
         },
         "head_pose": _rounded_list(observation.head_pose, _DIRECTION_DECIMALS),
         "gaze": None if gaze is None else _rounded_list(gaze, _DIRECTION_DECIMALS),
@@ -125,7 +134,7 @@ def make_record(
         "landmarks": {
             names.get(path, path): {
                 "pixels": _rounded_list(one.pixels, _PIXEL_DECIMALS),
-                "positions_mm": _rounded_list(one.positions_mm, _MM_DECIMALS),
+                "positions_mm": _rounded_list(one.positions_mm, MM_DECIMALS),
                 "visible": np.asarray(one.visible, bool).tolist(),
                 "occlusion": one.occlusion.tolist(),
             }

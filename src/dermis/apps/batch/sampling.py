@@ -29,7 +29,8 @@ _UNIFORM_NUMBER_BITS = (
 )
 _PERSON_PREFIX = "person."
 _HEAD_PARAMETER = "person.head"
-_PERSON_SEED_COUNT = 2**32
+_SENSOR_PREFIX, _SENSOR_SEED = "sensor.", "sensor.seed"
+_SEED_COUNT = 2**32
 _EXPRESSION_VARIATION_KEYS = "intensity", "asymmetry", "variation"
 _LAMP_PREFIXES = tuple(f"light.{lamp}." for lamp in ("key", "fill", "rim"))
 _BACKGROUND_CHANNELS = "background.red", "background.green", "background.blue"
@@ -43,6 +44,12 @@ _CONDITIONAL_PARAMETERS: tuple[tuple[str | tuple[str, ...], Callable[[Parameters
     (_BACKGROUND_CHANNELS, lambda sampled: sampled["background.kind"] == "colour"),
     ("background.blur", lambda sampled: sampled["background.kind"] == "environment"),
     ("camera.frame_mm", lambda sampled: "camera.focal_mm" not in sampled),
+    ("sensor.white_kelvin", lambda sampled: sampled.get("sensor.white_balance") == "kelvin"),
+    (
+        ("sensor.full_well_electrons", "sensor.read_noise_electrons", _SENSOR_SEED),
+        lambda sampled: bool(sampled.get("sensor.iso")),
+    ),
+    (("sensor.contrast", "sensor.shoulder"), lambda sampled: sampled.get("sensor.tone_curve") == "phone"),
 )
 """Prefixes of parameters that only some images have, and the condition under which an image has them."""
 
@@ -188,12 +195,12 @@ class Sampler:
         person = image_number // self.images_per_person
         sampled: Parameters = {"person.number": person}
         if _HEAD_PARAMETER not in self.distributions:
-            sampled["person.seed"] = int(
-                hashed_uniform(self.seed, person, "person.seed") * _PERSON_SEED_COUNT
-            )
+            sampled["person.seed"] = int(hashed_uniform(self.seed, person, "person.seed") * _SEED_COUNT)
         for name, distribution in self.distributions.items():
             if not name.startswith("pose."):
                 sampled[name] = self._sample_parameter(image_number, name, distribution)
+        if self._has_sensor:
+            sampled[_SENSOR_SEED] = int(hashed_uniform(self.seed, image_number, _SENSOR_SEED) * _SEED_COUNT)
         if sampled["background.kind"] == "environment" and sampled["environment.name"] == NO_ENVIRONMENT:
             sampled["background.kind"] = "gradient"
         for prefixes, applies in _CONDITIONAL_PARAMETERS:
@@ -210,7 +217,12 @@ class Sampler:
             ["person.number"] if _HEAD_PARAMETER in self.distributions else ["person.number", "person.seed"]
         )
         names = [name for name in self.distributions if not name.startswith("pose.")]
-        return *person, *names, *(f"pose.{target}" for target in self.targets)
+        sensor = [_SENSOR_SEED] if self._has_sensor else []
+        return *person, *names, *sensor, *(f"pose.{target}" for target in self.targets)
+
+    @cached_property
+    def _has_sensor(self) -> bool:
+        return any(name.startswith(_SENSOR_PREFIX) for name in self.distributions)
 
     def _sample_parameter(self, image_number: int, parameter: str, distribution: Distribution) -> float | str:
         is_constant = isinstance(distribution, Constant)

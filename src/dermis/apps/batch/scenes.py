@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dermis.apps.batch.cameras import face_hull_indices, sampled_camera
+from dermis.apps.batch.cameras import camera_behind_lens, face_hull_indices, sampled_camera, sampled_lens
 from dermis.apps.batch.face_boxes import BoxPoints, box_points, face_boxes
 from dermis.apps.batch.image_facts import ImageFacts, person_facts
-from dermis.apps.batch.lighting import direction_from_angles, sampled_lights
+from dermis.apps.batch.lighting import direction_from_angles, light_colour, sampled_lights
 from dermis.apps.batch.sampling import Parameters, table_numbers
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import GAZE_ANGLES, NO_ENVIRONMENT, table_values
@@ -25,6 +25,7 @@ from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.mesh.rotations import angles_matrix, matrix_angles
+from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.files import load_scene
 from dermis.scene.gaze import looking_at
@@ -79,12 +80,10 @@ class SceneBuilder:
         Raises DermisError for heads and environments that cannot be read.
         """
         person = self._cached_person(parameters)
-        head, (width, height) = person.head, self.spec.size
-        pose = Pose(
-            self._pose_weights(parameters, head), _bone_angles(_head_rotation(parameters), person.bones)
-        )
-        pose_arrays = pose.to_arrays(head.control_rig)
-        camera = sampled_camera(parameters, head, person.points, pose_arrays, width / height)
+        head, pose = person.head, self._sampled_pose(parameters, person)
+        camera, lens = self._sampled_camera(parameters, person, pose), sampled_lens(parameters)
+        if lens is not None:
+            camera = camera_behind_lens(camera, lens, self.spec.size)
         skin_values = table_values(parameters, "skin")
         if "profile" in skin_values:
             skin_values["profile"] = self._resolve_file(skin_values["profile"])
@@ -106,8 +105,28 @@ class SceneBuilder:
         person, camera = self._cached_person(parameters), scene.camera
         pose = scene.head.control_rig.rest if scene.pose_arrays is None else scene.pose_arrays
         errors = gaze_errors_deg(scene, _gaze_target(parameters, camera.position))
-        boxes = face_boxes(scene.head, person.boxes, pose, camera.to_opencv(self.spec.size))
-        return ImageFacts(person.facts, errors if _has_turning_eyes(scene.head) else None, boxes)
+        lens = sampled_lens(parameters)
+        if lens is not None:  # the camera of the scene shows what the lens shows, with another focal length
+            camera = self._sampled_camera(parameters, person, self._sampled_pose(parameters, person))
+        picture_camera = camera.to_opencv(self.spec.size)
+        boxes = face_boxes(scene.head, person.boxes, pose, picture_camera, lens)
+        return ImageFacts(
+            person.facts,
+            errors if _has_turning_eyes(scene.head) else None,
+            boxes,
+            None if self.spec.sensor is None else light_colour(scene),
+            picture_camera.K,
+        )
+
+    def _sampled_pose(self, parameters: Parameters, person: _Person) -> Pose:
+        weights = self._pose_weights(parameters, person.head)
+        return Pose(weights, _bone_angles(_head_rotation(parameters), person.bones))
+
+    def _sampled_camera(self, parameters: Parameters, person: _Person, pose: Pose) -> Camera:
+        """Return the camera of an image without the distortion of its lens."""
+        width, height = self.spec.size
+        pose_arrays = pose.to_arrays(person.head.control_rig)
+        return sampled_camera(parameters, person.head, person.points, pose_arrays, width / height)
 
     def _cached_person(self, parameters: Parameters) -> _Person:
         values = table_values(parameters, "person")

@@ -7,17 +7,26 @@ import hashlib
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, Field, PrivateAttr
+from pydantic import AfterValidator, BaseModel, Field, PrivateAttr
 
 from dermis.apps.batch import spec_tables as tables
-from dermis.apps.batch.distributions import Distribution, FileChoice
+from dermis.apps.batch.distributions import Constant, Distribution, FileChoice
 from dermis.apps.batch.output_encoding import Encoding
 from dermis.apps.batch.sampling import Parameters, Sampler
-from dermis.apps.batch.spec_checks import check_landmarks, check_spec
+from dermis.apps.batch.sensor.lens import Lens
+from dermis.apps.batch.sensor.model import Sensor
+from dermis.apps.batch.spec_checks import (
+    check_landmarks,
+    check_lens,
+    check_sensor,
+    check_spec,
+    note_lamps_without_blue,
+)
 from dermis.base.errors import error_context, format_value, refuse, shorten
 from dermis.base.quantities import checked_integer
 from dermis.base.reading import checked_path, is_file, read_file, read_toml
@@ -57,6 +66,16 @@ _MAX_KEY_LENGTH, _MIN_KEY_SIMILARITY = 80, 0.7  # limits for suggestions to unkn
 _FILE_PARAMETERS = "person.head", "environment.name", "skin.profile"
 """Parameters whose values may be files."""
 P = TypeVar("P", bound=FrozenModel)
+_DeviceTable = dict[str, Annotated[Distribution, tables.DistributionField()]]
+
+
+def _with_defaults(model: type[FrozenModel], table: _DeviceTable | None) -> _DeviceTable | None:
+    """Return the table of a lens or sensor with the defaults of omitted keys, in the order of its model."""
+    if table is None:
+        return None
+    defaults = model()
+    complete = {name: table.get(name, Constant(getattr(defaults, name))) for name in model.model_fields}
+    return complete | table  # unknown keys are refused later
 
 
 class Spec(FrozenModel):
@@ -84,6 +103,8 @@ class Spec(FrozenModel):
     """Shards as tar files (webdataset) or as folders."""
     encoding: Encoding = "png"
     """File format of the outputs: png (16 bits, where sufficient), exr or npy (all bits)."""
+    keep_linear: Annotated[bool | None, AfterValidator(lambda keep: keep or None)] = None
+    """Whether the linear picture before the model of the sensor is also stored; needs [sensor]."""
     render: Settings = Field(default_factory=lambda: Settings(size=(512, 512), **RENDER_DEFAULTS))
     """Render settings, without `size` and the background, which have their own keys."""
     person: tables.PersonTable = tables.PersonTable()
@@ -108,6 +129,10 @@ class Spec(FrozenModel):
     """Environment light."""
     background: tables.BackgroundTable = tables.BackgroundTable()
     """Background."""
+    lens: Annotated[_DeviceTable | None, AfterValidator(partial(_with_defaults, Lens))] = None
+    """Distortion of the camera's lens; needs [sensor]."""
+    sensor: Annotated[_DeviceTable | None, AfterValidator(partial(_with_defaults, Sensor))] = None
+    """Sensor and processing of the camera; without this table, pictures are as rendered."""
     correlated: tuple[tables.CorrelationGroup, ...] = ()
     """Correlated parameters."""
     files: dict[str, str] = Field(default_factory=dict)
@@ -126,6 +151,14 @@ class Spec(FrozenModel):
             check_outputs(self.outputs)
         check_landmarks(self.landmarks, self.folder)
         check_spec(distributions, expressions, self.correlated, self.folder)
+        if self.sensor is not None:
+            check_sensor(distributions, self.render)
+        for name in ("keep_linear", "lens"):
+            if getattr(self, name) is not None and self.sensor is None:
+                actual, advice = "there is none", "Add [sensor], which can be empty, or remove this key"
+                refuse(name, "a table [sensor]", actual, advice)
+        if self.lens is not None:
+            check_lens(distributions, self.outputs)
         rows = {name: row for group in self.correlated for name, row in group.cholesky_rows().items()}
         sampler = Sampler(self.seed, self.images_per_person, distributions, rows, expressions)
         BaseModel.__setattr__(self, "_sampler", sampler)
@@ -233,6 +266,8 @@ def parse_spec(toml_data: Mapping[str, object], folder: Path = Path()) -> Spec:
     if isinstance(groups := fields.get("correlated", ()), list | tuple):
         fields["correlated"] = tuple(_build_model(tables.CorrelationGroup, "correlated", g) for g in groups)
     spec = _build_model(Spec, "", fields | {"folder": folder})
+    if spec.sensor is not None:
+        note_lamps_without_blue(spec.distributions)
     names = [name for name in spec.landmarks if name not in LANDMARK_SETS]
     for parameter in spec.distributions.keys() & set(_FILE_PARAMETERS):
         names += map(str, spec.distributions[parameter].support)

@@ -7,8 +7,18 @@ from dataclasses import fields
 from pathlib import Path
 
 from dermis.apps.batch.distributions import Distribution
-from dermis.apps.batch.spec_tables import NO_ENVIRONMENT, RANDOM_EXPRESSION, CorrelationGroup, table_values
-from dermis.base.errors import DermisError, refuse, shorten
+from dermis.apps.batch.lighting import LAMP_NAMES
+from dermis.apps.batch.sensor.lens import Lens
+from dermis.apps.batch.sensor.model import MIN_DEMOSAICED_SIDE, Sensor
+from dermis.apps.batch.sensor.white_balance import lamp_appearance
+from dermis.apps.batch.spec_tables import (
+    LAMP_RIG,
+    NO_ENVIRONMENT,
+    RANDOM_EXPRESSION,
+    CorrelationGroup,
+    table_values,
+)
+from dermis.base.errors import DermisError, notify, refuse, shorten
 from dermis.base.reading import is_file
 from dermis.environment.panorama import UNIFORM_PANORAMA
 from dermis.formats.samples import SAMPLES
@@ -23,6 +33,7 @@ from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.pose import MAX_WEIGHT
 from dermis.scene.heads import HUMAN
 from dermis.scene.lights import NO_LIGHTS
+from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
 _UNSAMPLED_SKIN_FIELDS = "pigments", "layers", "profile_map", "other_profiles"  # fields of `Skin`
@@ -31,6 +42,9 @@ _LOOK_MODELS: Mapping[str, type] = {"skin": SkinLook, "eyes": EyeLook, "hair": H
 _ANCESTRY_PARAMETERS = "person.african", "person.asian", "person.caucasian"
 _ITA_PARAMETER, _MELANIN_PARAMETER = "person.ita", "person.skin.melanin"
 _HEAD_PARAMETER = "person.head"
+_SENSOR_RENDER_SETTINGS = {"tone": "none", "gamma": "right"}
+"""Settings of the renderer's tone curve and encoding, which [sensor] replaces, with their neutral values."""
+_MIN_VISIBLE_BLUE = 1e-3  # linear light that rounds to the level 3 of 255
 _MAX_FILE_NAME_LENGTH = 100  # characters
 
 
@@ -68,6 +82,61 @@ def check_landmarks(set_names: Sequence[str], folder: Path) -> None:
             )
             refuse("landmarks", expected, f"got {shorten(name, _MAX_FILE_NAME_LENGTH)!r}", "Correct it")
         read_landmark_table(str(folder / name))
+
+
+def check_sensor(distributions: Mapping[str, Distribution], render: Settings) -> None:
+    """Raise DermisError for values of the table [sensor] that are invalid, or contradict other tables.
+
+    distributions : distribution of each parameter by its dotted name
+    render : settings of the table [render]
+    """
+    _check_table("sensor", distributions, list(Sensor.model_fields), Sensor)
+    if "none" in distributions["background.kind"].support:
+        advice = 'Exclude "none", or remove [sensor]'
+        refuse("background: kind", "a background, as photographs have no alpha", 'it can be "none"', advice)
+    for name, value in _SENSOR_RENDER_SETTINGS.items():
+        if getattr(render, name) != value:
+            expected, actual = f"{value!r} with [sensor]", f"got {getattr(render, name)!r}"
+            refuse(f"render: {name}", expected, actual, "Use tone_curve of [sensor] instead")
+    filtered = set(distributions["sensor.demosaicing"].support) != {"none"}
+    if filtered and min(render.size) < MIN_DEMOSAICED_SIDE:
+        expected = f"{MIN_DEMOSAICED_SIDE} pixels or more along each side for demosaicing"
+        refuse("size", expected, f"got {list(render.size)}", "Correct it")
+
+
+def check_lens(distributions: Mapping[str, Distribution], outputs: Sequence[str]) -> None:
+    """Raise DermisError for invalid values of the table [lens], and for outputs that do not support it.
+
+    distributions : distribution of each parameter by its dotted name
+    outputs : outputs of the spec
+    """
+    _check_table("lens", distributions, list(Lens.model_fields), Lens)
+    if "motion" in outputs:
+        expected = "outputs without motion, which is that of a pinhole camera"
+        refuse("outputs", expected, "the spec has a table [lens]", "Remove motion or [lens]")
+
+
+def note_lamps_without_blue(distributions: Mapping[str, Distribution]) -> None:
+    """Notify the user of sampled lamps whose light has no blue in the pictures after the white balance.
+
+    distributions : distribution of each parameter by its dotted name, with the parameters of [sensor]
+    """
+    fixed = "kelvin" in distributions["sensor.white_balance"].support
+    if not fixed or LAMP_RIG not in distributions["light.kind"].support:
+        return
+    assumed = max(float(bound) for bound in distributions["sensor.white_kelvin"].support)
+    lowest = {
+        f"light.{lamp}": min(float(bound) for bound in distributions[f"light.{lamp}.kelvin"].support)
+        for lamp in LAMP_NAMES
+    }
+    sensor = Sensor(white_kelvin=assumed)
+    orange = [name for name, T in lowest.items() if lamp_appearance(sensor, T).min() < _MIN_VISIBLE_BLUE]
+    if orange:
+        T = min(lowest[name] for name in orange)
+        notify(
+            f"{', '.join(orange)}: lamps down to {T:g} K have no blue with a white balance of {assumed:g} K, "
+            f'so pictures can be orange; write white_balance = "lights" in [sensor] to balance their light'
+        )
 
 
 def _check_person(distributions: Mapping[str, Distribution]) -> None:

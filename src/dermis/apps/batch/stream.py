@@ -8,6 +8,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 
+from dermis.apps.batch.observed_photographs import as_photograph
+from dermis.apps.batch.output_encoding import LINEAR_PICTURE
 from dermis.apps.batch.reader import record_fields
 from dermis.apps.batch.records import make_record
 from dermis.apps.batch.spec import MAX_IMAGES, Spec, load_spec, parse_spec
@@ -104,8 +106,11 @@ def _produce(
     try:
         with closing(Worker(adapter, RunOptions(spec, Path()), freezes_objects=False)) as worker:
             for number, observation, parameters, tone, facts in worker.observe(numbers):
+                if spec.sensor is not None:
+                    observation, facts = as_photograph(observation, parameters, facts)
                 record = make_record(number, observation, parameters, spec, tone, facts)
-                outputs = {name: observation.outputs[name] for name in spec.outputs}
+                names = [*spec.outputs, *([LINEAR_PICTURE] if spec.keep_linear else [])]
+                outputs = {name: observation.outputs[name] for name in names}
                 fields = record_fields(record, f"image {number}") | outputs
                 if not _put(ready, arrays(fields | {"picture": observation.picture}), stop):
                     return

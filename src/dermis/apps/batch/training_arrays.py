@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.batch.face_boxes import BOX_NAMES
-from dermis.apps.batch.image_facts import SPLIT_NAMES, person_fact_names, text_fact_names
+from dermis.apps.batch.image_facts import SPLIT_NAMES, fact_names, text_fact_names
 from dermis.apps.batch.reader import FIELDS_WITHOUT_OUTPUTS, ImageFields
 from dermis.apps.batch.spec import Spec
 
@@ -38,7 +38,7 @@ def parameter_names(spec: Spec) -> tuple[str, ...]:
     >>> "person.age" in parameter_names(parse_spec({}))
     True
     """
-    names = {*spec.parameter_names, *person_fact_names()} - text_fact_names()
+    names = {*spec.parameter_names, *fact_names(spec)} - text_fact_names()
     texts = {
         name
         for name, distribution in spec.distributions.items()

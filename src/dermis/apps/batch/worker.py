@@ -19,6 +19,7 @@ from dermis.apps.batch.atomic_files import remove_path
 from dermis.apps.batch.child_processes import LostProcessError
 from dermis.apps.batch.encoder_pool import EncodedImage, EncoderPool
 from dermis.apps.batch.image_facts import ImageFacts
+from dermis.apps.batch.observed_photographs import as_photograph, rendered_outputs
 from dermis.apps.batch.parts import KeptImages, copy_images, join_parts, kept_images
 from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.sampling import Parameters
@@ -187,6 +188,8 @@ class Worker:
     def observe(self, image_numbers: Iterator[int]) -> Iterator[_ObservedImage]:
         """Render images without writing files; yield number, observation, parameters, skin tone and facts.
 
+        For a spec with [sensor], the pictures are linear, and are the arguments of `as_photograph`.
+
         Raises DermisError for images that cannot be rendered.
         """
         return self._encoder_jobs(image_numbers, [])
@@ -293,9 +296,10 @@ class Worker:
                 (plan.scene for plan in copies[0]),
                 (plan.settings for plan in copies[1]),
                 alpha=alpha,
+                linear=spec.sensor is not None,
                 # motion is relative to these scenes, not to the frame rendered before
                 previous=(plan.previous for plan in copies[2]),
-                outputs=spec.outputs,
+                outputs=rendered_outputs(spec),
                 landmarks=spec.landmark_tables.values(),
             )
 
@@ -367,4 +371,6 @@ def _encode_image(
     skin_tone: SkinTone | None,
     facts: ImageFacts,
 ) -> EncodedImage:
+    if spec.sensor is not None:
+        observation, facts = as_photograph(observation, parameters, facts)
     return image_number, encode_record(image_number, observation, parameters, spec, skin_tone, facts)

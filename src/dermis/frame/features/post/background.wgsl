@@ -8,10 +8,10 @@
 
 const COLOUR: u32 = 0u;
 const GRADIENT: u32 = 1u;
-const BACKDROP_MIDDLE: vec2f = vec2f(0.5, 0.42); // brightest point of the backdrop, relative to the picture
-const BACKDROP_BRIGHT: vec3f = vec3f(0.20, 0.207, 0.22); // a little cooler than skin
-const BACKDROP_DARK: vec3f = vec3f(0.026, 0.027, 0.029);
-const BACKDROP_WIDTH: f32 = 0.45; // standard deviation relative to the longer side of the picture
+//#fill const BACKDROP_MIDDLE: vec2f = vec2f({backdrop_middle_x}, {backdrop_middle_y}); // brightest point, relative to the picture
+//#fill const BACKDROP_BRIGHT: vec3f = vec3f({backdrop_bright_red}, {backdrop_bright_green}, {backdrop_bright_blue});
+//#fill const BACKDROP_DARK: vec3f = vec3f({backdrop_dark_red}, {backdrop_dark_green}, {backdrop_dark_blue});
+//#fill const BACKDROP_WIDTH: f32 = {backdrop_width}; // standard deviation relative to the longer side of the picture
 
 struct Background {
     rays: Rays,

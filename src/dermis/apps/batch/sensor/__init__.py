@@ -1,0 +1,1 @@
+"""Model of a digital camera: from linear light to the picture that the camera stores."""
