@@ -14,6 +14,7 @@ from small_observation import SIZE, observation, small_spec, write_all
 from small_set import read, write_spec
 
 import dermis.dataset
+from dermis.apps.batch import keypoint_files
 from dermis.apps.batch.datasheet import write_datasheet
 from dermis.apps.batch.index import write_index
 from dermis.apps.batch.spec import Spec
@@ -107,6 +108,25 @@ def test_coco_files_have_the_keypoints_of_the_records(faces: Path, tmp_path: Pat
             assert (out / split / image["file_name"]).is_file() and (image["width"], image["height"]) == SIZE
             seen += 1
     assert seen == 7
+
+
+def test_landmarks_that_a_lens_does_not_image_are_unlabelled(
+    faces: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    decode = keypoint_files.record_fields
+
+    def without_first_landmark(*given: Any) -> Any:
+        fields = decode(*given)
+        fields["landmarks"]["ibug-68"].pixels[0] = np.nan
+        return fields
+
+    monkeypatch.setattr(keypoint_files, "record_fields", without_first_landmark)
+    out = dermis.dataset.export_keypoints(faces, tmp_path / "coco", "coco")
+    for path in (out / "annotations").glob("*.json"):
+        for annotation in json.loads(path.read_text())["annotations"]:
+            assert annotation["keypoints"][:3] == [0, 0, 0] and np.isfinite(annotation["bbox"]).all()
+    with pytest.raises(DermisError, match="coco"):
+        dermis.dataset.export_keypoints(faces, tmp_path / "pts", "pts")
 
 
 def test_pts_files_count_from_one(faces: Path, tmp_path: Path) -> None:

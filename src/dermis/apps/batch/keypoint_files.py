@@ -81,7 +81,7 @@ def export_keypoints(
             folder.mkdir(exist_ok=True)
             (folder / f"{picture.key}.png").write_bytes(picture.png)
             if format == "pts":
-                text = _pts_text(picture.fields["landmarks"][landmarks].pixels)
+                text = _pts_text(picture, landmarks)
                 (folder / f"{picture.key}.pts").write_text(text, encoding="ascii")
             else:
                 by_split.setdefault(split, []).append(_coco_entry(picture, landmarks))
@@ -109,7 +109,12 @@ def _landmark_names(dataset_folder: Path, landmark_set: str) -> list[str]:
     return [str(name) for name in description.get("landmarks", {}).get(landmark_set, [])]
 
 
-def _pts_text(pixels: np.ndarray[Any, np.dtype[np.float64]]) -> str:
+def _pts_text(picture: _Picture, landmark_set: str) -> str:
+    """Return the .pts file of a picture; refuse landmarks that the lens does not image."""
+    pixels = picture.fields["landmarks"][landmark_set].pixels
+    if not np.isfinite(pixels).all():
+        actual = f"the lens images only some of image {picture.key}"
+        refuse("landmarks", "pixels of all landmarks", actual, 'Choose format "coco", which can omit some')
     rows = "".join(f"{x + 1.0:.3f} {y + 1.0:.3f}\n" for x, y in pixels.tolist())
     return f"version: 1\nn_points: {len(pixels)}\n{{\n{rows}}}\n"
 
@@ -124,8 +129,11 @@ def _coco_entry(picture: _Picture, landmark_set: str) -> dict[str, Any]:
     flags = np.where(inside, flags, 0)
     keypoints = np.column_stack([np.where(flags > 0, points.pixels.T, 0.0).T, flags])
     boxes = picture.fields["boxes"]
-    left, top, right, bottom = (x.min(), y.min(), x.max(), y.max()) if boxes is None else boxes["face"]
-    box = [left + 0.5, top + 0.5, right - left, bottom - top]  # COCO measures from the corner of the picture
+    if boxes is None:
+        boxes = {"face": (np.nanmin(x), np.nanmin(y), np.nanmax(x), np.nanmax(y))}
+    left, top, right, bottom = boxes["face"]
+    # COCO measures from the corner of the picture, and has no word for a box that the lens does not image
+    box = np.nan_to_num([left + 0.5, top + 0.5, right - left, bottom - top])
     annotation = {
         "id": number + 1,
         "image_id": number + 1,
