@@ -16,6 +16,7 @@ from dermis.apps.truths.person import medium
 from dermis.apps.truths.person.path_traced import path_trace_person, person_cache_key
 from dermis.apps.truths.person.person import posed_person
 from dermis.base.errors import DermisError
+from dermis.human.hair.look import HairLook
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.scene.camera import portrait
@@ -34,7 +35,7 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @cache
 def head() -> Head:
-    return Human().head()
+    return Human(hair=HairLook("cropped")).head(hairs=0.2)
 
 
 def scene(**given: Any) -> Scene:
