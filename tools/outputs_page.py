@@ -39,7 +39,7 @@ def _cells(output: Output) -> list[str]:
 
 def _png(output: Output) -> str:
     if output.kind == "uint8":
-        return "8 bit, as it is"
+        return "8 bit, unscaled"
     if output.quantisation is None:
         return "none"
     step, zero = output.quantisation

@@ -42,7 +42,7 @@ def test_defaults_leave_pictures_unchanged() -> None:
 
 @pytest.mark.parametrize(("electrons", "read_noise"), [(2000.0, 0.0), (2000.0, 8.0), (300.0, 3.0)])
 def test_variance_and_mean_are_on_the_photon_transfer_line(electrons: float, read_noise: float) -> None:
-    """In electrons, the variance is the mean plus the squared read noise, whatever the exposure."""
+    """Check at all exposures that the variance is the mean plus the squared read noise, in electrons."""
     levels = np.linspace(0.02, 0.9, 12)
     rng = np.random.default_rng(1)
     samples = noisy_signal(np.tile(levels, (40_000, 1)), 2.0, electrons, read_noise, rng) * electrons / 2.0

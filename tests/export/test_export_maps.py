@@ -25,7 +25,7 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 SIDE = 512
-LIGHT, PAINT, DRAWN = 0.03, 0.015, 0.03
+LIGHT, PAINT, DRAWN = 0.03, 0.012, 0.03
 """Root mean square of the difference over that of the values: texels hold the mean of what lies in them, and
 light leaves towards the eye as along the normal only where the skin faces it. Measured .019, .011, .02."""
 SETTINGS = Settings(atlas=512, size=(192, 192), samples=1, strands=False)

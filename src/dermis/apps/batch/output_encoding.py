@@ -79,7 +79,7 @@ def encode_linear_picture(linear_picture: Array) -> bytes:
 
 
 def half_precision(linear_picture: Array) -> NDArray[np.float32]:
-    """Return a linear picture as it is stored, rounded to 16-bit floats."""
+    """Return a linear picture rounded to 16-bit floats, the precision of its file."""
     limited = np.clip(linear_picture, -_MAX_HALF_FLOAT, _MAX_HALF_FLOAT)
     return np.asarray(limited.astype(np.float16), np.float32)
 

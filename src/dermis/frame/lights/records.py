@@ -55,7 +55,7 @@ _FIRST_SAMPLE_POINT = 2016  # with it, the first 12, 16, 32 and 64 points have n
 
 
 def light_shader_constants() -> dict[str, float]:
-    """Return the named values that `//#fill` lines insert into lights.wgsl and soft_shadows.wgsl."""
+    """Return the named values that `//#fill` lines insert into lights.wgsl."""
     return {"max_lights": _MAX_LIGHTS, "max_rays": _MAX_SHADOW_RAY_COUNT}
 
 

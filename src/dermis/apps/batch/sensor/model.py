@@ -44,7 +44,7 @@ class Sensor(FrozenModel):
     full_well_electrons: Annotated[
         float, Field(ge=500, le=90_000), BoundsReason("electrons: from the smallest pixels to the largest")
     ] = 10_000.0
-    """Number of electrons at which a pixel saturates at ISO 100; about 6000 for telephones, and 50,000 for
+    """Number of electrons at which a pixel saturates at ISO 100; about 6000 for phones, and 50,000 for
     large sensors."""
     read_noise_electrons: Annotated[float, Field(ge=0, le=50), BoundsReason("electrons")] = 2.0
     """Standard deviation of the noise of the read-out, unless `iso` is 0 [electrons]."""
@@ -54,7 +54,7 @@ class Sensor(FrozenModel):
     """Colour filter array (RGGB) and its interpolation: bilinear, or gradient-corrected after Malvar et al.;
     "none" for a sensor that measures three colours at each pixel."""
     tone_curve: Literal["srgb", "phone"] = "srgb"
-    """Curve from light to levels: that of sRGB, or one with contrast and shoulder, as telephones have."""
+    """Curve from light to levels: that of sRGB, or one with contrast and shoulder, as phones have."""
     contrast: Annotated[float, Field(ge=0.5, le=2), BoundsReason("1 is the contrast of sRGB")] = 1.2
     """Slope of the curve "phone" at middle grey, relative to that of sRGB [-]."""
     shoulder: Annotated[float, Field(ge=0, le=0.9), BoundsReason("0 clips at white")] = 0.5

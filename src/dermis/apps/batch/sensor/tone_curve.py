@@ -31,7 +31,7 @@ def compress_highlights(linear: Floats, shoulder: float, saturation: float) -> F
 
 
 def phone_levels(linear: Floats, contrast: float, shoulder: float, saturation: float) -> Floats:
-    """Return levels from 0 to 1 on a curve with contrast and shoulder, as telephones have.
+    """Return levels from 0 to 1 on a curve with contrast and shoulder, as phones have.
 
     Highlights are compressed and encoded as sRGB. Two powers then change the contrast; the curve has the
     slope `contrast`, relative to sRGB, at middle grey, and maps black, middle grey and white to themselves.

@@ -107,17 +107,8 @@ fn sky_past_hair(p: vec3f, normal: vec3f, mean_direction: vec3f) -> f32 {
     return clamp(hair.w + dot(hair.xyz, mean_direction), 0.0, 1.0);
 }
 
-// Distance on a light's map between the rays from a point to the edge and to the centre of the light, where they pass a depth;
-// times the half sides of the light.
-fn ray_spread_at(light: Light, depth: f32, from_depth: f32) -> f32 {
-    if (is_parallel(light)) {
-        return max(from_depth - depth, 0.0);
-    }
-    return max(1.0 / max(depth, 1.0) - 1.0 / max(from_depth, 1.0), 0.0);
-}
-
-// Depth behind the nearest strand of a window of the strands before a point, on average over the light; negative if there are none.
-// reach: half sides of the area that is searched [texel]
+// Mean depth of the strands between a point and an area light, behind the nearest strand of the window; negative if there are none.
+// at: position of the point in the window; reach: half sides of the area that is searched [texel]
 fn blocker_depth(light: Light, at: vec3f, reach: vec2f) -> f32 {
     var sum = 0.0;
     var count = 0.0;
@@ -144,11 +135,11 @@ fn soft_strand_transmittance(light: Light, p: vec3f) -> f32 {
     let position = to_window(window, at);
     let clip_per_spread = 2.0 * light.extent / (light.texel * vec2f(textureDimensions(shadow_maps)));
     let texels_per_spread = clip_per_spread / window.size * vec2f(window_size());
-    let blocker = blocker_depth(light, position, ray_spread_at(light, window.depth, at.z) * texels_per_spread);
+    let blocker = blocker_depth(light, position, ray_spread(light, window.depth, at.z) * texels_per_spread);
     if (blocker < 0.0) {
         return 1.0;
     }
-    let reach = ray_spread_at(light, window.depth + blocker, at.z) * texels_per_spread;
+    let reach = ray_spread(light, window.depth + blocker, at.z) * texels_per_spread;
     var sum = 0.0;
     for (var k = 0u; k < PENUMBRA_POINTS; k += 1u) {
         let texel = vec2i(floor(position.xy + reach * sample_point(k, light.round != 0u)));

@@ -22,7 +22,7 @@ struct Receiver {
 // Step of the rays from a point to the light.
 struct RayStep {
     depth: f32, // [mm]
-    spread: f32, // times the half sides of the light: distance on the map between the rays to its edge and to its centre
+    spread: f32, // see `ray_spread`
     thickness: f32, // a ray farther behind a surface than this passes behind it [mm]
 }
 
@@ -192,10 +192,16 @@ fn ray_step(light: Light, from_depth: f32, step: u32) -> RayStep {
     let depth = depth_on_ray(light, from_depth, f32(step) + 0.5);
     let next = depth_on_ray(light, from_depth, f32(step) + 1.5);
     let thickness = max(MIN_THICKNESS, CROSSING_STEPS * (depth - next));
+    return RayStep(depth, ray_spread(light, depth, from_depth), thickness);
+}
+
+// Distance on the map, at a depth, between the rays from a point to the edge and to the centre of the light; times the half sides
+// of the light.
+fn ray_spread(light: Light, depth: f32, from_depth: f32) -> f32 {
     if (is_parallel(light)) {
-        return RayStep(depth, from_depth - depth, thickness);
+        return from_depth - depth;
     }
-    return RayStep(depth, 1.0 / depth - 1.0 / from_depth, thickness);
+    return 1.0 / depth - 1.0 / from_depth;
 }
 
 // Depth after a number of steps from the point towards the light; the first steps are shorter, as near occluders need precision.
