@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 import dermis
 
 COMMANDS = {
@@ -32,6 +30,7 @@ def main() -> None:
     The exit status is 2 for errors that the user can correct and for a failed write to stdout, 130 after
     Ctrl-C, 143 after SIGTERM and 129 after SIGHUP. A closed pipe on stdout is not an error.
     """
+    from dermis.base.background import exit_process
     from dermis.cli.process import Interruption, StandardStreams
 
     with StandardStreams() as streams, Interruption() as interruption:
@@ -49,7 +48,7 @@ def main() -> None:
         except Exception:  # some libraries raise their own error after an interruption
             if not (code := interruption.code):
                 raise
-    sys.exit(interruption.code or code)
+    exit_process(interruption.code or code)
 
 
 def _run() -> int:

@@ -138,8 +138,8 @@ _HANDLED_SIGNALS = [
 # earlier repetitions are ignored: intermediate programs may send a signal twice
 _MIN_SECOND_SIGNAL_DELAY_S = 0.5
 _SIGNAL_RETRY_S = 0.02
-# exceptions leave half-imported modules, or are lost in Rust
-_UNINTERRUPTIBLE_PACKAGES = {"importlib", "pydantic"}
+# exceptions leave half-imported modules or half-created event loops, or are lost in Rust
+_UNINTERRUPTIBLE_PACKAGES = {"importlib", "asyncio", "pydantic"}
 _DRIVER_PACKAGES = {"wgpu", "glfw"}
 _RETRY_BYTE, _END_BYTE = b"\0", b"\xff"  # bytes that are not signal numbers
 _SIGNAL_EXIT_BASE = 128  # exit status after a signal, minus the number of the signal
@@ -270,7 +270,7 @@ def _running_loop() -> AbstractEventLoop | None:
 def _caller_swallows_exceptions(stack_frame: FrameType | None) -> bool:
     """Return whether a library on the call stack would swallow an exception that is raised now.
 
-    This is the case during callbacks of a graphics driver and during imports.
+    This is the case during callbacks of a graphics driver, during imports, and while asyncio creates a loop.
 
     stack_frame : innermost frame of the call stack
     """

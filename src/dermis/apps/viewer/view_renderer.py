@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +20,7 @@ from dermis.apps.viewer.state import (
     validated_copy,
 )
 from dermis.apps.viewer.views import IntermediateViews
+from dermis.base.background import run_in_thread
 from dermis.base.errors import refuse
 from dermis.frame.rendered_frame import RenderedFrame
 from dermis.frame.renderer import Renderer
@@ -331,9 +330,6 @@ def copy_texture(device: Device, source_texture: Texture, target_texture: Textur
     return target_texture
 
 
-T = TypeVar("T")
-
-
 class HeadPreparation:
     """Preparation of new heads for rendering, one at a time, in a separate thread.
 
@@ -382,18 +378,3 @@ class HeadPreparation:
         self._future = run_in_thread(lambda: view_renderer.prepare(state))
         self._future.add_done_callback(lambda _: self._request_frame())
         return self._held_image
-
-
-def run_in_thread(task: Callable[[], T]) -> Future[T]:
-    """Run a function in a daemon thread, and return a future for its result."""
-    future: Future[T] = Future()
-    future.set_running_or_notify_cancel()
-
-    def run_task() -> None:
-        try:
-            future.set_result(task())
-        except Exception as error:
-            future.set_exception(error)
-
-    threading.Thread(target=run_task, name="preparing", daemon=True).start()
-    return future

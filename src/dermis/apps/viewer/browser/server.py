@@ -18,8 +18,9 @@ from dermis.apps.viewer.browser.request_filter import RequestFilter, is_local_ho
 from dermis.apps.viewer.browser.uploads import Uploads
 from dermis.apps.viewer.player import MotionFile
 from dermis.apps.viewer.state import ViewerState
-from dermis.apps.viewer.view_renderer import ViewRenderer, run_in_thread
+from dermis.apps.viewer.view_renderer import ViewRenderer
 from dermis.apps.viewer.viewer import Viewer
+from dermis.base.background import run_in_thread
 from dermis.base.errors import refuse
 
 MAX_CONNECTIONS = 64
