@@ -19,6 +19,7 @@ const HEIGHT_BULGE_MM: f32 = 0.45; // of a tooth from its biting edge to the gum
 const ENAMEL: vec3f = vec3f(0.63, 0.58, 0.49);
 const NECK: vec3f = vec3f(0.58, 0.48, 0.36);
 const CLEAR_EDGE: vec3f = vec3f(0.52, 0.50, 0.45);
+const GAP: vec3f = vec3f(0.42, 0.34, 0.28); // fraction of the light that leaves narrow gaps between teeth
 const GUM: vec3f = vec3f(0.42, 0.15, 0.14);
 const TOOTH_SHADOW_OFFSET_MM: f32 = 2.5; // light spreads as far in dentine, so lips cast no sharp shadows on teeth
 const SALIVA_ROUGHNESS: f32 = 0.12; // roughness of wet surfaces
@@ -46,14 +47,15 @@ fn teeth_at(point: Point, kind: f32) -> Surface {
     let between = 0.5 * width * (1.0 - abs(side)); // [mm]
     let crown = CROWN_HEIGHT_MM - 1.4 * pow(abs(side), 3.0) - 0.18 * f32(index);
     let gum = smoothstep(-0.25, 0.25, height - crown);
-    let gap = smoothstep(0.02, 0.30 + 0.5 * (1.0 - smoothstep(0.0, 1.8, height)), between);
+    let gap = smoothstep(0.0, 0.12 + 0.3 * (1.0 - smoothstep(0.0, 1.5, height)), between);
     var colour = mix(ENAMEL, NECK, smoothstep(0.45, 1.0, height / crown));
     colour = mix(CLEAR_EDGE, colour, smoothstep(0.0, 1.4, height));
-    colour = mix(colour * mix(0.16, 1.0, gap), GUM * mix(0.75, 1.0, gap), gum);
+    colour = mix(colour * mix(GAP, vec3f(1.0), gap), GUM * mix(0.8, 1.0, gap), gum);
     let slope = -4.0 * BULGE_MM * side / width * (1.0 - gum) * sign(point.uv.x - MIDDLE);
     let down = clamp(2.0 * height / crown - 1.0, -1.0, 1.0); // -1 at the biting edge, 1 at the gum
     let rise = -4.0 * HEIGHT_BULGE_MM * down / crown * (1.0 - gum);
-    return Surface(bend(point, vec2f(slope * ARCH_MM, rise * CROWN_MM)), colour, SALIVA_ROUGHNESS, 1.0);
+    let face = smoothstep(0.5, 2.5, height); // the edge is round in the mesh, and v hardly changes along it
+    return Surface(bend(point, face * vec2f(slope * ARCH_MM, rise * CROWN_MM)), colour, SALIVA_ROUGHNESS, 1.0);
 }
 
 fn tongue_at(point: Point, colour: vec3f) -> Surface {
