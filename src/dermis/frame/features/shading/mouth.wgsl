@@ -24,6 +24,8 @@ const GUM: vec3f = vec3f(0.42, 0.15, 0.14);
 const TOOTH_SHADOW_OFFSET_MM: f32 = 2.5; // light spreads as far in dentine, so lips cast no sharp shadows on teeth
 const SALIVA_ROUGHNESS: f32 = 0.12; // roughness of wet surfaces
 const TOOTH_SHADOW_SCATTER: vec3f = vec3f(0.22, 0.20, 0.17); // fraction of a light that reaches shadowed teeth through their lit parts and from the lips
+const CANINE_MM: f32 = 22.0; // distance of the canines from the middle along the arch
+const SHADE_MM: f32 = 10.0; // length along the arch over which cheeks shade the teeth behind the canines to 1/e
 const MOUTH_SHADOW_SCATTER: vec3f = vec3f(0.04, 0.014, 0.008); // fraction of a light that enters through some 8 mm of cheeks and lips
 
 fn tooth_width(kind: f32, index: u32) -> f32 {
@@ -63,9 +65,10 @@ fn tongue_at(point: Point, colour: vec3f) -> Surface {
     return Surface(point.normal, colour * (0.75 + 0.35 * noise), 0.25, 1.0);
 }
 
-// Fraction of a light that reaches shadowed parts of the mouth, by the part.
-fn mouth_shadow_scatter(part: f32) -> vec3f {
-    return select(TOOTH_SHADOW_SCATTER, MOUTH_SHADOW_SCATTER, part == TONGUE);
+// Fraction of a light that reaches shadowed parts of the mouth.
+fn mouth_shadow_scatter(point: Point, part: f32) -> vec3f {
+    let behind_canines = max(abs(point.uv.x - MIDDLE) * ARCH_MM - CANINE_MM, 0.0);
+    return select(TOOTH_SHADOW_SCATTER * exp(-behind_canines / SHADE_MM), MOUTH_SHADOW_SCATTER, part == TONGUE);
 }
 
 // material: colour and part of the mouth
