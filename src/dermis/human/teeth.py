@@ -20,7 +20,7 @@ ARCH_MIDDLE_U, BITING_EDGE_V = 0.5, 0.02
 _ARCH_SAMPLE_COUNT = 2000
 _UPPER, _LOWER, _TONGUE = "helper-upper-teeth", "helper-lower-teeth", "helper-tongue"
 _SHOWN_MM, _OVERBITE_MM = 2.5, 2.0
-"""Length of the upper incisors below the line between closed lips, and their overlap with the lower ones [mm]."""
+"""Length of the upper incisors below the line between closed lips, and overlap with the lower ones [mm]."""
 _LIP_CLEARANCE_MM = 1.0
 """Distance between the upper incisors and the inner surface of the lips [mm]."""
 _INCISOR_HALF_WIDTH_MM = 8.0
@@ -28,7 +28,7 @@ _INCISOR_HALF_WIDTH_MM = 8.0
 
 
 def place_teeth(points_mm: Points) -> Points:
-    """Return the points (n, 3) of a person in the rest pose with teeth and tongue placed relative to the lips.
+    """Return the points (n, 3) of a person in rest pose with teeth and tongue placed relative to the lips [mm].
 
     MakeHuman's teeth end above the line between the lips and are 4 mm behind them, so that open mouths would
     show hardly any teeth.
