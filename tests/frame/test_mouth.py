@@ -42,3 +42,11 @@ def test_neutral_close_up_shows_neither_teeth_nor_tongue(renderer: Renderer, see
     labels = close_up(renderer, seed, expression("neutral"))
     assert pixels(labels, "upper_lip").sum() > 100 and pixels(labels, "lower_lip").sum() > 100
     assert not pixels(labels, "teeth", "tongue").any()
+
+
+@pytest.mark.parametrize("seed", [None, 5])
+def test_smiles_show_teeth_and_no_tongue(renderer: Renderer, seed: int | None) -> None:
+    closed = close_up(renderer, seed, expression("smile"))
+    assert not pixels(closed, "teeth", "tongue").any()
+    labels = close_up(renderer, seed, expression("joy"))
+    assert pixels(labels, "teeth").sum() > 150 and not pixels(labels, "tongue").any()

@@ -227,3 +227,13 @@ def test_segments_follow_curls(style: str, curl: float) -> None:
     )
     error = np.linalg.norm(fine[:, 1::2] - 0.5 * (coarse[:, :-1] + coarse[:, 1:]), axis=2)
     assert np.median(error) < 0.15 and np.quantile(error, 0.95) < 0.4
+
+
+def test_sampled_hair_fits_a_given_style() -> None:
+    for seed in range(12):
+        sampled, cropped = Human.sampled(seed).hair, Human.sampled(seed, hair={"style": "cropped"}).hair
+        assert cropped.style == "cropped" and cropped.length_mm <= 60.0
+        assert Human.sampled(seed, hair={"style": sampled.style}).hair.length_mm == pytest.approx(
+            sampled.length_mm
+        )
+    assert Human.sampled(3, hair={"style": "long", "length_mm": 250.0}).hair.length_mm == 250.0

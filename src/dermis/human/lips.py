@@ -15,7 +15,7 @@ from dermis.human.skin.surface import average_surface
 Index = NDArray[np.int64]
 
 _RINGS = "vermilion lip crest rim contact inner wall"
-_RIM, _CONTACT, _INNER = 3, 4, 5  # columns of lip_rings.csv
+_RIM, _CONTACT, _INNER, _WALL = 3, 4, 5, 6  # columns of lip_rings.csv
 _RING_MOTION = np.array([0.0, 0.15, 0.4, 0.75, 1.0, 1.0, 0.4])
 """Displacement of each ring relative to that of the ring on which the lips touch [-]."""
 _NEIGHBOUR_WEIGHT = 1 / 6
@@ -57,6 +57,25 @@ def close_lips(points_mm: Points) -> Points:
         gap = np.maximum(pairs.upper * (smooth - pairs.opposite @ smooth) + overlap, 0.0)
         closed[rings, 1] -= np.outer(0.5 * gap * pairs.upper / _smooth_motion(), _RING_MOTION)
     return closed
+
+
+class LipWall(NamedTuple):
+    """Middle of the inner surface of closed lips.
+
+    contact_y : height of the line on which the lips touch [mm]
+    upper_z, lower_z : z of the inner surface of the upper and the lower lip [mm]
+    """
+
+    contact_y: float
+    upper_z: float
+    lower_z: float
+
+
+def lip_wall(points_mm: Points) -> LipWall:
+    """Return the middle of the inner surface of a person's closed lips, from the points (n, 3) [mm]."""
+    left = _lip_pairs().rings[0]
+    upper, lower = points_mm[left[0]], points_mm[left[-1]]
+    return LipWall(float(upper[_CONTACT, 1]), float(upper[_WALL, 2]), float(lower[_WALL, 2]))
 
 
 def _smooth_motion() -> float:

@@ -74,7 +74,7 @@ def build_head(target_weights: Mapping[str, float], maps: Maps, layout: Layout, 
     layout : uv layout
     eye_look : look of the eyes
     """
-    points_mm, faces = close_lips(morphed_points_mm(target_weights)), _layout_faces(layout)
+    points_mm, faces = _rest_points_mm(target_weights), _layout_faces(layout)
     sockets = _eye_sockets(points_mm)
     (left, left_centre), (right, right_centre) = map(lids.place_eyeball, sockets)
     points = np.concatenate([lids.fit_lids(points_mm, sockets)[: mesh_point_count()], left, right])
@@ -100,11 +100,16 @@ def control_points_mm(target_weights: Mapping[str, float]) -> NDArray[np.float32
 
     target_weights : mapping from names of MakeHuman's morph targets to weights
     """
-    points_mm = close_lips(morphed_points_mm(target_weights))
+    points_mm = _rest_points_mm(target_weights)
     sockets = _eye_sockets(points_mm)
     balls = [lids.place_eyeball(eye)[0] for eye in sockets]
     skin = lids.fit_lids(points_mm, sockets)[: mesh_point_count()]
     return np.concatenate([skin, *balls]).astype(np.float32)
+
+
+def _rest_points_mm(target_weights: Mapping[str, float]) -> Points:
+    """Return MakeHuman's points (n, 3) of a person with closed lips and with teeth behind them [mm]."""
+    return teeth.place_teeth(close_lips(morphed_points_mm(target_weights)))
 
 
 def _eye_sockets(points_mm: Points) -> tuple[lids.EyeSocket, lids.EyeSocket]:

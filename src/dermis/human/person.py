@@ -17,6 +17,7 @@ from dermis.base.renamed import renamed_classmethod
 from dermis.human.hair.groom import add_hair
 from dermis.human.hair.look import (
     HairLook,
+    restyled_fields,
     sample_hair,
     sample_recession,
     scalp_shadow_fields,
@@ -234,6 +235,8 @@ def _sample_hair_and_skin(
     """
     hair, recession = sample_hair(rng, demographics, typical_look), sample_recession(rng, demographics)
     fixed = dict(fixed_fields.get("hair", {}))
+    if "style" in fixed:
+        fixed = restyled_fields(hair, str(fixed["style"])) | fixed
     if "beard_style" in fixed:
         fixed.setdefault("beard_mm", None)  # the usual length of the style
     hair = replace(hair, **fixed)

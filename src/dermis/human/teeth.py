@@ -1,4 +1,4 @@
-"""Uv layout of the human's teeth: u along the dental arch, v upwards from the biting edge."""
+"""Place and uv layout of the human's teeth: u along the dental arch, v upwards from the biting edge."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human.makehuman import group_points
+from dermis.human.lips import lip_wall
+from dermis.human.makehuman import Points, group_points
 from dermis.human.skin.surface import average_surface
 
 Doubles = NDArray[np.float64]
@@ -17,6 +18,37 @@ MM_PER_U, MM_PER_V = 160.0, 40.0
 ARCH_MIDDLE_U, BITING_EDGE_V = 0.5, 0.02
 """u of the gap between the two middle teeth, and v of the biting edge."""
 _ARCH_SAMPLE_COUNT = 2000
+_UPPER, _LOWER, _TONGUE = "helper-upper-teeth", "helper-lower-teeth", "helper-tongue"
+_SHOWN_MM, _OVERBITE_MM = 2.5, 2.0
+"""Length of the upper incisors below the line between closed lips, and overlap with the lower ones [mm]."""
+_LIP_CLEARANCE_MM = 1.0
+"""Distance between the upper incisors and the inner surface of the lips [mm]."""
+_INCISOR_HALF_WIDTH_MM = 8.0
+"""Distance from the middle within which points of the teeth belong to the middle incisors [mm]."""
+
+
+def place_teeth(points_mm: Points) -> Points:
+    """Return the points (n, 3) of a person in rest pose with teeth and tongue placed relative to the lips [mm].
+
+    MakeHuman's teeth end above the line between the lips and are 4 mm behind them, so that open mouths would
+    show hardly any teeth.
+
+    points_mm : points with closed lips [mm]
+    """
+    placed, wall = points_mm.copy(), lip_wall(points_mm)
+    upper, lower = (_incisor_points(points_mm, name) for name in (_UPPER, _LOWER))
+    edge_y = wall.contact_y - _SHOWN_MM
+    forward = min(wall.upper_z, wall.lower_z) - _LIP_CLEARANCE_MM - upper[:, 2].max()
+    lower_rise = edge_y + _OVERBITE_MM - lower[:, 1].max()
+    for name, rise in ((_UPPER, edge_y - upper[:, 1].min()), (_LOWER, lower_rise), (_TONGUE, lower_rise)):
+        placed[group_points(name)] += [0.0, rise, forward]
+    return placed
+
+
+def _incisor_points(points_mm: Points, group_name: str) -> Points:
+    """Return the points (n, 3) of the middle incisors of a group of teeth."""
+    points = points_mm[group_points(group_name)]
+    return points[np.abs(points[:, 0]) < _INCISOR_HALF_WIDTH_MM]
 
 
 @cache

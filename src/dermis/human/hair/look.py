@@ -236,6 +236,18 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
     )
 
 
+def restyled_fields(hair: HairLook, style_name: str) -> dict[str, Any]:
+    """Return the length and fade of a hair look in another style, longer or shorter than usual by as much.
+
+    style_name : name of the other style; the fields are empty for an unknown name
+    """
+    if style_name not in styles():
+        return {}
+    usual, style = styles().get(hair.style, _FALLBACK_STYLE), styles()[style_name]
+    length_mm = style.length_mm * hair.length_mm / max(usual.length_mm, 1.0)
+    return {"length_mm": float(np.clip(length_mm, 1.0, style.max_length_mm)), "fade": style.fade}
+
+
 def _pick_style(uniform_sample: float, is_man: bool, is_tightly_coiled: bool) -> str:
     """Return the name of a random hair style, with the probabilities in styles.toml.
 

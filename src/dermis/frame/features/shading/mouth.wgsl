@@ -16,13 +16,16 @@ const LOWER_MM: array<f32, TEETH_PER_SIDE> = array<f32, TEETH_PER_SIDE>(5.4, 5.9
 const CROWN_HEIGHT_MM: f32 = 9.8; // visible height of a tooth [mm]
 const BULGE_MM: f32 = 0.55; // of a tooth across its width
 const HEIGHT_BULGE_MM: f32 = 0.45; // of a tooth from its biting edge to the gum
-const ENAMEL: vec3f = vec3f(0.63, 0.58, 0.49);
-const NECK: vec3f = vec3f(0.58, 0.48, 0.36);
-const CLEAR_EDGE: vec3f = vec3f(0.52, 0.50, 0.45);
+const ENAMEL: vec3f = vec3f(0.50, 0.465, 0.38); // L* of 73, as measured teeth [-]
+const NECK: vec3f = vec3f(0.45, 0.375, 0.275);
+const CLEAR_EDGE: vec3f = vec3f(0.42, 0.405, 0.36);
+const GAP: vec3f = vec3f(0.42, 0.34, 0.28); // fraction of the light that leaves narrow gaps between teeth
 const GUM: vec3f = vec3f(0.42, 0.15, 0.14);
-const TOOTH_SHADOW_OFFSET_MM: f32 = 2.5; // light spreads as far in dentine, so lips cast no sharp shadows on teeth
+const TOOTH_SHADOW_OFFSET_MM: f32 = 1.2; // light spreads about as far in dentine, so shadows on teeth start beside the lips
 const SALIVA_ROUGHNESS: f32 = 0.12; // roughness of wet surfaces
 const TOOTH_SHADOW_SCATTER: vec3f = vec3f(0.22, 0.20, 0.17); // fraction of a light that reaches shadowed teeth through their lit parts and from the lips
+const CANINE_MM: f32 = 22.0; // distance of the canines from the middle along the arch
+const SHADE_MM: f32 = 10.0; // length along the arch over which cheeks shade the teeth behind the canines to 1/e
 const MOUTH_SHADOW_SCATTER: vec3f = vec3f(0.04, 0.014, 0.008); // fraction of a light that enters through some 8 mm of cheeks and lips
 
 fn tooth_width(kind: f32, index: u32) -> f32 {
@@ -46,14 +49,15 @@ fn teeth_at(point: Point, kind: f32) -> Surface {
     let between = 0.5 * width * (1.0 - abs(side)); // [mm]
     let crown = CROWN_HEIGHT_MM - 1.4 * pow(abs(side), 3.0) - 0.18 * f32(index);
     let gum = smoothstep(-0.25, 0.25, height - crown);
-    let gap = smoothstep(0.02, 0.30 + 0.5 * (1.0 - smoothstep(0.0, 1.8, height)), between);
+    let gap = smoothstep(0.0, 0.12 + 0.3 * (1.0 - smoothstep(0.0, 1.5, height)), between);
     var colour = mix(ENAMEL, NECK, smoothstep(0.45, 1.0, height / crown));
     colour = mix(CLEAR_EDGE, colour, smoothstep(0.0, 1.4, height));
-    colour = mix(colour * mix(0.16, 1.0, gap), GUM * mix(0.75, 1.0, gap), gum);
+    colour = mix(colour * mix(GAP, vec3f(1.0), gap), GUM * mix(0.8, 1.0, gap), gum);
     let slope = -4.0 * BULGE_MM * side / width * (1.0 - gum) * sign(point.uv.x - MIDDLE);
     let down = clamp(2.0 * height / crown - 1.0, -1.0, 1.0); // -1 at the biting edge, 1 at the gum
     let rise = -4.0 * HEIGHT_BULGE_MM * down / crown * (1.0 - gum);
-    return Surface(bend(point, vec2f(slope * ARCH_MM, rise * CROWN_MM)), colour, SALIVA_ROUGHNESS, 1.0);
+    let face = smoothstep(0.5, 2.5, height); // the edge is round in the mesh, and v hardly changes along it
+    return Surface(bend(point, face * vec2f(slope * ARCH_MM, rise * CROWN_MM)), colour, SALIVA_ROUGHNESS, 1.0);
 }
 
 fn tongue_at(point: Point, colour: vec3f) -> Surface {
@@ -61,9 +65,10 @@ fn tongue_at(point: Point, colour: vec3f) -> Surface {
     return Surface(point.normal, colour * (0.75 + 0.35 * noise), 0.25, 1.0);
 }
 
-// Fraction of a light that reaches shadowed parts of the mouth, by the part.
-fn mouth_shadow_scatter(part: f32) -> vec3f {
-    return select(TOOTH_SHADOW_SCATTER, MOUTH_SHADOW_SCATTER, part == TONGUE);
+// Fraction of a light that reaches shadowed parts of the mouth.
+fn mouth_shadow_scatter(point: Point, part: f32) -> vec3f {
+    let behind_canines = max(abs(point.uv.x - MIDDLE) * ARCH_MM - CANINE_MM, 0.0);
+    return select(TOOTH_SHADOW_SCATTER * exp(-behind_canines / SHADE_MM), MOUTH_SHADOW_SCATTER, part == TONGUE);
 }
 
 // material: colour and part of the mouth

@@ -185,7 +185,7 @@ fn apply_modelled_parts(shading_point: ptr<function, ShadingPoint>) {
         let material = shade.material_colour[point.flags >> 8u];
         if (material.w > 0.0) {
             (*shading_point).surface = mouth_at(point, material);
-            (*shading_point).film = Film((*shading_point).surface.normal, mouth_shadow_scatter(material.w), vec3f(1.0), 0.0);
+            (*shading_point).film = Film((*shading_point).surface.normal, mouth_shadow_scatter(point, material.w), vec3f(1.0), 0.0);
             (*shading_point).point.lit_position += TOOTH_SHADOW_OFFSET_MM * point.normal;
             break;
         }
