@@ -28,7 +28,7 @@ _INCISOR_HALF_WIDTH_MM = 8.0
 
 
 def place_teeth(points_mm: Points) -> Points:
-    """Return the points (n, 3) of a person in rest pose with teeth and tongue placed relative to the lips [mm].
+    """Return the points (n, 3) of a person in rest pose with teeth and tongue placed relative to the lips.
 
     MakeHuman's teeth end above the line between the lips and are 4 mm behind them, so that open mouths would
     show hardly any teeth.
