@@ -113,6 +113,8 @@ def _shade_constants(request: FrameRequest) -> Constants:
     eyes = request.head.eyes is not None
     used = {"DETAIL": request.has_fine_relief, "EYES": eyes, "MIXED": request.mixes_profiles}
     used["PARTS"] = has_part_materials(request.head)
+    used["WORN"] = not used["PARTS"] and request.head.undressed is not None
+    used["METALS"] = used["PARTS"] or used["WORN"]
     return tuple((name, 1) for name, value in used.items() if value)
 
 

@@ -43,6 +43,8 @@ from dermis.human.skin.measured import (
     pigment_ancestry,
 )
 from dermis.human.skin.painted import PaintedMaps
+from dermis.human.wear.dress import dress, dressed_template, garment_points_mm
+from dermis.human.wear.look import Clothing
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -85,7 +87,8 @@ _FIELD_RANGES = {
     "hair_eumelanin": (0.0, 10.0),
     "hair_pheomelanin": (0.0, 10.0),
 }
-_OPTIONAL_FIELDS = "ita", "skin_ancestry"
+_OPTIONAL_FIELDS = "ita", "skin_ancestry", "clothing"
+_LOOK_TYPES = (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook), ("clothing", Clothing))
 # fraction of Caucasian shapes that have one of `_OTHER_SKIN_ANCESTRIES`, if no ancestry is given
 _OTHER_SKIN_ANCESTRY_FRACTION = 0.45
 _OTHER_SKIN_ANCESTRIES = ("south asian", "iraqi", "arabian")
@@ -336,6 +339,8 @@ class Human:
         Look of the eyes; by default typical for the person.
     hair : HairLook, optional
         Look of the hair; by default typical for the person.
+    clothing : Clothing, optional
+        Garment of the upper body; by default none.
     skin_ancestry : str
         Name of a group of measured people, such as "south asian". The person gets the skin, eye and hair
         colours of this group, independently of the shape; "" for the colours of the shape's ancestries.
@@ -371,6 +376,7 @@ class Human:
     hair: HairLook | None = None
     skin_ancestry: str = ""
     ita: float | None = None
+    clothing: Clothing | None = None
 
     def __post_init__(self) -> None:
         """Raise DermisError for fields out of range."""
@@ -385,7 +391,7 @@ class Human:
             if not isinstance(name, str):
                 refuse("targets", "names", f"got {format_value(name)}", "See human_targets()")
             checked_number(f"target {name!r}", weight, *_TARGET_WEIGHT_RANGE, "beyond it is no face")
-        for name, kind in (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook)):
+        for name, kind in _LOOK_TYPES:
             if not isinstance(look := getattr(self, name), kind | None):
                 refuse(name, f"a {kind.__name__}", f"got {format_value(look)}", "Make one, or leave it out")
 
@@ -464,7 +470,10 @@ class Human:
         control_head = build_head(self.target_weights(), painted, layout, self.iris)
         shared = head_template(layout, resolve_levels(control_head, subdivide))
         head = shared.refine_head(control_head)
-        return add_hair(head, control_head, shared.root_finder, self.hair_look, self.look.recession, hairs)
+        head = add_hair(head, control_head, shared.root_finder, self.hair_look, self.look.recession, hairs)
+        if self.clothing is None:
+            return head
+        return dress(head, self.clothing, dressed_template(layout, head.levels, self.clothing))
 
     def transfer_skin_to(self, head: Head) -> Head:
         """Return the head of another person with the skin and eyes of this person.
@@ -533,11 +542,14 @@ class Human:
         """Return the control points (p, 3) in rest pose, relative to the midpoint between the eyes [mm].
 
         `Pose(positions_mm=...)` gives the head of any other person this shape, because all people have
-        corresponding points.
+        corresponding points. The points of clothing come last; heads that share a pose need equal garments.
 
         Raises DermisError if `targets` contains names that are not morph targets of MakeHuman.
         """
-        return control_points_mm(self.target_weights())
+        points = control_points_mm(self.target_weights())
+        if self.clothing is None:
+            return points
+        return np.concatenate([points, garment_points_mm(points, self.clothing).astype(np.float32)])
 
     def target_weights(self) -> dict[str, float]:
         """Return the nonzero weights of MakeHuman's morph targets for this person, by target name."""

@@ -20,11 +20,12 @@ from dermis.human.hair.look import HairLook
 from dermis.human.makehuman import check_targets
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook
+from dermis.human.wear.look import Clothing
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.head import Head
 
-T = TypeVar("T", Human, SkinLook, EyeLook, HairLook)
+T = TypeVar("T", Human, SkinLook, EyeLook, HairLook, Clothing)
 _STRETCH_ATLAS_SIDE = 1024
 """Largest side of the atlas that gives the size of texels on the skin; this size varies slowly [texel]."""
 
@@ -36,6 +37,7 @@ def person_parameters(person: Human) -> dict[str, Any]:
     """
     numbers = {one.name: getattr(person, one.name) for one in fields(person)}
     numbers |= {"targets": dict(person.targets), "skin": asdict(person.look)}
+    numbers |= {"clothing": person.clothing and asdict(person.clothing)}
     return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hair_look)}
 
 
@@ -57,7 +59,12 @@ def read_person(path: Path) -> Human:
     person = document.get("person") if isinstance(document, dict) else None
     if not isinstance(person, dict):
         refuse(path, expected, "there is none", "Write one with dermis head -o person.json")
-    parts: tuple[tuple[str, Any], ...] = (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook))
+    parts: tuple[tuple[str, Any], ...] = (
+        ("skin", SkinLook),
+        ("eyes", EyeLook),
+        ("hair", HairLook),
+        ("clothing", Clothing),
+    )
     looks = {
         name: _build_dataclass(path, kind, person[name])
         for name, kind in parts

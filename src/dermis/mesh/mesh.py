@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from dermis.base.arrays import Doubles, Floats, Ints, Mask
 from dermis.base.summary import ShortRepr
+from dermis.mesh.fabric import Fabric
 from dermis.mesh.geometry import tangents, vertex_normals, weld
 from dermis.mesh.outline import Outline, convex_hull
 from dermis.mesh.skull import Point, body_skull_centre, is_head_sized, skull_centre_below
@@ -35,6 +36,8 @@ class Material:
     metalness : 1 for metal [-]
     emission : radiance that the group emits, linear Rec. 709
     opacity_cutoff : opacity below which the group is cut out; 0 to cut out nothing
+    fabric : weave and sheen of cloth; None for other surfaces
+    label : label class of what a parametric human wears, such as "clothing"; empty for other surfaces
     """
 
     name: str
@@ -47,6 +50,8 @@ class Material:
     metalness: float = 0.0
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     opacity_cutoff: float = 0.0
+    fabric: Fabric | None = None
+    label: str = ""
 
 
 @dataclass(frozen=True, repr=False)

@@ -23,6 +23,7 @@ from dermis.frame.projection import (
 )
 from dermis.frame.technique import ProfileSplit
 from dermis.gpu import ComputeProgram, UniformRecord
+from dermis.mesh.fabric import WEAVES
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import MOUTH_PARTS
 from dermis.mesh.outline import Outline
@@ -117,6 +118,10 @@ def view_record(
         part["emission"], part["metalness"] = material.emission, material.metalness
         part["roughness"] = _WET_MATERIAL_MARKER if material.roughness is None else material.roughness
         part["has_maps"] = material.has_maps
+        if (fabric := material.fabric) is not None:
+            part["weave"], part["thread_mm"] = 1 + WEAVES.index(fabric.weave), fabric.thread_mm
+            part["relief"], part["contrast"] = fabric.relief, fabric.contrast
+            part["crumple"], part["sheen"] = fabric.crumple, fabric.sheen
     for name, value in profile_split.fine.items():
         record["fine"][name] = value
     if head.eyes is not None:
