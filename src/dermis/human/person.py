@@ -44,7 +44,7 @@ from dermis.human.skin.measured import (
 )
 from dermis.human.skin.painted import PaintedMaps
 from dermis.human.wear.dress import dress, dressed_template, garment_points_mm
-from dermis.human.wear.look import Clothing
+from dermis.human.wear.look import Clothing, Item
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -88,7 +88,8 @@ _FIELD_RANGES = {
     "hair_pheomelanin": (0.0, 10.0),
 }
 _OPTIONAL_FIELDS = "ita", "skin_ancestry", "clothing"
-_LOOK_TYPES = (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook), ("clothing", Clothing))
+_LOOK_TYPES = (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook))
+_WORN_TYPES: Mapping[str, type[Item]] = MappingProxyType({"clothing": Clothing})
 # fraction of Caucasian shapes that have one of `_OTHER_SKIN_ANCESTRIES`, if no ancestry is given
 _OTHER_SKIN_ANCESTRY_FRACTION = 0.45
 _OTHER_SKIN_ANCESTRIES = ("south asian", "iraqi", "arabian")
@@ -340,7 +341,7 @@ class Human:
     hair : HairLook, optional
         Look of the hair; by default typical for the person.
     clothing : Clothing, optional
-        Garment of the upper body; by default none.
+        Garment of the upper body, also as words such as "navy denim shirt"; by default none.
     skin_ancestry : str
         Name of a group of measured people, such as "south asian". The person gets the skin, eye and hair
         colours of this group, independently of the shape; "" for the colours of the shape's ancestries.
@@ -394,6 +395,8 @@ class Human:
         for name, kind in _LOOK_TYPES:
             if not isinstance(look := getattr(self, name), kind | None):
                 refuse(name, f"a {kind.__name__}", f"got {format_value(look)}", "Make one, or leave it out")
+        for name, item in _WORN_TYPES.items():
+            object.__setattr__(self, name, item.coerce(name, getattr(self, name)))
 
     @classmethod
     def sampled(cls, seed: int, **given: Any) -> Human:
@@ -527,6 +530,11 @@ class Human:
         if self.hair is not None:
             return self.hair
         return typical_hair(self._demographics, self.hair_eumelanin, self.hair_pheomelanin)
+
+    @property
+    def worn(self) -> dict[str, Item | None]:
+        """Return what the person wears by field of `Human`, such as "clothing"; None for nothing."""
+        return {name: getattr(self, name) for name in _WORN_TYPES}
 
     @property
     def _demographics(self) -> Demographics:

@@ -20,12 +20,11 @@ from dermis.human.hair.look import HairLook
 from dermis.human.makehuman import check_targets
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook
-from dermis.human.wear.look import Clothing
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.head import Head
 
-T = TypeVar("T", Human, SkinLook, EyeLook, HairLook, Clothing)
+T = TypeVar("T", Human, SkinLook, EyeLook, HairLook)
 _STRETCH_ATLAS_SIDE = 1024
 """Largest side of the atlas that gives the size of texels on the skin; this size varies slowly [texel]."""
 
@@ -63,7 +62,6 @@ def read_person(path: Path) -> Human:
         ("skin", SkinLook),
         ("eyes", EyeLook),
         ("hair", HairLook),
-        ("clothing", Clothing),
     )
     looks = {
         name: _build_dataclass(path, kind, person[name])

@@ -122,6 +122,25 @@ class Mesh(ShortRepr):
         )
 
     @cached_property
+    def body(self) -> Mesh:
+        """Return the mesh without what a person wears, whose triangles come last."""
+        worn = [index for index, one in enumerate(self.materials) if one.label]
+        if not worn:
+            return self
+        triangles = self.triangles[self.material < worn[0]]
+        vertices = int(triangles.max()) + 1
+        return Mesh(
+            self.positions[:vertices],
+            self.normals[:vertices],
+            self.uv[:vertices],
+            self.point[:vertices],
+            triangles,
+            self.material[: len(triangles)],
+            self.materials[: worn[0]],
+            self.quads,
+        )
+
+    @cached_property
     def topology_key(self) -> bytes:
         """Return a digest that is the same for all meshes that differ only in the positions of points."""
         digest = hashlib.blake2b(digest_size=16)

@@ -102,6 +102,8 @@ class HeadTable(FrozenModel):
     eye_groups: tuple[str, ...] = ()
     """Groups of the file that contain eyeballs, whatever their names; they may contain the rest of the
     head."""
+    clothing: str | None = None
+    """Garment of a person, in words such as "navy denim shirt"; none for bare shoulders."""
     eye: EyeTable | None = None
     """Overrides of the look of the eyes."""
     subdivide: _SubdivisionLevels = AUTO

@@ -63,6 +63,7 @@ def load_head(
     eyes: EyeMode = "fitted",
     eye_groups: Sequence[str] | str = (),
     eye: Mapping[str, float] | None = None,
+    clothing: str | None = None,
     subdivide: Subdivide = AUTO,
     regions: Literal["auto", "none"] = "auto",
 ) -> Head:
@@ -114,6 +115,9 @@ def load_head(
         the rest of the head.
     eye : mapping, optional
         Dictionary from fields of `EyeLook` to values that override the look of the eyes.
+    clothing : str, optional
+        Garment of a parametric human, in words such as "navy denim shirt", see `Clothing`; "none" for bare
+        shoulders. By default that of the person.
     subdivide : int, "auto" or callable
         Number of subdivision levels, 0 to 3, and at least 1 for the human. Meshes of quads are subdivided by
         Catmull-Clark, other meshes by Loop. "auto" uses as many levels as the outline needs to look smooth in
@@ -167,7 +171,11 @@ def load_head(
     )
     if is_person_name(name):
         mesh_options |= {"eyes": eyes, "skin_site": skin_site}
-        return _with_eye_look(_load_human(name, map_files, height_mm, normal_y, mesh_options, levels), eye)
+        worn = {"clothing": clothing}
+        loaded = _load_human(name, map_files, height_mm, normal_y, mesh_options, levels, worn)
+        return _with_eye_look(loaded, eye)
+    if clothing is not None:
+        refuse("clothing", f"a person, such as {HUMAN}", f"it is given with {name!r}", "Leave it out")
     if name not in SAMPLES and not is_file(path):
         _refuse_name(name)
     loaded, look = load_file_head(name, mesh_options, map_options)
@@ -223,6 +231,7 @@ def _load_human(
     normal_y: NormalY,
     mesh_options: dict[str, Any],
     subdivision_levels: SubdivisionLevels,
+    worn: Mapping[str, str | None],
 ) -> Head:
     """Return the head of a parametric human in the uv layout "own".
 
@@ -231,6 +240,7 @@ def _load_human(
     height_mm, normal_y : interpretation of the height map and the normal map, see `load_head`
     mesh_options : options that apply only to mesh files; DermisError is raised unless all have their defaults
     subdivision_levels : number of levels, or a function of the head that returns it
+    worn : what the person wears in words, by field of `Human`; None for what the person wears by default
     """
     texts = {"v_origin": "auto", "front": "auto", "eyes": "fitted"}
     defaults = {
@@ -249,7 +259,9 @@ def _load_human(
     map_files: dict[str, Any] = {role: file for role, file in user_files.items() if file is not None}
     loaded = load_maps(**map_files, height_mm=height_mm, normal_y=normal_y) if map_files else None
     level_of = subdivision_levels if callable(subdivision_levels) else lambda plain: subdivision_levels
-    head = load_person(head_name).head(
+    person = load_person(head_name)
+    person = replace(person, **{name: item for name, item in worn.items() if item is not None})
+    head = person.head(
         subdivide=lambda plain: max(MIN_HUMAN_SUBDIVISION_LEVELS, level_of(plain))
     )
     user_maps = {role: getattr(loaded, role) for role in map_files}  # the other maps are painted

@@ -38,6 +38,7 @@ from dermis.scene.skin import Skin
 
 _UNSAMPLED_SKIN_FIELDS = "pigments", "layers", "profile_map", "other_profiles"  # fields of `Skin`
 _SEED_FIELD = "seed"  # an integer that follows from the person
+_WORN_FIELDS = ("clothing",)
 _LOOK_MODELS: Mapping[str, type] = {"skin": SkinLook, "eyes": EyeLook, "hair": HairLook}
 _ANCESTRY_PARAMETERS = "person.african", "person.asian", "person.caucasian"
 _ITA_PARAMETER, _MELANIN_PARAMETER = "person.ita", "person.skin.melanin"
@@ -219,6 +220,10 @@ def _check_looks(distributions: Mapping[str, Distribution]) -> None:
 
     distributions : distribution of each parameter by its dotted name
     """
+    for name in _WORN_FIELDS:
+        distribution = distributions.get(f"person.{name}")
+        for value in () if distribution is None else distribution.support:
+            Human(**{name: value})
     for part, kind in _LOOK_MODELS.items():
         known = [one.name for one in fields(kind) if one.name not in (_SEED_FIELD, SITES_FIELD)]
         _check_table(f"person.{part}", distributions, known, kind)

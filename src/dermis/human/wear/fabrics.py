@@ -27,26 +27,26 @@ class Cloth(NamedTuple):
 
 CLOTHS: Mapping[str, Cloth] = {
     "cotton": Cloth(
-        Fabric("jersey", 0.9, 0.22, 0.06, 0.05, 0.10),
+        Fabric("jersey", 0.9, 0.22, 0.06, 0.05, 0.03),
         Fabric("rib", 2.2, 0.50, 0.10, 0.05, 0.0),
         Folds(5.0, 4.5, 4.5, 0.7),
         0.86,
     ),
     "wool": Cloth(
-        Fabric("jersey", 3.6, 0.55, 0.22, 0.16, 0.05),
+        Fabric("jersey", 3.6, 0.55, 0.22, 0.16, 0.0),
         Fabric("rib", 4.6, 0.60, 0.18, 0.16, 0.0),
         Folds(4.0, 4.5, 5.5, 0.2),
         0.9,
     ),
     "denim": Cloth(
-        Fabric("twill", 1.1, 0.45, 0.55, 0.02, 0.16),
-        Fabric("twill", 1.1, 0.45, 0.55, 0.02, 0.05),
+        Fabric("twill", 1.1, 0.45, 0.55, 0.02, 0.07),
+        Fabric("twill", 1.1, 0.45, 0.55, 0.02, 0.03),
         Folds(5.5, 6.0, 4.0, 0.9),
         0.82,
     ),
     "linen": Cloth(
-        Fabric("plain", 0.9, 0.40, 0.22, 0.04, 0.34),
-        Fabric("plain", 0.9, 0.40, 0.22, 0.04, 0.12),
+        Fabric("plain", 0.9, 0.40, 0.22, 0.04, 0.16),
+        Fabric("plain", 0.9, 0.40, 0.22, 0.04, 0.08),
         Folds(5.5, 5.0, 5.0, 1.8),
         0.84,
     ),

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Self
 
 from dermis.base.errors import format_value, refuse
 from dermis.human.wear.fabrics import CLOTHS, COLOURS
@@ -18,6 +20,8 @@ GARMENT_CLOTHS = {
 """Usual cloth of each garment."""
 GARMENT_NAMES: tuple[str, ...] = tuple(GARMENT_CLOTHS)
 CLOTH_NAMES: tuple[str, ...] = tuple(CLOTHS)
+NOTHING = "none"
+"""Word for wearing nothing."""
 _HEX_COLOUR = re.compile("#[0-9a-fA-F]{6}")
 
 
@@ -34,8 +38,59 @@ def check_colour(field_name: str, value: object) -> None:
         refuse(field_name, expected, f"got {format_value(value)}", "Choose a colour")
 
 
+class Item:
+    """Base class of what a person wears: conversion from and to words such as "navy denim shirt"."""
+
+    @classmethod
+    def _names_by_field(cls) -> dict[str, tuple[str, ...]]:
+        """Return the names of each field that are recognised as words, in the order of `text`."""
+        raise NotImplementedError
+
+    @classmethod
+    def coerce(cls, field_name: str, value: object) -> Self | None:
+        """Convert words or a mapping of fields; items and None are returned unchanged, "none" becomes None.
+
+        field_name : name of the field of `Human`, for error messages
+
+        Raises DermisError for words and fields that the item does not have, and for other types.
+        """
+        if value is None or value == NOTHING:
+            return None
+        if isinstance(value, cls):
+            return value
+        if isinstance(value, str):
+            return cls(**cls._parse(field_name, value))
+        known = getattr(cls, "__dataclass_fields__", {})
+        if not isinstance(value, Mapping) or set(value) - set(known):
+            expected = f"a {cls.__name__}, words, or values of {', '.join(known)}"
+            refuse(field_name, expected, f"got {format_value(value)}", "Correct it")
+        return cls(**value)
+
+    @classmethod
+    def _parse(cls, field_name: str, text: str) -> dict[str, Any]:
+        """Return the fields that words describe, in any order."""
+        found, rest = dict[str, Any](), f" {' '.join(text.replace(',', ' ').split())} "
+        for name, words in cls._names_by_field().items():
+            for word in sorted(words, key=len, reverse=True):
+                if f" {word} " in rest:
+                    found[name], rest = word, rest.replace(f" {word} ", " ", 1)
+                    break
+            if name == "colour" and name not in found and (hexadecimal := _HEX_COLOUR.search(rest)):
+                found[name], rest = hexadecimal[0], rest.replace(hexadecimal[0], "", 1)
+        if rest.strip():
+            options = (f"{name} ({', '.join(words)})" for name, words in cls._names_by_field().items())
+            expected = f"{NOTHING}, or words for {'; '.join(options)}"
+            refuse(field_name, expected, f"got {rest.strip()!r}", "Correct it")
+        return found
+
+    @property
+    def text(self) -> str:
+        """Return the item as words that can be parsed, such as "navy denim shirt"."""
+        return " ".join(str(getattr(self, name)) for name in self._names_by_field())
+
+
 @dataclass(frozen=True)
-class Clothing:
+class Clothing(Item):
     """Garment of the upper body.
 
     Parameters
@@ -62,6 +117,10 @@ class Clothing:
     garment: str = "crew neck"
     cloth: str = None  # type: ignore[assignment]  # `__post_init__` replaces None
     colour: str = "navy"
+
+    @classmethod
+    def _names_by_field(cls) -> dict[str, tuple[str, ...]]:
+        return {"colour": COLOURS, "cloth": CLOTH_NAMES, "garment": GARMENT_NAMES}
 
     def __post_init__(self) -> None:
         """Replace a missing cloth by the usual one; raise DermisError for unknown names."""

@@ -9,6 +9,7 @@ const RIB: u32 = 4u;
 const CLOTH_SPECULAR: f32 = 0.35; // strength of the surface lobe relative to a smooth dielectric: light is lost between fibres
 const FINITE_STEP: f32 = 0.12; // of derivatives [threads]
 const WEFT: vec3f = vec3f(0.52, 0.52, 0.50); // undyed threads of twill
+const FIBRE_MM: f32 = 1.7; // distance of uneven fibres
 const WRINKLE_MM: f32 = 13.0; // distance of small wrinkles
 
 fn lattice_value(cell: vec2i) -> f32 {
@@ -71,11 +72,12 @@ fn cloth_at(point: Point, colour: vec3f, material: PartMaterial, footprint: f32)
     let high = vec2f(wrinkle_height(mm + vec2f(step, 0.0)), wrinkle_height(mm + vec2f(0.0, step)));
     slope += material.crumple * (high - low) / 0.07;
     let mixture = material.contrast * mix(0.35, 1.0 - height, seen);
+    let fibres = 1.0 - smoothstep(0.25, 0.9, footprint * MM_PER_UV / FIBRE_MM);
     var albedo = colour * (1.0 - 0.5 * mixture);
     if (material.weave == TWILL) {
         albedo = mix(colour, WEFT, 0.55 * mixture);
     }
-    albedo *= 0.97 + 0.06 * cloth_noise(mm / 1.7) + 0.04 * (cloth_noise(mm / 42.0) - 0.5);
+    albedo *= 1.0 + 0.06 * fibres * (cloth_noise(mm / FIBRE_MM) - 0.5) + 0.04 * (cloth_noise(mm / 42.0) - 0.5);
     let hidden = (1.0 - seen) * material.relief * material.relief;
     let m = clamp(sqrt(pow(material.roughness, 4.0) + 0.5 * hidden), 0.05, 1.0);
     return Surface(bend(point, MM_PER_UV * slope), albedo, m, CLOTH_SPECULAR);

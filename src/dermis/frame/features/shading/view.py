@@ -93,14 +93,7 @@ def view_record(
     """
     jitter = np.zeros((64, 4), np.float32)
     jitter[: settings.samples, :2] = pixel_sample_positions(settings.samples)
-    colours = np.zeros((_MAX_MATERIALS, 4), np.float32)
     materials = head.mesh.materials
-    if len(materials) > _MAX_MATERIALS:
-        count = f"it has {len(materials)}"
-        refuse(head.name, f"at most {_MAX_MATERIALS} materials", count, "Join some groups")
-    for index, material in enumerate(materials):
-        colours[index, :3] = material.colour
-        colours[index, 3] = 1 + MOUTH_PARTS.index(material.part) if material.part else 0
     record = shading_program.make_record(
         "Shade",
         samples=settings.samples,
@@ -110,7 +103,7 @@ def view_record(
         ),
         total=profile_split.total,
         light_factors=_LIGHT_FACTORS[settings.parts],
-        material_colour=colours,
+        material_colour=material_colours(head),
         jitter=jitter,
     )
     for index, material in enumerate(materials):
@@ -129,6 +122,22 @@ def view_record(
         record["eyes"]["material"] = head.eyes.material
         record["eyes"]["middle_mm"] = head.eyes.centre_offset_mm
     return record
+
+
+def material_colours(head: Head) -> NDArray[np.float32]:
+    """Return the albedos of a head's materials as rows (64, 4); the last column is the part of the mouth.
+
+    Raises DermisError for a head with too many materials.
+    """
+    colours = np.zeros((_MAX_MATERIALS, 4), np.float32)
+    materials = head.mesh.materials
+    if len(materials) > _MAX_MATERIALS:
+        count = f"it has {len(materials)}"
+        refuse(head.name, f"at most {_MAX_MATERIALS} materials", count, "Join some groups")
+    for index, material in enumerate(materials):
+        colours[index, :3] = material.colour
+        colours[index, 3] = 1 + MOUTH_PARTS.index(material.part) if material.part else 0
+    return colours
 
 
 def mean_skin_albedo(head: Head) -> tuple[float, ...]:
