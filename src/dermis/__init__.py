@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from dermis.human.person import Human
     from dermis.human.regions.apply import with_regions
     from dermis.human.skin.look import SkinLook
-    from dermis.human.wear.look import Clothing
+    from dermis.human.wear.look import Clothing, Glasses
     from dermis.images.io import write_image
     from dermis.images.movie import MovieWriter
     from dermis.mesh.clip import Clip
@@ -63,6 +63,7 @@ _MODULE_OF_NAME = {
     "EyeLook": "mesh.eye_look",
     "HairLook": "human.hair.look",
     "Clothing": "human.wear.look",
+    "Glasses": "human.wear.look",
     "HairMotion": "frame.hair_motion",
     "human_targets": "human.makehuman",
     "with_regions": "human.regions.apply",
@@ -112,6 +113,7 @@ __all__ = [
     "DirectionalLight",
     "Environment",
     "EyeLook",
+    "Glasses",
     "HairLook",
     "HairMotion",
     "Head",

@@ -55,6 +55,7 @@ def head(
     eye: Annotated[list[str] | None, _WeightsParameter] = None,
     hair: Annotated[list[str] | None, _ValuesParameter] = None,
     clothing: str | None = None,
+    glasses: str | None = None,
     colour: Path | None = None,
     normal: Path | None = None,
     roughness: Path | None = None,
@@ -137,6 +138,9 @@ def head(
     clothing:
         Garment, in words for colour, cloth and cut such as "navy denim shirt": crew neck, v-neck, high neck,
         shirt or hoodie; cotton, wool, denim or linen. [default: none]
+    glasses:
+        Glasses, in words for colour and frame such as "brown square": round, square, aviator, rimless or
+        sunglasses. [default: none]
     colour:
         Colour map of the skin, sRGB. [default: painted]
     normal:
@@ -176,7 +180,7 @@ def head(
         skin=_look_with_values(person.look, skin, "--skin"),
         eyes=_look_with_values(person.iris, eye, "--eye"),
         hair=_hair_look_with_values(person.hair_look, hair),
-        **drop_none(clothing=clothing),
+        **drop_none(clothing=clothing, glasses=glasses),
     )
     report: Options = {"head": str(output), "person": person_parameters(person)}
     if output.suffix.lower() == ".json":

@@ -36,7 +36,7 @@ def person_parameters(person: Human) -> dict[str, Any]:
     """
     numbers = {one.name: getattr(person, one.name) for one in fields(person)}
     numbers |= {"targets": dict(person.targets), "skin": asdict(person.look)}
-    numbers |= {"clothing": person.clothing and asdict(person.clothing)}
+    numbers |= {name: asdict(item) if item else None for name, item in person.worn.items()}  # type: ignore[call-overload]
     return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hair_look)}
 
 

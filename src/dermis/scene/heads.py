@@ -64,6 +64,7 @@ def load_head(
     eye_groups: Sequence[str] | str = (),
     eye: Mapping[str, float] | None = None,
     clothing: str | None = None,
+    glasses: str | None = None,
     subdivide: Subdivide = AUTO,
     regions: Literal["auto", "none"] = "auto",
 ) -> Head:
@@ -118,6 +119,8 @@ def load_head(
     clothing : str, optional
         Garment of a parametric human, in words such as "navy denim shirt", see `Clothing`; "none" for bare
         shoulders. By default that of the person.
+    glasses : str, optional
+        Glasses of a parametric human, in words such as "brown square", see `Glasses`.
     subdivide : int, "auto" or callable
         Number of subdivision levels, 0 to 3, and at least 1 for the human. Meshes of quads are subdivided by
         Catmull-Clark, other meshes by Loop. "auto" uses as many levels as the outline needs to look smooth in
@@ -171,11 +174,12 @@ def load_head(
     )
     if is_person_name(name):
         mesh_options |= {"eyes": eyes, "skin_site": skin_site}
-        worn = {"clothing": clothing}
+        worn = {"clothing": clothing, "glasses": glasses}
         loaded = _load_human(name, map_files, height_mm, normal_y, mesh_options, levels, worn)
         return _with_eye_look(loaded, eye)
-    if clothing is not None:
-        refuse("clothing", f"a person, such as {HUMAN}", f"it is given with {name!r}", "Leave it out")
+    for item, words in (("clothing", clothing), ("glasses", glasses)):
+        if words is not None:
+            refuse(item, f"a person, such as {HUMAN}", f"it is given with {name!r}", "Leave it out")
     if name not in SAMPLES and not is_file(path):
         _refuse_name(name)
     loaded, look = load_file_head(name, mesh_options, map_options)
@@ -261,9 +265,7 @@ def _load_human(
     level_of = subdivision_levels if callable(subdivision_levels) else lambda plain: subdivision_levels
     person = load_person(head_name)
     person = replace(person, **{name: item for name, item in worn.items() if item is not None})
-    head = person.head(
-        subdivide=lambda plain: max(MIN_HUMAN_SUBDIVISION_LEVELS, level_of(plain))
-    )
+    head = person.head(subdivide=lambda plain: max(MIN_HUMAN_SUBDIVISION_LEVELS, level_of(plain)))
     user_maps = {role: getattr(loaded, role) for role in map_files}  # the other maps are painted
     return replace(head, name=head_name, maps=replace(head.maps, **user_maps))
 

@@ -38,7 +38,7 @@ from dermis.scene.skin import Skin
 
 _UNSAMPLED_SKIN_FIELDS = "pigments", "layers", "profile_map", "other_profiles"  # fields of `Skin`
 _SEED_FIELD = "seed"  # an integer that follows from the person
-_WORN_FIELDS = ("clothing",)
+_WORN_FIELDS = "clothing", "glasses"
 _LOOK_MODELS: Mapping[str, type] = {"skin": SkinLook, "eyes": EyeLook, "hair": HairLook}
 _ANCESTRY_PARAMETERS = "person.african", "person.asian", "person.caucasian"
 _ITA_PARAMETER, _MELANIN_PARAMETER = "person.ita", "person.skin.melanin"

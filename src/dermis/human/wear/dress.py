@@ -2,188 +2,99 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from dermis.base.arrays import Doubles, Floats, Index, Ints
-from dermis.human.makehuman import makehuman_arrays
+from dermis.base.arrays import Doubles, Floats
 from dermis.human.model import Layout, head_template
-from dermis.human.movement import expression_targets
-from dermis.human.wear.fabrics import CLOTHS, linear_colour
-from dermis.human.wear.garments import garment_panels
-from dermis.human.wear.look import Clothing
-from dermis.human.wear.panels import Panel
-from dermis.human.wear.skin_sheet import skin_sheet, unit_vectors
-from dermis.mesh.fabric import MM_PER_UV
+from dermis.human.wear.clothing import garment_materials, garment_points_mm, worn_garment
+from dermis.human.wear.eyewear import glasses_materials, glasses_points_mm, worn_glasses
+from dermis.human.wear.look import Clothing, Glasses, Item
+from dermis.human.wear.worn import Worn
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, build_mesh
-from dermis.mesh.rig import BONES_PER_POINT, MorphTargets, Rig, Stencils
+from dermis.mesh.rig import MorphTargets, Rig, Stencils
 
-_MIN_DELTA_MM = 0.02  # smaller displacements of cloth by expressions are left out
-_CLOTHING_LABEL = "clothing"
-_BUTTON_COLOUR, _BUTTON_ROUGHNESS = (0.62, 0.6, 0.54), 0.35
-_CORD_COLOUR = (0.72, 0.71, 0.68)
+Outfit = tuple[Item, ...]
+"""Everything that a person wears."""
 
 
-class Worn(NamedTuple):
-    """Surfaces that are worn, as one mesh that is the same for all people but for positions.
+class Wearable(NamedTuple):
+    """Functions that make the meshes of a kind of items.
 
-    point : (v,) index of the point of each vertex
-    uv : (v, 2) texture coordinates
-    triangles : (t, 3) vertices
-    material : (t,) index into the materials that are worn
-    bone, weight : (m, 4) bones that move each of the m points, and their weights
-    target, target_point, delta_mm : (n,) index of the expression, (n,) index of the point and (n, 3)
-        displacement of the points by expressions [mm]
+    mesh : mesh of an item, which does not depend on the person or on colours
+    points_mm : points (m, 3) of an item on a person with control points (p, 3) [mm]
+    materials : materials of an item
     """
 
-    point: Ints
-    uv: Floats
-    triangles: Ints
-    material: Ints
-    bone: Ints
-    weight: Floats
-    target: Index
-    target_point: Index
-    delta_mm: Floats
-
-    @property
-    def point_count(self) -> int:
-        """Return the number of points."""
-        return len(self.bone)
+    mesh: Callable[[Any], Worn]
+    points_mm: Callable[[Floats, Any], Doubles]
+    materials: Callable[[Any], tuple[Material, ...]]
 
 
-def garment_points_mm(control_mm: Floats, clothing: Clothing) -> Doubles:
-    """Return the points (m, 3) of a garment on a person [mm].
+WEARABLES: Mapping[type[Item], Wearable] = {
+    Clothing: Wearable(worn_garment, garment_points_mm, garment_materials),
+    Glasses: Wearable(worn_glasses, glasses_points_mm, glasses_materials),
+}
+"""Functions for each kind of items."""
+
+
+def worn_points_mm(control_mm: Floats, outfit: Outfit) -> Floats:
+    """Return the points (m, 3) of all items on a person [mm].
 
     control_mm : (p, 3) control points of the person at rest
     """
-    skin_mm, normals = skin_sheet().fit(control_mm.astype(np.float64))
-    cover, placed = np.zeros(len(skin_mm)), list[Doubles]()
-    for panel in _panels(clothing.garment, clothing.cloth):
-        points = panel.place(skin_mm, normals, cover)
-        placed.append(points)
-        if panel.covers:
-            cover = np.maximum(cover, panel.heights_on_sheet(points, skin_mm, normals))
-    return np.concatenate(placed)
+    points = [WEARABLES[type(item)].points_mm(control_mm, item) for item in outfit]
+    return np.concatenate(points).astype(np.float32)
 
 
-def dress(head: Head, clothing: Clothing, template: Head | None) -> Head:
-    """Return a head with clothing.
+def dress(head: Head, outfit: Outfit, template: Head | None) -> Head:
+    """Return a head that wears an outfit of at least one item.
 
     template : the dressed head of the mean person, whose atlas and other data are shared; None to make it
     """
-    worn = worn_garment(clothing.garment, clothing.cloth)
-    rig = _dressed_rig(head, worn, garment_points_mm(head.control_rig.positions_mm, clothing))
-    rig = replace(rig, template=template and template.control_rig)
     mesh, first_point = head.mesh, int(head.mesh.point.max()) + 1
-    points = rig.positions_mm[-worn.point_count :]
-    triangles = np.concatenate([mesh.triangles, worn.triangles + len(mesh.positions)])
+    rig, points = head.control_rig, worn_points_mm(head.control_rig.positions_mm, outfit)
+    positions, uv, triangles = [mesh.positions], [mesh.uv], [mesh.triangles]
+    point, material, materials = [mesh.point], [mesh.material], mesh.materials
+    vertex_count, done = len(mesh.positions), 0
+    for item in outfit:
+        make = WEARABLES[type(item)]
+        worn = make.mesh(item)
+        own = points[done : done + worn.point_count]
+        rig = _dressed_rig(rig, worn, own)
+        positions.append(own[worn.point])
+        uv.append(worn.uv)
+        triangles.append(worn.triangles + vertex_count)
+        point.append(worn.point + first_point + done)
+        material.append(worn.material + len(materials))
+        materials = (*materials, *make.materials(item))
+        vertex_count, done = vertex_count + len(worn.point), done + worn.point_count
     dressed = build_mesh(
-        np.concatenate([mesh.positions, points[worn.point]]),
-        np.concatenate([mesh.uv, worn.uv]),
-        triangles,
-        np.concatenate([mesh.material, worn.material + len(mesh.materials)]),
-        (*mesh.materials, *garment_materials(clothing)),
-        point=np.concatenate([mesh.point, worn.point + first_point]),
+        *(np.concatenate(parts) for parts in (positions, uv, triangles, material)),
+        materials,
+        point=np.concatenate(point),
         quads=mesh.quads,
     )
+    rig = replace(rig, template=template and template.control_rig)
     return replace(head, mesh=dressed, rig=rig, template=template, undressed=head)
 
 
-def dressed_template(layout: Layout, levels: int, clothing: Clothing) -> Head:
-    """Return the dressed head of the mean person, which all people with this garment share; it is cached."""
-    return _dressed_template(layout, levels, clothing.garment, clothing.cloth)
+def dressed_template(layout: Layout, levels: int, outfit: Outfit) -> Head:
+    """Return the dressed head of the mean person, which all people with these items share; it is cached."""
+    return _dressed_template(layout, levels, tuple(item.without_colour for item in outfit))
 
 
 @cache
-def _dressed_template(layout: Layout, levels: int, garment: str, cloth: str) -> Head:
-    return dress(head_template(layout, levels).head, Clothing(garment, cloth), None)
+def _dressed_template(layout: Layout, levels: int, outfit: Outfit) -> Head:
+    return dress(head_template(layout, levels).head, outfit, None)
 
 
-def garment_materials(clothing: Clothing) -> tuple[Material, ...]:
-    """Return the materials of a garment, one for each slot of `_slots`."""
-    cloth, colour = CLOTHS[clothing.cloth], linear_colour(clothing.colour)
-    of_slot = {
-        "cloth": Material("cloth", "opaque", colour, roughness=cloth.roughness, fabric=cloth.fabric),
-        "trim": Material("trim", "opaque", colour, roughness=cloth.roughness, fabric=cloth.trim),
-        "button": Material("button", "opaque", _BUTTON_COLOUR, roughness=_BUTTON_ROUGHNESS),
-        "cord": Material("cord", "opaque", _CORD_COLOUR, roughness=0.8, fabric=CLOTHS["cotton"].fabric),
-    }
-    slots = _slots(clothing.garment, clothing.cloth)
-    return tuple(replace(of_slot[slot], label=_CLOTHING_LABEL) for slot in slots)
-
-
-def _panels(garment: str, cloth: str) -> Sequence[Panel]:
-    return garment_panels(garment, CLOTHS[cloth].folds)
-
-
-def _slots(garment: str, cloth: str) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(panel.slot for panel in _panels(garment, cloth)))
-
-
-@cache
-def worn_garment(garment: str, cloth: str) -> Worn:
-    """Return the mesh of a garment, its bone weights and its displacements by expressions."""
-    from scipy.sparse import vstack
-
-    panels, slots = _panels(garment, cloth), _slots(garment, cloth)
-    counts = np.cumsum([0, *(len(panel.height_mm) for panel in panels)])
-    seams = [panel.vertices for panel in panels]
-    first_vertex = np.cumsum([0, *(len(one.point) for one in seams)])
-    bind = (vstack([panel.bind for panel in panels]) @ skin_sheet().weights).tocsr()
-    bone, weight = _bone_weights(bind)
-    target, point, delta = _displacements(bind)
-    return Worn(
-        np.concatenate([one.point + first for one, first in zip(seams, counts, strict=False)]),
-        np.concatenate([one.uv_mm for one in seams]).astype(np.float32) / np.float32(MM_PER_UV),
-        np.concatenate([one.triangles + first for one, first in zip(seams, first_vertex, strict=False)]),
-        np.repeat([slots.index(panel.slot) for panel in panels], [len(one.triangles) for one in seams]),
-        bone,
-        weight,
-        target,
-        point,
-        delta,
-    )
-
-
-def _bone_weights(bind) -> tuple[Ints, Floats]:
-    """Return the four strongest bones (m, 4) of points, and their weights (m, 4).
-
-    bind : (m, p) weights of MakeHuman's points in each of the m points
-    """
-    arrays = makehuman_arrays()
-    own = arrays["weight"][: bind.shape[1]].astype(np.float64)
-    dense = np.zeros((len(own), len(arrays["bone_names"])))
-    np.add.at(dense, (np.arange(len(own))[:, None], arrays["bone"][: len(own)]), own)
-    spread = np.asarray(bind @ (dense / dense.sum(axis=1, keepdims=True)))
-    bone = np.argsort(-spread, axis=1, kind="stable")[:, :BONES_PER_POINT]
-    weight = np.take_along_axis(spread, bone, 1)
-    return bone.astype(np.int32), (weight / weight.sum(axis=1, keepdims=True)).astype(np.float32)
-
-
-def _displacements(bind) -> tuple[Index, Index, Floats]:
-    """Return target, point and displacement of points by expressions; see `Worn` for the arrays."""
-    targets, count = expression_targets(), bind.shape[1]
-    found: list[tuple[Index, Index, Doubles]] = []
-    for k in range(len(targets.names)):
-        part = targets.displacement_rows(k)
-        inside = targets.point[part] < count
-        dense = np.zeros((count, 3))
-        dense[targets.point[part][inside]] = targets.delta_mm[part][inside]
-        moved = np.asarray(bind @ dense)
-        rows = np.flatnonzero(np.abs(moved).max(axis=1) > _MIN_DELTA_MM)
-        found.append((np.full(len(rows), k), rows, moved[rows]))
-    target, point, delta = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return target, point, delta.astype(np.float32)
-
-
-def _dressed_rig(head: Head, worn: Worn, points_mm: Doubles) -> Rig:
-    rig = head.control_rig
+def _dressed_rig(rig: Rig, worn: Worn, points_mm: Floats) -> Rig:
     assert rig.skeleton is not None
     skeleton = replace(
         rig.skeleton,

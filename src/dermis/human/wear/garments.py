@@ -92,9 +92,27 @@ def _collar_leaf(level_mm: Doubles, crease_mm: Doubles) -> Panel:
     angle = column_angles()
     edge = 14.0 + 40.0 * smoothstep(1.25, 0.35, angle)
     profile, columns = Profile(), list[Doubles]()
-    outer = [(0.0, 5.4), (0.01, 7.4), (0.06, 9.0), (0.2, 9.4), (0.35, 8.2), (0.5, 6.6), (0.65, 5.4), (0.8, 4.8)]
+    outer = [
+        (0.0, 5.4),
+        (0.01, 7.4),
+        (0.06, 9.0),
+        (0.2, 9.4),
+        (0.35, 8.2),
+        (0.5, 6.6),
+        (0.65, 5.4),
+        (0.8, 4.8),
+    ]
     outer += [(0.93, 4.8), (0.985, 4.7)]
-    under = [(1.0, 4.0), (0.985, 3.0), (0.93, 2.8), (0.8, 2.8), (0.65, 3.2), (0.5, 4.2), (0.35, 5.8), (0.2, 6.8)]
+    under = [
+        (1.0, 4.0),
+        (0.985, 3.0),
+        (0.93, 2.8),
+        (0.8, 2.8),
+        (0.65, 3.2),
+        (0.5, 4.2),
+        (0.35, 5.8),
+        (0.2, 6.8),
+    ]
     under += [(0.06, 6.4), (0.01, 5.0)]
     for t, height in reversed(outer + under):
         start = np.radians(4.0 + 13.0 * t)
@@ -105,7 +123,9 @@ def _collar_leaf(level_mm: Doubles, crease_mm: Doubles) -> Panel:
 
 def _placket() -> Panel:
     """Return the strip of cloth in which the buttonholes are."""
-    across = np.array([-17.5, -17.0, -16.0, -12.5, -11.5, -10.5, -4.0, 4.0, 10.5, 11.5, 12.5, 16.0, 17.0, 17.5])
+    across = np.array(
+        [-17.5, -17.0, -16.0, -12.5, -11.5, -10.5, -4.0, 4.0, 10.5, 11.5, 12.5, 16.0, 17.0, 17.5]
+    )
     rise = np.array([-2.0, 1.6, 2.0, 1.9, 1.5, 2.0, 2.2, 2.2, 2.0, 1.5, 1.9, 2.0, 1.6, -2.0])
     y = np.linspace(-352.0, -203.0, 44)
     x, y = np.meshgrid(across, y)
@@ -138,7 +158,11 @@ def hoodie(folds: Folds) -> list[Panel]:
         return np.asarray(6.0 * size * smooth_noise(around, 9) * np.sin(np.pi * row / 24.0))
 
     cords = [_cord(side * 15.0, side * 24.0, -198.0, end) for side, end in ((-1.0, -318.0), (1.0, -306.0))]
-    return [body_panel(level - 6.0, folds, 6.0), swept_panel(level, profile, "cloth", fold_mm=creases_mm), *cords]
+    return [
+        body_panel(level - 6.0, folds, 6.0),
+        swept_panel(level, profile, "cloth", fold_mm=creases_mm),
+        *cords,
+    ]
 
 
 def _cord(top_x_mm: float, low_x_mm: float, top_y_mm: float, low_y_mm: float) -> Panel:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 from dermis.base.errors import format_value, refuse
@@ -84,6 +84,12 @@ class Item:
         return found
 
     @property
+    def without_colour(self) -> Self:
+        """Return the item in the default colour; items that differ only in colour have the same mesh."""
+        fields = getattr(self, "__dataclass_fields__", {})
+        return replace(self, colour=fields["colour"].default)  # type: ignore[type-var, call-arg]
+
+    @property
     def text(self) -> str:
         """Return the item as words that can be parsed, such as "navy denim shirt"."""
         return " ".join(str(getattr(self, name)) for name in self._names_by_field())
@@ -128,4 +134,53 @@ class Clothing(Item):
         if self.cloth is None:
             object.__setattr__(self, "cloth", GARMENT_CLOTHS[self.garment])
         check_name("cloth", self.cloth, CLOTH_NAMES)
+        check_colour("colour", self.colour)
+
+
+GLASSES_COLOURS = {
+    "round": "mustard",
+    "square": "black",
+    "aviator": "mustard",
+    "rimless": "grey",
+    "sunglasses": "black",
+}
+"""Usual colour of each frame."""
+GLASSES_STYLES: tuple[str, ...] = tuple(GLASSES_COLOURS)
+
+
+@dataclass(frozen=True)
+class Glasses(Item):
+    """Glasses or sunglasses.
+
+    Parameters
+    ----------
+    style : {"round", "square", "aviator", "rimless", "sunglasses"}
+        Frame. Round, aviator and rimless frames are of metal; aviators and sunglasses have dark lenses.
+    colour : str, optional
+        Name of the palette, such as "brown", or "#rrggbb" (sRGB); by default the usual colour of the frame.
+
+    Raises
+    ------
+    DermisError
+        For unknown styles and colours.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> dermis.Human(glasses="brown square").glasses
+    Glasses(style='square', colour='brown')
+    """
+
+    style: str = "square"
+    colour: str = None  # type: ignore[assignment]  # `__post_init__` replaces None
+
+    @classmethod
+    def _names_by_field(cls) -> dict[str, tuple[str, ...]]:
+        return {"colour": COLOURS, "style": GLASSES_STYLES}
+
+    def __post_init__(self) -> None:
+        """Replace a missing colour by the usual one; raise DermisError for unknown names."""
+        check_name("style", self.style, GLASSES_STYLES)
+        if self.colour is None:
+            object.__setattr__(self, "colour", GLASSES_COLOURS[self.style])
         check_colour("colour", self.colour)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 _RELAXING_STEPS = 40
 _GROWING_HEIGHT_MM = 6.0  # height from which normals are smoothed, so that surfaces do not cross
 _NORMAL_STEPS = 12
+_NEIGHBOUR_WEIGHT = 3.0  # of the normals around a point of stretched cloth
 
 
 class PanelVertices(NamedTuple):
@@ -106,6 +107,8 @@ class Panel:
         height = self.height_mm + np.asarray(self.bind @ cover_mm) * (self.height_mm > 0.0)
         if height.max() > _GROWING_HEIGHT_MM and not self.taut.any():
             normal = self._smooth(normal)
+        if self.taut.any():  # normals at the border of the skin depend on single triangles
+            normal = unit_vectors(normal + _NEIGHBOUR_WEIGHT * (self.mean_of_neighbours @ normal))
         points = base + height[:, None] * normal
         if not self.taut.any():
             return np.asarray(points + self.fold_mm[:, None] * normal)

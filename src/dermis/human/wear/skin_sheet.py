@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dermis.base.arrays import Doubles, Index, Ints
+from dermis.base.arrays import Doubles, Index, Ints, Mask
 from dermis.human.makehuman import mesh_point_count
 from dermis.human.model import MEAN_PERSON_WEIGHTS, control_points_mm, head_template
 
@@ -24,7 +25,10 @@ NECK_AXIS_Z_MM = -92.0
 
 _FRONT_BASE_YZ_MM = -197.0, -43.0  # height and depth of the base of the neck at its front
 _BASE_SLOPE = -0.417  # rise of the base of the neck towards the back
-_BASE_RISE, _BASE_ROUNDING_MM = 0.42, 38.0  # rise of the base to the sides, and half width of its round middle
+_BASE_RISE, _BASE_ROUNDING_MM = (
+    0.42,
+    38.0,
+)  # rise of the base to the sides, and half width of its round middle
 
 
 def levels_mm(mean_mm: Doubles) -> Doubles:
@@ -79,19 +83,41 @@ def unit_vectors(vectors: Doubles) -> Doubles:
 @cache
 def skin_sheet() -> SkinSheet:
     """Return the sheet of skin on which garments are defined; it is the same for all people."""
+    return _sheet_where(lambda points: (levels_mm(points) > _HIGHEST_LEVEL_MM) & _is_outer_skin(points))
+
+
+@cache
+def head_sheet() -> SkinSheet:
+    """Return the sheet of skin on which glasses and headwear are fitted; it is the same for all people."""
+    return _sheet_where(lambda points: (points[:, 1] > -62.0) & _is_outside_sockets(points))
+
+
+def _sheet_where(is_wanted: Callable[[Doubles], Mask]) -> SkinSheet:
+    """Return the triangles of the skin whose corners on the mean person are all wanted.
+
+    is_wanted : function from points (n, 3) to a mask (n,)
+    """
     template = head_template("own", _SHEET_LEVELS)
     assert template.refinement is not None
     mean = control_points_mm(MEAN_PERSON_WEIGHTS).astype(np.float64)
     points, mesh = np.asarray(template.refinement.weights @ mean), template.head.mesh
     level = levels_mm(points)
     corners = mesh.point[mesh.triangles[mesh.material == 0]]
-    inside = (level[corners] > _HIGHEST_LEVEL_MM).all(axis=1) & _is_outer_skin(points)[corners].all(axis=1)
+    inside = is_wanted(points)[corners].all(axis=1)
     used, triangles = np.unique(corners[inside], return_inverse=True)
     weights = template.refinement.weights[used][:, : mesh_point_count()]
     return SkinSheet(weights.tocsr(), triangles.reshape(-1, 3), points[used], level[used])
 
 
-def _is_outer_skin(points: Doubles) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _is_outside_sockets(points: Doubles) -> Mask:
+    """Return a mask (n,) of points (n, 3) that are not in the mouth, or deep in nose and eye sockets."""
+    x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
+    in_socket = (np.hypot((x - 30.0) / 16.0, y / 9.0) < 1.0) & (z < 2.0) & (z > -40.0)
+    in_mouth = (x < 25.0) & (y < -40.0) & (z < 20.0) & (z > -60.0)
+    return np.asarray(~in_socket & ~in_mouth)
+
+
+def _is_outer_skin(points: Doubles) -> Mask:
     """Return a mask (n,) of points (n, 3) that are not in the mouth, on lips or ears."""
     x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     return np.asarray(((z < -30.0) | (y < -95.0)) & ((x < 62.0) | (y < -75.0)))

@@ -187,7 +187,9 @@ def draw(
     buffers, albedo, colours = interreflection
     (points, count), footprint = buffers.sample_points, 2.0 / (CELLS_PER_SIDE * SAMPLES_PER_PATCH**0.5)
     own: Bindings = {
-        "samples": shader.make_record("Samples", count=count, footprint=footprint, albedo=albedo, material_colour=colours),
+        "samples": shader.make_record(
+            "Samples", count=count, footprint=footprint, albedo=albedo, material_colour=colours
+        ),
         "sample_points": points,
         "sample_exitance": buffers.sample_exitance,
         "from_skin": buffers.no_light,
