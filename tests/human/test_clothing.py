@@ -10,6 +10,8 @@ from dermis.base.errors import DermisError
 from dermis.human.labels.classes import class_number
 from dermis.human.labels.fields import mesh_labels
 from dermis.human.person_file import read_person, write_person_json
+from dermis.human.wear.fabrics import CLOTHS
+from dermis.human.wear.garments import garment_panels
 from dermis.human.wear.look import GARMENT_NAMES, Clothing
 from dermis.human.wear.skin_sheet import RING_SIZE, levels_mm, ring_around, skin_sheet
 
@@ -46,16 +48,10 @@ def skin_depths_mm(head: dermis.Head, worn_mm: np.ndarray, skin_mm: np.ndarray) 
     return -np.sign(height[best]) * distance.ravel()[best]
 
 
-def outer_points(head: dermis.Head) -> np.ndarray:
-    """Return the points of a garment that are not the hem, which ends in the skin on purpose."""
-    from dermis.human.wear.dress import _panels
-
-    clothing = dermis.Human(clothing=_GARMENT_OF[id(head)]).clothing
-    panels = _panels(clothing.garment, clothing.cloth)
-    return np.concatenate([panel.height_mm > 0.0 for panel in panels])
-
-
-_GARMENT_OF: dict[int, str] = {}
+def outer_points(garment: str) -> np.ndarray:
+    """Return a mask of the points of a garment that are not the hem, which ends in the skin on purpose."""
+    cloth = CLOTHS[Clothing(garment).cloth]
+    return np.concatenate([panel.height_mm > 0.0 for panel in garment_panels(garment, cloth.folds)])
 
 
 @pytest.mark.parametrize("garment", GARMENT_NAMES)
@@ -64,8 +60,7 @@ def test_no_garment_cuts_the_skin(garment: str) -> None:
     turned = dermis.Pose({"jawOpen": 0.4}, {"neck02": (0, 12, 0), "head": (0, 12, 0)})
     for seed in PEOPLE:
         head = dressed(garment, seed)
-        _GARMENT_OF[id(head)] = garment
-        outer, count = outer_points(head), int(head.body.mesh.point.max()) + 1
+        outer, count = outer_points(garment), int(head.body.mesh.point.max()) + 1
         for pose in (dermis.Pose(), turned):
             points = head.control_rig.posed_points_mm(pose.to_arrays(head.control_rig))
             depth = skin_depths_mm(head, points[count:][outer], points[:count])

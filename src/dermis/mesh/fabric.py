@@ -19,7 +19,8 @@ class Fabric(NamedTuple):
     thread_mm : distance between threads, stitches or ribs [mm]
     relief : slope of the threads' relief [-]
     contrast : relative difference of brightness between the two directions of threads [-]
-    sheen : strength of the lobe by which upright fibres scatter light at grazing angles [-]
+    sheen : strength of the lobe by which upright fibres scatter light at grazing angles [EstevezKulla2017]
+        [-]
     crumple : slope of small wrinkles that are finer than the mesh [-]
     """
 

@@ -264,7 +264,8 @@ def _load_human(
     loaded = load_maps(**map_files, height_mm=height_mm, normal_y=normal_y) if map_files else None
     level_of = subdivision_levels if callable(subdivision_levels) else lambda plain: subdivision_levels
     person = load_person(head_name)
-    person = replace(person, **{name: item for name, item in worn.items() if item is not None})
+    worn_words: dict[str, Any] = {name: words for name, words in worn.items() if words is not None}
+    person = replace(person, **worn_words)
     head = person.head(subdivide=lambda plain: max(MIN_HUMAN_SUBDIVISION_LEVELS, level_of(plain)))
     user_maps = {role: getattr(loaded, role) for role in map_files}  # the other maps are painted
     return replace(head, name=head_name, maps=replace(head.maps, **user_maps))

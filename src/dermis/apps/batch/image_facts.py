@@ -55,7 +55,7 @@ class ImageFacts:
 
 
 def person_facts(person: Human) -> dict[str, float | str | None]:
-    """Return sex, age, ancestry, skin, eyes, hair and clothing of a person by parameter name, such as "person.age".
+    """Return sex, age, ancestry, looks and clothing of a person by parameter name, such as "person.age".
 
     Numbers are rounded to six significant digits; None stands for a field without a value. Morph targets and
     seeds are not included.

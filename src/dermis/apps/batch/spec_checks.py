@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 from dermis.apps.batch.distributions import Distribution
 from dermis.apps.batch.lighting import LAMP_NAMES
@@ -223,7 +224,8 @@ def _check_looks(distributions: Mapping[str, Distribution]) -> None:
     for name in _WORN_FIELDS:
         distribution = distributions.get(f"person.{name}")
         for value in () if distribution is None else distribution.support:
-            Human(**{name: value})
+            fields_of_human: dict[str, Any] = {name: value}
+            Human(**fields_of_human)
     for part, kind in _LOOK_MODELS.items():
         known = [one.name for one in fields(kind) if one.name not in (_SEED_FIELD, SITES_FIELD)]
         _check_table(f"person.{part}", distributions, known, kind)

@@ -75,12 +75,15 @@ def dress(head: Head, outfit: Outfit, template: Head | None) -> Head:
         materials = (*materials, *make.materials(item))
         vertex_count, done = vertex_count + len(worn.point), done + worn.point_count
     dressed = build_mesh(
-        *(np.concatenate(parts) for parts in (positions, uv, triangles, material)),
+        np.concatenate(positions),
+        np.concatenate(uv),
+        np.concatenate(triangles),
+        np.concatenate(material),
         materials,
         point=np.concatenate(point),
         quads=mesh.quads,
     )
-    rig = replace(rig, template=template and template.control_rig)
+    rig = replace(rig, template=None if template is None else template.control_rig)
     return replace(head, mesh=dressed, rig=rig, template=template, undressed=head)
 
 

@@ -28,13 +28,13 @@ class Cloth(NamedTuple):
 CLOTHS: Mapping[str, Cloth] = {
     "cotton": Cloth(
         Fabric("jersey", 0.9, 0.22, 0.06, 0.05, 0.03),
-        Fabric("rib", 2.2, 0.50, 0.10, 0.05, 0.0),
+        Fabric("rib", 2.2, 0.36, 0.10, 0.05, 0.0),
         Folds(5.0, 4.5, 4.5, 0.7),
         0.86,
     ),
     "wool": Cloth(
-        Fabric("jersey", 3.6, 0.55, 0.22, 0.16, 0.0),
-        Fabric("rib", 4.6, 0.60, 0.18, 0.16, 0.0),
+        Fabric("jersey", 3.6, 0.26, 0.14, 0.16, 0.0),
+        Fabric("rib", 4.6, 0.36, 0.14, 0.16, 0.0),
         Folds(4.0, 4.5, 5.5, 0.2),
         0.9,
     ),
@@ -75,6 +75,8 @@ _COLOURS = {
     "purple": "#5c4673",
     "brown": "#6b4c39",
     "beige": "#bfa987",
+    "gold": "#dcbd8b",
+    "silver": "#c9c9cb",
 }
 COLOURS: tuple[str, ...] = tuple(_COLOURS)
 """Names of the palette of fabrics."""

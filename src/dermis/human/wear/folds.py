@@ -66,7 +66,7 @@ def _ridges(phase: Doubles, seed: int) -> Doubles:
 
 
 def _drag_folds(mean_mm: Doubles, bend: Doubles) -> Doubles:
-    """Return the relative height (n,) of folds that radiate from the armpits over chest and shoulder blade."""
+    """Return the relative height (n,) of folds that radiate from the armpits over chest and back."""
     x, y, z = np.abs(mean_mm[:, 0]), mean_mm[:, 1], mean_mm[:, 2]
     side, up = x - _ARMPIT_MM[0], y - _ARMPIT_MM[1]
     r = np.sqrt(side**2 + up**2 + 1e-9)

@@ -43,7 +43,7 @@ FRAMES: Mapping[str, Frame] = {
         (57.0, 46.0), 15.0, (3.2, 2.2), 1.0, (0.8, 0.9), (0.7, 1.2), is_metal=True, is_dark=True
     ),
     "rimless": Frame((51.0, 34.0), 18.0, (3.2, 2.5), 0.0, (0.35, 1.0), (0.7, 1.1), is_metal=True),
-    "sunglasses": Frame((54.0, 43.0), 17.0, (3.0, 2.5), 0.25, (2.8, 2.2), (1.9, 4.6), is_dark=True),
+    "sunglasses": Frame((55.0, 44.0), 16.0, (3.3, 2.5), 0.3, (2.0, 2.0), (1.9, 4.6), is_dark=True),
 }
 """Frames by name."""
 _OUTLINE_SIZE = 56
@@ -52,6 +52,7 @@ _LENS_Y_MM, _TILT_DEGREES, _WRAP_RADIUS_MM = -4.5, 7.0, 210.0
 _CLEARANCE_MM, _MIN_FRONT_Z_MM = 1.2, 27.0  # of the frame in front of the skin; of the lenses past the lashes
 _FRONT_NEIGHBOURS = 5  # points of skin of which the frontmost counts
 _EAR_POINTS = {1.0: (4597, 4603), -1.0: (2176, 2182)}  # control points at the top and the back of each ear
+_PAD_WIRE_BEND_MM = np.array([0.0, -1.0, -4.0])
 _TRAGI = 4618, 2197
 
 
@@ -208,7 +209,7 @@ def _nose_pad(fit: _Fit, side: float, flat: Doubles, front_z_mm: float) -> list[
     inner = flat[np.abs(flat[:, 0]).argmin()]
     start = _on_front(inner[None] + [[0.0, 3.0]], front_z_mm)[0]
     t = np.linspace(0.0, 1.0, 6)[:, None]
-    wire = (1.0 - t) ** 2 * start + 2.0 * t * (1.0 - t) * (start + [0.0, -1.0, -4.0]) + t * t * middle
+    wire = (1.0 - t) ** 2 * start + 2.0 * t * (1.0 - t) * (start + _PAD_WIRE_BEND_MM) + t * t * middle
     thin = np.full(6, 0.45)
     return [pad, tube(wire, np.tile([0.0, 1.0, 0.2], (6, 1)), thin, thin, "frame")]
 

@@ -138,10 +138,10 @@ class Clothing(Item):
 
 
 GLASSES_COLOURS = {
-    "round": "mustard",
+    "round": "gold",
     "square": "black",
-    "aviator": "mustard",
-    "rimless": "grey",
+    "aviator": "gold",
+    "rimless": "silver",
     "sunglasses": "black",
 }
 """Usual colour of each frame."""

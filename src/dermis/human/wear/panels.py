@@ -20,7 +20,7 @@ _NEIGHBOUR_WEIGHT = 3.0  # of the normals around a point of stretched cloth
 
 
 class PanelVertices(NamedTuple):
-    """Vertices of a panel: index of the point (v,), position on the cloth (v, 2) [mm], and triangles (t, 3)."""
+    """Vertices of a panel: index of the point (v,), position on the cloth (v, 2) [mm], triangles (t, 3)."""
 
     point: Ints
     uv_mm: Doubles
@@ -63,14 +63,14 @@ class Panel:
     @cached_property
     def mean_of_neighbours(self) -> csr_array:
         """Return the (m, m) matrix of the means over the neighbours of each point."""
-        from scipy.sparse import coo_array, diags_array
+        from scipy.sparse import coo_array, csr_array, diags_array
 
         a = self.triangles.ravel()
         b = np.roll(self.triangles, -1, axis=1).ravel()
         rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
         links = coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(self.height_mm),) * 2).tocsr()
         links.data[:] = 1.0
-        return (diags_array(1.0 / np.maximum(links.sum(axis=1), 1.0)) @ links).tocsr()
+        return csr_array(diags_array(1.0 / np.maximum(links.sum(axis=1), 1.0)) @ links)
 
     @cached_property
     def vertices(self) -> PanelVertices:

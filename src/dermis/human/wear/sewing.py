@@ -52,7 +52,7 @@ def body_panel(field_mm: Doubles, folds: Folds, ease_mm: float) -> Panel:
     wall = np.concatenate([np.stack([a, c, b], 1), np.stack([b, c, d], 1)])
     taut = ~part.on_border
     taut[hem] = False
-    above_hem = cKDTree(mean[hem]).query(mean)[0]
+    above_hem: Doubles = np.asarray(cKDTree(mean[hem]).query(mean)[0])
     fold = folds.heights_mm(mean) * smoothstep(0.0, 28.0, below) * smoothstep(0.0, 24.0, above_hem)
     uv = cloth_coordinates_mm(part, mean)
     return Panel(
@@ -157,7 +157,8 @@ def front_panel(
     x_mm: Doubles, y_mm: Doubles, height_mm: Doubles, slot: str, is_closed: bool = False, covers: bool = False
 ) -> Panel:
     """Return a panel on the chest whose points are a grid (rows, columns) seen from the front [mm]."""
-    grid = Grid(*x_mm.shape, is_closed)
+    rows, columns = x_mm.shape
+    grid = Grid(rows, columns, is_closed)
     uv = np.stack([x_mm.ravel(), y_mm.ravel()], axis=1)
     bind = _front_bind(x_mm.ravel(), y_mm.ravel())
     return Panel(bind, grid.triangles, height_mm.ravel(), uv, slot, covers=covers, grid=grid)

@@ -71,7 +71,7 @@ def point_normals(points: Doubles, triangles: Ints) -> Doubles:
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     flat = triangles.ravel()
     total = np.stack([np.bincount(flat, np.repeat(area[:, k], 3), len(points)) for k in range(3)], axis=1)
-    return unit_vectors(total)
+    return unit_vectors(total.astype(np.float64))
 
 
 def unit_vectors(vectors: Doubles) -> Doubles:
@@ -106,7 +106,7 @@ def _sheet_where(is_wanted: Callable[[Doubles], Mask]) -> SkinSheet:
     inside = is_wanted(points)[corners].all(axis=1)
     used, triangles = np.unique(corners[inside], return_inverse=True)
     weights = template.refinement.weights[used][:, : mesh_point_count()]
-    return SkinSheet(weights.tocsr(), triangles.reshape(-1, 3), points[used], level[used])
+    return SkinSheet(weights.tocsr(), triangles.reshape(-1, 3).astype(np.int32), points[used], level[used])
 
 
 def _is_outside_sockets(points: Doubles) -> Mask:
@@ -167,7 +167,7 @@ def cut_below(field_mm: Doubles) -> Cut:
     columns = np.concatenate([np.arange(n), unique.ravel()])
     values = np.concatenate([np.ones(n), np.stack([1 - t, t], 1).ravel()])
     bind = csr_array((values, (rows, columns)), shape=(n + m, n))
-    return Cut(bind[used], corners.reshape(-1, 3), used >= n)
+    return Cut(bind[used], corners.reshape(-1, 3).astype(np.int32), used >= n)
 
 
 def ring_around(field_mm: Doubles) -> csr_array:

@@ -85,7 +85,7 @@ def disc(outline: Doubles, bulge: Doubles, slot: str) -> Solid:
     bulge : (3,) offset of the middle [mm]
     """
     rings, middle = [], outline.mean(axis=0)
-    sizes = (1.0, 0.8, 0.6, 0.4, 0.2, 0.02)
+    sizes = (*np.cos(np.linspace(0.0, 0.5 * np.pi, 12))[:-1].tolist(), 0.02)
     for size in sizes:
         rings.append(middle + size * (outline - middle) + (1.0 - size * size) * bulge)
     front = Grid(len(sizes), len(outline), True).triangles

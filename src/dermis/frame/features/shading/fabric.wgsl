@@ -63,7 +63,7 @@ fn wrinkle_height(mm: vec2f) -> f32 {
 fn cloth_at(point: Point, colour: vec3f, material: PartMaterial, footprint: f32) -> Surface {
     let mm = MM_PER_UV * point.uv;
     let p = mm / material.thread_mm;
-    let seen = 1.0 - smoothstep(0.25, 0.9, footprint * MM_PER_UV / material.thread_mm);
+    let seen = 1.0 - smoothstep(0.12, 0.4, footprint * MM_PER_UV / material.thread_mm);
     let height = thread_height(p, material.weave);
     let rise = vec2f(thread_height(p + vec2f(FINITE_STEP, 0.0), material.weave), thread_height(p + vec2f(0.0, FINITE_STEP), material.weave));
     var slope = seen * material.relief * clamp((rise - height) / FINITE_STEP, vec2f(-2.0), vec2f(2.0));
@@ -72,7 +72,7 @@ fn cloth_at(point: Point, colour: vec3f, material: PartMaterial, footprint: f32)
     let high = vec2f(wrinkle_height(mm + vec2f(step, 0.0)), wrinkle_height(mm + vec2f(0.0, step)));
     slope += material.crumple * (high - low) / 0.07;
     let mixture = material.contrast * mix(0.35, 1.0 - height, seen);
-    let fibres = 1.0 - smoothstep(0.25, 0.9, footprint * MM_PER_UV / FIBRE_MM);
+    let fibres = 1.0 - smoothstep(0.12, 0.4, footprint * MM_PER_UV / FIBRE_MM);
     var albedo = colour * (1.0 - 0.5 * mixture);
     if (material.weave == TWILL) {
         albedo = mix(colour, WEFT, 0.55 * mixture);
