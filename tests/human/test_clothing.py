@@ -17,6 +17,7 @@ from dermis.human.wear.skin_sheet import RING_SIZE, levels_mm, ring_around, skin
 
 BALD = dermis.HairLook("none")
 PEOPLE = tuple(range(10))
+POINT_STEP = 4  # one of this many points of a garment is tested
 CANDIDATE_COUNT = 12  # triangles near a point of which one is the nearest
 
 
@@ -63,7 +64,7 @@ def test_no_garment_cuts_the_skin(garment: str) -> None:
         outer, count = outer_points(garment), int(head.body.mesh.point.max()) + 1
         for pose in (dermis.Pose(), turned):
             points = head.control_rig.posed_points_mm(pose.to_arrays(head.control_rig))
-            depth = skin_depths_mm(head, points[count:][outer], points[:count])
+            depth = skin_depths_mm(head, points[count:][outer][::POINT_STEP], points[:count])
             assert depth.max() < 0.5, (seed, pose)
 
 
