@@ -87,7 +87,7 @@ class Item:
     def without_colour(self) -> Self:
         """Return the item in the default colour; items that differ only in colour have the same mesh."""
         fields = getattr(self, "__dataclass_fields__", {})
-        return replace(self, colour=fields["colour"].default)  # type: ignore[type-var, call-arg]
+        return replace(self, colour=fields["colour"].default)  # type: ignore[type-var]
 
     @property
     def text(self) -> str:
