@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import struct
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,10 +13,13 @@ import pytest
 
 import dermis
 from dermis.base.errors import DermisError
+from dermis.formats.gltf.write import encode_head
 from dermis.human.labels.classes import class_number
 from dermis.human.labels.fields import mesh_labels
+from dermis.human.wear.fabrics import linear_colour
 from dermis.human.wear.glasses import glasses_solids
 from dermis.human.wear.look import GLASSES_STYLES, Glasses
+from dermis.mesh.maps import Maps
 
 PEOPLE = tuple(range(6))
 LEFT_EAR_TOP, RIGHT_EAR_TOP = 4597, 2176  # control points
@@ -103,3 +109,18 @@ def test_words_describe_glasses() -> None:
     assert dermis.Human(glasses="none").glasses is None
     with pytest.raises(DermisError, match="glasses: expected"):
         dermis.Human(glasses="monocle")
+
+
+def test_gltf_files_have_the_materials_of_what_is_worn() -> None:
+    """Cloth, frame and lenses are materials of their own in glTF, with colour, roughness and metalness."""
+    person = dermis.Human(hair=dermis.HairLook("none"), clothing="red shirt", glasses="aviator")
+    head = replace(person.head(subdivide=0, hairs=0.05), maps=Maps(), eyes=None)
+    data = encode_head(head, roughness=0.3)
+    (length,) = struct.unpack("<I", data[12:16])
+    surfaces = {
+        one["name"]: one["pbrMetallicRoughness"] for one in json.loads(data[20 : 20 + length])["materials"]
+    }
+    assert surfaces["glasses frame"]["metallicFactor"] == 1.0
+    assert surfaces["dark lens"]["roughnessFactor"] < 0.2
+    assert surfaces["cloth"]["roughnessFactor"] > 0.8
+    np.testing.assert_allclose(surfaces["cloth"]["baseColorFactor"][:3], linear_colour("red"), atol=1e-3)
