@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from dermis.human.person import Human
     from dermis.human.regions.apply import with_regions
     from dermis.human.skin.look import SkinLook
+    from dermis.human.wear.look import Clothing, Glasses
     from dermis.images.io import write_image
     from dermis.images.movie import MovieWriter
     from dermis.mesh.clip import Clip
@@ -61,6 +62,8 @@ _MODULE_OF_NAME = {
     "SkinLook": "human.skin.look",
     "EyeLook": "mesh.eye_look",
     "HairLook": "human.hair.look",
+    "Clothing": "human.wear.look",
+    "Glasses": "human.wear.look",
     "HairMotion": "frame.hair_motion",
     "human_targets": "human.makehuman",
     "with_regions": "human.regions.apply",
@@ -105,10 +108,12 @@ _MODULE_OF_NAME = {
 __all__ = [
     "Camera",
     "Clip",
+    "Clothing",
     "DermisError",
     "DirectionalLight",
     "Environment",
     "EyeLook",
+    "Glasses",
     "HairLook",
     "HairMotion",
     "Head",

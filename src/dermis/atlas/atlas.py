@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +77,16 @@ class Atlas:
         """Return the fraction of skin triangles without texels; light on these is not diffused [-]."""
         skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
         return float(1.0 - self.mapped[skin].mean()) if skin.any() else 0.0
+
+    def with_triangles(self, triangle_count: int) -> Atlas:
+        """Return this atlas for a mesh with more triangles at the end, which have no texels."""
+        added = triangle_count - len(self.mapped)
+        return replace(
+            self,
+            corner_uv=np.concatenate([self.corner_uv, np.zeros((added, 3, 2), np.float32)]),
+            texels_per_uv=np.concatenate([self.texels_per_uv, np.ones(added, np.float32)]),
+            mapped=np.concatenate([self.mapped, np.zeros(added, bool)]),
+        )
 
     def barycentric_weights(self, rows: slice = _ALL_ROWS) -> Doubles:
         """Return the (n, n, 3) barycentric weights of all three corners at each texel.

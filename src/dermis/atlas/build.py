@@ -48,7 +48,12 @@ def build_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: fl
 
 
 def cached_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> Atlas:
-    """Return the result of `build_atlas`, which is cached on disk if a cache folder is writable."""
+    """Return the result of `build_atlas`, which is cached on disk if a cache folder is writable.
+
+    What a person wears has no texels, so that the atlas is that of the bare mesh.
+    """
+    if mesh.body is not mesh:
+        return cached_atlas(mesh.body, atlas_side, layout, gutter_mm).with_triangles(len(mesh.triangles))
     names = [field.name for field in fields(Atlas)]
 
     @logged_step("mapping the skin to the atlas")

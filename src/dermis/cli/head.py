@@ -54,6 +54,8 @@ def head(
     skin: Annotated[list[str] | None, _WeightsParameter] = None,
     eye: Annotated[list[str] | None, _WeightsParameter] = None,
     hair: Annotated[list[str] | None, _ValuesParameter] = None,
+    clothing: str | None = None,
+    glasses: str | None = None,
     colour: Path | None = None,
     normal: Path | None = None,
     roughness: Path | None = None,
@@ -133,6 +135,12 @@ def head(
         widows_peak, baby_hairs, beard_mm, bushy, grey, temple_grey, eumelanin, pheomelanin, dye_eumelanin,
         dye_pheomelanin, roots_mm and seed [default: from the person]. In .glb files, hairs are thin tubes;
         dermis ignores these tubes when it reads such a file.
+    clothing:
+        Garment, in words for colour, cloth and cut such as "navy denim shirt": crew neck, v-neck, high neck,
+        shirt or hoodie; cotton, wool, denim or linen. [default: none]
+    glasses:
+        Glasses, in words for colour and frame such as "brown square": round, square, aviator, rimless or
+        sunglasses. [default: none]
     colour:
         Colour map of the skin, sRGB. [default: painted]
     normal:
@@ -172,6 +180,7 @@ def head(
         skin=_look_with_values(person.look, skin, "--skin"),
         eyes=_look_with_values(person.iris, eye, "--eye"),
         hair=_hair_look_with_values(person.hair_look, hair),
+        **drop_none(clothing=clothing, glasses=glasses),
     )
     report: Options = {"head": str(output), "person": person_parameters(person)}
     if output.suffix.lower() == ".json":

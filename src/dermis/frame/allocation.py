@@ -22,7 +22,7 @@ from dermis.frame.features.occlusion.moving import (
     make_vertex_sky_visibility,
 )
 from dermis.frame.features.shading.shade import shade_program
-from dermis.frame.features.shading.view import mean_skin_albedo, view_record
+from dermis.frame.features.shading.view import material_colours, mean_skin_albedo, view_record
 from dermis.frame.features.shadows.shadows import ShadowMaps, make_shadow_maps
 from dermis.frame.features.shape.curvature import placeholder_curvature
 from dermis.frame.features.shape.mesh import HeadGeometry, rest_geometry, upload_geometry
@@ -113,6 +113,8 @@ def _shade_constants(request: FrameRequest) -> Constants:
     eyes = request.head.eyes is not None
     used = {"DETAIL": request.has_fine_relief, "EYES": eyes, "MIXED": request.mixes_profiles}
     used["PARTS"] = has_part_materials(request.head)
+    used["WORN"] = not used["PARTS"] and request.head.undressed is not None
+    used["METALS"] = used["PARTS"] or used["WORN"]
     return tuple((name, 1) for name, value in used.items() if value)
 
 
@@ -267,7 +269,15 @@ def _make_layout(
     interreflection = None
     if request.has_interreflection:
         light = request.profile_split.total, request.has_occlusion, request.light_cache_key
-        interreflection = make_interreflection(memo, device, head, atlas, *light, layout_key=layout_key)
+        interreflection = make_interreflection(
+            memo,
+            device,
+            head,
+            atlas,
+            *light,
+            layout_key=layout_key,
+            material_colour=material_colours(request.head),
+        )
     bindings["from_skin"] = (
         interreflection.buffers.from_skin if interreflection else placeholder_interreflection(device)
     )

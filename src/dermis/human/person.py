@@ -44,6 +44,8 @@ from dermis.human.skin.measured import (
     pigment_ancestry,
 )
 from dermis.human.skin.painted import PaintedMaps
+from dermis.human.wear.dress import Outfit, dress, dressed_template, worn_points_mm
+from dermis.human.wear.look import Clothing, Glasses, Item
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -86,7 +88,9 @@ _FIELD_RANGES = {
     "hair_eumelanin": (0.0, 10.0),
     "hair_pheomelanin": (0.0, 10.0),
 }
-_OPTIONAL_FIELDS = "ita", "skin_ancestry"
+_OPTIONAL_FIELDS = "ita", "skin_ancestry", "clothing", "glasses"
+_LOOK_TYPES = (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook))
+_WORN_TYPES: Mapping[str, type[Item]] = MappingProxyType({"clothing": Clothing, "glasses": Glasses})
 # fraction of Caucasian shapes that have one of `_OTHER_SKIN_ANCESTRIES`, if no ancestry is given
 _OTHER_SKIN_ANCESTRY_FRACTION = 0.45
 _OTHER_SKIN_ANCESTRIES = ("south asian", "iraqi", "arabian")
@@ -339,6 +343,10 @@ class Human:
         Look of the eyes; by default typical for the person.
     hair : HairLook, optional
         Look of the hair; by default typical for the person.
+    clothing : Clothing, optional
+        Garment of the upper body, also as words such as "navy denim shirt"; by default none.
+    glasses : Glasses, optional
+        Glasses or sunglasses, also as words such as "brown square"; by default none.
     skin_ancestry : str
         Name of a group of measured people, such as "south asian". The person gets the skin, eye and hair
         colours of this group, independently of the shape; "" for the colours of the shape's ancestries.
@@ -374,6 +382,8 @@ class Human:
     hair: HairLook | None = None
     skin_ancestry: str = ""
     ita: float | None = None
+    clothing: Clothing | None = None
+    glasses: Glasses | None = None
 
     def __post_init__(self) -> None:
         """Raise DermisError for fields out of range."""
@@ -388,9 +398,11 @@ class Human:
             if not isinstance(name, str):
                 refuse("targets", "names", f"got {format_value(name)}", "See human_targets()")
             checked_number(f"target {name!r}", weight, *_TARGET_WEIGHT_RANGE, "beyond it is no face")
-        for name, kind in (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook)):
+        for name, kind in _LOOK_TYPES:
             if not isinstance(look := getattr(self, name), kind | None):
                 refuse(name, f"a {kind.__name__}", f"got {format_value(look)}", "Make one, or leave it out")
+        for name, item in _WORN_TYPES.items():
+            object.__setattr__(self, name, item.coerce(name, getattr(self, name)))
 
     @classmethod
     def sampled(cls, seed: int, **given: Any) -> Human:
@@ -467,7 +479,10 @@ class Human:
         control_head = build_head(self.target_weights(), painted, layout, self.iris)
         shared = head_template(layout, resolve_levels(control_head, subdivide))
         head = shared.refine_head(control_head)
-        return add_hair(head, control_head, shared.root_finder, self.hair_look, self.look.recession, hairs)
+        head = add_hair(head, control_head, shared.root_finder, self.hair_look, self.look.recession, hairs)
+        if not self._outfit:
+            return head
+        return dress(head, self._outfit, dressed_template(layout, head.levels, self._outfit))
 
     def transfer_skin_to(self, head: Head) -> Head:
         """Return the head of another person with the skin and eyes of this person.
@@ -523,6 +538,15 @@ class Human:
         return typical_hair(self._demographics, self.hair_eumelanin, self.hair_pheomelanin)
 
     @property
+    def worn(self) -> dict[str, Item | None]:
+        """Return what the person wears by field of `Human`, such as "clothing"; None for nothing."""
+        return {name: getattr(self, name) for name in _WORN_TYPES}
+
+    @property
+    def _outfit(self) -> Outfit:
+        return tuple(item for item in self.worn.values() if item is not None)
+
+    @property
     def _demographics(self) -> Demographics:
         total = self.african + self.asian + self.caucasian
         fractions = self.african / total, self.asian / total, self.caucasian / total
@@ -536,11 +560,15 @@ class Human:
         """Return the control points (p, 3) in rest pose, relative to the midpoint between the eyes [mm].
 
         `Pose(positions_mm=...)` gives the head of any other person this shape, because all people have
-        corresponding points.
+        corresponding points. Points of clothing and glasses come last, so that heads that share
+        a pose need equal items.
 
         Raises DermisError if `targets` contains names that are not morph targets of MakeHuman.
         """
-        return control_points_mm(self.target_weights())
+        points = control_points_mm(self.target_weights())
+        if not self._outfit:
+            return points
+        return np.concatenate([points, worn_points_mm(points, self._outfit)])
 
     def target_weights(self) -> dict[str, float]:
         """Return the nonzero weights of MakeHuman's morph targets for this person, by target name."""

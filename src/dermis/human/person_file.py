@@ -36,6 +36,7 @@ def person_parameters(person: Human) -> dict[str, Any]:
     """
     numbers = {one.name: getattr(person, one.name) for one in fields(person)}
     numbers |= {"targets": dict(person.targets), "skin": asdict(person.look)}
+    numbers |= {name: asdict(item) if item else None for name, item in person.worn.items()}  # type: ignore[call-overload]
     return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hair_look)}
 
 
@@ -57,7 +58,11 @@ def read_person(path: Path) -> Human:
     person = document.get("person") if isinstance(document, dict) else None
     if not isinstance(person, dict):
         refuse(path, expected, "there is none", "Write one with dermis head -o person.json")
-    parts: tuple[tuple[str, Any], ...] = (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook))
+    parts: tuple[tuple[str, Any], ...] = (
+        ("skin", SkinLook),
+        ("eyes", EyeLook),
+        ("hair", HairLook),
+    )
     looks = {
         name: _build_dataclass(path, kind, person[name])
         for name, kind in parts

@@ -54,6 +54,9 @@ class Head:
         Head with the same triangles and uv, whose uv atlas and other precomputed data this head reuses.
     file_vertices : FileVertices, optional
         Correspondence between points and vertices of the mesh file, for mesh sequences.
+    undressed : Head, optional
+        Head without clothing, headwear and glasses, whose points, vertices, triangles and materials come
+        first in this head; None for a head that wears nothing.
 
     Examples
     --------
@@ -76,6 +79,7 @@ class Head:
     levels: int = 0
     template: Head | None = None
     file_vertices: FileVertices | None = None
+    undressed: Head | None = None
 
     def __repr__(self) -> str:
         """Return name, size, maps and rig on two lines."""
@@ -93,6 +97,11 @@ class Head:
         if self.rig is not None:
             return self.rig
         return Rig(self.mesh.points_mm.astype(np.float32))
+
+    @property
+    def body(self) -> Head:
+        """Return the head without clothing, headwear and glasses."""
+        return self.undressed or self
 
     @cached_property
     def without_maps(self) -> Head:
@@ -141,9 +150,11 @@ class Head:
     def skull_centre_mm(self) -> Point | None:
         """Return the centre of the skull [mm]; None for a mesh without a head.
 
-        Neck, shoulders and body do not shift this centre. If the mesh is a whole body whose skeleton has a
-        head bone, it is the centre of the points that follow this bone.
+        Neck, shoulders, body and what is worn do not shift this centre. If the mesh is a whole body whose
+        skeleton has a head bone, it is the centre of the points that follow this bone.
         """
+        if self.undressed is not None:
+            return self.undressed.skull_centre_mm
         skeleton = None if self.mesh.is_head_sized or self.rig is None else self.rig.skeleton
         bone = None if skeleton is None else head_bone(skeleton.names)
         if skeleton is None or bone is None:

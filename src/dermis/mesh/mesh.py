@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from dermis.base.arrays import Doubles, Floats, Ints, Mask
 from dermis.base.summary import ShortRepr
+from dermis.mesh.fabric import Fabric
 from dermis.mesh.geometry import tangents, vertex_normals, weld
 from dermis.mesh.outline import Outline, convex_hull
 from dermis.mesh.skull import Point, body_skull_centre, is_head_sized, skull_centre_below
@@ -35,6 +36,8 @@ class Material:
     metalness : 1 for metal [-]
     emission : radiance that the group emits, linear Rec. 709
     opacity_cutoff : opacity below which the group is cut out; 0 to cut out nothing
+    fabric : weave and sheen of cloth; None for other surfaces
+    label : label class of what a parametric human wears, such as "clothing"; empty for other surfaces
     """
 
     name: str
@@ -47,6 +50,8 @@ class Material:
     metalness: float = 0.0
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     opacity_cutoff: float = 0.0
+    fabric: Fabric | None = None
+    label: str = ""
 
 
 @dataclass(frozen=True, repr=False)
@@ -114,6 +119,25 @@ class Mesh(ShortRepr):
         is_eye = np.array([one.eye for one in self.materials])[self.material]
         return body_skull_centre(
             self.positions, self.triangles, self.positions[self.triangles[is_eye].ravel()]
+        )
+
+    @cached_property
+    def body(self) -> Mesh:
+        """Return the mesh without what a person wears, whose triangles come last."""
+        worn = [index for index, one in enumerate(self.materials) if one.label]
+        if not worn:
+            return self
+        triangles = self.triangles[self.material < worn[0]]
+        vertices = int(triangles.max()) + 1
+        return Mesh(
+            self.positions[:vertices],
+            self.normals[:vertices],
+            self.uv[:vertices],
+            self.point[:vertices],
+            triangles,
+            self.material[: len(triangles)],
+            self.materials[: worn[0]],
+            self.quads,
         )
 
     @cached_property

@@ -218,7 +218,9 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
     if by_quads:
         solid = mesh.quads[~mesh.cut_out_mask[mesh.quads[:, 0]]]
         quads = np.column_stack((mesh.triangles[solid[:, 0]], mesh.triangles[solid[:, 1], 1]))
-        return _coarsen_quads(quads, mesh.positions, skipped, tolerance_mm)
+        coarse = _coarsen_quads(quads, mesh.positions, skipped, tolerance_mm)
+        worn = mesh.triangles[len(head.body.mesh.triangles) :]
+        return np.concatenate([coarse, worn]) if len(worn) else coarse
     return _coarsen_triangles(mesh.triangles[~mesh.cut_out_mask], mesh.positions, skipped, tolerance_mm)
 
 

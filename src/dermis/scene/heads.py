@@ -63,6 +63,8 @@ def load_head(
     eyes: EyeMode = "fitted",
     eye_groups: Sequence[str] | str = (),
     eye: Mapping[str, float] | None = None,
+    clothing: str | None = None,
+    glasses: str | None = None,
     subdivide: Subdivide = AUTO,
     regions: Literal["auto", "none"] = "auto",
 ) -> Head:
@@ -114,6 +116,11 @@ def load_head(
         the rest of the head.
     eye : mapping, optional
         Dictionary from fields of `EyeLook` to values that override the look of the eyes.
+    clothing : str, optional
+        Garment of a parametric human, in words such as "navy denim shirt", see `Clothing`; "none" for bare
+        shoulders. By default that of the person.
+    glasses : str, optional
+        Glasses of a parametric human, in words such as "brown square", see `Glasses`.
     subdivide : int, "auto" or callable
         Number of subdivision levels, 0 to 3, and at least 1 for the human. Meshes of quads are subdivided by
         Catmull-Clark, other meshes by Loop. "auto" uses as many levels as the outline needs to look smooth in
@@ -167,7 +174,12 @@ def load_head(
     )
     if is_person_name(name):
         mesh_options |= {"eyes": eyes, "skin_site": skin_site}
-        return _with_eye_look(_load_human(name, map_files, height_mm, normal_y, mesh_options, levels), eye)
+        worn = {"clothing": clothing, "glasses": glasses}
+        loaded = _load_human(name, map_files, height_mm, normal_y, mesh_options, levels, worn)
+        return _with_eye_look(loaded, eye)
+    for item, words in (("clothing", clothing), ("glasses", glasses)):
+        if words is not None:
+            refuse(item, f"a person, such as {HUMAN}", f"it is given with {name!r}", "Leave it out")
     if name not in SAMPLES and not is_file(path):
         _refuse_name(name)
     loaded, look = load_file_head(name, mesh_options, map_options)
@@ -223,6 +235,7 @@ def _load_human(
     normal_y: NormalY,
     mesh_options: dict[str, Any],
     subdivision_levels: SubdivisionLevels,
+    worn: Mapping[str, str | None],
 ) -> Head:
     """Return the head of a parametric human in the uv layout "own".
 
@@ -231,6 +244,7 @@ def _load_human(
     height_mm, normal_y : interpretation of the height map and the normal map, see `load_head`
     mesh_options : options that apply only to mesh files; DermisError is raised unless all have their defaults
     subdivision_levels : number of levels, or a function of the head that returns it
+    worn : what the person wears in words, by field of `Human`; None for what the person wears by default
     """
     texts = {"v_origin": "auto", "front": "auto", "eyes": "fitted"}
     defaults = {
@@ -249,9 +263,10 @@ def _load_human(
     map_files: dict[str, Any] = {role: file for role, file in user_files.items() if file is not None}
     loaded = load_maps(**map_files, height_mm=height_mm, normal_y=normal_y) if map_files else None
     level_of = subdivision_levels if callable(subdivision_levels) else lambda plain: subdivision_levels
-    head = load_person(head_name).head(
-        subdivide=lambda plain: max(MIN_HUMAN_SUBDIVISION_LEVELS, level_of(plain))
-    )
+    person = load_person(head_name)
+    worn_words: dict[str, Any] = {name: words for name, words in worn.items() if words is not None}
+    person = replace(person, **worn_words)
+    head = person.head(subdivide=lambda plain: max(MIN_HUMAN_SUBDIVISION_LEVELS, level_of(plain)))
     user_maps = {role: getattr(loaded, role) for role in map_files}  # the other maps are painted
     return replace(head, name=head_name, maps=replace(head.maps, **user_maps))
 

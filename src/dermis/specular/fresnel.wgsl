@@ -1,8 +1,9 @@
 // Fresnel reflectance: Schlick's approximation or exact.
 
 override EXACT_FRESNEL: bool = false;
+override METALS: bool = false; // whether there are surfaces that are not skin and may be metal
 
-//#if PARTS
+//#if METALS
 var<private> metalness: f32; // of the surface, whose reflectance is that of metal where it is 1
 //#end
 
@@ -26,7 +27,7 @@ fn fresnel(cos_theta: f32) -> f32 {
     if (EXACT_FRESNEL) {
         reflectance = dielectric(cos_theta, skin.eta);
     }
-    //#if PARTS
+    //#if METALS
     reflectance = mix(reflectance, 1.0, metalness);
     //#end
     return reflectance;

@@ -11,6 +11,7 @@ from dermis.apps.batch.sampling import Parameters, hashed_uniform, round_signifi
 from dermis.apps.batch.spec import Spec
 from dermis.base.arrays import Doubles
 from dermis.human.person import Human
+from dermis.human.wear.look import NOTHING
 
 SPLITS = ("train", 0.8), ("val", 0.1), ("test", 0.1)
 """Names and fractions of the parts into which a data set is split by person."""
@@ -54,7 +55,7 @@ class ImageFacts:
 
 
 def person_facts(person: Human) -> dict[str, float | str | None]:
-    """Return sex, age, ancestry, skin, eyes and hair of a person by parameter name, such as "person.age".
+    """Return sex, age, ancestry, looks and clothing of a person by parameter name, such as "person.age".
 
     Numbers are rounded to six significant digits; None stands for a field without a value. Morph targets and
     seeds are not included.
@@ -63,6 +64,7 @@ def person_facts(person: Human) -> dict[str, float | str | None]:
     values = {f"person.{name}": value for name, value in _scalar_fields(person).items()}
     for part, look in looks.items():
         values |= {f"person.{part}.{name}": value for name, value in _scalar_fields(look).items()}
+    values |= {f"person.{name}": item.text if item else NOTHING for name, item in person.worn.items()}
     return values
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 from dermis.apps.batch.distributions import Distribution
 from dermis.apps.batch.lighting import LAMP_NAMES
@@ -38,6 +39,7 @@ from dermis.scene.skin import Skin
 
 _UNSAMPLED_SKIN_FIELDS = "pigments", "layers", "profile_map", "other_profiles"  # fields of `Skin`
 _SEED_FIELD = "seed"  # an integer that follows from the person
+_WORN_FIELDS = "clothing", "glasses"
 _LOOK_MODELS: Mapping[str, type] = {"skin": SkinLook, "eyes": EyeLook, "hair": HairLook}
 _ANCESTRY_PARAMETERS = "person.african", "person.asian", "person.caucasian"
 _ITA_PARAMETER, _MELANIN_PARAMETER = "person.ita", "person.skin.melanin"
@@ -219,6 +221,11 @@ def _check_looks(distributions: Mapping[str, Distribution]) -> None:
 
     distributions : distribution of each parameter by its dotted name
     """
+    for name in _WORN_FIELDS:
+        distribution = distributions.get(f"person.{name}")
+        for value in () if distribution is None else distribution.support:
+            fields_of_human: dict[str, Any] = {name: value}
+            Human(**fields_of_human)
     for part, kind in _LOOK_MODELS.items():
         known = [one.name for one in fields(kind) if one.name not in (_SEED_FIELD, SITES_FIELD)]
         _check_table(f"person.{part}", distributions, known, kind)

@@ -203,6 +203,10 @@ class PersonTable(FrozenModel):
     """Eumelanin of the hair before greying: 0.3 is blond, 1.3 brown, 8 black."""
     hair_pheomelanin: Annotated[Distribution | None, _HAIR_MELANIN_FIELD] = None
     """Pheomelanin of the hair before greying: 2 with little eumelanin is red."""
+    clothing: Annotated[Distribution | None, NameField()] = None
+    """Garment in words, such as "navy denim shirt"; "none" and by default bare shoulders."""
+    glasses: Annotated[Distribution | None, NameField()] = None
+    """Glasses in words, such as "brown square"; "none" and by default no glasses."""
     skin: _Distributions = Field(default_factory=dict)
     """Fields of `SkinLook`: melanin, blood, freckles, spots, oil ..."""
     eyes: _Distributions = Field(default_factory=dict)

@@ -113,10 +113,9 @@ def surface_material(
     roughness : Beckmann's m of skin without a roughness map [-]
     """
     if material.kind != "skin":
-        return {
-            "name": material.name,
-            "pbrMetallicRoughness": _plain_gltf_surface(material, _roughness_from_name(material)),
-        }
+        roughness = _roughness_from_name(material) if material.roughness is None else material.roughness
+        plain = _plain_gltf_surface(material, roughness) | {"metallicFactor": material.metalness}
+        return {"name": material.name, "pbrMetallicRoughness": plain}
     surface = _plain_gltf_surface(material, float(np.sqrt(roughness)))
     if "colour" in pictures:
         del surface["baseColorFactor"]

@@ -174,6 +174,8 @@ class MeshLabels(NamedTuple):
 
 def mesh_labels(head: Head) -> MeshLabels:
     """Return the label classes of a head; for parametric humans the result is cached by mesh topology."""
+    if head.undressed is not None:
+        return _with_worn_labels(head, mesh_labels(head.undressed))
     if not is_human(head):
         return _build_mesh_labels(head)
     digest = hashlib.blake2b(head.mesh.triangles.tobytes(), digest_size=16).digest()
@@ -184,6 +186,19 @@ def mesh_labels(head: Head) -> MeshLabels:
                 _LABEL_CACHE.pop(next(iter(_LABEL_CACHE)))
             _LABEL_CACHE[key] = _build_mesh_labels(head)
         return _LABEL_CACHE[key]
+
+
+def _with_worn_labels(head: Head, body_labels: MeshLabels) -> MeshLabels:
+    """Return the label classes of a head with what it wears, from those of the bare head."""
+    base, classes, fields = body_labels
+    worn = head.mesh.material[len(base) :]
+    class_of_material = [class_number(one.label) if one.label else 0 for one in head.mesh.materials]
+    outside = np.full((len(head.mesh.positions) - len(fields), len(classes)), _FIELD_OUTSIDE_CLASS_MM)
+    return MeshLabels(
+        np.concatenate([base, np.array(class_of_material, np.uint8)[worn]]),
+        classes,
+        np.concatenate([fields, outside.astype(np.float32)]),
+    )
 
 
 def _build_mesh_labels(head: Head) -> MeshLabels:

@@ -86,6 +86,7 @@ def human_landmarks(head: Head) -> dict[str, Doubles]:
 
 def is_human(head: Head) -> bool:
     """Return whether a head is a parametric human, judged by its control points, targets and materials."""
+    head = head.body
     rig = head.rig
     if rig is None or head.mesh.materials != tuple(MATERIAL_OF_GROUP.values()):
         return False  # without building the average head
@@ -101,7 +102,7 @@ def control_quads(head: Head, triangle_index: NDArray[Any]) -> NDArray[np.int64]
     """
     control_triangles = len(average_head().mesh.triangles)
     levels = 0
-    while len(head.mesh.triangles) > control_triangles * 4**levels:
+    while len(head.body.mesh.triangles) > control_triangles * 4**levels:
         levels += 1
     return np.asarray(triangle_index // (2 * 4**levels), np.int64)
 
@@ -112,6 +113,7 @@ def average_positions(head: Head) -> Doubles:
     Regions defined on the average human are looked up at these points.
     """
     points_mm = average_head().positions_mm.astype(np.float64)
+    head = head.body
     stencils = head.control_rig.stencils
     return np.asarray((points_mm if stencils is None else stencils.points(points_mm))[head.mesh.point])
 

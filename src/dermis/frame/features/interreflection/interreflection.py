@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.interreflection import CELLS_PER_SIDE, SAMPLES_PER_PATCH, FormFactors, cached_form_factors
+from dermis.atlas.worn_patches import with_worn_patches
 from dermis.frame.programs import WORKGROUP_SIZE, program, workgroup_grid
 from dermis.gpu import Bindings, Buffer, Constants, Device, Memo, Recorder, mark_scratch
 from dermis.mesh.head import Head
@@ -70,10 +71,15 @@ class InterreflectionBuffers:
 
 
 class Interreflection(NamedTuple):
-    """Buffers of interreflection, and the (3,) albedo of the skin's diffusion profile [-]."""
+    """Buffers of interreflection, with the albedos of skin and of what the person wears.
+
+    albedo : (3,) albedo of the skin's diffusion profile [-]
+    material_colour : (m, 4) albedos of the materials of the head, which apply to parts that are not skin [-]
+    """
 
     buffers: InterreflectionBuffers
     albedo: NDArray[np.float64]
+    material_colour: NDArray[np.float32]
 
 
 def make_interreflection(
@@ -85,6 +91,7 @@ def make_interreflection(
     has_occlusion: bool,
     light_cache_key: str,
     layout_key: str,
+    material_colour: NDArray[np.float32],
 ) -> Interreflection | None:
     """Return the interreflection of a head, None for a head where no skin is visible from other skin.
 
@@ -93,6 +100,7 @@ def make_interreflection(
     light_cache_key : cache key of the scene's light; callers that draw several scenes in turn use different
         keys
     layout_key : name of the atlas layout in the cache
+    material_colour : (m, 4) albedos of the materials of the head [-]
     """
     form_factors = memo.get(_form_factors, head, atlas, caller_name=layout_key)
     if not len(form_factors.cell_factor):
@@ -102,7 +110,7 @@ def make_interreflection(
     buffers = memo.get(
         _make_interreflection_buffers, device, uploaded, has_occlusion, light_cache_key, caller_name=key
     )
-    return Interreflection(buffers, profile_albedo)
+    return Interreflection(buffers, profile_albedo, material_colour)
 
 
 def placeholder_interreflection(device: Device) -> Buffer:
@@ -113,7 +121,9 @@ def placeholder_interreflection(device: Device) -> Buffer:
 
 
 def _form_factors(head: Head, atlas: Atlas) -> FormFactors:
-    return cached_form_factors(head.mesh, atlas.corner_uv, atlas.mapped)
+    if head.undressed is None:
+        return cached_form_factors(head.mesh, atlas.corner_uv, atlas.mapped)
+    return cached_form_factors(head.mesh, *with_worn_patches(head.mesh, atlas))
 
 
 def _upload_form_factors(device: Device, form_factors: FormFactors) -> FormFactorBuffers:
@@ -174,10 +184,12 @@ def draw(
     Source: [Goral1984].
     """
     shader = program(graph.device, "interreflection/interreflection_points.wgsl", constants)
-    buffers, albedo = interreflection
+    buffers, albedo, colours = interreflection
     (points, count), footprint = buffers.sample_points, 2.0 / (CELLS_PER_SIDE * SAMPLES_PER_PATCH**0.5)
     own: Bindings = {
-        "samples": shader.make_record("Samples", count=count, footprint=footprint, albedo=albedo),
+        "samples": shader.make_record(
+            "Samples", count=count, footprint=footprint, albedo=albedo, material_colour=colours
+        ),
         "sample_points": points,
         "sample_exitance": buffers.sample_exitance,
         "from_skin": buffers.no_light,

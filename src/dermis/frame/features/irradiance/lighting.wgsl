@@ -10,6 +10,9 @@
 //#include "environment.wgsl"
 //#include "interreflection/interreflection.wgsl"
 //#include "mirrored_lights.wgsl"
+//#if WORN
+//#include "sheen.wgsl"
+//#end
 
 // Whether each point skips lights behind its surface. Without it, software adapters shade a point with all lights that its
 // neighbours see; GPUs are faster when all points read the same light.
@@ -151,6 +154,9 @@ fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f
                     lit.entered += entering;
                     let factor = rough * surface.rho_s * max(dot(mirror, arriving.direction), 0.0);
                     lit.reflected += e * (factor * lobe(mirror, arriving.direction, v, surface.roughness));
+                    //#if WORN
+                    lit.reflected += e * sheen_lobe(mirror, arriving.direction, v, cosine);
+                    //#end
                 }
                 part++;
                 if (part >= parts_of(light)) {
@@ -171,10 +177,13 @@ fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f
             lit.across += entering;
         }
         lit.entered += entering;
+        //#if WORN
+        lit.reflected += entering * sheen_of_uniform(mirror, v);
+        //#end
     }
     if (ENVIRONMENT) {
         var albedo = surface.rho_s * surface_albedo(dot(mirror, v), surface.roughness).x;
-        //#if PARTS
+        //#if METALS
         albedo = mix(albedo, 1.0, metalness);
         //#end
         lit.reflected += albedo * mirrored(point, mirror, v, surface.roughness, open) * sky_past_hair_at(point, mirror);

@@ -31,11 +31,6 @@ BAKED_CHANNELS: Mapping[str, int] = MappingProxyType(
 BAKED_CHANNEL_COUNT = sum(BAKED_CHANNELS.values())
 
 
-def shader_constants() -> dict[str, int]:
-    """Return the named values that the shader preprocessor inserts at `//#fill` in bake.wgsl."""
-    return {"baked_numbers": BAKED_CHANNEL_COUNT}
-
-
 def bake_point_words(
     triangle_index: NDArray[np.integer], weights: NDArray[np.floating]
 ) -> NDArray[np.uint32]:

@@ -1,7 +1,8 @@
 // Surfaces of parts that are not skin, as glTF's metallic-roughness model describes them.
 //#include "surface/skin.wgsl"
 
-override PARTS: bool = false; // whether the head has such parts
+override PARTS: bool = false; // whether a file gives the head such parts
+override WORN: bool = false; // whether the head wears cloth or glasses
 
 const WET_ROUGHNESS: f32 = 0.1; // of plain materials: teeth, tongues, eyeballs of files
 const MIN_PART_ROUGHNESS: f32 = 0.05; // least Beckmann roughness of the tables
@@ -10,6 +11,12 @@ struct PartMaterial {
     emission: vec3f, // radiance
     roughness: f32, // perceptual; negative for the wet surface of plain materials
     metalness: f32,
+    weave: u32, // structure of cloth, see fabric.wgsl; 0 for other surfaces
+    thread_mm: f32, // distance of its threads
+    relief: f32, // slope of its threads
+    contrast: f32, // of the brightness of its threads
+    crumple: f32, // slope of its small wrinkles
+    sheen: f32, // strength of its lobe at grazing angles
     has_maps: u32, // 1 if `part_maps` has colour, slopes, roughness and metalness
 }
 
@@ -17,6 +24,7 @@ struct PartSurface {
     surface: Surface,
     metalness: f32,
     emission: vec3f,
+    sheen: vec3f,
 }
 
 //#if PARTS
@@ -31,7 +39,7 @@ fn part_texel(uv: vec2f, layer: i32, footprint: f32) -> vec4f {
 }
 
 fn part_at(point: Point, colour: vec3f, material: PartMaterial, footprint: f32) -> PartSurface {
-    var part = PartSurface(Surface(point.normal, colour, WET_ROUGHNESS, 1.0), material.metalness, material.emission);
+    var part = PartSurface(Surface(point.normal, colour, WET_ROUGHNESS, 1.0), material.metalness, material.emission, vec3f(0.0));
     var roughness = material.roughness;
     if (material.has_maps != 0u) {
         let own = part_texel(point.uv, 1, footprint);
@@ -49,7 +57,24 @@ fn part_at(point: Point, colour: vec3f, material: PartMaterial, footprint: f32) 
     return part;
 }
 //#else
+//#if WORN
+//#include "fabric.wgsl"
+
+const SHEEN_WHITENESS: f32 = 0.5; // of upright fibres, which are lit from all sides
+
 fn part_at(point: Point, colour: vec3f, material: PartMaterial, footprint: f32) -> PartSurface {
-    return PartSurface(Surface(point.normal, colour, WET_ROUGHNESS, 1.0), 0.0, vec3f(0.0));
+    var part = PartSurface(Surface(point.normal, colour, WET_ROUGHNESS, 1.0), material.metalness, material.emission, vec3f(0.0));
+    if (material.weave != 0u) {
+        part.surface = cloth_at(point, colour, material, footprint);
+        part.sheen = material.sheen * mix(colour, vec3f(1.0), SHEEN_WHITENESS);
+    } else if (material.roughness >= 0.0) {
+        part.surface.roughness = max(material.roughness * material.roughness, MIN_PART_ROUGHNESS);
+    }
+    return part;
 }
+//#else
+fn part_at(point: Point, colour: vec3f, material: PartMaterial, footprint: f32) -> PartSurface {
+    return PartSurface(Surface(point.normal, colour, WET_ROUGHNESS, 1.0), 0.0, vec3f(0.0), vec3f(0.0));
+}
+//#end
 //#end

@@ -48,6 +48,7 @@ struct ShadingPoint {
     texel: TexelAxes, // if there is light that is finer than texels
     metalness: f32, // of parts that are not skin
     emission: vec3f, // radiance that such parts emit
+    sheen: vec3f, // of cloth
 }
 
 struct Shaded {
@@ -115,7 +116,7 @@ fn shaded_plain(shading_point: ShadingPoint, lit: Lit, exit_factor: f32) -> Shad
     let surface = shading_point.surface;
     var below = lit.entered * surface.colour * exit_factor;
     var reflected = lit.reflected;
-    if (PARTS) {
+    if (METALS) {
         below = below * (1.0 - shading_point.metalness) + shading_point.emission;
         reflected *= mix(vec3f(1.0), surface.colour, shading_point.metalness);
     }
@@ -128,7 +129,7 @@ fn surface_or_part(point: Point, footprint: f32) -> PartSurface {
         let index = point.flags >> 8u;
         return part_at(point, shade.material_colour[index].rgb, shade.part_materials[index], footprint);
     }
-    return PartSurface(surface_at(point, footprint), 0.0, vec3f(0.0));
+    return PartSurface(surface_at(point, footprint), 0.0, vec3f(0.0), vec3f(0.0));
 }
 
 fn ray_to_position(position: vec2f, size: vec2f) -> vec3f {
@@ -166,7 +167,7 @@ fn shading_point_at(triangle: u32, position: vec2f, coverage: f32, size: vec2f) 
         area_v = deviation * (wy.x * a.position + wy.y * b.position + wy.z * c.position);
     }
     let film = Film(surface.normal, vec3f(0.0), vec3f(1.0), 0.0);
-    var shading_point = ShadingPoint(point, surface, film, v, footprint, open, texel, part.metalness, part.emission);
+    var shading_point = ShadingPoint(point, surface, film, v, footprint, open, texel, part.metalness, part.emission, part.sheen);
     if (EYES) {
         apply_modelled_parts(&shading_point);
     }
@@ -203,8 +204,11 @@ fn apply_modelled_parts(shading_point: ptr<function, ShadingPoint>) {
 }
 
 fn lit_at(shading_point: ShadingPoint) -> Lit {
-    //#if PARTS
+    //#if METALS
     metalness = shading_point.metalness;
+    //#end
+    //#if WORN
+    sheen = shading_point.sheen;
     //#end
     // The only call: software adapters run both sides of a branch for all pixels.
     return illuminate_film(shading_point.point, shading_point.surface, shading_point.film, shading_point.v, shading_point.open);

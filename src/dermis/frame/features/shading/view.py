@@ -23,6 +23,7 @@ from dermis.frame.projection import (
 )
 from dermis.frame.technique import ProfileSplit
 from dermis.gpu import ComputeProgram, UniformRecord
+from dermis.mesh.fabric import WEAVES
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import MOUTH_PARTS
 from dermis.mesh.outline import Outline
@@ -92,14 +93,7 @@ def view_record(
     """
     jitter = np.zeros((64, 4), np.float32)
     jitter[: settings.samples, :2] = pixel_sample_positions(settings.samples)
-    colours = np.zeros((_MAX_MATERIALS, 4), np.float32)
     materials = head.mesh.materials
-    if len(materials) > _MAX_MATERIALS:
-        count = f"it has {len(materials)}"
-        refuse(head.name, f"at most {_MAX_MATERIALS} materials", count, "Join some groups")
-    for index, material in enumerate(materials):
-        colours[index, :3] = material.colour
-        colours[index, 3] = 1 + MOUTH_PARTS.index(material.part) if material.part else 0
     record = shading_program.make_record(
         "Shade",
         samples=settings.samples,
@@ -109,7 +103,7 @@ def view_record(
         ),
         total=profile_split.total,
         light_factors=_LIGHT_FACTORS[settings.parts],
-        material_colour=colours,
+        material_colour=material_colours(head),
         jitter=jitter,
     )
     for index, material in enumerate(materials):
@@ -117,6 +111,10 @@ def view_record(
         part["emission"], part["metalness"] = material.emission, material.metalness
         part["roughness"] = _WET_MATERIAL_MARKER if material.roughness is None else material.roughness
         part["has_maps"] = material.has_maps
+        if (fabric := material.fabric) is not None:
+            part["weave"], part["thread_mm"] = 1 + WEAVES.index(fabric.weave), fabric.thread_mm
+            part["relief"], part["contrast"] = fabric.relief, fabric.contrast
+            part["crumple"], part["sheen"] = fabric.crumple, fabric.sheen
     for name, value in profile_split.fine.items():
         record["fine"][name] = value
     if head.eyes is not None:
@@ -124,6 +122,22 @@ def view_record(
         record["eyes"]["material"] = head.eyes.material
         record["eyes"]["middle_mm"] = head.eyes.centre_offset_mm
     return record
+
+
+def material_colours(head: Head) -> NDArray[np.float32]:
+    """Return the albedos of a head's materials as rows (64, 4); the last column is the part of the mouth.
+
+    Raises DermisError for a head with too many materials.
+    """
+    colours = np.zeros((_MAX_MATERIALS, 4), np.float32)
+    materials = head.mesh.materials
+    if len(materials) > _MAX_MATERIALS:
+        count = f"it has {len(materials)}"
+        refuse(head.name, f"at most {_MAX_MATERIALS} materials", count, "Join some groups")
+    for index, material in enumerate(materials):
+        colours[index, :3] = material.colour
+        colours[index, 3] = 1 + MOUTH_PARTS.index(material.part) if material.part else 0
+    return colours
 
 
 def mean_skin_albedo(head: Head) -> tuple[float, ...]:

@@ -137,7 +137,7 @@ def _upload_file_maps(device: Device, head: Head, use_colour: bool, decode_srgb:
 
 def has_part_materials(head: Head) -> bool:
     """Return whether a head has parts with maps or a metallic-roughness surface, see parts.wgsl."""
-    return head.maps.parts is not None or any(one.roughness is not None for one in head.mesh.materials)
+    return head.maps.parts is not None or any(one.roughness is not None for one in head.body.mesh.materials)
 
 
 def _part_bindings(device: Device, part_maps: PartMaps | None) -> MutableBindings:

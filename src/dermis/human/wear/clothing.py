@@ -1,0 +1,128 @@
+"""Clothing as a worn mesh: points, bones, expressions and materials of garments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dermis.base.arrays import Doubles, Floats, Index, Ints
+from dermis.human.makehuman import makehuman_arrays
+from dermis.human.movement import expression_targets
+from dermis.human.wear.fabrics import CLOTHS, linear_colour
+from dermis.human.wear.garments import garment_panels
+from dermis.human.wear.look import Clothing
+from dermis.human.wear.panels import Panel
+from dermis.human.wear.skin_sheet import skin_sheet
+from dermis.human.wear.worn import Worn
+from dermis.mesh.fabric import MM_PER_UV
+from dermis.mesh.mesh import Material
+from dermis.mesh.rig import BONES_PER_POINT
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+_MIN_DELTA_MM = 0.02  # smaller displacements of cloth by expressions are left out
+_LABEL = "clothing"
+_BUTTON_COLOUR, _BUTTON_ROUGHNESS = (0.62, 0.6, 0.54), 0.35
+_CORD_COLOUR = (0.72, 0.71, 0.68)
+
+
+def garment_points_mm(control_mm: Floats, clothing: Clothing) -> Doubles:
+    """Return the points (m, 3) of a garment on a person [mm].
+
+    control_mm : (p, 3) control points of the person at rest
+    """
+    skin_mm, normals = skin_sheet().fit(control_mm.astype(np.float64))
+    cover, placed = np.zeros(len(skin_mm)), list[Doubles]()
+    for panel in _panels(clothing.garment, clothing.cloth):
+        points = panel.place(skin_mm, normals, cover)
+        placed.append(points)
+        if panel.covers:
+            cover = np.maximum(cover, panel.heights_on_sheet(points, skin_mm, normals))
+    return np.concatenate(placed)
+
+
+def garment_materials(clothing: Clothing) -> tuple[Material, ...]:
+    """Return the materials of a garment, one for each slot of `_slots`."""
+    cloth, colour = CLOTHS[clothing.cloth], linear_colour(clothing.colour)
+    of_slot = {
+        "cloth": Material("cloth", "opaque", colour, roughness=cloth.roughness, fabric=cloth.fabric),
+        "trim": Material("trim", "opaque", colour, roughness=cloth.roughness, fabric=cloth.trim),
+        "button": Material("button", "opaque", _BUTTON_COLOUR, roughness=_BUTTON_ROUGHNESS),
+        "cord": Material("cord", "opaque", _CORD_COLOUR, roughness=0.8, fabric=CLOTHS["cotton"].fabric),
+    }
+    slots = _slots(clothing.garment, clothing.cloth)
+    return tuple(replace(of_slot[slot], label=_LABEL) for slot in slots)
+
+
+def _panels(garment: str, cloth: str) -> Sequence[Panel]:
+    return garment_panels(garment, CLOTHS[cloth].folds)
+
+
+def _slots(garment: str, cloth: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(panel.slot for panel in _panels(garment, cloth)))
+
+
+def worn_garment(clothing: Clothing) -> Worn:
+    """Return the mesh of a garment, which does not depend on its colour."""
+    return _worn_garment(clothing.garment, clothing.cloth)
+
+
+@cache
+def _worn_garment(garment: str, cloth: str) -> Worn:
+    """Return the mesh of a garment, its bone weights and its displacements by expressions."""
+    from scipy.sparse import vstack
+
+    panels, slots = _panels(garment, cloth), _slots(garment, cloth)
+    counts = np.cumsum([0, *(len(panel.height_mm) for panel in panels)])
+    seams = [panel.vertices for panel in panels]
+    first_vertex = np.cumsum([0, *(len(one.point) for one in seams)])
+    bind = (vstack([panel.bind for panel in panels]) @ skin_sheet().weights).tocsr()
+    bone, weight = _bone_weights(bind)
+    target, point, delta = _displacements(bind)
+    return Worn(
+        np.concatenate([one.point + first for one, first in zip(seams, counts, strict=False)]),
+        np.concatenate([one.uv_mm for one in seams]).astype(np.float32) / np.float32(MM_PER_UV),
+        np.concatenate([one.triangles + first for one, first in zip(seams, first_vertex, strict=False)]),
+        np.repeat([slots.index(panel.slot) for panel in panels], [len(one.triangles) for one in seams]),
+        bone,
+        weight,
+        target,
+        point,
+        delta,
+    )
+
+
+def _bone_weights(bind: csr_array) -> tuple[Ints, Floats]:
+    """Return the four strongest bones (m, 4) of points, and their weights (m, 4).
+
+    bind : (m, p) weights of MakeHuman's points in each of the m points
+    """
+    arrays = makehuman_arrays()
+    own = arrays["weight"][: bind.shape[1]].astype(np.float64)
+    dense = np.zeros((len(own), len(arrays["bone_names"])))
+    np.add.at(dense, (np.arange(len(own))[:, None], arrays["bone"][: len(own)]), own)
+    spread = np.asarray(bind @ (dense / dense.sum(axis=1, keepdims=True)))
+    bone = np.argsort(-spread, axis=1, kind="stable")[:, :BONES_PER_POINT]
+    weight = np.take_along_axis(spread, bone, 1)
+    return bone.astype(np.int32), (weight / weight.sum(axis=1, keepdims=True)).astype(np.float32)
+
+
+def _displacements(bind: csr_array) -> tuple[Index, Index, Floats]:
+    """Return target, point and displacement of points by expressions; see `Worn` for the arrays."""
+    targets, count = expression_targets(), bind.shape[1]
+    found: list[tuple[Index, Index, Doubles]] = []
+    for k in range(len(targets.names)):
+        part = targets.displacement_rows(k)
+        inside = targets.point[part] < count
+        dense = np.zeros((count, 3))
+        dense[targets.point[part][inside]] = targets.delta_mm[part][inside]
+        moved = np.asarray(bind @ dense)
+        rows = np.flatnonzero(np.abs(moved).max(axis=1) > _MIN_DELTA_MM)
+        found.append((np.full(len(rows), k), rows, moved[rows]))
+    target, point, delta = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return target, point, delta.astype(np.float32)

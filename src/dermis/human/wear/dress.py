@@ -1,0 +1,136 @@
+"""Heads with what they wear: meshes, rig and materials are appended to those of the bare head."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dermis.base.arrays import Doubles, Floats
+from dermis.human.model import Layout, head_template
+from dermis.human.wear.clothing import garment_materials, garment_points_mm, worn_garment
+from dermis.human.wear.eyewear import glasses_materials, glasses_points_mm, worn_glasses
+from dermis.human.wear.look import Clothing, Glasses, Item
+from dermis.human.wear.worn import Worn
+from dermis.mesh.head import Head
+from dermis.mesh.mesh import Material, build_mesh
+from dermis.mesh.rig import MorphTargets, Rig, Stencils
+
+Outfit = tuple[Item, ...]
+"""Everything that a person wears."""
+
+
+class Wearable(NamedTuple):
+    """Functions that make the meshes of a kind of items.
+
+    mesh : mesh of an item, which does not depend on the person or on colours
+    points_mm : points (m, 3) of an item on a person with control points (p, 3) [mm]
+    materials : materials of an item
+    """
+
+    mesh: Callable[[Any], Worn]
+    points_mm: Callable[[Floats, Any], Doubles]
+    materials: Callable[[Any], tuple[Material, ...]]
+
+
+WEARABLES: Mapping[type[Item], Wearable] = {
+    Clothing: Wearable(worn_garment, garment_points_mm, garment_materials),
+    Glasses: Wearable(worn_glasses, glasses_points_mm, glasses_materials),
+}
+"""Functions for each kind of items."""
+
+
+def worn_points_mm(control_mm: Floats, outfit: Outfit) -> Floats:
+    """Return the points (m, 3) of all items on a person [mm].
+
+    control_mm : (p, 3) control points of the person at rest
+    """
+    points = [WEARABLES[type(item)].points_mm(control_mm, item) for item in outfit]
+    return np.concatenate(points).astype(np.float32)
+
+
+def dress(head: Head, outfit: Outfit, template: Head | None) -> Head:
+    """Return a head that wears an outfit of at least one item.
+
+    template : the dressed head of the mean person, whose atlas and other data are shared; None to make it
+    """
+    mesh, first_point = head.mesh, int(head.mesh.point.max()) + 1
+    rig, points = head.control_rig, worn_points_mm(head.control_rig.positions_mm, outfit)
+    positions, uv, triangles = [mesh.positions], [mesh.uv], [mesh.triangles]
+    point, material, materials = [mesh.point], [mesh.material], mesh.materials
+    vertex_count, done = len(mesh.positions), 0
+    for item in outfit:
+        make = WEARABLES[type(item)]
+        worn = make.mesh(item)
+        own = points[done : done + worn.point_count]
+        rig = _dressed_rig(rig, worn, own)
+        positions.append(own[worn.point])
+        uv.append(worn.uv)
+        triangles.append(worn.triangles + vertex_count)
+        point.append(worn.point + first_point + done)
+        material.append(worn.material + len(materials))
+        materials = (*materials, *make.materials(item))
+        vertex_count, done = vertex_count + len(worn.point), done + worn.point_count
+    dressed = build_mesh(
+        np.concatenate(positions),
+        np.concatenate(uv),
+        np.concatenate(triangles),
+        np.concatenate(material),
+        materials,
+        point=np.concatenate(point),
+        quads=mesh.quads,
+    )
+    rig = replace(rig, template=None if template is None else template.control_rig)
+    return replace(head, mesh=dressed, rig=rig, template=template, undressed=head)
+
+
+def dressed_template(layout: Layout, levels: int, outfit: Outfit) -> Head:
+    """Return the dressed head of the mean person, which all people with these items share; it is cached."""
+    return _dressed_template(layout, levels, tuple(item.without_colour for item in outfit))
+
+
+@cache
+def _dressed_template(layout: Layout, levels: int, outfit: Outfit) -> Head:
+    return dress(head_template(layout, levels).head, outfit, None)
+
+
+def _dressed_rig(rig: Rig, worn: Worn, points_mm: Floats) -> Rig:
+    assert rig.skeleton is not None
+    skeleton = replace(
+        rig.skeleton,
+        bone=np.concatenate([rig.skeleton.bone, worn.bone]),
+        weight=np.concatenate([rig.skeleton.weight, worn.weight]),
+    )
+    control = len(rig.positions_mm)
+    stencils = None if rig.stencils is None else _with_single_points(rig.stencils, control, worn.point_count)
+    return replace(
+        rig,
+        positions_mm=np.concatenate([rig.positions_mm, points_mm.astype(np.float32)]),
+        targets=_with_displacements(rig.targets, worn, control),
+        skeleton=skeleton,
+        stencils=stencils,
+    )
+
+
+def _with_displacements(targets: MorphTargets, worn: Worn, first_point: int) -> MorphTargets:
+    """Return morph targets that also move what is worn, whose points begin at `first_point`."""
+    own = np.repeat(np.arange(len(targets.names)), np.diff(targets.first))
+    target = np.concatenate([own, worn.target])
+    order = np.argsort(target, kind="stable")
+    point = np.concatenate([targets.point, worn.target_point + first_point]).astype(np.int32)
+    delta = np.concatenate([targets.delta_mm, worn.delta_mm])
+    first = np.concatenate([[0], np.cumsum(np.bincount(target, minlength=len(targets.names)))])
+    return replace(targets, first=first.astype(np.int32), point=point[order], delta_mm=delta[order])
+
+
+def _with_single_points(stencils: Stencils, first_point: int, count: int) -> Stencils:
+    """Return stencils with `count` more points, each of which is one control point, from `first_point` on."""
+    end = int(stencils.first[-1])
+    return Stencils(
+        np.concatenate([stencils.first, end + 1 + np.arange(count)]).astype(np.int32),
+        np.concatenate([stencils.point, first_point + np.arange(count)]).astype(np.int32),
+        np.concatenate([stencils.weight, np.ones(count, np.float32)]),
+    )
