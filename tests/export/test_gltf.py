@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from dermis.apps.export.targets.gltf.volume import (
     volume_from_mean_free_paths,
     volume_profile,
 )
+from dermis.human.hair.look import HairLook
 from dermis.human.person_file import write_person_glb
 from dermis.optics.tissue import load_tissue
 
@@ -37,8 +39,8 @@ def person(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Return files of a head in both variants; its name contains quotes and code."""
     folder = tmp_path_factory.mktemp("glb")
     source = folder / 'x"; import os; <script>.glb'
-    human = Human.sampled(7)
-    write_person_glb(source, human, human.head(subdivide=0), roughness=0.3)
+    human = replace(Human.sampled(7), hair=HairLook("cropped"))
+    write_person_glb(source, human, human.head(subdivide=0, hairs=0.1), roughness=0.3)
     subject = load_subject(source, colour=brown(folder), subdivide=0)
     files = {variant: folder / f"{variant}.glb" for variant in (SCATTER_VARIANT, TRANSMISSION_VARIANT)}
     for variant, file in files.items():

@@ -179,7 +179,7 @@ def test_blender_imports_a_head_with_pictures(avatar: Subject, tmp_path: Path) -
     export_skin(avatar, "blender", tmp_path / "scene")
     assert avatar.head is not None
     export = export_in((tmp_path / "scene" / "skin.py").read_text("utf-8"))
-    (skin,) = [one.name for one in avatar.head.mesh.materials if one.kind == "skin"]
+    (skin,) = [f"{one.name} skin" for one in avatar.head.mesh.materials if one.kind == "skin"]
     assert (export["head"], export["skin_materials"]) == ("head.glb", [skin])
     (shirt,) = [
         one

@@ -28,13 +28,14 @@ from dermis.formats.gltf.materials import (
 from dermis.formats.gltf.primitives import PrimitiveSource, SurfacePrimitive
 from dermis.formats.part_pictures import PartPictures
 from dermis.mesh.eyeball import EyeTextures
-from dermis.mesh.grown_strands import hair_strands, is_beard
+from dermis.mesh.grown_strands import grow_strands, is_beard
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material
 from dermis.mesh.skeleton import Skeleton
 from dermis.mesh.strands import Strands
 
 _HAIR_KNOTS = {"brows": 3, "lashes": 4, "beard": 3}
+_MAX_GROWN_STRANDS = 10_000  # of hair and beard
 _MAX_TUBES = 1_000  # of brows, lashes or beard; more hairs are represented by fewer, wider ones
 _SIDE_WORDS = "left", "right", "upper", "lower"
 _METRES_PER_MM = 1e-3
@@ -170,8 +171,9 @@ def _hair_parts(deformable_mesh: DeformableMesh, pictures: dict[str, bytes]) -> 
     if (fine := head.strands) is not None:
         is_lash = np.zeros(len(fine), bool) if fine.is_lash is None else fine.is_lash
         groups |= {"brows": fine.select(~is_lash), "lashes": fine.select(is_lash)}
-    if head.hair is not None and (grown := hair_strands(head)) is not None:
-        beard = is_beard(head.hair)
+    if head.hair is not None:
+        grown = grow_strands(head.hair, head.mesh, head.mesh.points_mm, _MAX_GROWN_STRANDS)
+        beard = is_beard(head.hair, _MAX_GROWN_STRANDS)
         groups |= {"beard": grown.select(beard), "hair": grown.select(~beard)}
     for name, strands in groups.items():
         if not len(strands):
