@@ -62,4 +62,4 @@ def _has_same_shape(person_head: Head, file_head: Head) -> bool:
     sides = [np.concatenate([mesh.positions, mesh.uv * 1e3], axis=1) for mesh in (own, other)]
     scale = np.array([1.0, 1.0, 1.0, *[_SAME_MM / _SAME_UV * 1e-3] * 2])
     distance, _ = cKDTree(sides[0] * scale).query(sides[1] * scale)
-    return bool(distance.max() < _SAME_MM)
+    return bool(np.max(distance) < _SAME_MM)
