@@ -23,9 +23,9 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 KINDS = {
     "POSITION": ("VEC3", {5126}),
     "NORMAL": ("VEC3", {5126}),
-    "TEXCOORD_0": ("VEC2", {5126}),
+    "TEXCOORD_0": ("VEC2", {5123, 5126}),
     "JOINTS_0": ("VEC4", {5121, 5123}),
-    "WEIGHTS_0": ("VEC4", {5126}),
+    "WEIGHTS_0": ("VEC4", {5123, 5126}),
 }
 VERTICES, INDICES = 34962, 34963
 VALIDATE = """
@@ -91,6 +91,8 @@ def _check_primitive(document: Document, mesh: dict[str, Any], primitive: dict[s
         accessor = accessors[number]
         assert accessor["type"] == kind and accessor["componentType"] in components
         assert accessor["count"] == count
+        is_fraction = name in ("TEXCOORD_0", "WEIGHTS_0") and accessor["componentType"] != 5126
+        assert accessor.get("normalized", False) == is_fraction
         assert document.tree["bufferViews"][accessor["bufferView"]]["target"] == VERTICES
     assert "min" in accessors[given["POSITION"]]
     lengths = np.linalg.norm(document.read_floats(given["NORMAL"]), axis=1)
@@ -113,7 +115,7 @@ def _check_primitive(document: Document, mesh: dict[str, Any], primitive: dict[s
 
 def _check_influences(document: Document, given: dict[str, int]) -> None:
     (skin,) = document.tree["skins"]
-    joint, weight = (document.read_values(given[name]) for name in ("JOINTS_0", "WEIGHTS_0"))
+    joint, weight = document.read_values(given["JOINTS_0"]), document.read_floats(given["WEIGHTS_0"])
     assert joint.max() < len(skin["joints"]) and (weight >= 0).all()
     assert (joint[weight == 0] == 0).all()
     missed = np.abs(weight.astype(np.float64).sum(axis=1) - 1)

@@ -130,7 +130,11 @@ def test_head_file_is_written_next_to_the_script(tmp_path: Path) -> None:
     export_skin(head, "blender", tmp_path / "made.py", variant="burley", profile="skin1")
     text = (tmp_path / "made.py").read_text("utf-8")
     export = export_in(text)
-    assert (export["head"], export["skin_slots"], export["name"]) == ("made.glb", [0], "a'\"; head.obj")
+    assert (export["head"], export["skin_materials"], export["name"]) == (
+        "made.glb",
+        ["skin"],
+        "a'\"; head.obj",
+    )
     assert (tmp_path / "made.glb").read_bytes()[:4] == b"glTF"
     assert export["versions"] == [[4, 5], None] and str(tmp_path) not in text
 

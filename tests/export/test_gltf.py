@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from dermis.apps.export.targets.gltf.volume import (
     volume_from_mean_free_paths,
     volume_profile,
 )
+from dermis.human.hair.look import HairLook
 from dermis.human.person_file import write_person_glb
 from dermis.optics.tissue import load_tissue
 
@@ -37,8 +39,8 @@ def person(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Return files of a head in both variants; its name contains quotes and code."""
     folder = tmp_path_factory.mktemp("glb")
     source = folder / 'x"; import os; <script>.glb'
-    human = Human.sampled(7)
-    write_person_glb(source, human, human.head(subdivide=0), roughness=0.3)
+    human = replace(Human.sampled(7), hair=HairLook("cropped"))
+    write_person_glb(source, human, human.head(subdivide=0, hairs=0.1), roughness=0.3)
     subject = load_subject(source, colour=brown(folder), subdivide=0)
     files = {variant: folder / f"{variant}.glb" for variant in (SCATTER_VARIANT, TRANSMISSION_VARIANT)}
     for variant, file in files.items():
@@ -106,7 +108,7 @@ def test_albedo_without_inversion_would_lose_light() -> None:
 @pytest.mark.parametrize("name", ["skin1", "dj3"])
 def test_typed_values_have_larger_error(name: str) -> None:
     subject = load_subject(name)
-    target = TARGET.with_variant(None)
+    target = TARGET.with_variant(SCATTER_VARIANT)
     best, naive = (
         profile_error(subject.curve, target.predicted_profile(rows, subject, "2.0"))
         for rows in (target.parameters(subject, "2.0"), target.naive_parameters(subject, "2.0"))
@@ -127,7 +129,7 @@ def test_no_scattering_means_no_spread() -> None:
 
 
 def test_skin_without_head_is_exported_as_a_ball(tmp_path: Path) -> None:
-    report = export_skin("skin1", "gltf", tmp_path / "ball.glb")
+    report = export_skin("skin1", "gltf", tmp_path / "ball.glb", variant=SCATTER_VARIANT)
     document = check_rules(tmp_path / "ball.glb")
     tree, skin = document.tree, skin_of(tmp_path / "ball.glb")
     positions = document.read_floats(tree["meshes"][0]["primitives"][0]["attributes"]["POSITION"])
@@ -191,7 +193,7 @@ def test_hostile_names_are_escaped(person: dict[str, Path]) -> None:
     """The name of a head is a JSON string, and the file contains no path of its source."""
     data = person[SCATTER_VARIANT].read_bytes()
     tree = json.loads(data[20 : 20 + struct.unpack_from("<I", data, 12)[0]])
-    assert tree["meshes"][0]["name"] == 'x"; import os; <script>'
+    assert tree["scenes"][0]["name"] == 'x"; import os; <script>'
     assert str(person[SCATTER_VARIANT].parent).encode() not in data
 
 

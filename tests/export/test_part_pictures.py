@@ -179,8 +179,8 @@ def test_blender_imports_a_head_with_pictures(avatar: Subject, tmp_path: Path) -
     export_skin(avatar, "blender", tmp_path / "scene")
     assert avatar.head is not None
     export = export_in((tmp_path / "scene" / "skin.py").read_text("utf-8"))
-    (skin,) = [k for k, one in enumerate(avatar.head.mesh.materials) if one.kind == "skin"]
-    assert (export["head"], export["skin_slots"]) == ("head.glb", [skin])
+    (skin,) = [f"{one.name} skin" for one in avatar.head.mesh.materials if one.kind == "skin"]
+    assert (export["head"], export["skin_materials"]) == ("head.glb", [skin])
     (shirt,) = [
         one
         for one in check_rules(tmp_path / "scene" / "head.glb").tree["materials"]

@@ -58,11 +58,17 @@ def read_person(path: Path) -> Human:
     person = document.get("person") if isinstance(document, dict) else None
     if not isinstance(person, dict):
         refuse(path, expected, "there is none", "Write one with dermis head -o person.json")
-    parts: tuple[tuple[str, Any], ...] = (
-        ("skin", SkinLook),
-        ("eyes", EyeLook),
-        ("hair", HairLook),
-    )
+    return person_from_fields(path, person)
+
+
+def person_from_fields(path: Path, person: dict[str, Any]) -> Human:
+    """Return the person with parameters as in the result of `person_parameters`.
+
+    path : path of the file that contains them, for error messages
+
+    Raises DermisError for invalid values.
+    """
+    parts: tuple[tuple[str, Any], ...] = (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook))
     looks = {
         name: _build_dataclass(path, kind, person[name])
         for name, kind in parts

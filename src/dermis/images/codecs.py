@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Pixels = Bytes | NDArray[np.uint16] | Floats
 
-_PNG_COLOUR_TYPES = {1: 0, 3: 2, 4: 6}  # by number of channels
+_PNG_COLOUR_TYPES = {1: 0, 2: 4, 3: 2, 4: 6}  # by number of channels
 _PNG_UP_FILTER = 2  # PNG's code of the filter that stores differences from the row above
 
 _PIXELS_PER_STRIP = 1 << 20  # pixels converted at a time
@@ -127,7 +127,7 @@ def _decode_16_bit(file_bytes: bytes, pixel_format: str, picture: Image) -> NDAr
 
 
 def encode_png(pixel_levels: Numbers, zlib_level: int = 6, use_isal: bool = False) -> bytes:
-    """Encode a picture (H, W, C) of uint8 or uint16 with 1, 3 or 4 channels as a PNG file.
+    """Encode a picture (H, W, C) of uint8 or uint16 with 1 to 4 channels as a PNG file.
 
     zlib_level : compression level of zlib, from 1 (fast) to 9 (small files)
     use_isal : whether to compress with ISA-L instead of zlib; for rendered pictures, ISA-L is four times as

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.arrays import Doubles, Ints
+from dermis.base.arrays import Doubles, Ints, Mask
 from dermis.mesh.groom import KNOTS_PER_GUIDE, Groom
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -74,6 +74,12 @@ def hair_strands(head: Head, points_mm: NDArray[np.floating] | None = None) -> S
     if head.hair is None:
         return None
     return grow_strands(head.hair, head.mesh, head.mesh.points_mm if points_mm is None else points_mm)
+
+
+def is_beard(groom: Groom, max_strands: int = MAX_EXPORTED_STRANDS) -> Mask:
+    """Return a mask (n,) of the strands of `grow_strands` that belong to the beard."""
+    part = groom.roots.part[_growing_root_indices(groom, min(len(groom), max_strands))]
+    return np.asarray(groom.parameters["hairline"][part] == 0.0)
 
 
 def mean_hair_absorptance(groom: Groom) -> float:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.arrays import Doubles, Floats, Ints
+from dermis.base.arrays import Doubles, Floats, Ints, Mask
 from dermis.base.summary import ShortRepr
 from dermis.mesh.geometry import cross_columns, dot_columns
 from dermis.mesh.mesh import Mesh
@@ -38,6 +38,7 @@ class Strands(ShortRepr):
     radius_mm : (n, k) radius of the fibre at the knots
     absorption : (n, 3) absorption coefficient of the fibre [1/mm]
     cover : (n,) projected area of the hair around each root, per area of skin; None if negligible [-]
+    is_lash : (n,) whether each strand is a lash; None if no strand is
     """
 
     roots: Roots
@@ -45,10 +46,22 @@ class Strands(ShortRepr):
     radius_mm: Floats
     absorption: Floats
     cover: Floats | None = None
+    is_lash: Mask | None = None
 
     def __len__(self) -> int:
         """Return the number of strands."""
         return len(self.roots.quad)
+
+    def select(self, mask: Mask) -> Strands:
+        """Return the strands for which `mask` (n,) is true."""
+        return Strands(
+            Roots(self.roots.quad[mask], self.roots.position[mask]),
+            self.knots_mm[mask],
+            self.radius_mm[mask],
+            self.absorption[mask],
+            None if self.cover is None else self.cover[mask],
+            None if self.is_lash is None else self.is_lash[mask],
+        )
 
     def knot_positions_mm(self, mesh: Mesh, points_mm: NDArray[np.floating]) -> Doubles:
         """Return the positions of the knots (n, k, 3) on a posed skin [mm].

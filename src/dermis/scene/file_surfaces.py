@@ -81,7 +81,8 @@ def with_material_factors(maps: Maps, material: FileMaterial, user_roles: Collec
         )
     if maps.normal is not None and "normal" not in user_roles and material.normal_scale != 1.0:
         changed["normal"] = maps.normal * np.float32(material.normal_scale)
-    if material.maps is None and "roughness" not in user_roles and "roughness" in material.textures:
+    is_stored = material.maps is not None and "roughness" in material.maps
+    if not is_stored and "roughness" not in user_roles and "roughness" in material.textures:
         values = read_linear_picture(material.textures["roughness"], "roughness")[..., 0]
         changed["roughness"] = (values * np.float32(material.roughness)) ** 2
     return replace(maps, **changed)

@@ -13,6 +13,7 @@ from dermis.base.progress import logged_step
 from dermis.base.reading import is_file
 from dermis.formats.axes import Axis, Front
 from dermis.formats.maps import load_maps
+from dermis.formats.parts import is_gltf
 from dermis.formats.samples import SAMPLES
 from dermis.human.regions.apply import with_default_regions
 from dermis.mesh.eye_look import EyeLook
@@ -183,9 +184,29 @@ def load_head(
     if name not in SAMPLES and not is_file(path):
         _refuse_name(name)
     loaded, look = load_file_head(name, mesh_options, map_options)
+    is_plain = all(value in (None, (), AUTO) for value in mesh_options.values()) and eyes == "fitted"
+    if is_plain and (grown := _with_stored_person(loaded, levels)) is not None:
+        return _with_eye_look(with_default_regions(grown) if regions == AUTO else grown, eye)
     coarse, loaded = loaded.mesh, subdivide_head(loaded, levels)
     loaded = with_default_regions(loaded) if regions == AUTO else loaded
     return _with_eye_look(with_fitted_eyes(loaded, coarse, look) if eyes == "fitted" else loaded, eye)
+
+
+def _with_stored_person(file_head: Head, levels: SubdivisionLevels) -> Head | None:
+    """Return the head with the hair of the person that its file contains; None if there is no such person.
+
+    file_head, levels : see `with_grown_hair`
+    """
+    if (
+        file_head.name in SAMPLES
+        or not is_gltf(file_head.name)
+        or file_head.control_rig.targets.rest is not None
+    ):
+        return None
+    from dermis.scene.file_people import person_in_file, with_grown_hair
+
+    person = person_in_file(Path(file_head.name))
+    return None if person is None else with_grown_hair(file_head, person, levels)
 
 
 def is_person_name(head_name: str) -> bool:

@@ -17,6 +17,7 @@ from dermis.formats.gltf.materials import encode_skin_maps
 from dermis.formats.mesh_formats import find_format
 from dermis.formats.part_pictures import PartPictures
 from dermis.formats.samples import SAMPLES
+from dermis.human.person import Human
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.head import Head
@@ -57,6 +58,7 @@ class Subject:
     model : model of the profile, such as "montecarlo" or "layered"; "table" for a table of Gaussians
     tissue : tissue of the skin; None for a table of Gaussians
     scene : scene with the head and its skin; None for a skin without a head
+    person : parametric person to whom the head belongs; None for other heads
     """
 
     name: str
@@ -65,6 +67,7 @@ class Subject:
     model: str
     tissue: Tissue | None = None
     scene: Scene | None = None
+    person: Human | None = None
 
     @property
     def head(self) -> Head | None:
@@ -172,13 +175,14 @@ def load_subject(
     if not (is_person_name(name) or name in SAMPLES or find_format(path)):
         return _load_skin(name, model, head if profile is None else ("profile",))
     loaded = load_head(name_or_file, **head)
+    person = load_person(name) if is_person_name(name) else None
     if profile is not None:
         skin = Skin(profile=str(profile))
     else:
-        skin = skin_of(load_person(name)) if is_person_name(name) else Skin()
+        skin = Skin() if person is None else skin_of(person)
     curve, used_model, tissue = reference_profile(skin, model)
     albedo = curve.energy if loaded.maps.mean_colour is None else loaded.maps.mean_colour
-    return Subject(path.name, curve, albedo, used_model, tissue, Scene(loaded, skin=skin))
+    return Subject(path.name, curve, albedo, used_model, tissue, Scene(loaded, skin=skin), person)
 
 
 def _load_skin(skin_name: str, profile_model: ModelName | None, head_options: Iterable[str]) -> Subject:

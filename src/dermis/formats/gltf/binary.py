@@ -56,6 +56,13 @@ class BufferBuilder:
         view = self.add_view(values.tobytes(), buffer_target)
         return self._append_accessor(values, {"bufferView": view} | bounds)
 
+    def add_normalised(self, fractions: Numbers, buffer_target: int | None = None) -> int:
+        """Append numbers from 0 to 1, (n, k), as 16-bit integers and return the index of their accessor."""
+        levels = np.rint(np.clip(fractions, 0.0, 1.0) * 65535).astype("<u2")
+        index = self.add_accessor(levels, buffer_target)
+        self.accessors[index]["normalized"] = True
+        return index
+
     def add_triangles(self, corner_vertices: Numbers, vertex_count: int) -> int:
         """Append the vertex indices of triangles, (f, 3), and return the index of their accessor.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,7 +23,8 @@ EYE_PICTURE, EYE_NORMAL_PICTURE = "eye", "eye normal"
 """Names of the pictures of an eye."""
 _TEAR_FILM_ROUGHNESS = 0.15  # perceptual roughness of the tear film
 _TEAR_FILM_CLEARCOAT_FACTOR = 0.52  # eyes reflect 0.021 at normal incidence, glTF's clear coat 0.04
-_HAIR_ROUGHNESS = 0.45
+_HAIR_ROUGHNESS, _RIBBON_ROUGHNESS = 0.45, 0.6
+_RIBBON_SPECULAR = 0.4  # as other hair hides most of the surroundings
 _ROUGHNESS_BY_WORD = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # perceptual roughness by a word in the name
 _DEFAULT_ROUGHNESS = 0.8
 
@@ -62,7 +63,9 @@ class SkinMaterialAdditions:
         return extended | {"pbrMetallicRoughness": surface, "extras": extras}
 
 
-def encode_skin_maps(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], Tree]:
+def encode_skin_maps(
+    maps: Maps, slopes: Floats | None = None, compact: bool = False
+) -> tuple[dict[str, bytes], Tree]:
     """Return the maps of a skin as PNG files, and their description for the extras of the glTF material.
 
     The first result is a dictionary from picture name to PNG file. The second result is a dictionary from
@@ -71,7 +74,11 @@ def encode_skin_maps(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str
 
     slopes : (n, n, 2) slopes of the relief, which become a normal map for other programs if `maps` contains
         no normal map
+    compact : whether to leave out the pictures that no other program reads: heights, regions, and roughness
+        that is not perceptual
     """
+    if compact:
+        maps = replace(maps, height=None, region=None)
     pictures: dict[str, Numbers] = {}
     roles: Tree = {}
     if maps.colour is not None:
@@ -79,7 +86,7 @@ def encode_skin_maps(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str
     displayed = slopes if maps.normal is None else maps.normal
     if displayed is not None:
         pictures["normal"] = encode_normals8(displayed)
-    if maps.normal is not None:
+    if displayed is not None and (compact or maps.normal is not None):
         roles["normal"] = {"index": "normal"}
     if maps.height is not None:
         low, span = float(maps.height.min()), float(np.ptp(maps.height)) or 1.0
@@ -89,9 +96,10 @@ def encode_skin_maps(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str
         perceptual = np.zeros((*maps.roughness.shape, 3), np.float32)
         perceptual[..., 1] = np.sqrt(np.clip(maps.roughness, 0.0, 1.0))
         pictures["metallic roughness"] = encode_linear8(perceptual)
-    for role in ("specular", "roughness"):
-        if (grey_map := getattr(maps, role)) is not None:
-            pictures[role] = encode_linear8(grey_map)[..., None]
+    if maps.specular is not None:  # glTF reads alpha, and this package grey
+        pictures["specular"] = encode_linear8(maps.specular)[..., None].repeat(2, axis=2)
+    if maps.roughness is not None and not compact:
+        pictures["roughness"] = encode_linear8(maps.roughness)[..., None]
     if maps.region is not None:
         pictures["region"] = maps.region[..., None]
     stored = (role for role in ("height", "specular", "roughness", "region") if role in pictures)
@@ -122,11 +130,19 @@ def surface_material(
         surface["baseColorTexture"] = {"index": "colour"}
     if "metallic roughness" in pictures:
         surface |= {"roughnessFactor": 1.0, "metallicRoughnessTexture": {"index": "metallic roughness"}}
-    name = material.name if "skin" in material.name.casefold() else f"{material.name} skin"
-    gltf: Tree = {"name": name, "pbrMetallicRoughness": surface}
+    gltf: Tree = {"name": gltf_material_name(material), "pbrMetallicRoughness": surface}
     if "normal" in pictures:
         gltf["normalTexture"] = {"index": "normal"}
-    return gltf | {"extensions": _SKIN_IOR_EXTENSION, "extras": {"dermis": dict(map_entries)}}
+    extensions: Tree = dict(_SKIN_IOR_EXTENSION)
+    if "specular" in pictures:
+        extensions["KHR_materials_specular"] = {"specularTexture": {"index": "specular"}}
+    return gltf | {"extensions": extensions, "extras": {"dermis": dict(map_entries)}}
+
+
+def gltf_material_name(material: Material) -> str:
+    """Return the name of a material in the file; that of skin contains the word "skin"."""
+    is_named = material.kind != "skin" or "skin" in material.name.casefold()
+    return material.name if is_named else f"{material.name} skin"
 
 
 def encode_part_pictures(part_maps: PartPictures) -> dict[str, bytes]:
@@ -203,23 +219,32 @@ def eye_material(material: Material) -> Tree:
     }
 
 
-def hair_material(picture_name: str) -> Tree:
-    """Return the glTF material of hairs, whose colours are in the picture called `picture_name`."""
+def hair_material(picture_name: str, has_alpha: bool = False) -> Tree:
+    """Return the glTF material of hairs, whose colours are in the picture called `picture_name`.
+
+    has_alpha : whether the picture shows hairs with gaps between them, on ribbons that have two sides
+    """
     surface = {
         "baseColorTexture": {"index": picture_name},
         "metallicFactor": 0.0,
-        "roughnessFactor": _HAIR_ROUGHNESS,
+        "roughnessFactor": _RIBBON_ROUGHNESS if has_alpha else _HAIR_ROUGHNESS,
     }
+    cut = {"alphaMode": "MASK", "alphaCutoff": 0.5, "doubleSided": True} if has_alpha else {}
+    extensions: Tree = {"KHR_materials_ior": {"ior": KERATIN_ETA}}
+    if has_alpha:
+        extensions["KHR_materials_specular"] = {"specularFactor": _RIBBON_SPECULAR}
     return {
         "name": picture_name,
         "pbrMetallicRoughness": surface,
-        "extensions": {"KHR_materials_ior": {"ior": KERATIN_ETA}},
+        **cut,
+        "extensions": extensions,
     }
 
 
 def encode_colours_png(linear_colours: Floats) -> bytes:
-    """Encode linear colours (h, w, 3) as an sRGB PNG file."""
-    return encode_png(encode_srgb8(linear_colours))
+    """Encode linear colours (h, w, 3), or with alpha (h, w, 4), as an sRGB PNG file."""
+    levels = encode_srgb8(linear_colours[..., :3])
+    return encode_png(np.concatenate([levels, encode_linear8(linear_colours[..., 3:])], axis=-1))
 
 
 def _plain_gltf_surface(material: Material, roughness: float) -> Tree:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ from dermis.base.arrays import Doubles, Floats
 from dermis.formats.deformable_mesh import DeformableMesh
 from dermis.formats.gltf.binary import CLAMPED_SAMPLER, BufferBuilder, glb_bytes, resolve_textures
 from dermis.formats.gltf.document import FrozenTree, Tree
+from dermis.formats.gltf.hair_ribbons import RibbonPrimitive
+from dermis.formats.gltf.hair_tubes import FibreTubes, TubePrimitive
 from dermis.formats.gltf.materials import (
     SkinMaterialAdditions,
     encode_colours_png,
@@ -22,19 +25,34 @@ from dermis.formats.gltf.materials import (
     part_material,
     surface_material,
 )
-from dermis.formats.gltf.primitives import FibreTubes, HairPrimitive, PrimitiveSource, SurfacePrimitive
+from dermis.formats.gltf.primitives import PrimitiveSource, SurfacePrimitive
 from dermis.formats.part_pictures import PartPictures
 from dermis.mesh.eyeball import EyeTextures
-from dermis.mesh.grown_strands import hair_strands
+from dermis.mesh.grown_strands import grow_strands, is_beard
 from dermis.mesh.head import Head
+from dermis.mesh.mesh import Material
 from dermis.mesh.skeleton import Skeleton
+from dermis.mesh.strands import Strands
 
-BROWS, HAIR = "brows and lashes", "hair"
-"""Names of two materials: one for brows and lashes, one for all other hair. Their pictures have the same
-names."""
-_KNOTS_PER_HAIR = {BROWS: 5, HAIR: 4}
-_MAX_EXPORTED_HAIRS = 16_000  # more hairs are represented by fewer, wider ones
+_HAIR_KNOTS = {"brows": 3, "lashes": 4, "beard": 3}
+_MAX_GROWN_STRANDS = 10_000  # of hair and beard
+_MAX_TUBES = 1_000  # of brows, lashes or beard; more hairs are represented by fewer, wider ones
+_SIDE_WORDS = "left", "right", "upper", "lower"
 _METRES_PER_MM = 1e-3
+
+
+@dataclass(frozen=True)
+class ExportedPart:
+    """One mesh of an exported file.
+
+    name : name of the mesh, such as "head", "eye_left" or "hair"
+    source : geometry
+    material : glTF material, whose textures reference pictures by name
+    """
+
+    name: str
+    source: PrimitiveSource
+    material: Tree
 
 
 def encode_head(
@@ -46,10 +64,12 @@ def encode_head(
     asset_extras: FrozenTree | None = None,
     eyes: EyeTextures | None = None,
     skin_additions: SkinMaterialAdditions | None = None,
+    compact: bool = False,
 ) -> bytes:
-    """Encode a head as a .glb file in metres, with one primitive per material, morph targets and joints.
+    """Encode a head as a .glb file in metres, with one mesh per material, morph targets and joints.
 
-    Hairs become thin tubes, which this package does not read back. Equal heads give identical bytes.
+    Brows, lashes and beard become thin tubes that move with the skin. Other hair becomes ribbons that follow
+    the head. This package reads none of them back. Equal heads give identical bytes.
 
     roughness : Beckmann's m of skin without a roughness map [-]
     weights : default weights of morph targets by name, which override the weights of the rest pose
@@ -57,11 +77,16 @@ def encode_head(
     asset_extras : entries for the extras of the file's "asset"
     eyes : maps of the eyeballs; None for eyes in a uniform colour
     skin_additions : properties to add to the material of skin
+    compact : whether to leave out maps that no other program reads, and small changes by morph targets
     """
     binary, deformable = BufferBuilder(), DeformableMesh(head)
-    pictures, roles = encode_skin_maps(head.maps, slopes)
+    pictures, roles = encode_skin_maps(head.maps, slopes, compact)
     pictures |= {} if skin_additions is None else skin_additions.pictures
-    parts, materials = _primitive_sources(deformable, pictures, roles, roughness, eyes)
+    parts = [
+        *_surface_parts(deformable, pictures, roles, roughness, eyes, compact),
+        *_hair_parts(deformable, pictures),
+    ]
+    materials = [part.material for part in parts]
     if skin_additions is not None:
         materials = [
             skin_additions.extend_material(material) if "dermis" in material.get("extras", {}) else material
@@ -72,14 +97,14 @@ def encode_head(
         for name, data in pictures.items()
     ]
     textures = {name: index for index, name in enumerate(pictures)}
-    nodes, roots, skins = _gltf_nodes(head, binary)
+    nodes, roots, skins = _gltf_nodes(head, parts, binary)
     tree = {
         "asset": _gltf_asset(head, asset_extras),
         "extensionsUsed": sorted({name for material in materials for name in material.get("extensions", {})}),
         "scene": 0,
-        "scenes": [{"nodes": roots}],
+        "scenes": [{"name": Path(head.name).stem or "head", "nodes": roots}],
         "nodes": nodes,
-        "meshes": [_gltf_mesh(deformable, binary, parts, weights or {})],
+        "meshes": _gltf_meshes(deformable, binary, parts, weights or {}),
         "skins": skins,
         "materials": [resolve_textures(material, textures) for material in materials],
         "textures": [{"source": index, "sampler": 0} for index in range(len(images))],
@@ -92,18 +117,19 @@ def encode_head(
     return glb_bytes({key: value for key, value in tree.items() if value != []}, binary.data)
 
 
-def _primitive_sources(
+def _surface_parts(
     deformable_mesh: DeformableMesh,
     pictures: dict[str, bytes],
     map_entries: FrozenTree,
     roughness: float,
     eyes: EyeTextures | None,
-) -> tuple[list[PrimitiveSource], list[Tree]]:
-    """Return the geometry and the material of each glTF primitive, as two lists in the same order.
+    compact: bool,
+) -> Iterator[ExportedPart]:
+    """Yield the parts of the mesh, one for each material.
 
-    pictures : PNG files by name; this function adds the pictures of eyes, hairs and parts that are not skin
+    pictures : PNG files by name; this function adds the pictures of eyes and parts that are not skin
     map_entries : description of the maps for the extras of the skin material, see `encode_skin_maps`
-    roughness, eyes : see `encode_head`
+    roughness, eyes, compact : see `encode_head`
     """
     head = deformable_mesh.head
     eye_materials = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
@@ -112,24 +138,54 @@ def _primitive_sources(
     part_maps = PartPictures.from_head(head)
     if part_maps is not None:
         pictures |= encode_part_pictures(part_maps)
-    parts, materials = list[PrimitiveSource](), list[Tree]()
     for index in np.unique(head.mesh.material).tolist():
         eye = eye_materials.index(index) if index in eye_materials else -1
-        parts.append(SurfacePrimitive(deformable_mesh, np.flatnonzero(head.mesh.material == index), eye))
+        faces = np.flatnonzero(head.mesh.material == index)
+        source = SurfacePrimitive(deformable_mesh, faces, eye, compact)
         own = head.mesh.materials[index]
         if eye >= 0:
-            materials.append(eye_material(own))
+            material = eye_material(own)
         elif part_maps is not None and own.has_maps:
-            materials.append(part_material(own, part_maps))
+            material = part_material(own, part_maps)
         else:
-            materials.append(surface_material(own, pictures, map_entries, roughness))
-    for name, strands in ((BROWS, head.strands), (HAIR, hair_strands(head))):
-        if strands is not None and len(strands):
-            fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_EXPORTED_HAIRS, _KNOTS_PER_HAIR[name])
-            parts.append(HairPrimitive(deformable_mesh, fibres))
-            materials.append(hair_material(name))
+            material = surface_material(own, pictures, map_entries, roughness)
+        yield ExportedPart(part_name(own), source, material)
+
+
+def part_name(material: Material) -> str:
+    """Return the name of the mesh with a material: "head" for skin, "eye_left" for "left eye"."""
+    if material.kind == "skin":
+        return "head" if material.name.casefold() in ("", "skin") else material.name
+    words = material.name.split()
+    sides = [word for word in words if word in _SIDE_WORDS]
+    return "_".join([*(word for word in words if word not in sides), *sides]) or "part"
+
+
+def _hair_parts(deformable_mesh: DeformableMesh, pictures: dict[str, bytes]) -> Iterator[ExportedPart]:
+    """Yield brows, lashes, beard and hair.
+
+    pictures : PNG files by name; this function adds the colours of the hairs
+    """
+    head = deformable_mesh.head
+    groups = dict[str, Strands]()
+    if (fine := head.strands) is not None:
+        is_lash = np.zeros(len(fine), bool) if fine.is_lash is None else fine.is_lash
+        groups |= {"brows": fine.select(~is_lash), "lashes": fine.select(is_lash)}
+    if head.hair is not None:
+        grown = grow_strands(head.hair, head.mesh, head.mesh.points_mm, _MAX_GROWN_STRANDS)
+        beard = is_beard(head.hair, _MAX_GROWN_STRANDS)
+        groups |= {"beard": grown.select(beard), "hair": grown.select(~beard)}
+    for name, strands in groups.items():
+        if not len(strands):
+            continue
+        if name in _HAIR_KNOTS:
+            fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_TUBES, _HAIR_KNOTS[name])
+            source: PrimitiveSource = TubePrimitive(deformable_mesh, fibres)
             pictures[name] = encode_colours_png(fibres.palette_and_uv()[0])
-    return parts, materials
+        else:
+            source = ribbons = RibbonPrimitive(deformable_mesh, strands)
+            pictures[name] = encode_colours_png(ribbons.streaks_and_uv()[0])
+        yield ExportedPart(name, source, hair_material(name, has_alpha=name not in _HAIR_KNOTS))
 
 
 def _gltf_asset(head: Head, notes: FrozenTree | None) -> Tree:
@@ -139,59 +195,80 @@ def _gltf_asset(head: Head, notes: FrozenTree | None) -> Tree:
     return asset | ({"extras": dict(notes)} if notes else {})
 
 
-def _gltf_mesh(
+def _gltf_meshes(
     deformable_mesh: DeformableMesh,
     buffer_builder: BufferBuilder,
-    primitive_sources: list[PrimitiveSource],
+    parts: Sequence[ExportedPart],
     weights: Mapping[str, float],
-) -> Tree:
-    """Return the glTF mesh with its primitives, morph targets and default weights.
+) -> list[Tree]:
+    """Return the glTF meshes with their morph targets and default weights.
+
+    Meshes of skin list all morph targets, other meshes those that move them.
 
     buffer_builder : buffer to which vertices, triangles and morph targets are appended
-    primitive_sources : geometry of each primitive; primitive i has material i
+    parts : parts of the file; part i has mesh i and material i
     weights : default weights of morph targets by name
     """
-    primitives = [
-        source.add_primitive(buffer_builder) | {"material": number}
-        for number, source in enumerate(primitive_sources)
-    ]
-    mesh: Tree = {"name": _mesh_name(deformable_mesh.head), "primitives": primitives}
-    names, rest = deformable_mesh.rig.targets.names, deformable_mesh.rig.targets.rest
-    if not names:
-        return mesh
-    for target in deformable_mesh.targets():
-        for primitive, source in zip(primitives, primitive_sources, strict=True):
-            primitive.setdefault("targets", []).append(source.add_target(buffer_builder, target))
-    resting = {} if rest is None else dict(zip(names, rest.tolist(), strict=True))
-    values = [float({**resting, **weights}.get(name, 0.0)) for name in names]
-    return mesh | {"weights": values, "extras": {"targetNames": list(names)}}
+    targets = deformable_mesh.rig.targets
+    resting = {} if targets.rest is None else dict(zip(targets.names, targets.rest.tolist(), strict=True))
+    meshes = list[Tree]()
+    for number, part in enumerate(parts):
+        primitive = part.source.add_primitive(buffer_builder) | {"material": number}
+        meshes.append({"name": part.name, "primitives": [primitive]})
+    for name, target in zip(targets.names, deformable_mesh.targets(), strict=True):
+        for mesh, part in zip(meshes, parts, strict=True):
+            is_skin = "dermis" in part.material.get("extras", {})
+            if not is_skin and not part.source.is_moved_by(target):
+                continue
+            displacements = part.source.add_target(buffer_builder, target)
+            mesh["primitives"][0].setdefault("targets", []).append(displacements)
+            mesh.setdefault("weights", []).append(float({**resting, **weights}.get(name, 0.0)))
+            mesh.setdefault("extras", {"targetNames": []})["targetNames"].append(name)
+    return meshes
 
 
-def _mesh_name(head: Head) -> str:
-    """Return a name for the exported mesh that differs from the names of all bones."""
-    name = Path(head.name).stem or "head"
-    return f"{name} mesh" if name in head.bones else name
-
-
-def _gltf_nodes(head: Head, buffer_builder: BufferBuilder) -> tuple[list[Tree], list[int], list[Tree]]:
+def _gltf_nodes(
+    head: Head, parts: Sequence[ExportedPart], buffer_builder: BufferBuilder
+) -> tuple[list[Tree], list[int], list[Tree]]:
     """Return the glTF nodes, the indices of the root nodes, and the list of glTF skins.
 
-    The nodes are the bones, then the mesh. The list contains one glTF skin, which binds the mesh to the
-    bones; it is empty for a head without bones.
+    The nodes are the bones, then the meshes in the order of `parts`. The list contains one glTF skin, which
+    binds meshes to the bones; it is empty for a head without bones. Ribbons of hair are children of a bone.
     """
     skeleton = head.control_rig.skeleton
+    names = _unique_names([part.name for part in parts], head.bones)
+    mesh_roots = list[int]()  # in reversed order, as `read_nodes` visits the roots from last to first
     if skeleton is None:
-        return [{"name": _mesh_name(head), "mesh": 0}], [0], []
+        mesh_nodes = [{"name": name, "mesh": k} for k, name in enumerate(names)]
+        return mesh_nodes, list(range(len(parts)))[::-1], []
     nodes, inverse_bind = _bone_nodes(skeleton)
     roots = np.flatnonzero(skeleton.parent < 0).tolist()
     if len(roots) > 1:  # the joints of a skin need a common root
-        nodes.append({"name": f"{_mesh_name(head)} bones", "children": roots})
+        nodes.append({"name": f"{Path(head.name).stem or 'head'} bones", "children": roots})
         roots = [len(nodes) - 1]
     skin = {"joints": list(range(len(skeleton.names))), "skeleton": roots[0]}
     rows = inverse_bind.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
     skin["inverseBindMatrices"] = buffer_builder.add_accessor(rows)
-    nodes.append({"name": _mesh_name(head), "mesh": 0, "skin": 0})
-    return nodes, [*roots, len(nodes) - 1], [skin]
+    for number, (name, part) in enumerate(zip(names, parts, strict=True)):
+        node: Tree = {"name": name, "mesh": number}
+        if isinstance(part.source, RibbonPrimitive):
+            bone = part.source.root_bone
+            nodes[bone].setdefault("children", []).append(len(nodes))
+            nodes.append(node | _node_transform(inverse_bind[bone]))
+        else:
+            mesh_roots.insert(0, len(nodes))
+            nodes.append(node | {"skin": 0})
+    return nodes, [*roots, *mesh_roots], [skin]
+
+
+def _unique_names(names: Sequence[str], taken_names: Sequence[str]) -> list[str]:
+    """Return names that differ from each other and from `taken_names`, by appended "_mesh" or numbers."""
+    used, unique = {*taken_names}, list[str]()
+    for name in names:
+        candidates = [name, f"{name}_mesh", *(f"{name}_{number}" for number in range(2, len(names) + 2))]
+        unique.append(next(one for one in candidates if one not in used))
+        used.add(unique[-1])
+    return unique
 
 
 def _bone_nodes(skeleton: Skeleton) -> tuple[list[Tree], Doubles]:

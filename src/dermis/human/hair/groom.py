@@ -51,6 +51,8 @@ def add_hair(
     rows = list(_grow_lashes(surface, root_finder, eye_centres(control_head.mesh), rngs))
     groups = [left, *rows[:2], right, *rows[2:]]
     strands = _join_groups(groups, _fine_hair_absorption(groups, hair_look))
+    is_lash = np.repeat([False, True, True, False, True, True], [len(group.radius) for group in groups])
+    strands = replace(strands, is_lash=is_lash)
     groom = make_groom(hair_look, recession, root_finder, head.levels, hair_fraction)
     return replace(head, strands=strands, hair=groom)
 

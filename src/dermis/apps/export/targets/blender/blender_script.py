@@ -86,10 +86,14 @@ def place_head() -> None:
     before = set(bpy.data.objects)
     bpy.ops.import_scene.gltf(filepath=str(find_data_folder() / EXPORT["head"]))
     meshes = [added for added in bpy.data.objects if added not in before and added.type == "MESH"]
-    head = max((mesh for mesh in meshes if mesh.users_scene), key=lambda mesh: len(mesh.data.vertices))
-    for slot in EXPORT["skin_slots"]:
-        material = head.material_slots[slot].material
+    slots = [slot for mesh in meshes if mesh.users_scene for slot in mesh.material_slots]
+    for material in {slot.material for slot in slots if is_skin_name(slot.material.name)}:
         set_skin_inputs(next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED"))
+
+
+def is_skin_name(material_name: str) -> bool:
+    """Return whether an imported material is skin; Blender may have appended a number to its name."""
+    return material_name in EXPORT["skin_materials"] or material_name[:-4] in EXPORT["skin_materials"]
 
 
 def add_ball(diameter_m: float) -> None:

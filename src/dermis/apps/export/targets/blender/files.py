@@ -23,6 +23,7 @@ from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_
 from dermis.apps.truths.cycles import cycles_camera
 from dermis.apps.truths.lights import CYCLES_LIGHTS, cycles_lamp
 from dermis.apps.truths.scene_description import CYCLES_UNIT_MM, SceneDict, cycles_world
+from dermis.formats.gltf.materials import gltf_material_name
 from dermis.formats.gltf.write import encode_head
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
@@ -100,7 +101,7 @@ def _describe_skin(
         "smoother": float(np.sqrt(skin.roughness_factor * _GGX_PER_BECKMANN_ROUGHNESS)),
         "ball_m": BALL_DIAMETER_MM * METRES_PER_MM,
         "head": None,
-        "skin_slots": skin_material_indices(subject.head_or_ball),
+        "skin_materials": skin_material_names(subject.head_or_ball),
         "size": list(Settings().size),
     }
 
@@ -139,10 +140,10 @@ def _encode_head(subject: Subject, scene: Scene) -> bytes:
     )
 
 
-def skin_material_indices(head: Head) -> list[int]:
-    """Return the indices of the skin materials in the .glb file, which omits materials without triangles."""
-    used = np.unique(head.mesh.material)
-    return [slot for slot, kind in enumerate(used) if head.mesh.materials[kind].kind == "skin"]
+def skin_material_names(head: Head) -> list[str]:
+    """Return the names of the skin materials in the .glb file."""
+    used = [head.mesh.materials[index] for index in np.unique(head.mesh.material)]
+    return [gltf_material_name(material) for material in used if material.kind == "skin"]
 
 
 def blender_script_text(export_data: Mapping[str, object]) -> str:

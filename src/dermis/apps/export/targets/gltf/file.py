@@ -13,7 +13,6 @@ from dermis.formats.gltf.materials import SkinMaterialAdditions, encode_colours_
 from dermis.formats.gltf.write import encode_head
 from dermis.human.person_file import person_parameters, relief_slopes
 from dermis.mesh.head import Head
-from dermis.scene.heads import is_person_name, load_person
 
 Extensions = Mapping[str, Mapping[str, object]]
 _MULTISCATTER_ROLE = "multiscatter"
@@ -28,8 +27,8 @@ def encode_glb(subject: Subject, material_extensions: Extensions, draft_notice: 
     """
     head = subject.head_or_ball
     notes: dict[str, object] = {"draft": draft_notice} if draft_notice else {}
-    if is_person_name(subject.name):
-        notes["person"] = person_parameters(load_person(subject.name))
+    if subject.person is not None:
+        notes["person"] = person_parameters(subject.person)
     elif head.eyes is not None:
         notes["person"] = {"eyes": asdict(head.eyes.look)}
     return encode_head(
@@ -39,6 +38,7 @@ def encode_glb(subject: Subject, material_extensions: Extensions, draft_notice: 
         asset_extras=notes,
         eyes=subject.eye_pictures(),
         skin_additions=_skin_additions(subject, head, material_extensions, draft_notice),
+        compact=True,
     )
 
 

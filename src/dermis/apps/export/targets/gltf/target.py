@@ -1,4 +1,4 @@
-"""Export to glTF: a .glb file whose skin scatters light (draft extension) or transmits light (ratified)."""
+"""Export to glTF: a .glb file with skin for all viewers, or with skin that scatters or transmits light."""
 
 from __future__ import annotations
 
@@ -8,13 +8,21 @@ import numpy as np
 
 from dermis.apps.export.fitting import fit_burley_width
 from dermis.apps.export.subject import Subject
-from dermis.apps.export.target import Parameter, Parameters, ParameterValue, Target, flat_tuple, get_numbers
+from dermis.apps.export.target import (
+    Parameter,
+    Parameters,
+    ParameterValue,
+    Target,
+    flat_tuple,
+    get_numbers,
+    replace_values,
+)
 from dermis.apps.export.targets.gltf.file import encode_glb
 from dermis.apps.export.targets.gltf.volume import Volume, fit_volume, volume_profile
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.media import SKIN_ETA, Floats
 
-SCATTER_VARIANT, TRANSMISSION_VARIANT = "scatter", "diffuse-transmission"
+CORE_VARIANT, SCATTER_VARIANT, TRANSMISSION_VARIANT = "core", "scatter", "diffuse-transmission"
 DRAFT_NOTICE = (
     "KHR_materials_scatter: draft of 2026-06-22 (KhronosGroup/glTF pull request 2579), not ratified"
 )
@@ -24,6 +32,7 @@ _MULTISCATTER_NAME = "KHR_materials_scatter.multiscatterColorFactor"
 _TRANSMISSION_FACTOR_NAME = "KHR_materials_diffuse_transmission.diffuseTransmissionFactor"
 _TRANSMISSION_COLOUR_NAME = "KHR_materials_diffuse_transmission.diffuseTransmissionColorFactor"
 _BASE_COLOUR_NAME = "pbrMetallicRoughness.baseColorFactor"
+_DEFAULT_IOR = 1.5
 _IOR_PARAMETER = Parameter("KHR_materials_ior.ior", SKIN_ETA, "-", "reflectance 0.028 at normal incidence")
 _HEAD_THICKNESS_M = 0.1  # of a head; programs that trace no rays use it as path length
 _EAR_THICKNESS_MM = 4.0  # thickness at which the transmitted light is computed
@@ -31,35 +40,40 @@ _NAIVE_TRANSMISSION_FACTOR = 0.5  # middle of the slider
 
 
 class Gltf(Target):
-    """Export to a .glb file whose skin material has extensions for scattering or transmission."""
+    """Export to a .glb file with skin for all viewers, or with skin that scatters or transmits light."""
 
     name = "gltf"
     title = "glTF"
     suffixes = (".glb",)
     versions = ("2.0",)
-    variants = (SCATTER_VARIANT, TRANSMISSION_VARIANT)
+    variants = (CORE_VARIANT, TRANSMISSION_VARIANT, SCATTER_VARIANT)
     needs_maps = True
     limitations = (
-        f"{DRAFT_NOTICE}. Ray tracers that support it show the errors of this table. Programs that support"
-        " only transmission and volume show dark glass. Rasterisers use the multiscatter colour as base"
-        f" colour, so the skin is too light. The variant {TRANSMISSION_VARIANT} looks like skin in all"
-        " programs, but light is not diffused: shadow edges stay sharp."
+        f"The variants {CORE_VARIANT} and {TRANSMISSION_VARIANT} look like skin in all programs, but light is"
+        f" not diffused: shadow edges stay sharp. The variant {SCATTER_VARIANT} uses {DRAFT_NOTICE}: ray"
+        " tracers that support it show the errors of its table; programs that support only transmission and"
+        " volume show dark glass; rasterisers use the multiscatter colour as base colour, which is too light."
     )
     part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the material parameters for the variant of this target.
 
-        In the variant "scatter", they describe a scattering volume that is fitted to the skin's profile. In
-        the variant "diffuse-transmission", they are the fraction and the colour of the light that skin as
-        thick as an ear transmits.
+        In the variant "core", they are the base colour and the index of refraction. In the variant "scatter",
+        they describe a scattering volume that is fitted to the skin's profile. In the variant
+        "diffuse-transmission", they are the fraction and the colour of the light that skin as thick as an ear
+        transmits.
         """
+        if self.variant == CORE_VARIANT:
+            return _core_parameters(subject)
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_transmission_parameters(subject, *_ear_transmission(subject))
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return parameters with the skin's colour for every colour, and with guesses for other values."""
+        if self.variant == CORE_VARIANT:
+            return replace_values(_core_parameters(subject), {_IOR_PARAMETER.name: _DEFAULT_IOR})
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_transmission_parameters(subject, _NAIVE_TRANSMISSION_FACTOR, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())
@@ -69,11 +83,13 @@ class Gltf(Target):
     def predicted_profile(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile of the light that the skin returns.
 
-        In the variant "diffuse-transmission", all returned light leaves where it enters, so the cumulative
-        profile is 1 at all radii above 0.
+        In the variants "core" and "diffuse-transmission", all returned light leaves where it enters, so the
+        cumulative profile is 1 at all radii above 0.
         """
-        if self.variant == TRANSMISSION_VARIANT:
-            reflected = (1.0 - get_numbers(parameters, _TRANSMISSION_FACTOR_NAME)[0]) * subject.curve.energy
+        if self.variant != SCATTER_VARIANT:
+            reflected = subject.curve.energy
+            if self.variant == TRANSMISSION_VARIANT:
+                reflected = (1.0 - get_numbers(parameters, _TRANSMISSION_FACTOR_NAME)[0]) * reflected
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), reflected)
         return subject.rescale_energy(volume_profile(_volume_from_parameters(parameters)))
 
@@ -88,9 +104,21 @@ class Gltf(Target):
                 value = list(one.value) if isinstance(one.value, tuple) else one.value
                 extensions.setdefault(extension, {})[member] = value
         output.write_bytes(
-            encode_glb(subject, extensions, DRAFT_NOTICE if self.variant != TRANSMISSION_VARIANT else "")
+            encode_glb(subject, extensions, DRAFT_NOTICE if self.variant == SCATTER_VARIANT else "")
         )
         return [output]
+
+
+def _core_parameters(subject: Subject) -> Parameters:
+    return (
+        Parameter(
+            _BASE_COLOUR_NAME,
+            flat_tuple(subject.albedo),
+            "-",
+            "diffuse reflectance; the mean of a colour map",
+        ),
+        _IOR_PARAMETER,
+    )
 
 
 def _scatter_parameters(volume: Volume) -> Parameters:
@@ -122,13 +150,9 @@ def _diffuse_transmission_parameters(
     transmitted_fraction : fraction of the diffuse light that leaves through the unlit side [-]
     transmitted_colour : (3,) colour of the transmitted light
     """
+    base_colour, ior = _core_parameters(subject)
     return (
-        Parameter(
-            _BASE_COLOUR_NAME,
-            flat_tuple(subject.albedo),
-            "-",
-            "diffuse reflectance; the mean of a colour map",
-        ),
+        base_colour,
         Parameter(
             _TRANSMISSION_FACTOR_NAME,
             float(transmitted_fraction),
@@ -138,7 +162,7 @@ def _diffuse_transmission_parameters(
         Parameter(
             _TRANSMISSION_COLOUR_NAME, flat_tuple(transmitted_colour), "-", "colour of the transmitted light"
         ),
-        _IOR_PARAMETER,
+        ior,
     )
 
 

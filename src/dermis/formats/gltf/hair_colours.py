@@ -1,0 +1,23 @@
+"""Colours of exported hairs, sorted into a few groups of similar colour."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dermis.base.arrays import Doubles, Index
+from dermis.mesh.strands import Strands
+
+HAIR_COLOUR_COUNT = 64
+"""Number of colours into which the hairs of a head are sorted."""
+_HAIR_ALBEDO_EXPONENT = 5.89  # for fibres of roughness 0.3: [Chiang2016] equation 9
+
+
+def grouped_colours(strands: Strands, count: int = HAIR_COLOUR_COUNT) -> tuple[Doubles, Index]:
+    """Return `count` linear colours (c, 3), from dark to light, and the colour index (n,) of each strand."""
+    absorbance = strands.absorption * strands.radius_mm.max(axis=1, keepdims=True)
+    albedo = np.exp(-_HAIR_ALBEDO_EXPONENT * np.sqrt(absorbance.astype(np.float64)))
+    order = np.argsort(albedo.sum(axis=1), kind="stable")
+    group = np.empty(len(order), np.int64)
+    group[order] = np.arange(len(order)) * count // len(order)
+    sums = np.stack([np.bincount(group, albedo[:, c], count) for c in range(3)], axis=-1)
+    return sums / np.maximum(np.bincount(group, minlength=count), 1)[:, None], group

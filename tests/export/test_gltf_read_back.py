@@ -1,0 +1,51 @@
+"""Reading a person's glTF file again: hair, eyes and bones of the person, and the maps of the file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis import Human, load_head
+from dermis.base.errors import DermisWarning
+from dermis.formats.gltf.write import encode_head
+from dermis.human.hair.look import HairLook
+from dermis.human.person_file import person_parameters
+from dermis.mesh.maps import Maps
+from dermis.scene.file_people import person_in_file
+
+PERSON = replace(Human.sampled(7), hair=HairLook("cropped"))
+COLOUR = np.full((32, 32, 3), 0.25, np.float32)
+
+
+def written(path: Path, taller_mm: float = 0.0) -> Path:
+    head = replace(PERSON.head(subdivide=0, hairs=0.05), maps=Maps(colour=COLOUR))
+    mesh = replace(head.mesh, positions=head.mesh.positions + np.array([0.0, taller_mm, 0.0], np.float32))
+    mesh.positions[: len(mesh.positions) // 2] += np.float32(taller_mm)
+    notes = {"person": person_parameters(PERSON)}
+    path.write_bytes(encode_head(replace(head, mesh=mesh), roughness=0.3, asset_extras=notes, compact=True))
+    return path
+
+
+def test_a_file_keeps_its_person_and_hair(tmp_path: Path) -> None:
+    path = written(tmp_path / "person.glb")
+    found = person_in_file(path)
+    assert found is not None and person_parameters(found) == person_parameters(PERSON)
+    head = load_head(path, subdivide=0)
+    assert head.hair is not None and head.strands is not None and len(head.strands) > 1000
+    assert head.eyes is not None and head.eyes.look == PERSON.iris and len(head.targets) == 52
+    np.testing.assert_allclose(head.maps.colour, np.full((32, 32, 3), 0.25), atol=0.005)
+    assert len(load_head(path, subdivide=1).mesh.triangles) == 4 * len(head.mesh.triangles)
+
+
+def test_a_sculpted_mesh_is_kept_without_hair(tmp_path: Path) -> None:
+    with pytest.warns(DermisWarning, match="hair is left out"):
+        head = load_head(written(tmp_path / "sculpted.glb", taller_mm=2.0), subdivide=0)
+    assert head.hair is None and head.eyes is not None
+
+
+def test_plain_eyes_keep_everything_of_the_file(tmp_path: Path) -> None:
+    head = load_head(written(tmp_path / "person.glb"), subdivide=0, eyes="plain")
+    assert head.hair is None and head.strands is None
