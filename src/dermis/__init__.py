@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from dermis.scene.environment import Environment
     from dermis.scene.files import load_lights, load_scene
     from dermis.scene.heads import load_head
+    from dermis.scene.living import Pulse, SkinState, StateEvent
     from dermis.scene.lights import (
         DirectionalLight,
         PointLight,
@@ -91,6 +92,9 @@ _MODULE_OF_NAME = {
     "SpotLight": "scene.lights",
     "StripeLight": "scene.lights",
     "studio": "scene.lights",
+    "Pulse": "scene.living",
+    "SkinState": "scene.living",
+    "StateEvent": "scene.living",
     "Scene": "scene.model",
     "Pose": "mesh.pose",
     "Settings": "scene.settings",
@@ -117,14 +121,17 @@ __all__ = [
     "Observation",
     "PointLight",
     "Pose",
+    "Pulse",
     "RectangleLight",
     "Renderer",
     "Scene",
     "Settings",
     "Skin",
     "SkinLook",
+    "SkinState",
     "SphereLight",
     "SpotLight",
+    "StateEvent",
     "StripeLight",
     "Tissue",
     "export_skin",
