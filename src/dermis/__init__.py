@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from dermis.scene.environment import Environment
     from dermis.scene.files import load_lights, load_scene
     from dermis.scene.heads import load_head
-    from dermis.scene.living import Pulse, SkinState, StateEvent
     from dermis.scene.lights import (
         DirectionalLight,
         PointLight,
@@ -50,8 +49,10 @@ if TYPE_CHECKING:
         StripeLight,
         studio,
     )
+    from dermis.scene.living import SkinState, StateEvent
     from dermis.scene.model import Scene
     from dermis.scene.motion import load_motion
+    from dermis.scene.pulse import Pulse
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
 
@@ -92,7 +93,7 @@ _MODULE_OF_NAME = {
     "SpotLight": "scene.lights",
     "StripeLight": "scene.lights",
     "studio": "scene.lights",
-    "Pulse": "scene.living",
+    "Pulse": "scene.pulse",
     "SkinState": "scene.living",
     "StateEvent": "scene.living",
     "Scene": "scene.model",

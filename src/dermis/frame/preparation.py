@@ -30,7 +30,13 @@ from dermis.frame.features.occlusion.moving import (
 )
 from dermis.frame.features.outputs.stage_inputs import PreviousScene
 from dermis.frame.features.shading.shade import shade_program
-from dermis.frame.features.shading.view import EyePoses, camera_views, with_camera, with_redness, world_space_pinhole
+from dermis.frame.features.shading.view import (
+    EyePoses,
+    camera_views,
+    with_camera,
+    with_redness,
+    world_space_pinhole,
+)
 from dermis.frame.features.shape.shape import PoseBytes, rest_pose_bytes
 from dermis.frame.hair_motion import HairFrame, HairMotion
 from dermis.frame.inputs import FrameInputs

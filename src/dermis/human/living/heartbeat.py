@@ -10,19 +10,20 @@ import numpy as np
 from dermis.base.arrays import Doubles
 
 _TABLE_SIZE = 512
-# Artist's values in the form of two Gaussians over the phase of a beat, as in [Tang2020]: height, centre, width.
+# Artist's values in the form of two Gaussians over the phase of a beat [Tang2020]: height, centre, width.
 _SYSTOLIC, _DIASTOLIC = (1.0, 0.22, 0.075), (0.45, 0.48, 0.10)
-# Chosen: effects of breathing on the intervals between beats, the strength of the pulse, and the blood volume.
+# Chosen: effects of breathing on the intervals between beats, on strength of the pulse, and on blood volume.
 _INTERVAL_CHANGE, _STRENGTH_CHANGE, _BASELINE_CHANGE = 0.03, 0.10, 0.15
 _MIN_INTERVAL_FACTOR, _MAX_INTERVAL_FACTOR = 0.4, 2.5
 # Chosen: recoil of the head as a damped oscillation that starts with the pulse.
 _RECOIL_HZ, _RECOIL_DECAY_S, _RECOIL_BEATS = 4.0, 0.12, 3
+_RECOIL_RANGE = 0.848  # from the lowest to the highest value of the damped oscillation
 _SPREAD_PERCENTILES = (2.5, 97.5)
 _MIN_BEAT_INTERVAL_S = 0.33  # shortest interval between beats that are found in a recording
 
 
 def typical_beat() -> Doubles:
-    """Return samples (n,) of the blood volume over one typical beat, with systolic peak and dicrotic notch."""
+    """Return samples (512,) of the blood volume over a beat with systolic peak and dicrotic notch."""
     phase = np.arange(_TABLE_SIZE) / _TABLE_SIZE
     shifted = phase[:, None] + np.arange(-1.0, 2.0)
     waves = [
@@ -40,9 +41,10 @@ def normalised_beat(samples: Doubles) -> Doubles:
 
 
 def _recoil(seconds: Doubles) -> Doubles:
-    """Return the displacement of the head at times after the start of a beat, with a range of about 1."""
+    """Return the displacement of the head at times after the start of a beat, with a range of 1 [-]."""
     after = np.maximum(seconds, 0.0)
-    return np.asarray(-1.0 * np.sin(2 * np.pi * _RECOIL_HZ * after) * np.exp(-after / _RECOIL_DECAY_S))
+    wave = np.sin(2 * np.pi * _RECOIL_HZ * after) * np.exp(-after / _RECOIL_DECAY_S)
+    return np.asarray(-wave / _RECOIL_RANGE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +63,11 @@ class ModelledPulse:
     variability_s: float = 0.0
     respiration_hz: float = 0.0
     seed: int = 0
+
+    @property
+    def duration_s(self) -> float:
+        """Return the time up to which the pulse is known: infinite."""
+        return float("inf")
 
     def beat_times(self, end_s: float) -> Doubles:
         """Return the start times of the beats from before 0 to after a time [s].
@@ -107,6 +114,11 @@ class RecordedPulse:
     times_s: Doubles
     values: Doubles
 
+    @property
+    def duration_s(self) -> float:
+        """Return the time of the last value [s]."""
+        return float(self.times_s[-1])
+
     @cached_property
     def _scaled(self) -> Doubles:
         low, high = np.percentile(self.values, _SPREAD_PERCENTILES)
@@ -127,7 +139,7 @@ class RecordedPulse:
     def blood(self, seconds: Doubles) -> Doubles:
         """Return the change of the blood volume at times [s]; the mean is 0, and the range about 1 [-].
 
-        Before the recording and after it, the first and the last value hold.
+        Before the recording, its first value holds.
         """
         return np.interp(seconds, self.times_s, self._scaled)
 

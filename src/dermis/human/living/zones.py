@@ -18,7 +18,6 @@ _MASKS = ("everywhere", "lips", "lid edges")
 _STATE_QUANTITIES = ("blood", "oxygen", "strength", "roughness")
 LARGEST_OXYGEN_DROP = 0.4
 """Largest decrease of the oxygen saturation by states [-]."""
-MAX_TIME_S = 1e6
 
 
 class ZoneChanges(NamedTuple):
@@ -38,7 +37,9 @@ def _zone_indices() -> dict[str, int]:
 
 
 def _no_changes() -> ZoneChanges:
-    return ZoneChanges(np.zeros((len(_zone_indices()), 4), np.float32), np.zeros((len(_MASKS), 4), np.float32))
+    return ZoneChanges(
+        np.zeros((len(_zone_indices()), 4), np.float32), np.zeros((len(_MASKS), 4), np.float32)
+    )
 
 
 def _add(changes: ZoneChanges, zone: str, values: Iterable[float]) -> None:
@@ -58,7 +59,11 @@ def pulse_changes() -> ZoneChanges:
     changes = _no_changes()
     for row in read_rows(__package__, "pulse_zones"):
         weight = float(row["weight"])
-        _add(changes, row["zone"], (weight * float(row["amplitude"]), 1e-3 * weight * float(row["delay_ms"]), weight, 0.0))
+        _add(
+            changes,
+            row["zone"],
+            (weight * float(row["amplitude"]), 1e-3 * weight * float(row["delay_ms"]), weight, 0.0),
+        )
     return changes
 
 
@@ -93,8 +98,12 @@ def check_state_weights(weights: Mapping[str, float], error_subject: str = "stat
     """
     for name in weights:
         if name not in STATE_NAMES:
-            refuse(error_subject, f"one of {', '.join(STATE_NAMES)}", f"got {format_value(name)}", "Correct it")
-    return {name: checked_number(f"{error_subject}: {name}", weight, 0.0, 1.0) for name, weight in weights.items()}
+            refuse(
+                error_subject, f"one of {', '.join(STATE_NAMES)}", f"got {format_value(name)}", "Correct it"
+            )
+    return {
+        name: checked_number(f"{error_subject}: {name}", weight, 0.0, 1.0) for name, weight in weights.items()
+    }
 
 
 def state_changes(weights: Mapping[str, float]) -> ZoneChanges:
@@ -119,8 +128,8 @@ def eye_redness(weights: Mapping[str, float]) -> float:
 def response(state: str, weight: float, begin_s: float, end_s: float, seconds: float) -> float:
     """Return the weight of a state at a time, if it is caused from `begin_s` to `end_s`.
 
-    The weight rises and falls exponentially with the time constants of the state. For `begin_s` = -inf, it has
-    its full value from the start.
+    The weight rises and falls exponentially with the time constants of the state. For `begin_s` = -inf, it
+    has its full value from the start.
 
     weight : final weight of the rise, 0 to 1
     seconds : time [s]
@@ -128,5 +137,7 @@ def response(state: str, weight: float, begin_s: float, end_s: float, seconds: f
     rise_s, fall_s = state_times()[state]
     if seconds <= begin_s:
         return 0.0
-    reached = weight if math.isinf(begin_s) else weight * -math.expm1(-(min(seconds, end_s) - begin_s) / rise_s)
+    reached = (
+        weight if math.isinf(begin_s) else weight * -math.expm1(-(min(seconds, end_s) - begin_s) / rise_s)
+    )
     return reached * math.exp(-max(seconds - end_s, 0.0) / fall_s)

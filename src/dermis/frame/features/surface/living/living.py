@@ -74,7 +74,11 @@ def make_living_maps(
     frame.submit()
     tables, oxygen_per_layer = blood_tables(look)
     changed = map_mips.empty_map(device, map_shape), map_mips.empty_map(device, map_shape)
-    gloss: MutableBindings = {"specular_at_rest": specular, "roughness_at_rest": roughness, "state_map": states}
+    gloss: MutableBindings = {
+        "specular_at_rest": specular,
+        "roughness_at_rest": roughness,
+        "state_map": states,
+    }
     gloss |= {"specular": changed[0].levels[0], "roughness": changed[1].levels[0]}
     bindings: MutableBindings = {"roughness_at_rest": roughness, "state_map": states, "pulse_map": pulse}
     bindings["blood_tables"] = _upload_tables(device, tables)
@@ -85,15 +89,19 @@ def blood_tables(look: SkinLook) -> tuple[NDArray[np.float32], float]:
     """Return tables (3, n, n, 3) of the colour, and the difference of oxygen between the first two [-].
 
     The first two tables are logarithms of the colour with the oxygen saturation of the cheek and with less.
-    The third table is the derivative of the first one by the logarithm of the blood fraction. The axes are the
-    square roots of the fractions of melanin and of blood, as in `ColourTable`.
+    The third table is the derivative of the first one by the logarithm of the blood fraction. The axes are
+    the square roots of the fractions of melanin and of blood, as in `ColourTable`.
     """
     low = max(look.oxygen - LARGEST_OXYGEN_DROP, min(_LEAST_OXYGEN, 0.5 * look.oxygen))
-    colours = (skin_colour_table(look.eumelanin, one, look.epidermis_mm).colours for one in (look.oxygen, low))
-    first, second = (np.log(np.maximum(one, _LEAST_COLOUR)) for one in colours)
+    first, second = _log_colours(look, look.oxygen), _log_colours(look, low)
     root = np.linspace(0.0, 1.0, first.shape[1])
     derivative = np.gradient(first, root, axis=1) * (0.5 * root)[None, :, None]
     return np.stack([first, second, derivative]).astype(np.float32), max(look.oxygen - low, 1e-3)
+
+
+def _log_colours(look: SkinLook, oxygen: float) -> NDArray[np.float64]:
+    colours = skin_colour_table(look.eumelanin, oxygen, look.epidermis_mm).colours
+    return np.log(np.maximum(colours, _LEAST_COLOUR))
 
 
 def _upload_tables(device: Device, tables: NDArray[np.float32]) -> Texture:

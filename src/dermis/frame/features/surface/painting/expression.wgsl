@@ -52,11 +52,11 @@ fn pulse_at(delay_s: f32) -> f32 {
     return mix(living.pulse[before / 4u][before % 4u], living.pulse[next / 4u][next % 4u], place - f32(before));
 }
 
-// Number in [0, 1) that differs between texels and channels.
+// Number from 0.01 to 0.99 that differs between texels and channels; rounding errors do not reach its limits.
 fn threshold(index: u32) -> f32 {
     let mixed = (index * 747796405u + 2891336453u) ^ (index >> 7u);
     let word = ((mixed >> ((mixed >> 28u) + 4u)) ^ mixed) * 277803737u;
-    return f32(((word >> 22u) ^ word) >> 8u) / 16777216.0;
+    return 0.01 + 0.98 * f32(((word >> 22u) ^ word) >> 8u) / 16777216.0;
 }
 
 // Half float next to a value, the lower one or the upper one such that the mean over texels is that of the values: the pulse is

@@ -32,7 +32,6 @@ from dermis.gpu import (
     Device,
     Graph,
     MutableBindings,
-    Recorder,
     Texture,
     UniformRecord,
     make_texture,

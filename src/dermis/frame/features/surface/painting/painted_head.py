@@ -60,9 +60,7 @@ def reddened(look: EyeLook, skin_state: SkinState | None) -> EyeLook:
     return replace(look, redness=min(look.redness + redness, 1.0)) if redness else look
 
 
-def with_painted_maps(
-    device: Device, head: Head, map_side: int, skin_state: SkinState | None = None
-) -> Head:
+def with_painted_maps(device: Device, head: Head, map_side: int, skin_state: SkinState | None = None) -> Head:
     """Return a copy of a head with its painted maps as arrays.
 
     Maps from files are kept. A head without painted maps is returned unchanged.
