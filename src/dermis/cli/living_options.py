@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from dermis.base.errors import DermisError, refuse
+from dermis.base.errors import refuse
 from dermis.cli.options import Options, check_fields, model_options, option_name
 from dermis.scene.pulse import Pulse
 
@@ -55,6 +56,7 @@ def parse_states(option_values: Sequence[str]) -> list[StateEvent]:
 
 
 def _parse_state(item: str) -> StateEvent:
+    from dermis.human.living.zones import check_state_weights
     from dermis.scene.living import StateEvent
 
     found = _EVENT_PATTERN.fullmatch(item)
@@ -66,10 +68,11 @@ def _parse_state(item: str) -> StateEvent:
     except ValueError:
         expected = "NAME=WEIGHT or NAME=WEIGHT@BEGIN-END with times in s, such as blush=0.6@2-8"
         refuse(STATE_OPTION, expected, f"got {item!r}", "Correct it")
-    try:
-        return StateEvent(found["name"].strip(), weight, **times)
-    except DermisError as error:
-        raise DermisError(f"{STATE_OPTION}: {error}") from None
+    name = found["name"].strip()
+    check_state_weights({name: weight}, STATE_OPTION)
+    if times.get("begin_s", 0.0) >= times.get("end_s", math.inf):
+        refuse(STATE_OPTION, "a begin before the end", f"got {item!r}", "Correct it")
+    return StateEvent(name, weight, **times)
 
 
 def check_constant_states(events: Iterable[StateEvent]) -> dict[str, float]:
