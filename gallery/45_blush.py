@@ -7,12 +7,10 @@ Columns: 4
 Sources: DonnerJensen2006, Jacques1998
 """
 
-from dataclasses import replace
-
 import dermis
 from dermis.apps.gallery.script import run_gallery_script
 
-PERSON = replace(dermis.Human.sampled(21), hair=dermis.HairLook("cropped"))
+PERSON = dermis.Human(age=26, skin_ancestry="caucasian", hair=dermis.HairLook("cropped"))
 STATES = {f"blush {weight:g}": {"blush": weight} for weight in (0.0, 0.33, 0.67, 1.0)}
 STATES |= {name: {name: 1.0} for name in ("pallor", "cold", "exertion", "crying")}
 
@@ -20,7 +18,7 @@ STATES |= {name: {name: 1.0} for name in ("pallor", "cold", "exertion", "crying"
 def draw(studio):
     head, panels = PERSON.head(), {}
     for title, state in STATES.items():
-        scene = dermis.Scene(head, lights="beauty", camera=dermis.portrait(head), state=state)
+        scene = dermis.Scene(head, lights="studio", camera=dermis.headshot(head), state=state)
         panels[title] = studio.render(scene, scale=0.75)
     return panels
 

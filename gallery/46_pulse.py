@@ -18,7 +18,7 @@ PHASES, GAIN = 6, 30.0
 def draw(studio):
     head = dermis.Human(hair=dermis.HairLook("cropped")).head()
     pulse = dermis.Pulse(rate_per_min=60, head_motion_mm=0)
-    scene = dermis.Scene(head, lights="beauty", camera=dermis.portrait(head))
+    scene = dermis.Scene(head, lights="studio", camera=dermis.headshot(head))
     beat = [studio.render_linear(pulse.scene_at(scene, k / PHASES), scale=0.5) for k in range(PHASES)]
     mean = np.mean(beat, axis=0)
     return {f"{k}/{PHASES} of a beat": mean + GAIN * (picture - mean) for k, picture in enumerate(beat)}

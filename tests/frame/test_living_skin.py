@@ -1,4 +1,4 @@
-"""Skin that changes with states and the pulse: the rate is found in pictures, and colours follow the model."""
+"""Skin with states and a pulse: the rate is found in pictures, and colours follow the model."""
 
 from __future__ import annotations
 

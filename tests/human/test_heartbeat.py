@@ -94,9 +94,15 @@ def test_the_form_of_a_beat_from_a_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "expected"),
-    [("1,2,3\n1,2,3\n", "one or two numbers"), ("", "empty"), ("0,1\n0,2\n", "increasing"), ("1\n2\n", "at least 8"),
-     ("0,1\n3,1\n", "change"), ("0,1\n1,nan\n", "one or two numbers")],
-)  # fmt: skip
+    [
+        ("1,2,3\n1,2,3\n", "one or two numbers"),
+        ("", "empty"),
+        ("0,1\n0,2\n", "increasing"),
+        ("1\n2\n", "at least 8"),
+        ("0,1\n3,1\n", "change"),
+        ("0,1\n1,nan\n", "one or two numbers"),
+    ],
+)
 def test_unusable_files_are_refused(tmp_path: Path, text: str, expected: str) -> None:
     (tmp_path / "a.csv").write_text(text)
     with pytest.raises(DermisError, match=expected):

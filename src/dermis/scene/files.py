@@ -96,11 +96,11 @@ def load_scene(
     The tables of the file are [head], [pose], [state], [skin], [[lights]], [environment], [camera] and
     [render]. The table [head] has the `name` of a sample or a mesh file, options of `load_head`, and
     `regions`, the table of face regions for `with_regions`. The table [state] has weights of states of the
-    skin of a person, such as blush = 0.6. The table [pose] has the subtables `weights` and `bones`, whose keys
-    are names of morph targets and bones. The name of a preset can replace three of the tables, as in skin =
-    "deck-2007", lights = "studio" and camera = "portrait". Missing keys have their default values. File names
-    are relative to the folder of the scene file. A scene with an environment has no lights unless the file
-    specifies lights.
+    skin of a person, such as blush = 0.6. The table [pose] has the subtables `weights` and `bones`, whose
+    keys are names of morph targets and bones. The name of a preset can replace three of the tables, as in
+    skin = "deck-2007", lights = "studio" and camera = "portrait". Missing keys have their default values.
+    File names are relative to the folder of the scene file. A scene with an environment has no lights unless
+    the file specifies lights.
 
     Parameters
     ----------
