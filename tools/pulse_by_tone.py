@@ -1,14 +1,12 @@
-"""Plot the relative change of skin colour by the pulse over melanin, as the model of skin predicts it.
-
-Usage: python tools/pulse_by_tone.py OUTPUT.png
-"""
+"""Plot the relative change of skin colour by the pulse over melanin, as the model of skin predicts it."""
 
 from __future__ import annotations
 
-import sys
+from pathlib import Path
 
 import numpy as np
 
+from dermis.base.command_line import run_script
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 from dermis.optics.skin_colours import colour_table
 from dermis.scene.pulse import Pulse
@@ -17,8 +15,14 @@ MELANIN = np.geomspace(0.003, 0.4, 40)
 MEASURED_DIRECTION = np.array([0.33, 0.77, 0.53])  # de Haan and van Leest 2014
 
 
-def main(output: str) -> None:
-    """Write the plot to a file."""
+def main(output: Path, /) -> None:
+    """Plot the relative change of skin colour by the pulse over melanin, as the model of skin predicts it.
+
+    Parameters
+    ----------
+    output:
+        Picture to write (.png).
+    """
     from matplotlib import pyplot as plt
 
     amplitude, table = Pulse().amplitude, colour_table(DEFAULT_SKIN, 129)
@@ -38,4 +42,4 @@ def main(output: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    run_script(main)
