@@ -50,8 +50,10 @@ if TYPE_CHECKING:
         StripeLight,
         studio,
     )
+    from dermis.scene.living import SkinState, StateEvent
     from dermis.scene.model import Scene
     from dermis.scene.motion import load_motion
+    from dermis.scene.pulse import Pulse
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
 
@@ -94,6 +96,9 @@ _MODULE_OF_NAME = {
     "SpotLight": "scene.lights",
     "StripeLight": "scene.lights",
     "studio": "scene.lights",
+    "Pulse": "scene.pulse",
+    "SkinState": "scene.living",
+    "StateEvent": "scene.living",
     "Scene": "scene.model",
     "Pose": "mesh.pose",
     "Settings": "scene.settings",
@@ -122,14 +127,17 @@ __all__ = [
     "Observation",
     "PointLight",
     "Pose",
+    "Pulse",
     "RectangleLight",
     "Renderer",
     "Scene",
     "Settings",
     "Skin",
     "SkinLook",
+    "SkinState",
     "SphereLight",
     "SpotLight",
+    "StateEvent",
     "StripeLight",
     "Tissue",
     "export_skin",

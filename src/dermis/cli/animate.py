@@ -16,7 +16,16 @@ from cyclopts import Parameter
 from dermis.base.console import print_note, print_report, progress_bar, spinner
 from dermis.base.errors import refuse
 from dermis.base.quantities import checked_number
-from dermis.cli.options import AdapterOption, FlagOption, IntegerOption, JsonOption, Options, OutputPath
+from dermis.cli.living_options import PulseOptions, parse_pulse, parse_states
+from dermis.cli.options import (
+    NO_OPTIONS,
+    AdapterOption,
+    FlagOption,
+    IntegerOption,
+    JsonOption,
+    Options,
+    OutputPath,
+)
 from dermis.cli.output_options import AnimationOutput
 from dermis.cli.scene_options import (
     DEFAULT_SCENE_OPTIONS,
@@ -31,7 +40,9 @@ if TYPE_CHECKING:
     from dermis.frame.renderer import Renderer
     from dermis.mesh.clip import Clip
     from dermis.mesh.head import Head
+    from dermis.scene.living import StateEvent
     from dermis.scene.model import Scene
+    from dermis.scene.pulse import Pulse
     from dermis.scene.settings import Settings
 
 
@@ -45,6 +56,8 @@ class _AnimatedScene:
     rate : frame rate of the animation [1/s]
     first : number of the first frame, at which automatic exposure is metered and hair is at rest
     hair_motion : whether to simulate the swing of long hair
+    pulse : pulse of the skin, None for none
+    states : causes of states of the skin that change over time, in addition to the state of `scene`
     """
 
     scene: Scene
@@ -53,6 +66,8 @@ class _AnimatedScene:
     rate: Fraction
     first: int
     hair_motion: bool = True
+    pulse: Pulse | None = None
+    states: tuple[StateEvent, ...] = ()
 
     def scenes(self, frame_numbers: Iterable[int]) -> Iterator[Scene]:
         """Yield the scene at each frame; morph targets and bones not in the clip keep the pose of `scene`.
@@ -60,10 +75,14 @@ class _AnimatedScene:
         frame_numbers : numbers of the frames to yield
         """
         from dermis.mesh.pose import merge_poses
+        from dermis.scene.living import state_at
 
         for frame in frame_numbers:
-            pose = self.clip.pose_at(float(frame / self.rate))
-            yield replace(self.scene, pose=merge_poses(pose, self.scene.pose))
+            seconds = float(frame / self.rate)
+            scene = replace(self.scene, pose=merge_poses(self.clip.pose_at(seconds), self.scene.pose))
+            if self.states:
+                scene = replace(scene, state=state_at(self.states, seconds, scene.state))
+            yield self.pulse.scene_at(scene, seconds) if self.pulse else scene
 
 
 def animate(
@@ -81,6 +100,9 @@ def animate(
     overwrite: Annotated[bool, Parameter(name="--anew", negative="", show_default=False)] = False,
     names: FlagOption = False,
     hair_motion: bool = True,
+    pulse: str | None = None,
+    pulse_options: PulseOptions = NO_OPTIONS,
+    pulse_record: Path | None = None,
     scene: SceneOptions = DEFAULT_SCENE_OPTIONS,
     adapter: AdapterOption = "auto",
     as_json: JsonOption = False,
@@ -100,13 +122,18 @@ def animate(
 
         dermis animate face.glb --names
 
+        dermis animate human:7 --pulse 72 --to 20 --crf 0 --pulse-record pulse.csv -o pulse.mp4
+
+        dermis animate human --state blush=0.8@1-6 --to 10 -o blush.mp4
+
     Parameters
     ----------
     head:
         Mesh (.glb .gltf .vrm .usdz .obj .ply .stl), sample name or scene (.toml).
     motion:
         File with the motion: .glb or .gltf with clips, .csv of Live Link Face, .json of MediaPipe, or a
-        sequence of meshes such as face_%05d.obj. [default: the file of the head]
+        sequence of meshes such as face_%05d.obj. [default: the file of the head; with --pulse or --state, a
+        still head for the time --to, or 10 s]
     output:
         Movie (.mp4), or numbered images (.png or .exr), such as frames/%05d.png; the folder of images is
         created if necessary.
@@ -128,6 +155,12 @@ def animate(
     hair_motion:
         Simulate the swing of long hair, which is at rest in the first frame. Otherwise hair moves rigidly
         with the head.
+    pulse:
+        Heartbeat of a person: a rate such as 72 [1/min], or a CSV file with the columns time [s] and value
+        (photoplethysmogram; more blood is higher). It changes the blood of the skin and moves the head.
+    pulse_record:
+        CSV file to write with the true pulse of each frame: time [s], relative change of the blood volume
+        without delay, and vertical motion of the face [mm].
     names:
         List the morph targets, bones and clips of the head without rendering.
     as_json:
@@ -138,25 +171,41 @@ def animate(
     from dermis.gpu.adapters import select_adapters
 
     started = time.perf_counter()
+    heartbeat, states = parse_pulse(pulse, pulse_options), parse_states(scene.state or ())
+    changing = tuple(event for event in states if not event.is_constant)
+    scene = replace(scene, state=list(_constant_state_texts(states)))
+    if pulse_record is not None and heartbeat is None:
+        refuse("--pulse-record", "--pulse with it", "there is none", "Add --pulse 72, or leave it out")
     span, target = parse_time_span(begin, end, fps, motion_fps), AnimationOutput(output, crf, overwrite)
     target.check_writable(scene.settings.get("size", (2, 2)))
-    motion_path = motion_file(head, motion)
+    is_still = motion is None and bool(heartbeat or states) and not _has_own_motion(head)
+    motion_path = "" if is_still else motion_file(head, motion)
+    span = span.with_default_end() if is_still else span
     with spinner("loading"):
         animated, settings = assemble_scene(head, scene)
         target.check_writable(settings.size)
-        motion_clip = load_clip(head, animated.head, motion_path, clip, scene.head, span)
+        motion_clip = (
+            _still_clip(span)
+            if is_still
+            else load_clip(head, animated.head, motion_path, clip, scene.head, span)
+        )
         numbers, rate = span.frames(motion_clip)
     if motion_clip.note:
         print_note(f"note: {motion_clip.note}")
     note_subdivision(head, scene, animated.head)
     settings = shrink_atlas_on_cpu(animated, settings, select_adapters(adapter)[0][0].kind)
-    animation = _AnimatedScene(animated, settings, motion_clip, rate, numbers[0], hair_motion)
+    animation = _AnimatedScene(
+        animated, settings, motion_clip, rate, numbers[0], hair_motion, heartbeat, changing
+    )
+    next(iter(animation.scenes(numbers[:1])))  # for errors before the file is written
     missing = target.frames_to_render(
         numbers, settings.size, _frame_digest(animation, scene, head, motion_path)
     )
     draw_started = time.perf_counter()
     adapter_name = _render_frames(animation, missing, target, adapter) if missing else None
     now = time.perf_counter()
+    if heartbeat and pulse_record:
+        _write_pulse_record(pulse_record, heartbeat, numbers, rate)
     report = {
         "file": str(output),
         "adapter": adapter_name,
@@ -167,9 +216,48 @@ def animate(
         "drawn": len(missing),
         "seconds": round(now - started, 3),
         "frames_per_s": round(len(missing) / (now - draw_started), 3),
+        **({"pulse": _pulse_report(heartbeat, numbers, rate)} if heartbeat else {}),
     }
     print_report(as_json, report, lambda: [_summary_line(report), *filter(None, [animated.head.attribution])])
     return 0
+
+
+def _constant_state_texts(states: Iterable[StateEvent]) -> Iterator[str]:
+    """Yield values of --state for the states that do not change over time."""
+    yield from (f"{event.name}={event.weight!r}" for event in states if event.is_constant)
+
+
+def _has_own_motion(head_or_scene: str) -> bool:
+    """Return whether the file of a head can contain clips."""
+    from dermis.formats.parts import is_gltf
+
+    return is_gltf(str(_head_table(head_or_scene).get("name", head_or_scene)))
+
+
+def _still_clip(time_span: TimeSpan) -> Clip:
+    """Return a clip of a head that does not move."""
+    from dermis.mesh.clip import Clip
+    from dermis.mesh.pose import Pose
+
+    return Clip("still", float(time_span.end or 0), None, (), (), (), lambda _: Pose())
+
+
+def _pulse_report(pulse: Pulse, frame_numbers: Sequence[int], rate: Fraction) -> Options:
+    """Return the settings of a pulse, and its mean rate over the frames [1/min]."""
+    begin, end = float(frame_numbers[0] / rate), float(frame_numbers[-1] / rate)
+    mean = pulse.signal().mean_rate_per_min(begin, end)
+    settings = pulse.model_dump(exclude={"rate_per_min"} if pulse.is_recording else set())
+    return {**settings, "mean_rate_per_min": None if math.isnan(mean) else round(mean, 3)}
+
+
+def _write_pulse_record(path: Path, pulse: Pulse, frame_numbers: Sequence[int], rate: Fraction) -> None:
+    """Write the true pulse of each frame as a CSV file."""
+    from dermis.base.atomic_write import atomic_file
+
+    rows = (pulse.truth_at(float(number / rate)) for number in frame_numbers)
+    lines = ["time_s,blood_change,face_up_mm", *(",".join(f"{value:.9g}" for value in row) for row in rows)]
+    with atomic_file(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _render_frames(
@@ -252,6 +340,7 @@ def _frame_digest(animated_scene: _AnimatedScene, options: SceneOptions, *files:
         *map(_file_fingerprint, names),
         *map(repr, option_values),
         f"hair motion {animated_scene.hair_motion}",
+        f"pulse {animated_scene.pulse} states {options.state} {animated_scene.states}",
         repr(frame_values),
         str(scene.head.levels),
     ]
@@ -287,6 +376,7 @@ def _print_animatable_names(head_or_scene: str, options: SceneOptions, as_json: 
 
 
 _DEFAULT_FRAME_RATE = 30.0
+_STILL_SECONDS = 10
 
 
 @dataclass(frozen=True)
@@ -303,6 +393,12 @@ class TimeSpan:
     end: Fraction | None
     rate: Fraction | None
     motion_rate: float | None
+
+    def with_default_end(self) -> TimeSpan:
+        """Return a time span that ends 10 s after its begin if no end is given."""
+        return (
+            self if self.end is not None else replace(self, end=(self.begin or Fraction(0)) + _STILL_SECONDS)
+        )
 
     def frames(self, clip: Clip) -> tuple[range, Fraction]:
         """Return the frame numbers and the frame rate [1/s] for a clip; frame k is at time k / rate.

@@ -11,6 +11,7 @@ from dermis.apps.export.registry import TARGETS
 from dermis.base.console import print_report, spinner
 from dermis.base.errors import refuse
 from dermis.cli.head_options import HeadOptions, check_head_options
+from dermis.cli.living_options import StatesOption, check_constant_states, parse_states
 from dermis.cli.options import NO_OPTIONS, AdapterOption, FlagOption, JsonOption, OutputPath, drop_none
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def export(
     library: Path | None = None,
     map_side: int = 2048,
     head: HeadOptions = NO_OPTIONS,
+    state: StatesOption = None,
     adapter: AdapterOption = "auto",
     naive: FlagOption = False,
     as_json: JsonOption = False,
@@ -54,6 +56,8 @@ def export(
         dermis export human:7 --to unity -o person
 
         dermis export human:7 --to gltf --diffuse-transmission -o person.glb
+
+        dermis export human --to gltf --state blush=0.6 -o blush.glb
 
         dermis export human --to babylon -o head.html
 
@@ -98,7 +102,10 @@ def export(
             actual = f"it is given with --variant {variant}"
             refuse("--diffuse-transmission", "no other variant", actual, "Remove one of them")
         variant = "diffuse-transmission"
-    options = drop_none(version=version, variant=variant, model=model, profile=profile, library=library)
+    weights = check_constant_states(parse_states(state or ())) or None
+    options = drop_none(
+        state=weights, version=version, variant=variant, model=model, profile=profile, library=library
+    )
     with spinner(f"exporting {subject}"):
         report = export_skin(subject, to, output, side=map_side, adapter=adapter, **options, **head)
     print_report(as_json, report.as_json(), lambda: [*report.lines(naive), "", *map(str, report.files)])

@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from dermis.base.console import print_report, spinner
 from dermis.base.errors import refuse
 from dermis.cli.head_options import parse_weights
+from dermis.cli.living_options import STATE_OPTION, StatesOption, check_constant_states, parse_states
 from dermis.cli.options import (
     AdapterOption,
     FlagOption,
@@ -62,6 +63,7 @@ def head(
     size: int = 1024,
     layout: Literal["own", "hm08"] = "own",
     subdivide: IntegerOption = None,
+    state: StatesOption = None,
     adapter: AdapterOption = "auto",
     list_targets: FlagOption = False,
     as_json: JsonOption = False,
@@ -164,6 +166,7 @@ def head(
     from dermis.gpu.failures import run_on_device
     from dermis.human.makehuman import human_targets
     from dermis.human.person_file import person_parameters, write_person_json
+    from dermis.scene.living import SkinState
 
     if list_targets:
         print_report(as_json, list(human_targets()), human_targets)
@@ -182,6 +185,11 @@ def head(
         hair=_hair_look_with_values(person.hair_look, hair),
         **drop_none(clothing=clothing, glasses=glasses),
     )
+    weights = check_constant_states(parse_states(state or ()))
+    skin_state = SkinState(weights) if weights else None
+    if skin_state and (output.suffix.lower() == ".json" or colour is not None):
+        actual = "a file of parameters has none" if colour is None else "--colour replaces the painted map"
+        refuse(STATE_OPTION, "a .glb file with painted maps", actual, "Leave it out")
     report: Options = {"head": str(output), "person": person_parameters(person)}
     if output.suffix.lower() == ".json":
         report |= {"bytes": write_person_json(output, person)}
@@ -192,7 +200,9 @@ def head(
         person_head = _head_with_maps(
             person_head, drop_none(colour=colour, normal=normal, roughness=roughness)
         )
-        person_head, eyes = run_on_device(adapter, lambda device: paint_head(device, person_head, size))
+        person_head, eyes = run_on_device(
+            adapter, lambda device: paint_head(device, person_head, size, skin_state)
+        )
         byte_count = _write_glb(output, person, person_head, rest_weights, eyes)
     seconds, mesh = round(time.perf_counter() - started, 3), person_head.mesh
     report |= {"vertices": len(mesh.positions), "triangles": len(mesh.triangles)}

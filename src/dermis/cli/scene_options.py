@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -26,6 +27,7 @@ from dermis.cli.head_options import (
     pose_from_options,
     pose_with_gaze,
 )
+from dermis.cli.living_options import StatesOption, check_constant_states, parse_states
 from dermis.cli.options import Options, check_fields, model_options, option_name, refuse_options
 from dermis.scene.environment import Environment
 from dermis.scene.head_table import AUTO, NO_REGIONS, EyeTable, HeadTable, has_region_table
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
     from dermis.mesh.head import Head
     from dermis.scene import Scene
     from dermis.scene.lights import Light
+    from dermis.scene.living import SkinState
 
     SkinOptions = Options
     SettingsOptions = Options
@@ -97,6 +100,7 @@ class SceneOptions:
     pose: WeightsOption = None
     bone: BoneAngleOptions = None
     look_at: LookAtOption = None
+    state: StatesOption = None
 
 
 DEFAULT_SCENE_OPTIONS = SceneOptions()
@@ -119,6 +123,7 @@ def assemble_scene(
         options = replace(
             options, head=options.head | {"eye": parse_weights(options.eye, EYE_OPTION)}, eye=None
         )
+    states = check_constant_states(parse_states(options.state or ()))
     _check_values(head_or_scene, options)
     scene, settings = _base_scene(head_or_scene, options)
     note_kept_eyeballs(scene.head, options.head.get("eyes"))
@@ -137,6 +142,7 @@ def assemble_scene(
         skin=Skin(**(scene.skin.model_dump() | SKIN_PRESETS[options.surface or "default"] | options.skin)),
         environment=environment,
         pose=scene.pose,
+        state=_merge_states(scene.state, states),
     )
     look_at = options.look_at
     if looks_at_camera and _is_default_view_of_person(head_or_scene, options):
@@ -147,6 +153,13 @@ def assemble_scene(
     final_settings = Settings(**{**PHOTOGRAPHIC_SETTINGS, **set_values})
     _note_profile_map(assembled.skin, final_settings)
     return assembled, final_settings
+
+
+def _merge_states(state: SkinState | None, weights: Mapping[str, float]) -> SkinState | None:
+    """Return the state of a scene file with the weights of --state, which override those of the file."""
+    from dermis.scene.living import SkinState
+
+    return SkinState({**(state.weights if state else {}), **weights}) if weights else state
 
 
 def default_camera(head_or_scene: str) -> str:

@@ -56,7 +56,7 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
     settings, cached = request.settings, memo.get
     check_limits(device, request)
     map_options = request.takes_albedo_from_map, settings.gamma == "right", request.painted_map_side
-    map_inputs = device, request.head, *map_options, request.has_animated_maps
+    map_inputs = device, request.head, *map_options, request.has_animated_maps, request.is_living
     maps = memo.submit(device.executor, upload_maps, *map_inputs)  # in the background, as files load slowly
     shadow_maps = _shadow_maps(memo, device, request)
     shapes = shape.make_resources(memo, device, request)

@@ -34,7 +34,7 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
     if resources.shape.rest_shape:
         shape.draw(graph, resources.shape.rest_shape, inputs.pose_bytes.at_rest)
     if resources.expression_maps and inputs.face_movements is not None:
-        draw_expression(graph, resources.expression_maps, inputs.face_movements)
+        draw_expression(graph, resources.expression_maps, inputs.face_movements, inputs.skin_state)
     area_lights = ("SHAPES", 1) in inputs.light_constants
     shadows.draw(graph, resources.shadow_maps, inputs.shadow_views, resources.head, area_lights)
     hair_geometry, strands = (resources.shape.shape, resources.head), None

@@ -16,6 +16,7 @@ from dermis.frame.projection import Triple, Views
 from dermis.frame.resources import AtlasLayout, Resources
 from dermis.gpu import Bindings, Constants, UniformRecord
 from dermis.scene.camera import ImageRectangle
+from dermis.scene.living import SkinState
 from dermis.scene.settings import Settings
 
 
@@ -27,6 +28,7 @@ class FrameInputs:
     pose_bytes : pose of the head, as bytes for the shaders
     face_movements : (9,) strength of the facial movements that change the skin maps; None if the maps are
         constant
+    skin_state : state and pulse of the skin, None for skin at rest
     layouts : atlas layouts of `resources`, each with the uniform record of this frame's lights
     blurs : Gaussian blurs of each layout, with a factor that brings this frame's light into the range of the
         texture format
@@ -47,6 +49,7 @@ class FrameInputs:
     settings: Settings
     pose_bytes: PoseBytes
     face_movements: NDArray[np.float32] | None
+    skin_state: SkinState | None
     layouts: tuple[AtlasLayout, ...]
     blurs: tuple[Blur, ...]
     shadow_views: Views

@@ -30,7 +30,13 @@ from dermis.frame.features.occlusion.moving import (
 )
 from dermis.frame.features.outputs.stage_inputs import PreviousScene
 from dermis.frame.features.shading.shade import shade_program
-from dermis.frame.features.shading.view import EyePoses, camera_views, with_camera, world_space_pinhole
+from dermis.frame.features.shading.view import (
+    EyePoses,
+    camera_views,
+    with_camera,
+    with_redness,
+    world_space_pinhole,
+)
 from dermis.frame.features.shape.shape import PoseBytes, rest_pose_bytes
 from dermis.frame.hair_motion import HairFrame, HairMotion
 from dermis.frame.inputs import FrameInputs
@@ -149,6 +155,7 @@ class Preparation:
             shadow_layers=len(shadow_views.clips),
             posed=scene.pose_arrays is not None,
             view_name=view,
+            is_living=scene.state is not None,
             other_profiles=tuple(others),
             blend_weights=blend_weights,
             outputs=requested_names[0],
@@ -170,6 +177,7 @@ class Preparation:
             settings=settings,
             pose_bytes=state.pose_bytes,
             face_movements=cached(_face_movements, head, scene.pose_arrays) if animated else None,
+            skin_state=scene.state,
             layouts=tuple(with_lights(layout, lights) for layout in resources.layouts),
             blurs=cached(_scaled_blurs, resources.diffusion.blurs, scale),
             shadow_views=shadow_views,
@@ -177,7 +185,7 @@ class Preparation:
             camera_views=camera_views(camera, state.outline, settings.samples),
             image_rectangle=camera.image_rectangle,
             sky_view=self._sky_view(head, scene.pose_arrays, state.outline) if resources.sky else None,
-            view=with_camera(resources.view, camera, state.eyes),
+            view=with_redness(with_camera(resources.view, camera, state.eyes), head, scene.state),
             constants=resources.constants + constants,
             centre_mm=head.centre_mm,
         )
@@ -286,8 +294,8 @@ def _rest_positions_mm(scene: Scene) -> NDArray[np.float32] | None:
 
 
 def _face_movements(head: Head, pose_arrays: PoseArrays | None) -> NDArray[np.float32]:
-    assert pose_arrays is not None
-    return movement_weights(head.targets, pose_arrays.weights)
+    weights = np.zeros(len(head.targets), np.float32) if pose_arrays is None else pose_arrays.weights
+    return movement_weights(head.targets, weights)
 
 
 def _rest_pose_bytes(head: Head) -> PoseBytes:

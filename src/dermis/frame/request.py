@@ -33,6 +33,7 @@ class FrameRequest:
         that replace the brightest areas of the panorama, such as the sun
     shadow_layers : number of shadow maps
     posed : whether the scene has a pose
+    is_living : whether the scene has a state of the skin or a pulse
     view_name : cache key of the scene, for callers that draw several scenes in turn
     other_profiles : further diffusion profiles of the skin, which `blend_weights` blends with `profile`; all
         profiles have the same variances
@@ -54,6 +55,7 @@ class FrameRequest:
     shadow_layers: int
     posed: bool
     view_name: str
+    is_living: bool = False
     other_profiles: tuple[GaussianSum, ...] = ()
     blend_weights: NDArray[np.float32] | None = None
     outputs: tuple[str, ...] = ()
@@ -144,8 +146,8 @@ class FrameRequest:
 
     @property
     def has_animated_maps(self) -> bool:
-        """Return whether expressions change the painted maps."""
-        return self.posed and self.painted_map_side > 0 and bool(self.head.targets)
+        """Return whether expressions or states of the skin change the painted maps."""
+        return (self.posed or self.is_living) and self.painted_map_side > 0 and bool(self.head.targets)
 
     @property
     def blur_count(self) -> int:

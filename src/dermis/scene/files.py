@@ -23,13 +23,14 @@ from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.head_table import AUTO, NO_REGIONS, HeadTable, has_region_table
 from dermis.scene.heads import load_head
 from dermis.scene.lights import LIGHTS, NO_LIGHTS, Light, light_presets, preset_lights
+from dermis.scene.living import SkinState
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.skin import SKIN_PRESETS, Skin
 from dermis.scene.smoothness import SmoothOutlineLevels
 
 P = TypeVar("P", bound=FrozenModel)
-_SCENE_TABLE_NAMES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
+_SCENE_TABLE_NAMES = {"head", "pose", "skin", "lights", "environment", "camera", "render", "state"}
 _MAP_ROLES = ("colour", "normal", "height", "specular", "roughness")
 _TargetWeight = Annotated[
     float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), BoundsReason("faces break apart long before")
@@ -92,13 +93,14 @@ def load_scene(
 ) -> tuple[Scene, Settings]:
     r"""Load a scene and its settings from a TOML file.
 
-    The tables of the file are [head], [pose], [skin], [[lights]], [environment], [camera] and [render]. The
-    table [head] has the `name` of a sample or a mesh file, options of `load_head`, and `regions`, the table
-    of face regions for `with_regions`. The table [pose] has the subtables `weights` and `bones`, whose keys
-    are names of morph targets and bones. The name of a preset can replace three of the tables, as in skin =
-    "deck-2007", lights = "studio" and camera = "portrait". Missing keys have their default values. File names
-    are relative to the folder of the scene file. A scene with an environment has no lights unless the file
-    specifies lights.
+    The tables of the file are [head], [pose], [state], [skin], [[lights]], [environment], [camera] and
+    [render]. The table [head] has the `name` of a sample or a mesh file, options of `load_head`, and
+    `regions`, the table of face regions for `with_regions`. The table [state] has weights of states of the
+    skin of a person, such as blush = 0.6. The table [pose] has the subtables `weights` and `bones`, whose
+    keys are names of morph targets and bones. The name of a preset can replace three of the tables, as in
+    skin = "deck-2007", lights = "studio" and camera = "portrait". Missing keys have their default values.
+    File names are relative to the folder of the scene file. A scene with an environment has no lights unless
+    the file specifies lights.
 
     Parameters
     ----------
@@ -170,6 +172,7 @@ def load_scene(
         camera=_parse_camera(path, entry, head),
         skin=_resolve_skin_files(path.parent, skin),
         pose=pose,
+        state=_parse_state(path, table["state"]) if "state" in table else None,
     ), settings
 
 
@@ -267,6 +270,11 @@ def _parse_pose(path: Path, pose_table: Any, head: Head) -> Pose:
     pose = Pose(entry.weights, entry.bones)
     pose.to_arrays(head.control_rig, f"{path}: pose")  # for an error that names the file
     return pose
+
+
+def _parse_state(path: Path, state_table: Any) -> SkinState:
+    with error_context(path):
+        return SkinState(state_table)
 
 
 def _parse_environment(path: Path, environment_table: Any) -> Environment:

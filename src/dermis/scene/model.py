@@ -15,6 +15,7 @@ from dermis.scene.camera import Camera, portrait
 from dermis.scene.conversions import as_camera, as_environment, as_head, as_lights, as_model
 from dermis.scene.environment import Environment
 from dermis.scene.lights import Light, studio
+from dermis.scene.living import SkinState, check_living_head
 from dermis.scene.skin import Skin
 
 if TYPE_CHECKING:
@@ -42,11 +43,15 @@ class Scene:
         An environment or the name of its panorama.
     pose : Pose or mapping, optional
         Pose of the head, or a mapping from morph targets to weights; by default the rest pose.
+    state : SkinState or mapping, optional
+        State of the skin of a person, or a mapping from states ("blush", "pallor", "cold", "exertion",
+        "crying") to weights; by default skin at rest.
 
     Raises
     ------
     DermisError
-        For a pose that the head cannot assume, and for arguments of other types.
+        For a pose that the head cannot assume, for a state of a head whose skin is not painted, and for
+        arguments of other types.
 
     Examples
     --------
@@ -62,6 +67,7 @@ class Scene:
     skin: Skin
     environment: Environment | None
     pose: Pose | None
+    state: SkinState | None
 
     def __init__(
         self,
@@ -71,6 +77,7 @@ class Scene:
         skin: Skin | Mapping[str, Any] | None = None,
         environment: Environment | str | os.PathLike[str] | None = None,
         pose: Pose | Mapping[str, float] | None = None,
+        state: SkinState | Mapping[str, float] | None = None,
     ) -> None:
         self._set_field("head", as_head(head))
         self._set_field("environment", as_environment(environment))
@@ -83,6 +90,9 @@ class Scene:
         self._set_field("pose", Pose.coerce(pose))
         if self.pose is not None:
             self.pose_arrays  # noqa: B018 checks the pose
+        self._set_field("state", SkinState.coerce(state))
+        if self.state is not None:
+            check_living_head(self.head, self.skin.albedo)
 
     @classmethod
     def coerce(cls, scene: object) -> Scene:

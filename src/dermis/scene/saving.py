@@ -14,6 +14,7 @@ from dermis.base.reading import is_file
 from dermis.mesh.pose import Pose
 from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.head_table import has_region_table
+from dermis.scene.living import SkinState
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.toml_text import table_text
@@ -40,11 +41,11 @@ def scene_text(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str
 
     head : [head] table of the scene, with absolute file names
 
-    Raises DermisError for a pose given as point positions, which scene files cannot contain.
+    Raises DermisError for a pose given as point positions and for a pulse, which scene files cannot contain.
     """
     excluded = _FIELDS_SET_BY_REGIONS if has_region_table(head) else set()
     parts = [] if scene.lights else ['lights = "none"\n']
-    parts += [table_text("[head]", head), *_pose_tables(scene.pose)]
+    parts += [table_text("[head]", head), *_pose_tables(scene.pose), *_state_tables(scene.state)]
     parts.append(_model_table("[skin]", scene.skin, excluded | {"pigments", "layers"}))
     if scene.skin.pigments:
         parts.append(_model_table("[skin.pigments]", scene.skin.pigments))
@@ -68,6 +69,17 @@ def _pose_tables(pose: Pose | None) -> list[str]:
     bones = {name: np.asarray(rotation, np.float64).tolist() for name, rotation in pose.bones.items()}
     tables = {"[pose.weights]": weights, "[pose.bones]": bones}
     return [table_text(title, values) for title, values in tables.items() if values] or ["[pose]\n"]
+
+
+def _state_tables(state: SkinState | None) -> list[str]:
+    """Return the TOML table [state] of a state of the skin."""
+    if state is None:
+        return []
+    if state.blood is not None:
+        refuse(
+            "state", "weights, which fit into a scene file", "it has a pulse", "Use dermis animate --pulse"
+        )
+    return [table_text("[state]", state.weights)] if state.weights else ["[state]\n"]
 
 
 def _model_table(title: str, model: FrozenModel, excluded_fields: set[str] | None = None) -> str:

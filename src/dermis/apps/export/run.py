@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +16,7 @@ from dermis.apps.export.target import Parameters, ParameterValue, Target
 from dermis.base.atomic_write import atomic_file, atomic_folder, check_output, temporary_folder
 from dermis.base.errors import notify, refuse
 from dermis.optics.media import Floats
+from dermis.scene.living import SkinState
 
 _NOTABLE_PROFILE_ERROR = 0.05  # fraction of the light that leaves at the wrong radius
 _CHANNEL_NAMES = "red", "green", "blue"
@@ -162,6 +163,7 @@ def export_skin(
     library: str | Path | None = None,
     side: int = _DEFAULT_MAP_SIDE,
     adapter: str = "auto",
+    state: SkinState | Mapping[str, float] | None = None,
     **head: Any,
 ) -> ExportReport:
     """Write a skin or a head for another program, and report the predicted errors of the rendered skin.
@@ -192,6 +194,8 @@ def export_skin(
         Side of the maps that are generated for the export [texel].
     adapter : str, default "auto"
         Graphics adapter on which maps are generated.
+    state : SkinState or mapping, optional
+        State of the skin of a person, such as {"blush": 0.6}, which the painted maps show.
     **head
         Options of `load_head`.
 
@@ -218,7 +222,7 @@ def export_skin(
     target = replace(TARGETS[to].with_variant(variant), side=side, adapter=adapter)
     target = target if library is None else target.with_embedded_library(library)
     resolved, path = target.resolve_version(version), _check_output_path(target, output)
-    options = {"model": model, "profile": profile, **head}
+    options = {"model": model, "profile": profile, "state": state, **head}
     if not isinstance(subject, Subject):
         subject = load_subject(subject, **options)
     elif given := [name for name, value in options.items() if value is not None]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -31,6 +31,7 @@ from dermis.optics.profiles import find_gaussians
 from dermis.optics.radial import RadialProfile, gaussian_radial_profile
 from dermis.optics.tissue import Tissue
 from dermis.scene.heads import is_person_name, load_head, load_person
+from dermis.scene.living import SkinState
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 from dermis.scene.skin import Skin
@@ -59,6 +60,7 @@ class Subject:
     tissue : tissue of the skin; None for a table of Gaussians
     scene : scene with the head and its skin; None for a skin without a head
     person : parametric person to whom the head belongs; None for other heads
+    eye_state : state of the skin that is painted in the maps, and that reddens the eyes; None for none
     """
 
     name: str
@@ -68,6 +70,7 @@ class Subject:
     tissue: Tissue | None = None
     scene: Scene | None = None
     person: Human | None = None
+    eye_state: SkinState | None = None
 
     @property
     def head(self) -> Head | None:
@@ -115,11 +118,14 @@ class Subject:
 
     def eye_pictures(self) -> EyeTextures | None:
         """Return the painted textures of the eyes, or None if there are no eyes."""
-        from dermis.frame.features.surface.painting.painted_head import paint_eye
+        from dermis.frame.features.surface.painting.painted_head import paint_eye, reddened
         from dermis.gpu.failures import run_on_device
 
         eyes = self.head_or_ball.eyes
-        return None if eyes is None else run_on_device("auto", lambda device: paint_eye(device, eyes.look))
+        if eyes is None:
+            return None
+        look = reddened(eyes.look, self.eye_state or (self.scene.state if self.scene else None))
+        return run_on_device("auto", lambda device: paint_eye(device, look))
 
     def with_painted_maps(self, map_side: int, adapter: str) -> Subject:
         """Return a copy of the subject with the head's procedural maps replaced by arrays of texels.
@@ -129,14 +135,15 @@ class Subject:
         map_side : side of the maps, a power of two from 256 to 4096 [texel]
         adapter : graphics adapter on which the maps are computed
         """
-        head = self.head
+        head, state = self.head, self.scene.state if self.scene else None
         if self.scene is None or head is None or not head.maps.is_painted:
             return self
         from dermis.frame.features.surface.painting.painted_head import with_painted_maps
         from dermis.gpu.failures import run_on_device
 
-        painted = run_on_device(adapter, lambda device: with_painted_maps(device, head, map_side))
-        return replace(self, scene=replace(self.scene, head=painted))
+        painted = run_on_device(adapter, lambda device: with_painted_maps(device, head, map_side, state))
+        scene = replace(self.scene, head=painted, state=None)
+        return replace(self, scene=scene, eye_state=state)
 
     def encode_maps(self) -> dict[str, bytes]:
         """Return the maps of the head as PNG files, by role.
@@ -156,6 +163,7 @@ def load_subject(
     *,
     profile: str | Path | None = None,
     model: ModelName | None = None,
+    state: SkinState | Mapping[str, float] | None = None,
     **head: Any,
 ) -> Subject:
     """Load a skin or a head, given by name or file, and return it with the reference profile of its skin.
@@ -166,14 +174,16 @@ def load_subject(
     profile : name or file of the profile of a head's skin; by default, the skin of a parametric person has
         the pigments of that person, and other heads have the default skin
     model : model of the reference profile, see `reference_profile`
+    state : state of the skin of a person, or its weights; None for skin at rest
     head : options of `load_head`
 
-    Raises DermisError for an unknown name, and for options of heads if `name_or_file` is a skin.
+    Raises DermisError for an unknown name, and for options and states of heads if `name_or_file` is a skin.
     """
     path = checked_path(name_or_file, "a skin or a head")
     name = str(name_or_file)
     if not (is_person_name(name) or name in SAMPLES or find_format(path)):
-        return _load_skin(name, model, head if profile is None else ("profile",))
+        given = dict(head) if profile is None else {"profile": profile}
+        return _load_skin(name, model, given | ({} if state is None else {"state": state}))
     loaded = load_head(name_or_file, **head)
     person = load_person(name) if is_person_name(name) else None
     if profile is not None:
@@ -182,7 +192,8 @@ def load_subject(
         skin = Skin() if person is None else skin_of(person)
     curve, used_model, tissue = reference_profile(skin, model)
     albedo = curve.energy if loaded.maps.mean_colour is None else loaded.maps.mean_colour
-    return Subject(path.name, curve, albedo, used_model, tissue, Scene(loaded, skin=skin), person)
+    scene = Scene(loaded, skin=skin, state=state)
+    return Subject(path.name, curve, albedo, used_model, tissue, scene, person)
 
 
 def _load_skin(skin_name: str, profile_model: ModelName | None, head_options: Iterable[str]) -> Subject:

@@ -148,6 +148,13 @@ def noise_table() -> NDArray[np.float32]:
     return table
 
 
+def noise_row_range(noise_name: str) -> tuple[int, int]:
+    """Return the first row of a noise in `noise_table`, and the row after its last."""
+    names, octaves = [noise.name for noise in NOISES], [noise.octaves for noise in NOISES]
+    first = sum(octaves[: names.index(noise_name)])
+    return first, first + octaves[names.index(noise_name)]
+
+
 def _octave_rows() -> Iterator[tuple[NDArray[np.float64], float, float, int, int, int, int]]:
     seed = 0
     for noise_index, noise in enumerate(NOISES):

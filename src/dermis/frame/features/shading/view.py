@@ -24,10 +24,12 @@ from dermis.frame.projection import (
 from dermis.frame.technique import ProfileSplit
 from dermis.gpu import ComputeProgram, UniformRecord
 from dermis.mesh.fabric import WEAVES
+from dermis.human.living.zones import eye_redness
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import MOUTH_PARTS
 from dermis.mesh.outline import Outline
 from dermis.scene.camera import Camera, ImageRectangle
+from dermis.scene.living import SkinState
 from dermis.scene.settings import Settings
 from dermis.scene.skin import MAX_OTHER_PROFILES
 
@@ -168,6 +170,17 @@ def with_camera(shade_record: UniformRecord, pinhole: Pinhole, eyes: EyePoses | 
         homogeneous = np.concatenate([points, np.ones((*points.shape[:2], 1))], axis=-1)
         record["lids"] = np.einsum("kij,krj->kri", eyes.frames, homogeneous).reshape(-1, 4)
     return record
+
+
+def with_redness(shade_record: UniformRecord, head: Head, skin_state: SkinState | None) -> UniformRecord:
+    """Return a Shade record in which states of the skin redden the white of the eyes.
+
+    shade_record : result of `with_camera`, which is changed
+    """
+    redness = eye_redness(skin_state.weights) if skin_state else 0.0
+    if redness and head.eyes is not None:
+        shade_record["eyes"]["redness"] = min(head.eyes.look.redness + redness, 1.0)
+    return shade_record
 
 
 def ray_record(shader: ComputeProgram, shade_record: UniformRecord) -> UniformRecord:

@@ -48,6 +48,7 @@ def upload_maps(
     decode_srgb: bool = True,
     painted_map_side: int = 0,
     has_expressions: bool = False,
+    is_living: bool = False,
 ) -> UploadedMaps:
     """Upload or paint the maps of a head, with their sampler and the table of Beckmann's distribution.
 
@@ -57,6 +58,7 @@ def upload_maps(
         talk [dEonLuebke2007] shows
     painted_map_side : side of painted maps [texels]
     has_expressions : whether expressions change painted maps
+    is_living : whether states of the skin and the pulse change painted maps
     """
     maps = head.maps
     if not isinstance(maps, PaintedMaps):
@@ -66,7 +68,7 @@ def upload_maps(
         maps = replace(maps, colour=found.colour)
         head = replace(head, maps=maps)
     painted, expression_maps = _paint_maps(
-        device, head, maps, use_colour, (painted_map_side, has_expressions)
+        device, head, maps, use_colour, (painted_map_side, has_expressions, is_living)
     )
     return UploadedMaps(_upload_file_maps(device, head, use_colour, decode_srgb) | painted, expression_maps)
 
@@ -84,20 +86,20 @@ def detail_bindings(device: Device, has_fine_relief: bool) -> MutableBindings:
 
 
 def _paint_maps(
-    device: Device, head: Head, maps: PaintedMaps, use_colour: bool, paint_options: tuple[int, bool]
+    device: Device, head: Head, maps: PaintedMaps, use_colour: bool, paint_options: tuple[int, bool, bool]
 ) -> tuple[MutableBindings, ExpressionMaps | None]:
     """Paint the maps that the head does not have as files; also return the maps that expressions change.
 
     maps : look of the skin to paint, and maps from files that replace painted maps
     use_colour : whether to include the colour map
-    paint_options : side of the painted maps [texels], and whether expressions change them
+    paint_options : side of the painted maps [texels], and whether expressions and states change them
     """
-    surface, (side, animated) = _painted_surface(head), paint_options
+    surface, (side, animated, is_living) = _painted_surface(head), paint_options
     if device.adapter.kind == "CPU":
         side = min(side, _MAX_SOFTWARE_MAP_SIDE)
     from_file = {"relief": maps.height if maps.normal is None else maps.normal, "colour": maps.colour}
     animated = animated and (from_file["relief"] is None or (use_colour and maps.colour is None))
-    painted = paint.paint_textures(device, surface, maps.look, side, animated)
+    painted = paint.paint_textures(device, surface, maps.look, side, animated, is_living and animated)
     textures = {role: getattr(painted, role) for role in ("colour", "specular", "roughness", "relief")}
     from_file |= {"specular": maps.specular, "roughness": maps.roughness}
     used = [role for role in textures if from_file[role] is None and (use_colour or role != "colour")]

@@ -16,6 +16,14 @@ from dermis.base.disk import Arrays, array_key, load_arrays, load_or_make
 from dermis.base.errors import refuse
 from dermis.base.progress import logged_step
 from dermis.frame.features.surface import mips as map_mips
+from dermis.frame.features.surface.living.living import (
+    LIVING_CONSTANTS,
+    LivingMaps,
+    draw_state,
+    draw_state_texels,
+    make_living_maps,
+    pulse_record,
+)
 from dermis.frame.programs import FEATURES_FOLDER, HALF_TEXEL_FORMAT, program, shader_folders, workgroup_grid
 from dermis.gpu import (
     Bindings,
@@ -24,7 +32,6 @@ from dermis.gpu import (
     Device,
     Graph,
     MutableBindings,
-    Recorder,
     Texture,
     UniformRecord,
     make_texture,
@@ -46,9 +53,11 @@ from dermis.human.skin.textures import (
     NOISES,
     TILE_LENGTH_MM,
     ZONE_BORDER_NOISE_COUNT,
+    noise_row_range,
     noise_table,
 )
 from dermis.mesh.maps import Maps
+from dermis.scene.living import PULSE_SAMPLE_COUNT, SkinState
 from dermis.scene.skin import DEFAULT_RHO_S
 from dermis.specular.hair import absorption_per_mm, dense_hair_reflectance
 
@@ -67,7 +76,6 @@ _TRIANGLE_ROW_PADDING = (0, 0), (0, 2)  # padding from two to four columns
 _PAINTED_CACHE_FOLDER = "painted"
 _WORD_BYTES = 4
 _PAINTED_MAP_NAMES = ("colour", "specular", "roughness")
-_FOLDING_VALUE_COUNT = FOLD_MOVEMENT_COUNT + 1  # numbers in `folding` of the shader: fold movements and flush
 
 
 def painting_shader_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
@@ -82,6 +90,8 @@ def painting_constants() -> dict[str, float]:
     """Return the named values that the shader preprocessor inserts at `//#fill` in painting shaders."""
     counts = {name: len(names) for name, names in _PAINTING_LISTS.items()} | paint_table_sizes()
     rows = {"noise_rows": len(noise_table()), "amount_rows": len(ZONE_AMOUNTS) // 4}
+    first, end = noise_row_range("blotches")
+    rows |= {"first_blotch_row": first, "end_blotch_row": end, "pulse_rows": PULSE_SAMPLE_COUNT // 4}
     sizes = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM}
     return sizes | counts | rows | {"folding": FOLD_MOVEMENT_COUNT, "wander_rows": ZONE_BORDER_NOISE_COUNT}
 
@@ -297,42 +307,47 @@ def _upload_cached_maps(device: Device, map_arrays: Arrays, map_side: int) -> Re
 
 @dataclass(frozen=True, eq=False)
 class ExpressionMaps:
-    """Painted maps that change with expressions, and the inputs of the pass that fills these maps.
+    """Painted maps that change with expressions, and the inputs of the passes that fill these maps.
 
-    bindings : dictionary from names in expression.wgsl to resources
+    bindings : dictionary from names in expression.wgsl and expression_relief.wgsl to resources
     heights : buffer of heights from which the relief is computed [mm]
     colour, relief : textures with all mip levels
+    living : maps that states of the skin and the pulse change, None if the skin has neither
     """
 
     bindings: MutableBindings
     heights: Buffer
     colour: map_mips.MippedTexture
     relief: map_mips.MippedTexture
+    living: LivingMaps | None = None
 
 
 def draw_expression(
-    graph: Graph, expression_maps: ExpressionMaps, movement_strengths: NDArray[np.float32]
+    graph: Graph,
+    expression_maps: ExpressionMaps,
+    movement_strengths: NDArray[np.float32],
+    skin_state: SkinState | None = None,
 ) -> None:
-    """Declare the passes that compute the colour and relief of an expression.
+    """Declare the passes that compute the maps of skin with an expression, a state and a pulse.
 
     movement_strengths : (9,) strength of each facial movement, from `human.skin.face.movement_weights` [-]
+    skin_state : state and pulse of the skin; None if `expression_maps` has no `living` maps
     """
-    shader, side = program(graph.device, "surface/painting/expression.wgsl"), expression_maps.colour.size[0]
-    folding = movement_strengths[:_FOLDING_VALUE_COUNT].reshape(2, 4)
-    record = shader.make_record(
-        "Expression", folding=folding, pressed=movement_strengths[_FOLDING_VALUE_COUNT], side=side
-    )
-    graph.compute("maps", shader, expression_maps.bindings | {"expression": record}, (side, side))
-    graph.add_replayable(_fill_expression_maps, expression_maps)
-
-
-def _fill_expression_maps(graph: Recorder, expression_maps: ExpressionMaps) -> None:
-    """Declare the passes that compute the coarser mip levels of the colour map, and the whole relief map.
-
-    The relief map, with all its mip levels, is computed from the buffer of heights.
-    """
-    map_mips.fill_mips(graph, expression_maps.colour)
-    map_mips.fill_relief(graph, expression_maps.relief, expression_maps.heights)
+    side = expression_maps.colour.size[0]
+    folding, (flush, pressed) = np.split(movement_strengths, [FOLD_MOVEMENT_COUNT])
+    shader = program(graph.device, "surface/painting/expression_relief.wgsl")
+    record = shader.make_record("Relief", folding=np.append(folding, 0.0).reshape(2, 4), side=side)
+    graph.compute("maps", shader, expression_maps.bindings | {"relief": record}, (side, side))
+    graph.add_replayable(map_mips.fill_relief, expression_maps.relief, expression_maps.heights)
+    living = expression_maps.living if skin_state is not None else None
+    shader = program(graph.device, "surface/painting/expression.wgsl", LIVING_CONSTANTS if living else ())
+    record = shader.make_record("Expression", flush=flush, pressed=pressed, side=side)
+    bindings: MutableBindings = {**expression_maps.bindings, "expression": record}
+    if living is not None and skin_state is not None:
+        draw_state(graph, living, skin_state)
+        bindings |= living.bindings | {"living": pulse_record(shader, living, skin_state)}
+    graph.compute("maps", shader, bindings, (side, side))
+    graph.add_replayable(map_mips.fill_mips, expression_maps.colour)
 
 
 class PaintedTextures(NamedTuple):
@@ -362,22 +377,30 @@ class RawPaintedArrays(NamedTuple):
 
 
 def paint_textures(
-    device: Device, surface: PaintedSurface, look: SkinLook, map_side: int, with_expressions: bool = False
+    device: Device,
+    surface: PaintedSurface,
+    look: SkinLook,
+    map_side: int,
+    with_expressions: bool = False,
+    is_living: bool = False,
 ) -> PaintedTextures:
     """Paint the maps of a skin that has the given look, and return them as textures.
 
     map_side : side of the maps [texels]
     with_expressions : whether expressions change colour and relief; if so, `draw_expression` fills these maps
+    is_living : whether states and the pulse change colour and gloss too; it requires `with_expressions`
     """
-    maps = cached_rest_maps(device, paint_inputs(surface, look, map_side), map_side, with_expressions)
+    inputs = paint_inputs(surface, look, map_side)
+    maps = cached_rest_maps(device, inputs, map_side, with_expressions)
     colour = map_mips.empty_map(device, (map_side, map_side)) if with_expressions else maps.colour
+    living = _living_maps(device, inputs, look, maps) if is_living else None
+    specular, roughness = (living or maps).specular, (living or maps).roughness
+    constant = [*([] if with_expressions else [colour]), *([] if living else [specular, roughness])]
     frame = CommandList(device, timed=False)
-    for one in (
-        (maps.specular, maps.roughness) if with_expressions else (colour, maps.specular, maps.roughness)
-    ):
+    for one in constant:
         map_mips.fill_mips(frame, one)
     frame.submit()
-    gloss = maps.specular.texture, maps.roughness.texture
+    gloss = specular.texture, roughness.texture
     if not with_expressions or maps.deltas is None:
         texture = map_mips.relief_from_buffers(device, [maps.heights], (map_side, map_side), map_side)
         return PaintedTextures(colour.texture, *gloss, texture, None)
@@ -387,17 +410,33 @@ def paint_textures(
     )
     bindings: MutableBindings = {"colour_at_rest": maps.colour.texture, "heights_at_rest": maps.heights}
     bindings |= {"expression_deltas": maps.deltas, "heights": heights, "colour": colour.levels[0]}
-    expression_maps = ExpressionMaps(bindings, heights, colour, relief)
+    expression_maps = ExpressionMaps(bindings, heights, colour, relief, living)
     return PaintedTextures(colour.texture, *gloss, relief.texture, expression_maps)
 
 
-def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, map_side: int) -> Maps:
+def _living_maps(device: Device, inputs: PaintInputs, look: SkinLook, maps: RestMaps) -> LivingMaps:
+    """Return the maps of a painted skin that states and the pulse change."""
+    map_side = maps.colour.size[0]
+    zone_bindings: MutableBindings = {"paint": inputs.paint, "tables": inputs.tables}
+    zone_bindings |= _surface_buffers(device, inputs, map_side)
+    return make_living_maps(device, look, zone_bindings, maps.specular.texture, maps.roughness.texture)
+
+
+def paint_arrays(
+    device: Device,
+    surface: PaintedSurface,
+    look: SkinLook,
+    map_side: int,
+    skin_state: SkinState | None = None,
+) -> Maps:
     """Paint the maps of a skin that has the given look, and return them as arrays.
 
     Pores and fine lines are left out, because they are too fine for maps. Heights fade to 0 outside the
     charts of the uv layout.
+
+    skin_state : state and pulse of the skin, None for skin at rest
     """
-    arrays = paint_raw_arrays(device, surface, look, map_side)
+    arrays = paint_raw_arrays(device, surface, look, map_side, skin_state)
     rho_s = DEFAULT_RHO_S * arrays.specular[..., 0]
     return Maps(
         colour=np.ascontiguousarray(arrays.colour[..., :3]),
@@ -408,12 +447,37 @@ def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, map_si
 
 
 def paint_raw_arrays(
-    device: Device, surface: PaintedSurface, look: SkinLook, map_side: int
+    device: Device,
+    surface: PaintedSurface,
+    look: SkinLook,
+    map_side: int,
+    skin_state: SkinState | None = None,
 ) -> RawPaintedArrays:
-    """Paint the maps of a skin that has the given look, and return all channels that the shader writes."""
-    maps = paint_rest_maps(device, paint_inputs(surface, look, map_side), map_side)
+    """Paint the maps of a skin that has the given look, and return all channels that the shader writes.
+
+    skin_state : state and pulse of the skin, None for skin at rest
+    """
+    inputs = paint_inputs(surface, look, map_side)
+    maps = paint_rest_maps(device, inputs, map_side)
+    if skin_state is not None:
+        maps = _with_state(device, maps, _living_maps(device, inputs, look, maps), skin_state)
     textures = maps.colour, maps.specular, maps.roughness
     colour, specular, roughness = (download(device, one.texture).astype(np.float32) for one in textures)
     raw = np.frombuffer(device.handle.queue.read_buffer(maps.heights), np.float32)
     height = np.ascontiguousarray(raw.reshape(map_side + 2, map_side + 2)[1:-1, 1:-1])
     return RawPaintedArrays(colour, specular, roughness, height)
+
+
+def _with_state(device: Device, maps: RestMaps, living: LivingMaps, skin_state: SkinState) -> RestMaps:
+    """Return the finest mip levels of painted maps with a state and a pulse, without an expression."""
+    side, frame = maps.colour.size[0], CommandList(device, timed=False)
+    colour = map_mips.empty_map(device, (side, side))
+    draw_state_texels(frame, living, skin_state)
+    shader = program(device, "surface/painting/expression.wgsl", LIVING_CONSTANTS)
+    assert maps.deltas is not None
+    bindings: MutableBindings = {"colour_at_rest": maps.colour.texture, "expression_deltas": maps.deltas}
+    bindings |= living.bindings | {"living": pulse_record(shader, living, skin_state)}
+    bindings |= {"expression": shader.make_record("Expression", side=side), "colour": colour.levels[0]}
+    frame.compute("maps", shader, bindings, (side, side))
+    frame.submit()
+    return maps._replace(colour=colour, specular=living.specular, roughness=living.roughness)

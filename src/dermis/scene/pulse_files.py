@@ -1,0 +1,98 @@
+"""Files with the form of a beat or a recording of the pulse, and the motion of the head by the pulse."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dermis.base.arrays import Doubles
+from dermis.base.errors import format_value, refuse
+from dermis.base.reading import checked_path, read_text
+from dermis.base.tables import column_separator
+from dermis.human.living import TYPICAL_BEAT
+from dermis.human.living.heartbeat import ModelledPulse, RecordedPulse, normalised_beat, typical_beat
+from dermis.mesh.pose import Pose, merge_poses
+from dermis.mesh.rotations import angles_matrix
+
+_HEAD_BONE = "head"
+_MAX_FILE_BYTES, _MIN_BEAT_SAMPLES = 64 << 20, 8
+_MIN_RECORDING_S, _MAX_RECORDING_S = 2.0, 1e6
+
+
+@lru_cache(maxsize=32)
+def load_signal(
+    waveform: str, rate_per_min: float, variability_ms: float, respiration_per_min: float, seed: int
+) -> ModelledPulse | RecordedPulse:
+    """Return a pulse as a function of time, for fields of `Pulse`.
+
+    Raises DermisError for files that cannot be read.
+    """
+    table = typical_beat()[:, None] if waveform == TYPICAL_BEAT else _read_columns(waveform)
+    if table.shape[1] == 2:
+        return RecordedPulse(*_checked_recording(waveform, table))
+    beat = table[:, 0]
+    if len(beat) < _MIN_BEAT_SAMPLES or np.ptp(beat) == 0.0:
+        expected = f"at least {_MIN_BEAT_SAMPLES} different values over one beat"
+        refuse(waveform, expected, f"got {len(beat)} with a range of {np.ptp(beat):g}", "Correct it")
+    beat = normalised_beat(beat)
+    return ModelledPulse(rate_per_min, beat, 1e-3 * variability_ms, respiration_per_min / 60.0, seed)
+
+
+def _read_columns(file_name: str) -> Doubles:
+    """Return the table (n, 1 or 2) of a CSV file, without a header line."""
+    expected = f"{TYPICAL_BEAT}, or a CSV file with one column (a beat) or two (time, value)"
+    path = checked_path(file_name, expected)
+    lines = [
+        line
+        for line in read_text(path, expected, _MAX_FILE_BYTES).splitlines()
+        if line.strip() and line[0] != "#"
+    ]
+    rows = [_numbers(line) for line in lines]
+    if rows and rows[0] is None:
+        lines, rows = lines[1:], rows[1:]
+    for line, row in zip(lines, rows, strict=True):
+        if row is None or len(row) != len(rows[0] or ()) or len(row) not in (1, 2):
+            expected = "one or two numbers in each line, as in the first"
+            refuse(path, expected, f"got {format_value(line)}", "Correct it")
+    if not rows:
+        refuse(path, expected, "it is empty", "Correct it")
+    return np.array(rows, np.float64)
+
+
+def _numbers(line: str) -> list[float] | None:
+    """Return the numbers of a line of a table; None if it has others than finite numbers."""
+    mark = column_separator(line)
+    texts = line.split(mark) if mark == "," else line.replace(",", ".").split(mark)
+    try:
+        numbers = [float(text) for text in texts]
+    except ValueError:
+        return None
+    return numbers if np.isfinite(numbers).all() else None
+
+
+def _checked_recording(file_name: str | Path, table: Doubles) -> tuple[Doubles, Doubles]:
+    """Return times from 0 [s] and values of a recording; raise DermisError if it cannot be used."""
+    times = table[:, 0] - table[0, 0]
+    if len(times) < 2 or (np.diff(times) <= 0).any():
+        refuse(file_name, "increasing times [s] in the first column", "they are not", "Correct it")
+    if times[-1] < _MIN_RECORDING_S or times[-1] > _MAX_RECORDING_S:
+        expected = f"a recording of {_MIN_RECORDING_S:g} to {_MAX_RECORDING_S:g} s"
+        refuse(file_name, expected, f"it lasts {times[-1]:g} s", "Give times in seconds")
+    if np.ptp(np.percentile(table[:, 1], (2.5, 97.5))) == 0.0:
+        refuse(file_name, "values that change", "they are constant", "Correct it")
+    return times, table[:, 1]
+
+
+def with_nod(pose: Pose | None, nod_degrees: float) -> Pose:
+    """Return a pose in which the head is rotated about x, in addition to its rotation in `pose`."""
+    base = pose or Pose()
+    before: Any = base.bones.get(_HEAD_BONE, (0.0, 0.0, 0.0))
+    if np.shape(before) == (3,):
+        rotation: Any = (before[0] + nod_degrees, before[1], before[2])
+    else:
+        rotation = np.array(before, np.float64)
+        rotation[:3, :3] = rotation[:3, :3] @ np.array(angles_matrix((nod_degrees, 0.0, 0.0)))[:3, :3]
+    return merge_poses(Pose(bones={_HEAD_BONE: rotation}), base)
