@@ -23,8 +23,8 @@ from dermis.frame.projection import (
 )
 from dermis.frame.technique import ProfileSplit
 from dermis.gpu import ComputeProgram, UniformRecord
-from dermis.mesh.fabric import WEAVES
 from dermis.human.living.zones import eye_redness
+from dermis.mesh.fabric import WEAVES
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import MOUTH_PARTS
 from dermis.mesh.outline import Outline
