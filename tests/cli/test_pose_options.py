@@ -11,8 +11,10 @@ import pytest
 from moving_head import write_moving_head
 
 import dermis
+from dermis.base.errors import DermisError
 from dermis.cli.head_options import parse_bone_angles, parse_weights
 from dermis.cli.scene_options import SceneOptions, assemble_scene
+from dermis.human.expressions import expression
 from dermis.images.io import read_image
 from dermis.mesh.pose import Pose
 
@@ -32,6 +34,21 @@ def test_option_values_become_a_pose() -> None:
         "a=b": -2.0,
     }
     assert parse_bone_angles(["head=0,25,0", "eye.L=1,2,-3"]) == {"head": [0, 25, 0], "eye.L": [1, 2, -3]}
+
+
+def test_expression_names_are_weights() -> None:
+    assert parse_weights(["joy"]) == expression("joy")
+    assert parse_weights(["joy,jawOpen=0.3"]) == expression("joy") | {"jawOpen": 0.3}
+
+
+def test_scene_file_names_an_expression(tmp_path: Path) -> None:
+    file = tmp_path / "s.toml"
+    file.write_text('[head]\nname = "human"\n[pose]\nexpression = "joy"\nweights = {jawOpen = 0.3}\n')
+    pose = Pose.coerce(assemble_scene(str(file), SceneOptions())[0].pose)
+    assert pose and pose.weights == expression("joy") | {"jawOpen": 0.3}
+    file.write_text('[head]\nname = "human"\n[pose]\nexpression = "jy"\n')
+    with pytest.raises(DermisError, match=r"s.toml: pose: expression: expected one of neutral, .* got 'jy'"):
+        assemble_scene(str(file), SceneOptions())
 
 
 def test_pose_and_bone_move_the_picture(render: Run, face: str) -> None:
@@ -66,6 +83,7 @@ def test_options_override_the_pose_of_a_scene(face: str) -> None:
         ("--pose jawOpne=1", "Nearest: jawOpen. All names: dermis animate face.glb --names."),
         ("--bone hed=1,2,3", "Nearest: head. All names: dermis animate face.glb --names."),
         ("--pose jawOpen", "--pose: expected NAME=WEIGHT"),
+        ("--pose jyo", "Add a weight, or choose one of neutral, smile"),
         ("--pose jawOpen=wide", "got 'jawOpen=wide'"),
         ("--pose =1", "got '=1'"),
         ("--pose jawOpen=nan", "jawOpen=nan'"),

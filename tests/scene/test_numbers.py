@@ -24,6 +24,7 @@ from dermis.scene.files import PoseTable
 from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.head_table import EyeTable, HeadTable
 from dermis.scene.lights import LIGHTS
+from dermis.scene.pulse import Pulse
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, TissueLayer
 
@@ -36,7 +37,7 @@ NEEDED: dict[type[FrozenModel], dict[str, Any]] = {
     Environment: {"name": "uniform"},
     HeadTable: {"name": "human"},
     TissueLayer: {"absorption_per_mm": THIRD, "scattering_per_mm": THIRD},
-    **{model: {} for model in (EyeTable, Pigments, Skin, Settings, PoseTable)},
+    **{model: {} for model in (EyeTable, Pigments, Skin, Settings, PoseTable, Pulse)},
 }
 """The package's models, each with what it cannot be without."""
 PEOPLE = (Human, SkinLook, HairLook, EyeLook, SkinParameters)

@@ -78,8 +78,8 @@ WeightsOption = Annotated[
         name=POSE_OPTION,
         negative="",
         metavar="NAME=WEIGHT,...",
-        help="Weights of morph targets, such as jawOpen=0.6,mouthSmileLeft=1, in addition to the [pose] of a "
-        "scene; `dermis animate HEAD --names` lists the names; repeatable.",
+        help="Expression, such as joy, or weights of morph targets, such as jawOpen=0.6,mouthSmileLeft=1, in "
+        "addition to the [pose] of a scene; `dermis animate HEAD --names` lists the targets; repeatable.",
     ),
 ]
 LookAtOption = Annotated[
@@ -103,10 +103,24 @@ BoneAngleOptions = Annotated[
 
 
 def parse_weights(option_values: Sequence[str], option_name: str = POSE_OPTION) -> dict[str, float]:
-    """Return a dictionary from names to weights for option values such as "jawOpen=0.6,mouthSmileLeft=1"."""
-    expected = "NAME=WEIGHT,..., such as jawOpen=0.6,mouthSmileLeft=1"
-    parts = (part for text in option_values for part in text.split(","))
-    return {name: weight for name, (weight,) in _parse_named_numbers(parts, 1, option_name, expected)}
+    """Return a dictionary from names to weights for option values such as "joy" or "jawOpen=0.6,mouthLeft=1".
+
+    A word without a weight is the name of an expression; weights given by name replace those of expressions.
+    """
+    expected = "NAME=WEIGHT,..., such as jawOpen=0.6,mouthSmileLeft=1, or an expression, such as joy"
+    parts = [part.strip() for text in option_values for part in text.split(",")]
+    weights = dict[str, float]()
+    for name in parts:
+        if name and "=" not in name:
+            from dermis.human.expressions import EXPRESSIONS, expression
+
+            if name not in EXPRESSIONS:
+                advice = f"Add a weight, or choose one of {', '.join(EXPRESSIONS)}"
+                refuse(option_name, expected, f"got {name!r}", advice)
+            weights |= expression(name)
+    given = (part for part in parts if "=" in part or not part)
+    named = _parse_named_numbers(given, 1, option_name, expected)
+    return weights | {name: weight for name, (weight,) in named}
 
 
 def parse_bone_angles(option_values: Sequence[str]) -> dict[str, list[float]]:

@@ -12,6 +12,7 @@ from pydantic import Field
 from dermis.base.errors import error_context, refuse
 from dermis.base.reading import checked_path, is_file, read_toml
 from dermis.base.renamed import renamed_keywords
+from dermis.human.expressions import expression
 from dermis.human.regions.apply import with_regions
 from dermis.human.regions.region_table import load_region_table
 from dermis.mesh.head import Head
@@ -96,11 +97,11 @@ def load_scene(
     The tables of the file are [head], [pose], [state], [skin], [[lights]], [environment], [camera] and
     [render]. The table [head] has the `name` of a sample or a mesh file, options of `load_head`, and
     `regions`, the table of face regions for `with_regions`. The table [state] has weights of states of the
-    skin of a person, such as blush = 0.6. The table [pose] has the subtables `weights` and `bones`, whose
-    keys are names of morph targets and bones. The name of a preset can replace three of the tables, as in
-    skin = "deck-2007", lights = "studio" and camera = "portrait". Missing keys have their default values.
-    File names are relative to the folder of the scene file. A scene with an environment has no lights unless
-    the file specifies lights.
+    skin of a person, such as blush = 0.6. The table [pose] has a named `expression`, such as "joy", and the
+    subtables `weights` and `bones`, whose keys are names of morph targets and bones. The name of a preset can
+    replace three of the tables, as in skin = "deck-2007", lights = "studio" and camera = "portrait". Missing
+    keys have their default values. File names are relative to the folder of the scene file. A scene with an
+    environment has no lights unless the file specifies lights.
 
     Parameters
     ----------
@@ -267,7 +268,9 @@ def _parse_camera(path: Path, table_or_preset: Any, head: Head) -> Camera:
 
 def _parse_pose(path: Path, pose_table: Any, head: Head) -> Pose:
     entry = _build_settings(PoseTable, path, "pose", pose_table)
-    pose = Pose(entry.weights, entry.bones)
+    with error_context(f"{path}: pose"):
+        weights = expression(entry.expression) if entry.expression else {}
+    pose = Pose(weights | entry.weights, entry.bones)
     pose.to_arrays(head.control_rig, f"{path}: pose")  # for an error that names the file
     return pose
 
@@ -344,8 +347,10 @@ def _read_scene_file(file_name: str | Path, expected_content: str) -> dict[str, 
 
 
 class PoseTable(FrozenModel):
-    """The [pose] table of a scene file: morph target weights and bone rotations."""
+    """The [pose] table of a scene file: expression, morph target weights and bone rotations."""
 
+    expression: str = ""
+    """Named expression, such as "joy"; weights given by name replace those of the expression."""
     weights: dict[str, _TargetWeight] = Field(default_factory=dict)
     """Weights of morph targets by name, normally 0 to 1."""
     bones: dict[str, Any] = Field(default_factory=dict)
