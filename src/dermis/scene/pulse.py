@@ -60,7 +60,9 @@ class Pulse(FrozenModel):
     """Range of the blood volume of the forehead over a beat, from lowest to highest, relative to its mean."""
     variability_ms: Annotated[float, Field(ge=0, le=200), BoundsReason("ms: more is an arrhythmia")] = 0.0
     """Standard deviation of the intervals between beats [ms]."""
-    respiration_per_min: Annotated[float, Field(ge=0, le=60)] = 0.0
+    respiration_per_min: Annotated[
+        float, Field(ge=0, le=60), BoundsReason("1/min: nobody breathes faster")
+    ] = 0.0
     """Rate of breathing, which changes intervals, strength and blood volume; 0 for none [1/min]."""
     head_motion_mm: Annotated[
         float, Field(ge=0, le=5, json_schema_extra=slider(0, 1)), BoundsReason("mm: more is a nod")
@@ -69,7 +71,7 @@ class Pulse(FrozenModel):
     waveform: str = TYPICAL_BEAT
     """Form of a beat: "typical", a CSV file with one column for a beat at evenly spaced times, or a CSV file
     with the columns time [s] and value for a recording (photoplethysmogram; more blood is higher)."""
-    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
+    seed: Annotated[int, Field(ge=0, lt=2**32), BoundsReason("seeds of 32 bits")] = 0
     """Seed of the intervals between beats."""
 
     @model_validator(mode="after")
