@@ -197,7 +197,7 @@ def load_subject(
 
 
 def _person_with_options(name: str, loaded: Head, head_options: Mapping[str, Any]) -> Human:
-    """Return the person of a loaded head, with the clothing, glasses and eyes that options of the head set."""
+    """Return the person of a loaded head, with clothing, glasses and eyes from the options of the head."""
     changed = {item: head_options[item] for item in ("clothing", "glasses") if head_options.get(item)}
     if head_options.get("eye") and loaded.eyes is not None:
         changed["eyes"] = loaded.eyes.look
