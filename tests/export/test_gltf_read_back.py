@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from dermis import Human, load_head
+from dermis.apps.export.subject import load_subject
 from dermis.base.errors import DermisWarning
 from dermis.formats.gltf.write import encode_head
 from dermis.human.hair.look import HairLook
-from dermis.human.person_file import person_parameters
+from dermis.human.person_file import person_parameters, write_person_json
 from dermis.mesh.maps import Maps
 from dermis.scene.file_people import person_in_file
 
@@ -66,3 +67,16 @@ def test_a_note_says_why_hair_is_left_out(tmp_path: Path) -> None:
         with pytest.warns(DermisWarning, match=f"{path.name}: its hair is left out, .*{reason}"):
             head = load_head(path, subdivide=0, **options)
         assert head.hair is None and head.eyes is not None
+
+
+def test_options_of_the_head_are_stored_with_the_person(tmp_path: Path) -> None:
+    """Exported parameters contain clothing and eyes from options, so that they are those of the mesh."""
+    write_person_json(tmp_path / "person.json", replace(PERSON, hair=HairLook("none")))
+    subject = load_subject(
+        tmp_path / "person.json", clothing="red shirt", eye={"eumelanin": 0.9}, subdivide=1
+    )
+    person, head = subject.person, subject.head
+    assert person is not None and head is not None and head.eyes is not None
+    assert person.clothing is not None and person.clothing.text == "red cotton shirt"
+    assert person.iris == head.eyes.look and person.iris.eumelanin == 0.9
+    assert person.positions_mm.shape == head.control_rig.positions_mm.shape
