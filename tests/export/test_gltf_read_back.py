@@ -15,11 +15,13 @@ from dermis.base.errors import DermisWarning
 from dermis.formats.gltf.write import encode_head
 from dermis.human.hair.look import HairLook
 from dermis.human.person_file import person_parameters, write_person_json
+from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.maps import Maps
 from dermis.scene.file_people import person_in_file
 
 PERSON = replace(Human.sampled(7), hair=HairLook("cropped"))
 COLOUR = np.full((32, 32, 3), 0.25, np.float32)
+EYES = EyeTextures(COLOUR, np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), COLOUR.shape))
 
 
 def written(path: Path, taller_mm: float = 0.0, person: dict[str, Any] | None = None, **options: Any) -> Path:
@@ -27,8 +29,8 @@ def written(path: Path, taller_mm: float = 0.0, person: dict[str, Any] | None = 
     mesh = replace(head.mesh, positions=head.mesh.positions + np.array([0.0, taller_mm, 0.0], np.float32))
     mesh.positions[: len(mesh.positions) // 2] += np.float32(taller_mm)
     notes = {"person": person_parameters(PERSON) | (person or {})}
-    data = encode_head(replace(head, mesh=mesh), roughness=0.3, asset_extras=notes, compact=True, **options)
-    path.write_bytes(data)
+    settings = {"roughness": 0.3, "asset_extras": notes, "eyes": EYES, "compact": True} | options
+    path.write_bytes(encode_head(replace(head, mesh=mesh), **settings))
     return path
 
 

@@ -10,12 +10,14 @@ from typing import get_args
 import numpy as np
 from scipy.spatial import cKDTree
 
+from dermis.base.arrays import Doubles
 from dermis.base.errors import DermisError, notify
 from dermis.formats.gltf.document import read_document
 from dermis.human.model import Layout
 from dermis.human.person import Human
 from dermis.human.person_file import person_from_fields
 from dermis.mesh.head import Head
+from dermis.mesh.mesh import Mesh
 from dermis.mesh.subdivide import MAX_SUBDIVISION_LEVELS
 from dermis.scene.smoothness import SubdivisionLevels
 
@@ -81,17 +83,35 @@ def _notify_without_hair(file_name: str | Path, reason: str) -> None:
 
 
 def _has_same_shape(person_head: Head, file_head: Head) -> bool:
-    """Return whether two heads have the same vertices, uv, names of morph targets and names of bones.
+    """Return whether two heads have the same vertices, uv of skin, names of morph targets and names of bones.
 
-    The order does not matter.
+    The order does not matter. The uv of eyes differ, because files contain pictures of painted eyes.
     """
     own, other = person_head.mesh, file_head.mesh
     if len(own.triangles) != len(other.triangles):
         return False
     if {*person_head.targets} != {*file_head.targets} or {*person_head.bones} != {*file_head.bones}:
         return False
-    rows = [
-        np.concatenate([mesh.positions, mesh.uv * (_SAME_MM / _SAME_UV)], axis=1) for mesh in (own, other)
-    ]
-    distance, _ = cKDTree(rows[0]).query(rows[1])
-    return bool(np.max(distance) < _SAME_MM)
+    return all(
+        _rows_agree(*(_vertex_rows(mesh, of_skin) for mesh in (own, other))) for of_skin in (True, False)
+    )
+
+
+def _vertex_rows(mesh: Mesh, of_skin: bool) -> Doubles:
+    """Return positions (n, 3) of the vertices of skin with their uv (n, 2), or only positions of other parts.
+
+    The uv are scaled so that the largest difference that counts as equal is that of positions.
+    """
+    is_skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
+    vertex = np.unique(mesh.triangles[is_skin == of_skin])
+    positions = mesh.positions[vertex].astype(np.float64)
+    return (
+        np.concatenate([positions, mesh.uv[vertex] * (_SAME_MM / _SAME_UV)], axis=1) if of_skin else positions
+    )
+
+
+def _rows_agree(own: Doubles, other: Doubles) -> bool:
+    """Return whether each row of `other` (n, k) is near a row of `own` (m, k)."""
+    if not len(own) or not len(other):
+        return len(own) == len(other)
+    return bool(np.max(cKDTree(own).query(other)[0]) < _SAME_MM)
