@@ -81,7 +81,7 @@ def test_core_viewers_get_colour_roughness_and_normals(document: Document) -> No
     (skin,) = [one for one in document.tree["materials"] if one["name"] == "skin"]
     surface = skin["pbrMetallicRoughness"]
     assert {"baseColorTexture", "metallicRoughnessTexture"} <= surface.keys() and "normalTexture" in skin
-    assert "KHR_materials_transmission" not in skin["extensions"]  # which is black in rasterisers
+    assert "KHR_materials_transmission" not in skin["extensions"]  # rasterisers would show it black
     assert abs(int(picture(document, surface["baseColorTexture"])[0, 0, 0]) - 137) <= 1  # 0.25 in sRGB
     specular = picture(document, skin["extensions"]["KHR_materials_specular"]["specularTexture"])
     assert specular.shape[-1] == 2 and (specular[..., 0] == specular[..., 1]).all() and np.ptp(specular) > 100

@@ -1,4 +1,4 @@
-"""An exported person in three.js, Babylon.js and model-viewer: the colour of the face is that of our picture.
+"""Exported people in three.js, Babylon.js and model-viewer: the face has the colour of the rendered picture.
 
 Each test runs if a variable names npm's folder node_modules with the viewer: DERMIS_THREE, DERMIS_BABYLON,
 DERMIS_MODEL_VIEWER.
@@ -50,7 +50,7 @@ def mean_lab(picture: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("viewer", ["three", "babylon", "model-viewer"])
-def test_the_face_has_the_colour_of_our_picture(viewer: str, folder: Path) -> None:
+def test_the_face_has_the_colour_of_the_rendered_picture(viewer: str, folder: Path) -> None:
     node_modules = os.environ.get(VIEWER_VARIABLES[viewer])
     if node_modules is None:
         pytest.skip(f"{VIEWER_VARIABLES[viewer]} does not name the folder node_modules with the viewer")

@@ -98,3 +98,13 @@ def generated(document: Any, generator: Any) -> str:
     generator.setUnitSystem(units)
     context.getOptions().targetDistanceUnit = "centimeter"
     return generator.generate("skin", document.getMaterialNodes()[0], context).getSourceCode("pixel")
+
+
+@pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD_SURFACE])
+def test_metal_frames_keep_roughness_and_metalness(shader: str) -> None:
+    frame = Material("glasses frame", "opaque", (0.7, 0.5, 0.3), roughness=0.25, metalness=1.0)
+    document_read = read_back(build_document([untextured_part_material(frame)], shader, ""))
+    (node,) = document_read.getNodes(shader)
+    values = {one.getName(): one.getValue() for one in node.getInputs()}
+    assert values["specular_roughness"] == pytest.approx(0.25)
+    assert values["base_metalness" if shader == OPEN_PBR else "metalness"] == 1.0

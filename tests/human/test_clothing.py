@@ -152,7 +152,7 @@ def test_words_describe_garments(words: object, item: Clothing | None) -> None:
 
 
 @pytest.mark.parametrize(
-    "words", ["tuxedo", "navy red shirt", {"garment": "shirt", "size": 3}, 7, "#12 shirt"]
+    "words", ["tuxedo", "navy red shirt", {"garment": "shirt", "size": 3}, 7, "#12 shirt", ""]
 )
 def test_unknown_words_are_refused(words: object) -> None:
     """Words, fields and types that no garment has are refused with the known ones."""

@@ -79,7 +79,10 @@ class Atlas:
         return float(1.0 - self.mapped[skin].mean()) if skin.any() else 0.0
 
     def with_triangles(self, triangle_count: int) -> Atlas:
-        """Return this atlas for a mesh with more triangles at the end, which have no texels."""
+        """Return this atlas for a mesh with triangles added at its end, which have no texels.
+
+        triangle_count : number of triangles of that mesh
+        """
         added = triangle_count - len(self.mapped)
         return replace(
             self,

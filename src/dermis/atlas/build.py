@@ -50,7 +50,7 @@ def build_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: fl
 def cached_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> Atlas:
     """Return the result of `build_atlas`, which is cached on disk if a cache folder is writable.
 
-    What a person wears has no texels, so that the atlas is that of the bare mesh.
+    Clothing and glasses have no texels, so a dressed person has the atlas of the mesh without them.
     """
     if mesh.body is not mesh:
         return cached_atlas(mesh.body, atlas_side, layout, gutter_mm).with_triangles(len(mesh.triangles))

@@ -1,4 +1,4 @@
-"""Patches of what a person wears among the patches of skin that exchange light."""
+"""Patches of clothing and glasses, added to the patches of skin for interreflection."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ from dermis.atlas.interreflection import CELLS_PER_SIDE
 from dermis.base.arrays import Floats, Mask
 from dermis.mesh.mesh import Mesh
 
-_PATCH_MM = 40.0  # size of patches of cloth, if there are enough unused blocks of the uv square
-_BLOCK_CELLS = 2  # cells along the side of a patch
+_PATCH_MM = 40.0  # size of patches of cloth; larger if there are too few unused blocks of the uv square
+_BLOCK_CELLS = 2  # cells along the side of a block
+_MIN_FREE_BLOCKS = 8  # number of cubes that meet in the origin, however large they are
 
 
 def with_worn_patches(mesh: Mesh, atlas: Atlas) -> tuple[Floats, Mask]:
-    """Return uv (f, 3, 2) and mask (f,) of the triangles that exchange light, those of cloth included.
+    """Return the uv (f, 3, 2) of all triangles, and the mask (f,) of those that exchange light.
 
-    Cloth has no texels in the atlas. Its triangles are divided into cubes of a few centimetres, and each
-    cube gets the uv of one block of cells that no skin uses, so that it is one patch of interreflection.
+    Clothing and glasses have no texels in the atlas. Their triangles are grouped by cubes of a few
+    centimetres. The triangles in each cube get the uv of one block of cells that no skin uses, so that they
+    form one patch. Without enough unused blocks, only skin exchanges light.
     """
     is_worn = np.array([bool(one.label) for one in mesh.materials])[mesh.material]
     worn, free = np.flatnonzero(is_worn), _unused_blocks(atlas)
-    if not len(worn) or not len(free):
+    if not len(worn) or len(free) < _MIN_FREE_BLOCKS:
         return atlas.corner_uv, atlas.mapped
     middles, size = mesh.positions[mesh.triangles[worn]].mean(axis=1), _PATCH_MM
     patch = _cubes(middles, size)

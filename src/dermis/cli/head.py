@@ -135,13 +135,13 @@ def head(
         beard_style (none, stubble, short, full, moustache or goatee), length_mm, density, diameter_mm, curl,
         curl_radius_mm, curl_pitch_mm, curl_coherence, clump, clump_mm, frizz_mm, flyaways, parting_mm, fade,
         widows_peak, baby_hairs, beard_mm, bushy, grey, temple_grey, eumelanin, pheomelanin, dye_eumelanin,
-        dye_pheomelanin, roots_mm and seed [default: from the person]. In .glb files, hairs are thin tubes;
-        dermis ignores these tubes when it reads such a file.
+        dye_pheomelanin, roots_mm and seed [default: from the person]. A .glb file contains simplified hair;
+        when dermis reads the file, it grows the hair again, unless the mesh was changed.
     clothing:
-        Garment, in words for colour, cloth and cut such as "navy denim shirt": crew neck, v-neck, high neck,
+        Garment in words for colour, cloth and cut, such as "navy denim shirt": crew neck, v-neck, high neck,
         shirt or hoodie; cotton, wool, denim or linen. [default: none]
     glasses:
-        Glasses, in words for colour and frame such as "brown square": round, square, aviator, rimless or
+        Glasses in words for colour and frame, such as "brown square": round, square, aviator, rimless or
         sunglasses. [default: none]
     colour:
         Colour map of the skin, sRGB. [default: painted]

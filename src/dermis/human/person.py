@@ -539,7 +539,7 @@ class Human:
 
     @property
     def worn(self) -> dict[str, Item | None]:
-        """Return what the person wears by field of `Human`, such as "clothing"; None for nothing."""
+        """Return clothing and glasses by field of `Human`; None for a field without an item."""
         return {name: getattr(self, name) for name in _WORN_TYPES}
 
     @property
@@ -560,8 +560,8 @@ class Human:
         """Return the control points (p, 3) in rest pose, relative to the midpoint between the eyes [mm].
 
         `Pose(positions_mm=...)` gives the head of any other person this shape, because all people have
-        corresponding points. Points of clothing and glasses come last, so that heads that share
-        a pose need equal items.
+        corresponding points. The points of clothing and glasses come last; such a pose fits only heads with
+        the same items.
 
         Raises DermisError if `targets` contains names that are not morph targets of MakeHuman.
         """

@@ -55,8 +55,8 @@ class Head:
     file_vertices : FileVertices, optional
         Correspondence between points and vertices of the mesh file, for mesh sequences.
     undressed : Head, optional
-        Head without clothing, headwear and glasses, whose points, vertices, triangles and materials come
-        first in this head; None for a head that wears nothing.
+        The same head without clothing and glasses, whose points, vertices, triangles and materials come first
+        in this head; None for a head that wears nothing.
 
     Examples
     --------
@@ -100,7 +100,7 @@ class Head:
 
     @property
     def body(self) -> Head:
-        """Return the head without clothing, headwear and glasses."""
+        """Return the head without clothing and glasses."""
         return self.undressed or self
 
     @cached_property
@@ -150,8 +150,8 @@ class Head:
     def skull_centre_mm(self) -> Point | None:
         """Return the centre of the skull [mm]; None for a mesh without a head.
 
-        Neck, shoulders, body and what is worn do not shift this centre. If the mesh is a whole body whose
-        skeleton has a head bone, it is the centre of the points that follow this bone.
+        Neck, shoulders, body, clothing and glasses do not shift this centre. If the mesh is a whole body
+        whose skeleton has a head bone, it is the centre of the points that follow this bone.
         """
         if self.undressed is not None:
             return self.undressed.skull_centre_mm

@@ -37,7 +37,7 @@ class Material:
     emission : radiance that the group emits, linear Rec. 709
     opacity_cutoff : opacity below which the group is cut out; 0 to cut out nothing
     fabric : weave and sheen of cloth; None for other surfaces
-    label : label class of what a parametric human wears, such as "clothing"; empty for other surfaces
+    label : label class of clothing and glasses of a parametric human; empty for other surfaces
     """
 
     name: str
@@ -123,7 +123,7 @@ class Mesh(ShortRepr):
 
     @cached_property
     def body(self) -> Mesh:
-        """Return the mesh without what a person wears, whose triangles come last."""
+        """Return the mesh without clothing and glasses, whose triangles come last."""
         worn = [index for index, one in enumerate(self.materials) if one.label]
         if not worn:
             return self

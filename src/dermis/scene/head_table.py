@@ -103,9 +103,9 @@ class HeadTable(FrozenModel):
     """Groups of the file that contain eyeballs, whatever their names; they may contain the rest of the
     head."""
     clothing: str | None = None
-    """Garment of a person, in words such as "navy denim shirt"; none for bare shoulders."""
+    """Garment of a person in words, such as "navy denim shirt"; none for bare shoulders."""
     glasses: str | None = None
-    """Glasses of a person, in words such as "brown square": round, square, aviator, rimless or sunglasses;
+    """Glasses of a person in words, such as "brown square": round, square, aviator, rimless or sunglasses;
     none for no glasses."""
     eye: EyeTable | None = None
     """Overrides of the look of the eyes."""

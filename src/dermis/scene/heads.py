@@ -118,10 +118,11 @@ def load_head(
     eye : mapping, optional
         Dictionary from fields of `EyeLook` to values that override the look of the eyes.
     clothing : str, optional
-        Garment of a parametric human, in words such as "navy denim shirt", see `Clothing`; "none" for bare
-        shoulders. By default that of the person.
+        Garment of a parametric human in words, such as "navy denim shirt", see `Clothing`; "none" for bare
+        shoulders. By default, the person's own.
     glasses : str, optional
-        Glasses of a parametric human, in words such as "brown square", see `Glasses`.
+        Glasses of a parametric human in words, such as "brown square", see `Glasses`; "none" for no glasses.
+        By default, the person's own.
     subdivide : int, "auto" or callable
         Number of subdivision levels, 0 to 3, and at least 1 for the human. Meshes of quads are subdivided by
         Catmull-Clark, other meshes by Loop. "auto" uses as many levels as the outline needs to look smooth in
@@ -143,7 +144,8 @@ def load_head(
     Warns
     -----
     DermisWarning
-        For maps that an .mtl file names but that are not used.
+        For maps that an .mtl file names but that are not used, and for people's glTF files whose hair is
+        left out.
 
     Examples
     --------
@@ -180,33 +182,24 @@ def load_head(
         return _with_eye_look(loaded, eye)
     for item, words in (("clothing", clothing), ("glasses", glasses)):
         if words is not None:
-            refuse(item, f"a person, such as {HUMAN}", f"it is given with {name!r}", "Leave it out")
+            refuse(
+                item,
+                f"a person ({HUMAN}, {HUMAN}:SEED or a .json file)",
+                f"it is given with {name!r}",
+                "Leave it out",
+            )
     if name not in SAMPLES and not is_file(path):
         _refuse_name(name)
     loaded, look = load_file_head(name, mesh_options, map_options)
-    is_plain = all(value in (None, (), AUTO) for value in mesh_options.values()) and eyes == "fitted"
-    if is_plain and (grown := _with_stored_person(loaded, levels)) is not None:
-        return _with_eye_look(with_default_regions(grown) if regions == AUTO else grown, eye)
+    if eyes == "fitted" and name not in SAMPLES and is_gltf(name):
+        from dermis.scene.file_people import with_grown_hair
+
+        given = [option for option, value in mesh_options.items() if value not in (None, (), AUTO)]
+        if (grown := with_grown_hair(loaded, levels, given)) is not None:
+            return _with_eye_look(with_default_regions(grown) if regions == AUTO else grown, eye)
     coarse, loaded = loaded.mesh, subdivide_head(loaded, levels)
     loaded = with_default_regions(loaded) if regions == AUTO else loaded
     return _with_eye_look(with_fitted_eyes(loaded, coarse, look) if eyes == "fitted" else loaded, eye)
-
-
-def _with_stored_person(file_head: Head, levels: SubdivisionLevels) -> Head | None:
-    """Return the head with the hair of the person that its file contains; None if there is no such person.
-
-    file_head, levels : see `with_grown_hair`
-    """
-    if (
-        file_head.name in SAMPLES
-        or not is_gltf(file_head.name)
-        or file_head.control_rig.targets.rest is not None
-    ):
-        return None
-    from dermis.scene.file_people import person_in_file, with_grown_hair
-
-    person = person_in_file(Path(file_head.name))
-    return None if person is None else with_grown_hair(file_head, person, levels)
 
 
 def is_person_name(head_name: str) -> bool:
@@ -265,7 +258,7 @@ def _load_human(
     height_mm, normal_y : interpretation of the height map and the normal map, see `load_head`
     mesh_options : options that apply only to mesh files; DermisError is raised unless all have their defaults
     subdivision_levels : number of levels, or a function of the head that returns it
-    worn : what the person wears in words, by field of `Human`; None for what the person wears by default
+    worn : clothing and glasses in words, by field of `Human`; None keeps those of the person
     """
     texts = {"v_origin": "auto", "front": "auto", "eyes": "fitted"}
     defaults = {

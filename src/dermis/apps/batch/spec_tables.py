@@ -204,9 +204,9 @@ class PersonTable(FrozenModel):
     hair_pheomelanin: Annotated[Distribution | None, _HAIR_MELANIN_FIELD] = None
     """Pheomelanin of the hair before greying: 2 with little eumelanin is red."""
     clothing: Annotated[Distribution | None, NameField()] = None
-    """Garment in words, such as "navy denim shirt"; "none" and by default bare shoulders."""
+    """Garment in words, such as "navy denim shirt"; by default "none", for bare shoulders."""
     glasses: Annotated[Distribution | None, NameField()] = None
-    """Glasses in words, such as "brown square"; "none" and by default no glasses."""
+    """Glasses in words, such as "brown square"; by default "none"."""
     skin: _Distributions = Field(default_factory=dict)
     """Fields of `SkinLook`: melanin, blood, freckles, spots, oil ..."""
     eyes: _Distributions = Field(default_factory=dict)

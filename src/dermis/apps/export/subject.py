@@ -60,7 +60,7 @@ class Subject:
     tissue : tissue of the skin; None for a table of Gaussians
     scene : scene with the head and its skin; None for a skin without a head
     person : parametric person to whom the head belongs; None for other heads
-    eye_state : state of the skin that is painted in the maps, and that reddens the eyes; None for none
+    eye_state : state of the skin that the painted maps contain and that reddens the eyes; None for none
     """
 
     name: str
@@ -185,7 +185,7 @@ def load_subject(
         given = dict(head) if profile is None else {"profile": profile}
         return _load_skin(name, model, given | ({} if state is None else {"state": state}))
     loaded = load_head(name_or_file, **head)
-    person = load_person(name) if is_person_name(name) else None
+    person = _person_with_options(name, loaded, head) if is_person_name(name) else None
     if profile is not None:
         skin = Skin(profile=str(profile))
     else:
@@ -194,6 +194,14 @@ def load_subject(
     albedo = curve.energy if loaded.maps.mean_colour is None else loaded.maps.mean_colour
     scene = Scene(loaded, skin=skin, state=state)
     return Subject(path.name, curve, albedo, used_model, tissue, scene, person)
+
+
+def _person_with_options(name: str, loaded: Head, head_options: Mapping[str, Any]) -> Human:
+    """Return the person of a loaded head, with clothing, glasses and eyes from the options of the head."""
+    changed = {item: head_options[item] for item in ("clothing", "glasses") if head_options.get(item)}
+    if head_options.get("eye") and loaded.eyes is not None:
+        changed["eyes"] = loaded.eyes.look
+    return replace(load_person(name), **changed)
 
 
 def _load_skin(skin_name: str, profile_model: ModelName | None, head_options: Iterable[str]) -> Subject:

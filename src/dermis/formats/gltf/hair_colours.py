@@ -1,4 +1,4 @@
-"""Colours of exported hairs, sorted into a few groups of similar colour."""
+"""Colours of exported hairs, reduced to a few groups of similar hairs."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from dermis.base.arrays import Doubles, Index
 from dermis.mesh.strands import Strands
 
 HAIR_COLOUR_COUNT = 64
-"""Number of colours into which the hairs of a head are sorted."""
+"""Default number of groups."""
 _HAIR_ALBEDO_EXPONENT = 5.89  # for fibres of roughness 0.3: [Chiang2016] equation 9
 
 
 def grouped_colours(strands: Strands, count: int = HAIR_COLOUR_COUNT) -> tuple[Doubles, Index]:
-    """Return `count` linear colours (c, 3), from dark to light, and the colour index (n,) of each strand."""
+    """Return the mean linear colours (count, 3) of groups of strands, and the group (n,) of each strand.
+
+    Groups have equal sizes and are in the order of brightness, from dark to light.
+    """
     absorbance = strands.absorption * strands.radius_mm.max(axis=1, keepdims=True)
     albedo = np.exp(-_HAIR_ALBEDO_EXPONENT * np.sqrt(absorbance.astype(np.float64)))
     order = np.argsort(albedo.sum(axis=1), kind="stable")

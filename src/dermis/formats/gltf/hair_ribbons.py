@@ -15,22 +15,16 @@ from dermis.formats.gltf.hair_colours import grouped_colours
 from dermis.formats.gltf.primitives import to_metres
 from dermis.mesh.strands import Roots, Strands
 
-_KNOT_COUNTS = 4, 5, 6, 8, 10, 13, 17, 22  # knots per ribbon, of which the fewest that suffice are used
-_MAX_DEVIATION_MM = 1.5  # of nine tenths of the knots from their ribbon
+_KNOT_COUNTS = 4, 5, 6, 8, 10, 13, 17, 22  # possible numbers of knots per ribbon
+_MAX_DEVIATION_MM = 1.5  # largest distance of nine tenths of the knots of hairs from their ribbons
 _MAX_KNOTS = 30_000  # of all ribbons
 _COLOUR_COUNT, _ROWS_PER_COLOUR = 8, 64
-_STREAK_COLUMNS, _STREAK_WIDTH, _COLUMNS_PER_RIBBON = (
-    256,
-    4,
-    36,
-)  # columns of the texture, of a streak, of a ribbon
-_GAP_WIDTH, _STREAK_CONTRAST = (
-    2,
-    0.5,
-)  # columns between streaks; deviation of the logarithm of their brightness
-_MIN_STREAK_LENGTH = 0.75  # of the length of the ribbon
-_MAX_ROLL = 0.9  # of ribbons about their tangents, so that some face each viewer [rad]
-_MAX_NORMAL_TURN = 0.15  # of normals, which differ between ribbons: tangent of the angle
+_TEXTURE_COLUMNS, _COLUMNS_PER_RIBBON = 256, 36
+_STREAK_WIDTH, _GAP_WIDTH = 4, 2  # columns of a streak, which shows one hair, and between streaks
+_STREAK_CONTRAST = 0.5  # standard deviation of the logarithm of the brightness of streaks
+_MIN_STREAK_LENGTH = 0.75  # relative to the length of the ribbon
+_MAX_ROLL = 0.9  # largest roll of ribbons about their tangents, so that some face each viewer [rad]
+_MAX_NORMAL_TURN = 0.15  # tangent of the largest angle by which the normal of a ribbon is turned
 _MIN_VECTOR_LENGTH = 1e-9
 
 
@@ -38,8 +32,8 @@ _MIN_VECTOR_LENGTH = 1e-9
 class RibbonPrimitive:
     """Hair as ribbons with the normals of a smooth surface around the head.
 
-    Each ribbon replaces several hairs of the same total width, which its texture shows with gaps between
-    them.
+    Each ribbon represents several hairs, which its texture shows with gaps between them. The total width of
+    all ribbons is that of all hairs.
 
     deformable : mesh of the head with its deformation
     strands : all hairs
@@ -50,7 +44,10 @@ class RibbonPrimitive:
 
     @cached_property
     def _ribbons(self) -> tuple[Strands, Doubles]:
-        """Return the hairs that become ribbons, and their knots (n, k, 3) in the rest pose [mm]."""
+        """Return the hairs along which the ribbons run, and their knots (n, k, 3) in the rest pose [mm].
+
+        The number of knots is the smallest one that keeps the deviation small.
+        """
         mesh = self.deformable.head.mesh
         points = replace(mesh, positions=self.deformable.positions_mm).points_mm
         last = self.strands.knots_mm.shape[1] - 1
@@ -93,7 +90,7 @@ class RibbonPrimitive:
         return {"attributes": attributes, "indices": index, "extras": {"dermis": {"hair": True}}}
 
     def add_target(self, buffer_builder: BufferBuilder, morph_target: VertexMorphTarget) -> dict[str, int]:
-        """Return no attributes, as the ribbons have no morph targets."""
+        """Return an empty dictionary, as the ribbons have no morph targets."""
         return {}
 
     def is_moved_by(self, morph_target: VertexMorphTarget) -> bool:
@@ -121,7 +118,7 @@ class RibbonPrimitive:
 
     @staticmethod
     def _axis_points(knots_mm: Doubles) -> Doubles:
-        """Return for each knot the nearest point of the vertical axis below the middle of the roots [mm]."""
+        """Return for each knot the nearest point of the vertical line below the mean of the roots [mm]."""
         middle = knots_mm[:, 0].mean(axis=0)
         axis = np.broadcast_to(middle, knots_mm.shape).copy()
         axis[..., 1] = np.minimum(knots_mm[..., 1], middle[1])
@@ -141,35 +138,36 @@ class RibbonPrimitive:
     def streaks_and_uv(self) -> tuple[Floats, Floats]:
         """Return a texture of hairs (h, w, 4), linear with alpha, and the uv (n * m, 2) of all vertices.
 
-        Rows of tiles show hairs of one colour each, from their roots above to their tips, which end at
-        different lengths. Each ribbon shows some of the columns of one tile.
+        The texture consists of one tile above the other, one for each colour. A tile shows hairs as vertical
+        streaks of different lengths, with the roots at its top. Each ribbon shows some columns of one tile.
         """
         strands, _ = self._ribbons
         colours, group = grouped_colours(strands, _COLOUR_COUNT)
         rng = np.random.default_rng(0)
-        streak, place = np.divmod(np.arange(_STREAK_COLUMNS), _STREAK_WIDTH + _GAP_WIDTH)
+        streak, place = np.divmod(np.arange(_TEXTURE_COLUMNS), _STREAK_WIDTH + _GAP_WIDTH)
         brightness = np.exp(_STREAK_CONTRAST * rng.standard_normal(streak[-1] + 1))
         length = rng.uniform(_MIN_STREAK_LENGTH, 1.0, streak[-1] + 1)
         row = (np.arange(_ROWS_PER_COLOUR) + 0.5) / _ROWS_PER_COLOUR
         alpha = (place < _STREAK_WIDTH) & (row[:, None] < length[streak])
-        picture = np.empty((_COLOUR_COUNT, _ROWS_PER_COLOUR, _STREAK_COLUMNS, 4), np.float32)
+        picture = np.empty((_COLOUR_COUNT, _ROWS_PER_COLOUR, _TEXTURE_COLUMNS, 4), np.float32)
         picture[..., :3] = colours[:, None, None] * (brightness / brightness.mean())[streak][:, None]
         picture[..., 3] = alpha
         knot_count = strands.knots_mm.shape[1]
-        start = rng.integers(0, _STREAK_COLUMNS - _COLUMNS_PER_RIBBON, len(strands))
+        start = rng.integers(0, _TEXTURE_COLUMNS - _COLUMNS_PER_RIBBON, len(strands))
         edge = np.array([*[0.0, 1.0] * (knot_count - 1), 0.5]) * _COLUMNS_PER_RIBBON
-        u = (start[:, None] + edge) / _STREAK_COLUMNS
+        u = (start[:, None] + edge) / _TEXTURE_COLUMNS
         along = np.append(np.repeat(np.arange(knot_count - 1), 2), knot_count - 1) / (knot_count - 1)
         inside = (0.5 + (_ROWS_PER_COLOUR - 1) * along) / _ROWS_PER_COLOUR
         v = (group[:, None] + inside) / _COLOUR_COUNT
         uv = np.stack([u.ravel(), v.ravel()], axis=1).astype(np.float32)
-        return picture.reshape(-1, _STREAK_COLUMNS, 4), uv
+        return picture.reshape(-1, _TEXTURE_COLUMNS, 4), uv
 
 
 def _deviation_mm(knots_mm: Doubles, kept: Intp) -> float:
-    """Return the deviation of nine tenths of the knots (n, k, 3) from polylines through some of them [mm].
+    """Return the 90th percentile of the distances of knots from polylines through some of them [mm].
 
-    kept : indices of the knots of the polylines
+    knots_mm : (n, k, 3) knots of hairs
+    kept : indices of the knots through which the polylines run
     """
     place = np.interp(np.arange(knots_mm.shape[1]), kept, np.arange(len(kept)))
     first = np.minimum(place.astype(int), len(kept) - 2)
@@ -184,7 +182,7 @@ def _unit(vectors: Doubles) -> Doubles:
 
 
 def _join_tips(pairs: Doubles, tips: Doubles) -> Doubles:
-    """Return the vectors of all ribbons as rows: both edges at all knots but the last, then the tip.
+    """Return one vector per vertex of all ribbons: both edges at all knots but the last, then the tip.
 
     pairs : (n, k, 2, 3) vectors at both edges
     tips : (n, k, 3) vectors in the middle, of which those at the last knots are used

@@ -18,7 +18,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, Strands, quad_weights, root_frames
 
 _TUBE_SIDES = 3
-# makes a tube as wide on average as a round hair
+# ratio at which a tube is as wide on average as a round hair
 _TUBE_RADIUS_PER_HAIR_RADIUS = 2.0 * np.pi / (_TUBE_SIDES * np.sqrt(3.0))
 _MIN_DISPLACEMENT_MM = 0.1  # smaller displacements count as 0
 _MIN_VECTOR_LENGTH = 1e-9
@@ -112,6 +112,7 @@ class FibreTubes:
             radius_mm=np.float32(width_factor) * strands.radius_mm[:count][:, knot],
             absorption=strands.absorption[:count] / np.float32(width_factor),
             cover=None,
+            is_lash=None,
         )
         return cls(reduced, mesh)
 

@@ -24,7 +24,7 @@ EYE_PICTURE, EYE_NORMAL_PICTURE = "eye", "eye normal"
 _TEAR_FILM_ROUGHNESS = 0.15  # perceptual roughness of the tear film
 _TEAR_FILM_CLEARCOAT_FACTOR = 0.52  # eyes reflect 0.021 at normal incidence, glTF's clear coat 0.04
 _HAIR_ROUGHNESS, _RIBBON_ROUGHNESS = 0.45, 0.6
-_RIBBON_SPECULAR = 0.4  # as other hair hides most of the surroundings
+_RIBBON_SPECULAR = 0.4  # factor of the specular reflectance, as other hair hides most of the surroundings
 _ROUGHNESS_BY_WORD = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # perceptual roughness by a word in the name
 _DEFAULT_ROUGHNESS = 0.8
 
@@ -96,7 +96,7 @@ def encode_skin_maps(
         perceptual = np.zeros((*maps.roughness.shape, 3), np.float32)
         perceptual[..., 1] = np.sqrt(np.clip(maps.roughness, 0.0, 1.0))
         pictures["metallic roughness"] = encode_linear8(perceptual)
-    if maps.specular is not None:  # glTF reads alpha, and this package grey
+    if maps.specular is not None:  # other programs read the alpha channel, this package the grey one
         pictures["specular"] = encode_linear8(maps.specular)[..., None].repeat(2, axis=2)
     if maps.roughness is not None and not compact:
         pictures["roughness"] = encode_linear8(maps.roughness)[..., None]

@@ -16,9 +16,10 @@ from dermis.formats.gltf.document import Tree
 from dermis.mesh.eyeball import eye_uv
 from dermis.mesh.head import Head
 
-_METRES_PER_MM = 1e-3
+METRES_PER_MM = 1e-3
+"""Length of a millimetre in metres, the unit of glTF [m]."""
 _MIN_COMPACT_DISPLACEMENT_MM = 0.1  # smaller displacements are left out of compact files
-_MIN_COMPACT_NORMAL_CHANGE = 0.05  # the same for changes of unit normals: 3 degrees
+_MIN_COMPACT_NORMAL_CHANGE = 0.05  # so are smaller changes of unit normals, about 3 degrees
 
 
 class PrimitiveSource(Protocol):
@@ -98,7 +99,7 @@ class SurfacePrimitive:
         if not self.compact:
             accessors = buffer_builder.add_displacements(row, list(columns.values()), vertex_count)
             return dict(zip(columns, accessors, strict=True))
-        least = 1e-3 * _MIN_COMPACT_DISPLACEMENT_MM, _MIN_COMPACT_NORMAL_CHANGE
+        least = METRES_PER_MM * _MIN_COMPACT_DISPLACEMENT_MM, _MIN_COMPACT_NORMAL_CHANGE
         result = dict[str, int]()
         for (name, values), smallest in zip(columns.items(), least, strict=True):
             kept = np.abs(values).max(axis=1) >= smallest
@@ -134,7 +135,7 @@ class SurfacePrimitive:
 
 def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
     """Convert lengths from millimetres to metres, the unit of glTF."""
-    return (positions_mm.astype(np.float64) * _METRES_PER_MM).astype(np.float32)
+    return (positions_mm.astype(np.float64) * METRES_PER_MM).astype(np.float32)
 
 
 def vertex_attributes(
@@ -169,7 +170,7 @@ def bone_attributes(
             "JOINTS_0": buffer_builder.add_accessor(bone, VERTEX_TARGET),
             "WEIGHTS_0": buffer_builder.add_accessor(weight, VERTEX_TARGET),
         }
-    rounded = _with_sum_of_levels(weight)
+    rounded = _normalised_levels(weight)
     return {
         "JOINTS_0": buffer_builder.add_accessor(
             np.where(rounded > 0.0, bone, bone.dtype.type(0)), VERTEX_TARGET
@@ -178,7 +179,7 @@ def bone_attributes(
     }
 
 
-def _with_sum_of_levels(weights: Floats) -> Doubles:
+def _normalised_levels(weights: Floats) -> Doubles:
     """Return weights (v, 4) rounded to multiples of 1/65535 whose sums are 1."""
     levels = np.floor(65535 * weights.astype(np.float64) / weights.sum(axis=1, keepdims=True))
     levels[:, 0] += 65535 - levels.sum(axis=1)

@@ -25,7 +25,7 @@ from dermis.formats.gltf.materials import (
     part_material,
     surface_material,
 )
-from dermis.formats.gltf.primitives import PrimitiveSource, SurfacePrimitive
+from dermis.formats.gltf.primitives import METRES_PER_MM, PrimitiveSource, SurfacePrimitive
 from dermis.formats.part_pictures import PartPictures
 from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.grown_strands import grow_strands, is_beard
@@ -38,7 +38,6 @@ _HAIR_KNOTS = {"brows": 3, "lashes": 4, "beard": 3}
 _MAX_GROWN_STRANDS = 10_000  # of hair and beard
 _MAX_TUBES = 1_000  # of brows, lashes or beard; more hairs are represented by fewer, wider ones
 _SIDE_WORDS = "left", "right", "upper", "lower"
-_METRES_PER_MM = 1e-3
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ def encode_head(
     """Encode a head as a .glb file in metres, with one mesh per material, morph targets and joints.
 
     Brows, lashes and beard become thin tubes that move with the skin. Other hair becomes ribbons that follow
-    the head. This package reads none of them back. Equal heads give identical bytes.
+    the head. `read_gltf` skips tubes and ribbons. Equal heads give identical bytes.
 
     roughness : Beckmann's m of skin without a roughness map [-]
     weights : default weights of morph targets by name, which override the weights of the rest pose
@@ -237,7 +236,7 @@ def _gltf_nodes(
     """
     skeleton = head.control_rig.skeleton
     names = _unique_names([part.name for part in parts], head.bones)
-    mesh_roots = list[int]()  # in reversed order, as `read_nodes` visits the roots from last to first
+    mesh_roots = list[int]()  # in reverse order, as `read_nodes` visits the roots from last to first
     if skeleton is None:
         mesh_nodes = [{"name": name, "mesh": k} for k, name in enumerate(names)]
         return mesh_nodes, list(range(len(parts)))[::-1], []
@@ -273,7 +272,7 @@ def _unique_names(names: Sequence[str], taken_names: Sequence[str]) -> list[str]
 
 def _bone_nodes(skeleton: Skeleton) -> tuple[list[Tree], Doubles]:
     """Return the glTF nodes of b bones, and their inverse bind matrices (b, 4, 4); lengths are in metres."""
-    to_file = np.diag([_METRES_PER_MM] * 3 + [1.0]) @ skeleton.to_head
+    to_file = np.diag([METRES_PER_MM] * 3 + [1.0]) @ skeleton.to_head
     size = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
     scaled_up, scaled_down = (np.diag([factor] * 3 + [1.0]) for factor in (size, 1.0 / size))
     nodes: list[Tree] = []

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats
 from dermis.base.tables import read_rows
+from dermis.human.curves import smoothstep
 from dermis.human.hair.root_finder import Index, RootFinder
 from dermis.human.hair.styles import BeardArea
 from dermis.human.skin.face import HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, hairline_heights, zone_table
@@ -182,12 +183,6 @@ def _beard_point_mask() -> NDArray[np.bool_]:
 def _beard_amount(points: Doubles) -> Doubles:
     lip_fade = smoothstep(*_LIP_FADE_MM, -points[:, 3])
     return np.asarray(smoothstep(*_BEARD_FADE, _sum_zones("beard", zone_table(), points)) * lip_fade)
-
-
-def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
-    """Return a smooth cubic transition of x from 0 at `low` to 1 at `high`; `low` may exceed `high`."""
-    t = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
 def quad_areas_cm2(control_mesh: Mesh, quad_index: Index) -> Doubles:

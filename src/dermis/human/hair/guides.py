@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.base.arrays import Doubles
+from dermis.human.curves import smoothstep
 from dermis.human.hair.root_finder import RootFinder
 from dermis.human.hair.skin_surface import SkinSurface, tangent_component
 from dermis.human.hair.styles import Style
@@ -60,12 +61,6 @@ class Growth(NamedTuple):
     height_mm: Doubles
     length_mm: Doubles
     tied_mm: Doubles
-
-
-def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
-    """Return a smooth transition of x from 0 at `low` to 1 at `high`; `low` may exceed `high`."""
-    t = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
 def unit_vectors(vectors: Doubles) -> Doubles:

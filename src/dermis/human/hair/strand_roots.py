@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles
 from dermis.base.disk import Arrays, cached_arrays
+from dermis.human.curves import smoothstep
 from dermis.human.hair import density
 from dermis.human.hair.density import average_control_points, recession_effect
 from dermis.human.hair.guides import (
@@ -20,7 +21,6 @@ from dermis.human.hair.guides import (
     fringe_weight,
     grow_guides,
     parting_side,
-    smoothstep,
 )
 from dermis.human.hair.root_finder import RootFinder
 from dermis.human.hair.styles import Style

@@ -189,7 +189,10 @@ def mesh_labels(head: Head) -> MeshLabels:
 
 
 def _with_worn_labels(head: Head, body_labels: MeshLabels) -> MeshLabels:
-    """Return the label classes of a head with what it wears, from those of the bare head."""
+    """Return the label classes of a dressed head.
+
+    body_labels : label classes of the head without clothing and glasses
+    """
     base, classes, fields = body_labels
     worn = head.mesh.material[len(base) :]
     class_of_material = [class_number(one.label) if one.label else 0 for one in head.mesh.materials]

@@ -1,4 +1,4 @@
-"""Coordinates on the cloth of a garment's body, along the threads."""
+"""Coordinates along the threads of the cloth of a garment's body."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import numpy as np
 from dermis.base.arrays import Doubles
 from dermis.human.wear.skin_sheet import Cut, point_normals, unit_vectors
 
-_MIN_PROJECTED = 0.05  # smallest length of the projected weft direction that counts
+_MIN_PROJECTED = 0.05  # lower limit of the length of the weft direction after projection onto the surface
 _REGULARISATION = 1e-6
 
 
 def cloth_coordinates_mm(part: Cut, mean_mm: Doubles) -> Doubles:
-    """Return coordinates (m, 2) of the points of a part along weft and warp [mm].
+    """Return the coordinates (m, 2) of the points of a garment's body along weft and warp [mm].
 
-    Their gradients agree as well as possible with the directions of threads on the surface: the weft runs
+    Their gradients are a least-squares fit to the directions of the threads on the surface: the weft runs
     from side to side, and the warp up the front and down the back.
 
-    part : part of the skin sheet
-    mean_mm : (m, 3) its points on the mean person
+    part : part of the skin sheet that the body covers
+    mean_mm : (m, 3) points of this part on the mean person
     """
     from scipy.sparse import csr_array, diags_array, eye_array
     from scipy.sparse.linalg import factorized

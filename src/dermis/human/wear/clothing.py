@@ -1,4 +1,4 @@
-"""Clothing as a worn mesh: points, bones, expressions and materials of garments."""
+"""Meshes of garments: points, bone weights, displacements by expressions, and materials."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def garment_points_mm(control_mm: Floats, clothing: Clothing) -> Doubles:
 
 
 def garment_materials(clothing: Clothing) -> tuple[Material, ...]:
-    """Return the materials of a garment, one for each slot of `_slots`."""
+    """Return the materials of a garment, in the order of the material indices of its mesh."""
     cloth, colour = CLOTHS[clothing.cloth], linear_colour(clothing.colour)
     of_slot = {
         "cloth": Material("cloth", "opaque", colour, roughness=cloth.roughness, fabric=cloth.fabric),
@@ -100,7 +100,7 @@ def _worn_garment(garment: str, cloth: str) -> Worn:
 def _bone_weights(bind: csr_array) -> tuple[Ints, Floats]:
     """Return the four strongest bones (m, 4) of points, and their weights (m, 4).
 
-    bind : (m, p) weights of MakeHuman's points in each of the m points
+    bind : (m, p) weights of p points of MakeHuman in each of the m points
     """
     arrays = makehuman_arrays()
     own = arrays["weight"][: bind.shape[1]].astype(np.float64)
@@ -113,7 +113,10 @@ def _bone_weights(bind: csr_array) -> tuple[Ints, Floats]:
 
 
 def _displacements(bind: csr_array) -> tuple[Index, Index, Floats]:
-    """Return target, point and displacement of points by expressions; see `Worn` for the arrays."""
+    """Return the displacements of points by expressions: the last three arrays of `Worn`.
+
+    bind : see `_bone_weights`
+    """
     targets, count = expression_targets(), bind.shape[1]
     found: list[tuple[Index, Index, Doubles]] = []
     for k in range(len(targets.names)):

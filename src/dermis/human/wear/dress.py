@@ -1,4 +1,4 @@
-"""Heads with what they wear: meshes, rig and materials are appended to those of the bare head."""
+"""Dressed heads: mesh, rig and materials of a head, followed by those of clothing and glasses."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from dermis.mesh.mesh import Material, build_mesh
 from dermis.mesh.rig import MorphTargets, Rig, Stencils
 
 Outfit = tuple[Item, ...]
-"""Everything that a person wears."""
+"""Items that a person wears."""
 
 
 class Wearable(NamedTuple):
-    """Functions that make the meshes of a kind of items.
+    """Functions that build one kind of item, such as glasses.
 
     mesh : mesh of an item, which does not depend on the person or on colours
     points_mm : points (m, 3) of an item on a person with control points (p, 3) [mm]
@@ -40,7 +40,7 @@ WEARABLES: Mapping[type[Item], Wearable] = {
     Clothing: Wearable(worn_garment, garment_points_mm, garment_materials),
     Glasses: Wearable(worn_glasses, glasses_points_mm, glasses_materials),
 }
-"""Functions for each kind of items."""
+"""Functions that build items, by the type of item."""
 
 
 def worn_points_mm(control_mm: Floats, outfit: Outfit) -> Floats:
@@ -55,7 +55,7 @@ def worn_points_mm(control_mm: Floats, outfit: Outfit) -> Floats:
 def dress(head: Head, outfit: Outfit, template: Head | None) -> Head:
     """Return a head that wears an outfit of at least one item.
 
-    template : the dressed head of the mean person, whose atlas and other data are shared; None to make it
+    template : head of the mean person in this outfit, from `dressed_template`; None to build that head itself
     """
     mesh, first_point = head.mesh, int(head.mesh.point.max()) + 1
     rig, points = head.control_rig, worn_points_mm(head.control_rig.positions_mm, outfit)
@@ -88,7 +88,10 @@ def dress(head: Head, outfit: Outfit, template: Head | None) -> Head:
 
 
 def dressed_template(layout: Layout, levels: int, outfit: Outfit) -> Head:
-    """Return the dressed head of the mean person, which all people with these items share; it is cached."""
+    """Return the head of the mean person in an outfit, cached.
+
+    It is the template of all people who wear these items in any colour, and who share its atlas.
+    """
     return _dressed_template(layout, levels, tuple(item.without_colour for item in outfit))
 
 
@@ -116,7 +119,7 @@ def _dressed_rig(rig: Rig, worn: Worn, points_mm: Floats) -> Rig:
 
 
 def _with_displacements(targets: MorphTargets, worn: Worn, first_point: int) -> MorphTargets:
-    """Return morph targets that also move what is worn, whose points begin at `first_point`."""
+    """Return morph targets that also displace the points of an item, which begin at `first_point`."""
     own = np.repeat(np.arange(len(targets.names)), np.diff(targets.first))
     target = np.concatenate([own, worn.target])
     order = np.argsort(target, kind="stable")
@@ -127,7 +130,7 @@ def _with_displacements(targets: MorphTargets, worn: Worn, first_point: int) -> 
 
 
 def _with_single_points(stencils: Stencils, first_point: int, count: int) -> Stencils:
-    """Return stencils with `count` more points, each of which is one control point, from `first_point` on."""
+    """Return stencils with `count` more points, which are the control points from `first_point` on."""
     end = int(stencils.first[-1])
     return Stencils(
         np.concatenate([stencils.first, end + 1 + np.arange(count)]).astype(np.int32),

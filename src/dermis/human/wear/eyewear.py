@@ -1,4 +1,4 @@
-"""Glasses as a worn mesh: rigid parts that follow the head, and their materials."""
+"""Meshes and materials of glasses, which follow the head bone as one rigid body."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _worn_glasses(style: str) -> Worn:
 
 
 def glasses_materials(glasses: Glasses) -> tuple[Material, ...]:
-    """Return the materials of glasses, one for each slot of their mesh."""
+    """Return the materials of glasses, in the order of the material indices of their mesh."""
     metal, colour = FRAMES[glasses.style].is_metal, linear_colour(glasses.colour)
     roughness = _METAL_ROUGHNESS if metal else _ACETATE_ROUGHNESS
     of_slot = {

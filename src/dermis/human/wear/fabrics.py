@@ -1,13 +1,12 @@
-"""Fabrics and colours of clothing; the numbers are an artist's choice."""
+"""Cloths and colours of clothing and glasses; the numbers are chosen by eye."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import NamedTuple
 
-import numpy as np
-
 from dermis.human.wear.folds import Folds
+from dermis.images.colour import decode_srgb
 from dermis.mesh.fabric import Fabric
 
 
@@ -15,7 +14,7 @@ class Cloth(NamedTuple):
     """Cloth of a garment: its appearance and its folds.
 
     fabric, trim : appearance of the body of a garment, and of its knitted bands
-    folds : strength of its folds
+    folds : heights of its folds
     roughness : perceptual roughness of the fibres [-]
     """
 
@@ -79,13 +78,11 @@ _COLOURS = {
     "silver": "#c9c9cb",
 }
 COLOURS: tuple[str, ...] = tuple(_COLOURS)
-"""Names of the palette of fabrics."""
+"""Names of the colours of clothing and glasses."""
 
 
 def linear_colour(colour: str) -> tuple[float, float, float]:
     """Return the albedo of a colour of the palette or of "#rrggbb" (sRGB), linear Rec. 709 [-]."""
     digits = _COLOURS.get(colour, colour).lstrip("#")
-    encoded = np.array([int(digits[k : k + 2], 16) for k in (0, 2, 4)]) / 255.0
-    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
-    red, green, blue = linear.tolist()
+    red, green, blue = decode_srgb([int(digits[k : k + 2], 16) / 255.0 for k in (0, 2, 4)]).tolist()
     return red, green, blue

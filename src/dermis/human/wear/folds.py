@@ -1,4 +1,4 @@
-"""Folds of cloth: heights over the skin of the mean person, from artist's patterns around arms and neck."""
+"""Folds of cloth: procedural patterns of height around arms and neck of the mean person, chosen by eye."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.base.arrays import Doubles, Index
+from dermis.human.curves import smoothstep
 
 _ARMPIT_MM = np.array([128.0, -262.0, -95.0])
 _SHOULDER_MM, _ARM_DIRECTION = np.array([150.0, -190.0, -100.0]), np.array([0.76, -0.65, 0.0])
@@ -15,7 +16,7 @@ _LATTICE_SIZE = 64  # period of the noise [cells]
 
 
 class Folds(NamedTuple):
-    """Strength of the folds of a fabric.
+    """Heights of the folds of a cloth.
 
     drag_mm : height of folds that radiate from the armpits [mm]
     sleeve_mm : height of folds around the upper arms [mm]
@@ -39,7 +40,7 @@ class Folds(NamedTuple):
 
 
 def smooth_noise(points: Doubles, seed: int) -> Doubles:
-    """Return smooth random values (n,) from -1 to 1 at points (n, 3) in units of the distance of extrema."""
+    """Return value noise (n,) from -1 to 1 at points (n, 3), whose unit is the spacing of the lattice."""
     values = np.random.default_rng((seed, 71)).uniform(-1.0, 1.0, (_LATTICE_SIZE,) * 3)
     cell = np.floor(points).astype(np.int64)
     t = points - cell
@@ -51,14 +52,8 @@ def smooth_noise(points: Doubles, seed: int) -> Doubles:
     return total
 
 
-def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
-    """Return values (n,) that rise smoothly from 0 at `low` to 1 at `high`; `low` may be the larger one."""
-    t = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return np.asarray(t * t * (3.0 - 2.0 * t))
-
-
 def _ridges(phase: Doubles, seed: int) -> Doubles:
-    """Return rounded ridges (n,) of random heights from 0 to 1, one for each unit of the phase (n,)."""
+    """Return the heights (n,) of random rounded ridges, 0 to 1; each unit of the phase (n,) has one ridge."""
     index: Index = np.floor(phase).astype(np.int64)
     strength = np.random.default_rng((seed, 72)).uniform(0.25, 1.0, 256)[index % 256]
     width = _RIDGE_WIDTH * (0.7 + 0.6 * np.random.default_rng((seed, 73)).random(256)[index % 256])

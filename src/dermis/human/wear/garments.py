@@ -1,4 +1,4 @@
-"""Garments for the upper body, made of panels over the skin: registry of their patterns."""
+"""Registry of garments for the upper body, which consist of panels over the skin."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from functools import cache
 import numpy as np
 
 from dermis.base.arrays import Doubles
-from dermis.human.wear.folds import Folds, smooth_noise, smoothstep
+from dermis.human.curves import smoothstep
+from dermis.human.wear.folds import Folds, smooth_noise
 from dermis.human.wear.panels import Panel
 from dermis.human.wear.sewing import (
     FULL_TURN,
@@ -122,7 +123,7 @@ def _collar_leaf(level_mm: Doubles, crease_mm: Doubles) -> Panel:
 
 
 def _placket() -> Panel:
-    """Return the strip of cloth in which the buttonholes are."""
+    """Return the placket, the strip of cloth with the buttonholes."""
     across = np.array(
         [-17.5, -17.0, -16.0, -12.5, -11.5, -10.5, -4.0, 4.0, 10.5, 11.5, 12.5, 16.0, 17.0, 17.5]
     )
@@ -184,7 +185,7 @@ GARMENTS: Mapping[str, Pattern] = {
     "shirt": shirt,
     "hoodie": hoodie,
 }
-"""Function that makes the panels of each garment, by name."""
+"""Functions that make the panels of garments, by the name of the garment."""
 
 
 @cache

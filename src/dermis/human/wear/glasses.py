@@ -18,8 +18,9 @@ class Frame(NamedTuple):
 
     lens : width and height of a lens
     bridge : distance between the lenses
-    exponent : shape of the upper and of the lower half of the outline; 2 is an ellipse, 4 a rounded square
-    droop : how much lower half of the outline is longer and leans outwards, 0 to 1
+    exponent : superellipse exponents of the upper and the lower half of the outline; 2 is an ellipse, 4 a
+        rounded square
+    droop : extent to which the lower half of the outline is longer and shifted outwards, 0 to 1
     rim : half width of the rim in the plane of the lens, and its half depth
     temple : half thickness and half height of the temples at the hinge
     is_metal : whether the frame is of metal, with nose pads
@@ -49,18 +50,20 @@ FRAMES: Mapping[str, Frame] = {
 _OUTLINE_SIZE = 56
 _REFERENCE_HALF_WIDTH_MM = 70.3  # half distance of the tragi on the average person
 _LENS_Y_MM, _TILT_DEGREES, _WRAP_RADIUS_MM = -4.5, 7.0, 210.0
-_CLEARANCE_MM, _MIN_FRONT_Z_MM = 1.2, 27.0  # of the frame in front of the skin; of the lenses past the lashes
-_FRONT_NEIGHBOURS = 5  # points of skin of which the frontmost counts
+_CLEARANCE_MM = 1.2  # distance of the frame from the skin behind it
+_MIN_FRONT_Z_MM = 27.0  # least z of the frame, which keeps lenses in front of the lashes
+_NEIGHBOURS = 5  # nearest points of skin, of which the outermost is used
 _EAR_POINTS = {1.0: (4597, 4603), -1.0: (2176, 2182)}  # control points at the top and the back of each ear
 _PAD_WIRE_BEND_MM = np.array([0.0, -1.0, -4.0])
-_TRAGI = 4618, 2197
+_TRAGI = 4618, 2197  # control points in front of the left and the right ear
 
 
 class _Fit(NamedTuple):
-    """Skin of a person near glasses.
+    """Measurements of a person's head to which glasses are fitted.
 
-    front : k-d tree over x and y of the skin that faces forwards, and z of its points
-    sides : k-d tree over y and z of the sides of the head without ears, and |x| of its points, by side
+    front : k-d tree over x and y of the points of skin that face forwards, and z of these points
+    sides : k-d tree over y and z of the points beside the head without ears, and |x| of these points, by
+        side: 1 for left, -1 for right
     control_mm : (p, 3) control points
     scale : width of the head relative to the average
     """
@@ -71,18 +74,18 @@ class _Fit(NamedTuple):
     scale: float
 
     def front_z(self, x: Doubles, y: Doubles) -> Doubles:
-        """Return the depth (n,) of the frontmost skin around positions (n,) seen from the front [mm]."""
+        """Return the largest z (n,) of the skin near positions (n,) seen from the front [mm]."""
         tree, z = self.front
-        return np.asarray(z[tree.query(np.stack([x, y], axis=-1), k=_FRONT_NEIGHBOURS)[1]].max(axis=-1))
+        return np.asarray(z[tree.query(np.stack([x, y], axis=-1), k=_NEIGHBOURS)[1]].max(axis=-1))
 
     def side_x(self, side: float, y: Doubles, z: Doubles) -> Doubles:
-        """Return the largest distance (n,) from the middle of the head around positions (n,) [mm]."""
+        """Return the largest |x| (n,) of the skin near positions (n,) seen from one side [mm]."""
         tree, x = self.sides[side]
-        return np.asarray(x[tree.query(np.stack([y, z], axis=-1), k=_FRONT_NEIGHBOURS)[1]].max(axis=-1))
+        return np.asarray(x[tree.query(np.stack([y, z], axis=-1), k=_NEIGHBOURS)[1]].max(axis=-1))
 
 
 def glasses_solids(style: str, control_mm: Doubles) -> list[Solid]:
-    """Return the parts of glasses on a person; shapes depend on the person, triangles only on the style.
+    """Return the parts of glasses that fit a person; triangles depend only on the style.
 
     control_mm : (p, 3) control points of the person at rest
     """
@@ -110,7 +113,7 @@ def _measure(sheet: SkinSheet, control_mm: Doubles) -> _Fit:
     front = points[faces_front]
     sides = {}
     for side in (1.0, -1.0):
-        own = points[(side * points[:, 0] > 38.0) & ~head_ears()]
+        own = points[(side * points[:, 0] > 38.0) & ~_ear_mask()]
         sides[side] = cKDTree(own[:, 1:]), np.abs(own[:, 0])
     width = np.abs(control_mm[list(_TRAGI), 0]).mean()
     scale = float(np.clip(width / _REFERENCE_HALF_WIDTH_MM, 0.9, 1.15))
@@ -118,14 +121,14 @@ def _measure(sheet: SkinSheet, control_mm: Doubles) -> _Fit:
 
 
 @cache
-def head_ears() -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _ear_mask() -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Return the mask (n,) of the points of the sheet of the head that belong to ears."""
     x, y, z = head_sheet().mean_mm.T
     return np.asarray((np.abs(x) > 69.0 + 0.2 * np.maximum(y, 0.0)) & (np.abs(y + 20.0) < 32.0) & (z < -58.0))
 
 
 def _outline(frame: Frame, side: float, scale: float) -> Doubles:
-    """Return the outline (n, 2) of a lens in the plane of the frame, counter-clockwise from outside [mm]."""
+    """Return the outline (n, 2) of a lens in the frame's plane, counter-clockwise from the front [mm]."""
     (width, height), (upper, lower) = frame.lens, frame.exponent
     angle = np.arange(_OUTLINE_SIZE) * 2.0 * np.pi / _OUTLINE_SIZE
     exponent = np.where(np.sin(angle) > 0.0, upper, lower)
@@ -139,14 +142,18 @@ def _outline(frame: Frame, side: float, scale: float) -> Doubles:
 
 
 def _on_front(flat: Doubles, front_z_mm: float) -> Doubles:
-    """Return points (n, 3) of the curved and tilted front of a frame from its plane (n, 2) [mm]."""
+    """Return the points (n, 3) on the curved and tilted front of a frame, from points in its plane [mm].
+
+    flat : (n, 2) points in the plane of the frame
+    front_z_mm : z of the middle of the front
+    """
     x, y = flat.T
     lean = np.tan(np.radians(_TILT_DEGREES))
     return np.stack([x, y + _LENS_Y_MM, front_z_mm - x * x / (2.0 * _WRAP_RADIUS_MM) + lean * y], axis=1)
 
 
 def _front_depth_mm(frame: Frame, fit: _Fit, outlines: Mapping[float, Doubles]) -> float:
-    """Return the least depth of the middle of a front that is not in the skin [mm]."""
+    """Return the least z of the middle of the front at which rims and bridge are not in the skin [mm]."""
     half_width, half_depth = frame.rim
     needed = [_MIN_FRONT_Z_MM]
     for flat in outlines.values():
@@ -161,7 +168,7 @@ def _front_depth_mm(frame: Frame, fit: _Fit, outlines: Mapping[float, Doubles]) 
 
 
 def _temple(frame: Frame, fit: _Fit, side: float, flat: Doubles, front_z_mm: float) -> Solid:
-    """Return the arm from the outer side of a lens over the ear and down behind it."""
+    """Return the temple: the arm from the outer side of a lens over the ear and down behind it."""
     top, back = fit.control_mm[list(_EAR_POINTS[side])]
     thick, tall = frame.temple
     outer = flat[np.abs(flat[:, 0]).argmax()] + np.array([0.0, 0.22 * frame.lens[1]])
@@ -179,7 +186,7 @@ def _temple(frame: Frame, fit: _Fit, side: float, flat: Doubles, front_z_mm: flo
     straight = np.interp(path[:, 2], [over[2], hinge[2]], [room[22], abs(hinge[0])])
     x = np.maximum(room, np.where(path[:, 2] >= over[2], straight, room))
     x[:2] = np.maximum(np.abs([start[0], hinge[0]]), room[:2] * (path[:2, 2] < 10.0))
-    for _ in range(4):  # the arm does not follow each bump of the head
+    for _ in range(4):  # smoothed over the bumps of the head
         x[2:-1] = np.maximum(x[2:-1], 0.5 * (x[1:-2] + x[3:]))
     path[:, 0] = side * x
     height = np.interp(
@@ -215,7 +222,7 @@ def _nose_pad(fit: _Fit, side: float, flat: Doubles, front_z_mm: float) -> list[
 
 
 def _bridges(frame: Frame, outlines: Mapping[float, Doubles], front_z_mm: float) -> list[Solid]:
-    """Return the bar between the lenses, and a second one above it for frames that droop."""
+    """Return the bar between the lenses, and a second one above it for a droop of 1."""
     half_width, half_depth = frame.rim
     half = max(half_width * 0.9, 0.7)
     left = outlines[1.0]

@@ -1,4 +1,4 @@
-"""What a person wears: clothing, as plain data."""
+"""Clothing and glasses as plain data, which can also be given as words."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ GARMENT_CLOTHS = {
 GARMENT_NAMES: tuple[str, ...] = tuple(GARMENT_CLOTHS)
 CLOTH_NAMES: tuple[str, ...] = tuple(CLOTHS)
 NOTHING = "none"
-"""Word for wearing nothing."""
+"""Word for no garment and for no glasses."""
 _HEX_COLOUR = re.compile("#[0-9a-fA-F]{6}")
 
 
@@ -68,7 +68,7 @@ class Item:
 
     @classmethod
     def _parse(cls, field_name: str, text: str) -> dict[str, Any]:
-        """Return the fields that words describe, in any order."""
+        """Return the fields that words in any order set; missing fields get their defaults."""
         found, rest = dict[str, Any](), f" {' '.join(text.replace(',', ' ').split())} "
         for name, words in cls._names_by_field().items():
             for word in sorted(words, key=len, reverse=True):
@@ -77,7 +77,7 @@ class Item:
                     break
             if name == "colour" and name not in found and (hexadecimal := _HEX_COLOUR.search(rest)):
                 found[name], rest = hexadecimal[0], rest.replace(hexadecimal[0], "", 1)
-        if rest.strip():
+        if rest.strip() or not found:
             options = (f"{name} ({', '.join(words)})" for name, words in cls._names_by_field().items())
             expected = f"{NOTHING}, or words for {'; '.join(options)}"
             refuse(field_name, expected, f"got {rest.strip()!r}", "Correct it")
@@ -85,7 +85,7 @@ class Item:
 
     @property
     def without_colour(self) -> Self:
-        """Return the item in the default colour; items that differ only in colour have the same mesh."""
+        """Return the item in its default colour; items that differ only in colour have the same mesh."""
         fields = getattr(self, "__dataclass_fields__", {})
         return replace(self, colour=fields["colour"].default)  # type: ignore[type-var]
 

@@ -13,8 +13,8 @@ from dermis.human.wear.skin_sheet import point_normals, unit_vectors
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-_RELAXING_STEPS = 40
-_GROWING_HEIGHT_MM = 6.0  # height from which normals are smoothed, so that surfaces do not cross
+_RELAXATION_STEPS = 40
+_SMOOTHED_HEIGHT_MM = 6.0  # height from which normals are smoothed, so that surfaces do not cross
 _NORMAL_STEPS = 12
 _NEIGHBOUR_WEIGHT = 3.0  # of the normals around a point of stretched cloth
 
@@ -38,7 +38,7 @@ class Panel:
     slot : material, such as "cloth"
     taut : (m,) mask of points that are stretched between their neighbours instead of following the skin
     covers : whether later panels lie on top of this one
-    grid : the points as a grid, if they are one
+    grid : indices of the points if they are a grid, else None
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Panel:
 
     @cached_property
     def vertices(self) -> PanelVertices:
-        """Return the vertices; those in the first column of a closed grid are double, for the jump of uv."""
+        """Return the vertices; the first column of a closed grid is duplicated at its end, where uv jumps."""
         if self.grid is None or not self.grid.is_closed:
             return PanelVertices(np.arange(len(self.height_mm), dtype=np.int32), self.uv_mm, self.triangles)
         rows, columns, _ = self.grid
@@ -105,7 +105,7 @@ class Panel:
         """
         base, normal = np.asarray(self.bind @ skin_mm), unit_vectors(np.asarray(self.bind @ skin_normals))
         height = self.height_mm + np.asarray(self.bind @ cover_mm) * (self.height_mm > 0.0)
-        if height.max() > _GROWING_HEIGHT_MM and not self.taut.any():
+        if height.max() > _SMOOTHED_HEIGHT_MM and not self.taut.any():
             normal = self._smooth(normal)
         if self.taut.any():  # normals at the border of the skin depend on single triangles
             normal = unit_vectors(normal + _NEIGHBOUR_WEIGHT * (self.mean_of_neighbours @ normal))
@@ -113,7 +113,7 @@ class Panel:
         if not self.taut.any():
             return np.asarray(points + self.fold_mm[:, None] * normal)
         links, taut = self.mean_of_neighbours[self.taut], self.taut
-        for _ in range(_RELAXING_STEPS):
+        for _ in range(_RELAXATION_STEPS):
             points[taut] = links @ points
             low = height - ((points - base) * normal).sum(axis=1)
             points += np.maximum(low, 0.0)[:, None] * normal
@@ -161,7 +161,7 @@ class Grid(NamedTuple):
 
 
 def border_loop(triangles: Ints) -> Index:
-    """Return the directed border edges (b, 2) of triangles (t, 3): edges without a twin."""
+    """Return the directed border edges (b, 2) of triangles (t, 3), which belong to one triangle only."""
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
     size = int(triangles.max()) + 1
     twins = np.isin(edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0])

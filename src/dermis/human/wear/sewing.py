@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dermis.base.arrays import Doubles
+from dermis.human.curves import smoothstep
 from dermis.human.wear.cloth_uv import cloth_coordinates_mm
-from dermis.human.wear.folds import Folds, smoothstep
+from dermis.human.wear.folds import Folds
 from dermis.human.wear.panels import Grid, Panel, border_loop
 from dermis.human.wear.skin_sheet import NECK_AXIS_Z_MM, RING_SIZE, cut_below, ring_around, skin_sheet
+from dermis.mesh.geometry import cross_2d
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -34,8 +36,10 @@ def towards_back(angle: Doubles) -> Doubles:
 
 
 def body_panel(field_mm: Doubles, folds: Folds, ease_mm: float) -> Panel:
-    """Return the body of a garment: all of the sheet where a field (n,) is positive, with a hem below.
+    """Return the body of a garment: the sheet below the neckline, with a hem at its lower border.
 
+    field_mm : (n,) distance of the points of the sheet below the neckline, negative above it [mm]
+    folds : folds of the cloth
     ease_mm : least height of the cloth above the skin, away from the neckline [mm]
     """
     from scipy.sparse import vstack
@@ -75,9 +79,9 @@ def swept_panel(
 ) -> Panel:
     """Return a panel with a profile that is swept around the neck.
 
-    field_mm : (n,) field over the sheet, from which the rows of the panel are at constant distances
+    field_mm : (n,) level of the points of the sheet, on which the profile places the rows [mm]
     profile : rows from the outer lower edge upwards, over the upper edge, and down on the inner side; each
-        has its level in the field and its height, both by angle from the front (RING_SIZE,) [mm]
+        has its level and its height above the skin, both by angle from the front (RING_SIZE,) [mm]
     columns : angles of the columns in each row [rad]; None for closed rings. The ends are closed by joining
         the first row to the last one, the second to the last but one, and so on
     fold_mm : function of angles (n,) [rad] and rows (n,) that returns heights of folds (n,) [mm]
@@ -137,7 +141,7 @@ def _front_bind(x_mm: Doubles, y_mm: Doubles) -> csr_array:
     p = np.stack([x_mm, y_mm], axis=1)
     near = front[cKDTree(middles[front, :2]).query(p, k=_CANDIDATE_COUNT)[1]]
     a, b, c = (sheet.mean_mm[sheet.triangles[near, k], :2] - p[:, None] for k in range(3))
-    weights = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=-1)
+    weights = np.stack([cross_2d(b, c), cross_2d(c, a), cross_2d(a, b)], axis=-1)
     area = weights.sum(axis=-1, keepdims=True)
     weights = np.where(area > 1e-6, weights / np.maximum(area, 1e-6), -np.inf)
     best = weights.min(axis=-1).argmax(axis=1)
@@ -147,10 +151,6 @@ def _front_bind(x_mm: Doubles, y_mm: Doubles) -> csr_array:
     own /= own.sum(axis=1, keepdims=True)
     shape = len(best), len(sheet.mean_mm)
     return csr_array((own.ravel(), (rows, sheet.triangles[triangle].ravel())), shape=shape)
-
-
-def _cross(a: Doubles, b: Doubles) -> Doubles:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def front_panel(

@@ -11,6 +11,7 @@ import numpy as np
 from dermis.base.arrays import Doubles, Index, Ints, Mask
 from dermis.human.makehuman import mesh_point_count
 from dermis.human.model import MEAN_PERSON_WEIGHTS, control_points_mm, head_template
+from dermis.mesh.geometry import edges
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -22,13 +23,10 @@ _HIGHEST_LEVEL_MM = -110.0  # level of the highest skin of the sheet, below the 
 NECK_AXIS_Z_MM = -92.0
 """Depth of the vertical axis about which rings run, on the mean person [mm]."""
 
-
 _FRONT_BASE_YZ_MM = -197.0, -43.0  # height and depth of the base of the neck at its front
-_BASE_SLOPE = -0.417  # rise of the base of the neck towards the back
-_BASE_RISE, _BASE_ROUNDING_MM = (
-    0.42,
-    38.0,
-)  # rise of the base to the sides, and half width of its round middle
+_BASE_SLOPE = -0.417  # slope of the base of the neck along z
+_BASE_RISE = 0.42  # slope of the base of the neck towards the sides
+_BASE_ROUNDING_MM = 38.0  # half width of the rounded middle of the base
 
 
 def levels_mm(mean_mm: Doubles) -> Doubles:
@@ -88,7 +86,7 @@ def skin_sheet() -> SkinSheet:
 
 @cache
 def head_sheet() -> SkinSheet:
-    """Return the sheet of skin on which glasses and headwear are fitted; it is the same for all people."""
+    """Return the sheet of skin to which glasses are fitted; it is the same for all people."""
     return _sheet_where(lambda points: (points[:, 1] > -62.0) & _is_outside_sockets(points))
 
 
@@ -143,14 +141,14 @@ def cut_below(field_mm: Doubles) -> Cut:
     triangles, inside = skin_sheet().triangles, field_mm > 0.0
     count = inside[triangles].sum(axis=1)
     whole = triangles[count == 3]
-    edges, made = list[Doubles](), list[Index]()
+    cut_edges, made = list[Doubles](), list[Index]()
     for wanted, corner_count in ((1, 1), (2, 2)):
         part = triangles[count == wanted]
         lone = (inside[part] == (corner_count == 1)).argmax(axis=1)  # the corner that differs from the others
         a, b, c = (np.take_along_axis(part, ((lone + k) % 3)[:, None], 1)[:, 0] for k in range(3))
-        edges.append(np.stack([np.stack([a, b], 1), np.stack([a, c], 1)], axis=1))
+        cut_edges.append(np.stack([np.stack([a, b], 1), np.stack([a, c], 1)], axis=1))
         made.append(np.stack([a, b, c], axis=1))
-    pairs = np.sort(np.concatenate(edges).reshape(-1, 2), axis=1)
+    pairs = np.sort(np.concatenate(cut_edges).reshape(-1, 2), axis=1)
     unique, at = np.unique(pairs, axis=0, return_inverse=True)
     at = at.ravel() + len(field_mm)
     first, second = (part.reshape(-1, 2) for part in np.split(at, [2 * len(made[0])]))
@@ -177,8 +175,8 @@ def ring_around(field_mm: Doubles) -> csr_array:
     """
     from scipy.sparse import csr_array
 
-    sheet, edges = skin_sheet(), _sheet_edges()
-    crossed = edges[(field_mm[edges] > 0.0).sum(axis=1) == 1]
+    sheet, sides = skin_sheet(), _sheet_edges()
+    crossed = sides[(field_mm[sides] > 0.0).sum(axis=1) == 1]
     values = field_mm[crossed]
     share = values[:, 0] / (values[:, 0] - values[:, 1])
     first, second = crossed.T
@@ -201,6 +199,4 @@ def ring_around(field_mm: Doubles) -> csr_array:
 @cache
 def _sheet_edges() -> Index:
     """Return the edges (e, 2) of the sheet as pairs of points, each edge once."""
-    triangles = skin_sheet().triangles.astype(np.int64)
-    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
-    return np.unique(np.sort(edges, axis=1), axis=0)
+    return edges(skin_sheet().triangles)[0]

@@ -58,6 +58,12 @@ def _grid_around(
     *,
     is_closed: bool,
 ) -> Solid:
+    """Return a tube; see `tube` for the parameters.
+
+    forward : (k, 3) unit tangents of the path
+    size : factors of the size of the cross-sections, for all points of an open path including its two ends
+    is_closed : whether the path is closed
+    """
     if not is_closed:
         side, forward, half_width, half_height = (
             np.concatenate([part[:1], part, part[-1:]]) for part in (side, forward, half_width, half_height)
@@ -80,7 +86,7 @@ def _grid_around(
 
 
 def disc(outline: Doubles, bulge: Doubles, slot: str) -> Solid:
-    """Return a disc with two faces: rings of its outline (k, 3) that shrink to the middle.
+    """Return a curved disc: rings that shrink from its outline (k, 3) to its middle.
 
     bulge : (3,) offset of the middle [mm]
     """

@@ -1,4 +1,4 @@
-"""Meshes that are worn, as data that all people share but for positions."""
+"""Meshes of garments and glasses without positions, which all people share."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dermis.base.arrays import Floats, Index, Ints
 
 
 class Worn(NamedTuple):
-    """Surfaces that are worn, as one mesh that is the same for all people but for positions.
+    """Mesh of a garment or of glasses without the positions of its points, which depend on the person.
 
     point : (v,) index of the point of each vertex
     uv : (v, 2) texture coordinates
     triangles : (t, 3) vertices
-    material : (t,) index into the materials that are worn
+    material : (t,) index into the materials of the item
     bone, weight : (m, 4) bones that move each of the m points, and their weights
     target, target_point, delta_mm : (n,) index of the expression, (n,) index of the point and (n, 3)
         displacement of the points by expressions [mm]

@@ -71,7 +71,7 @@ class InterreflectionBuffers:
 
 
 class Interreflection(NamedTuple):
-    """Buffers of interreflection, with the albedos of skin and of what the person wears.
+    """Buffers of interreflection, with the albedos of skin, clothing and glasses.
 
     albedo : (3,) albedo of the skin's diffusion profile [-]
     material_colour : (m, 4) albedos of the materials of the head, which apply to parts that are not skin [-]

@@ -5,7 +5,7 @@ const SHEEN_UNIFORM: f32 = 0.35; // albedo of the lobe for uniform light at graz
 
 var<private> sheen: vec3f; // strength of the lobe
 
-// Radiance towards v per irradiance on a plane across the light.
+// Radiance towards v per irradiance on a plane across the light, whose cosine of incidence is `cosine`.
 fn sheen_lobe(n: vec3f, l: vec3f, v: vec3f, cosine: f32) -> vec3f {
     let half_cosine = clamp(dot(n, normalize(l + v)), 0.0, 1.0);
     let facing = max(dot(n, v), 0.05);

@@ -8,5 +8,5 @@ __all__ = ["draw", "shader_constants"]
 
 
 def shader_constants() -> dict[str, float]:
-    """Return the named values that the shader preprocessor inserts at `//#fill` in bake and fabric.wgsl."""
+    """Return the values that the shader preprocessor inserts at `//#fill` in bake.wgsl and fabric.wgsl."""
     return {"baked_numbers": BAKED_CHANNEL_COUNT, "fabric_mm_per_uv": MM_PER_UV}

@@ -2,15 +2,14 @@
 
 //#fill const MM_PER_UV: f32 = {fabric_mm_per_uv};
 
-const JERSEY: u32 = 1u; // weaves, in the order of mesh/fabric.py; 0 is no cloth
+const JERSEY: u32 = 1u; // weaves, in the order of mesh/fabric.py; 0 is no cloth, and 4 is rib
 const PLAIN: u32 = 2u;
 const TWILL: u32 = 3u;
-const RIB: u32 = 4u;
 const CLOTH_SPECULAR: f32 = 0.35; // strength of the surface lobe relative to a smooth dielectric: light is lost between fibres
 const FINITE_STEP: f32 = 0.12; // of derivatives [threads]
-const WEFT: vec3f = vec3f(0.52, 0.52, 0.50); // undyed threads of twill
-const FIBRE_MM: f32 = 1.7; // distance of uneven fibres
-const WRINKLE_MM: f32 = 13.0; // distance of small wrinkles
+const WEFT: vec3f = vec3f(0.52, 0.52, 0.50); // albedo of the undyed threads of twill
+const FIBRE_MM: f32 = 1.7; // size of the variation of brightness by uneven fibres
+const WRINKLE_MM: f32 = 13.0; // size of small wrinkles
 
 fn lattice_value(cell: vec2i) -> f32 {
     var h = u32(cell.x) * 0x9E3779B9u + u32(cell.y) * 0x85EBCA6Bu;
@@ -45,13 +44,10 @@ fn thread_height(p: vec2f, weave: u32) -> f32 {
     if (weave == TWILL) {
         return abs(sin(PI * (p.x + 0.55 * p.y))) * (0.8 + 0.2 * abs(sin(PI * 1.7 * p.y)));
     }
-    if (weave == RIB) {
-        return pow(abs(sin(PI * p.x)), 0.8);
-    }
-    return cloth_noise(3.0 * p);
+    return pow(abs(sin(PI * p.x)), 0.8); // rib
 }
 
-// Height of small wrinkles in units of their distance.
+// Height of small wrinkles in units of WRINKLE_MM, at a position on the cloth.
 fn wrinkle_height(mm: vec2f) -> f32 {
     let p = mm / WRINKLE_MM;
     let bent = p + 0.9 * vec2f(cloth_noise(0.5 * p + 3.0), cloth_noise(0.5 * p + 11.0));
@@ -59,6 +55,7 @@ fn wrinkle_height(mm: vec2f) -> f32 {
     return ridge * ridge * smoothstep(0.35, 0.75, cloth_noise(0.21 * p + 5.0)) * 0.5;
 }
 
+// Surface of cloth, with the normal, the albedo and the roughness of threads and wrinkles.
 // footprint : side of the filter in uv
 fn cloth_at(point: Point, colour: vec3f, material: PartMaterial, footprint: f32) -> Surface {
     let mm = MM_PER_UV * point.uv;

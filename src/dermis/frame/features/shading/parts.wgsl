@@ -1,7 +1,7 @@
 // Surfaces of parts that are not skin, as glTF's metallic-roughness model describes them.
 //#include "surface/skin.wgsl"
 
-override PARTS: bool = false; // whether a file gives the head such parts
+override PARTS: bool = false; // whether the head has such parts of a file
 override WORN: bool = false; // whether the head wears cloth or glasses
 
 const WET_ROUGHNESS: f32 = 0.1; // of plain materials: teeth, tongues, eyeballs of files
@@ -60,7 +60,7 @@ fn part_at(point: Point, colour: vec3f, material: PartMaterial, footprint: f32) 
 //#if WORN
 //#include "fabric.wgsl"
 
-const SHEEN_WHITENESS: f32 = 0.5; // of upright fibres, which are lit from all sides
+const SHEEN_WHITENESS: f32 = 0.5; // fraction of white in the colour of the sheen, as upright fibres also scatter light at their surfaces
 
 fn part_at(point: Point, colour: vec3f, material: PartMaterial, footprint: f32) -> PartSurface {
     var part = PartSurface(Surface(point.normal, colour, WET_ROUGHNESS, 1.0), material.metalness, material.emission, vec3f(0.0));

@@ -92,7 +92,7 @@ def place_head() -> None:
 
 
 def is_skin_name(material_name: str) -> bool:
-    """Return whether an imported material is skin; Blender may have appended a number to its name."""
+    """Return whether an imported material is skin; Blender appends a number such as .001 to a used name."""
     return material_name in EXPORT["skin_materials"] or material_name[:-4] in EXPORT["skin_materials"]
 
 

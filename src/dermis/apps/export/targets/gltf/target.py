@@ -1,4 +1,4 @@
-"""Export to glTF: a .glb file with skin for all viewers, or with skin that scatters or transmits light."""
+"""Export to glTF: a .glb file whose skin uses core glTF, or extensions for scattering or transmission."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _NAIVE_TRANSMISSION_FACTOR = 0.5  # middle of the slider
 
 
 class Gltf(Target):
-    """Export to a .glb file with skin for all viewers, or with skin that scatters or transmits light."""
+    """Export to a .glb file whose skin uses core glTF, or extensions for scattering or transmission."""
 
     name = "gltf"
     title = "glTF"

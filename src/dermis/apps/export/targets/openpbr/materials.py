@@ -149,16 +149,19 @@ def skin_material(
 
 
 def untextured_part_material(material: Material) -> OpenPbrMaterial:
-    """Return the OpenPBR material, without textures, of a part of the head such as the teeth or lashes."""
-    name = material.name.casefold()
-    roughness = next(
-        (value for part, value in _ROUGHNESS_BY_KIND.items() if part in name), _DEFAULT_PART_ROUGHNESS
-    )
+    """Return the OpenPBR material, without textures, of a part of the head such as teeth or clothing."""
+    name, roughness = material.name.casefold(), material.roughness
+    if roughness is None:
+        roughness = next(
+            (value for part, value in _ROUGHNESS_BY_KIND.items() if part in name), _DEFAULT_PART_ROUGHNESS
+        )
     values: dict[str, InputValue] = {
         "base_color": flat_tuple(material.colour),
         "specular_roughness": roughness,
         "specular_ior": _CORNEA_IOR if "eye" in name else SKIN_ETA,
     }
+    if material.metalness > 0.0:
+        values["base_metalness"] = material.metalness
     return OpenPbrMaterial(material.name, values, {})
 
 
