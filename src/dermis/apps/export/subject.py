@@ -60,7 +60,7 @@ class Subject:
     tissue : tissue of the skin; None for a table of Gaussians
     scene : scene with the head and its skin; None for a skin without a head
     person : parametric person to whom the head belongs; None for other heads
-    eye_state : state of the skin that is painted in the maps, and that reddens the eyes; None for none
+    eye_state : state of the skin that the painted maps already contain, for the redness of the eyes
     """
 
     name: str
