@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from conftest import Run
 
 from dermis import DermisError, Human, Pulse, Scene, SkinState, StateEvent
 from dermis.cli.living_options import check_constant_states, parse_pulse, parse_states
@@ -17,6 +17,8 @@ from dermis.human.person_file import write_person_json
 from dermis.scene.files import load_scene
 from dermis.scene.saving import save_scene, scene_text
 from dermis.scene.settings import Settings
+
+Run = Callable[..., Any]
 
 
 @pytest.fixture
