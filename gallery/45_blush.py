@@ -1,6 +1,6 @@
-"""One person at rest, with a blush in four steps, and in four other states.
+"""One person with a blush in four steps from none to full, and in four other states.
 
-The blood volume and its oxygen change by zones of the face; sweat and tears make the skin smoother.
+Blood volume and oxygen saturation change by zones of the face; sweat and tears make the skin smoother.
 
 Deck: S24
 Columns: 4

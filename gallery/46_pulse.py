@@ -1,6 +1,6 @@
 """A heartbeat in the colour of the face, magnified 30 times.
 
-A beat in steps of a sixth: to the mean picture of the beat, 30 times the difference of each picture is added.
+Six phases of a beat: the mean of the six pictures, plus 30 times the difference of each from this mean.
 
 Deck: S24
 Columns: 6

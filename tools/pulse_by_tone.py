@@ -1,4 +1,4 @@
-"""Plot the relative change of skin colour by the pulse over melanin, as the model of skin predicts it."""
+"""Plot the relative change of skin colour by the pulse against melanin, as the model of skin predicts it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MEASURED_DIRECTION = np.array([0.33, 0.77, 0.53])  # de Haan and van Leest 2014
 
 
 def main(output: Path, /) -> None:
-    """Plot the relative change of skin colour by the pulse over melanin, as the model of skin predicts it.
+    """Plot the relative change of skin colour by the pulse against melanin, as the model of skin predicts it.
 
     Parameters
     ----------
@@ -35,7 +35,10 @@ def main(output: Path, /) -> None:
         left.semilogx(MELANIN, change[:, k], colour, label=name)
         right.semilogx(MELANIN, direction[:, k], colour)
         right.axhline(MEASURED_DIRECTION[k], color=colour, linestyle=":")
-    left.set(xlabel="melanosomes in the epidermis [-]", ylabel="pulse, of the mean colour [%]")
+    left.set(
+        xlabel="melanosomes in the epidermis [-]",
+        ylabel="peak-to-peak pulse, relative to the mean colour [%]",
+    )
     right.set(xlabel="melanosomes in the epidermis [-]", ylabel="direction (dotted: measured)")
     left.legend()
     figure.savefig(output, dpi=80)

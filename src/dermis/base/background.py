@@ -33,10 +33,10 @@ def run_in_thread(task: Callable[[], T]) -> Future[T]:
 
 
 def exit_process(code: int) -> NoReturn:
-    """Exit the process, also while a function of `run_in_thread` still runs.
+    """Exit the process, even while a function of `run_in_thread` is running.
 
-    In that case Python does not run its own shutdown: it would end the thread at its next Python instruction,
-    and if that is inside a callback of a C++ or Rust library, the process would abort.
+    In that case, Python's own shutdown is skipped: it would end the thread at its next Python instruction,
+    which aborts the process if that instruction is in a callback of a C++ or Rust library.
 
     code : exit status
     """

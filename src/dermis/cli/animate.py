@@ -56,8 +56,8 @@ class _AnimatedScene:
     rate : frame rate of the animation [1/s]
     first : number of the first frame, at which automatic exposure is metered and hair is at rest
     hair_motion : whether to simulate the swing of long hair
-    pulse : pulse of the skin, None for none
-    states : causes of states of the skin that change over time, in addition to the state of `scene`
+    pulse : pulse of the skin; None for skin without a pulse
+    states : events that change the skin over time; other states are those of `scene`
     """
 
     scene: Scene
@@ -133,7 +133,7 @@ def animate(
     motion:
         File with the motion: .glb or .gltf with clips, .csv of Live Link Face, .json of MediaPipe, or a
         sequence of meshes such as face_%05d.obj. [default: the file of the head; with --pulse or --state, a
-        still head for the time --to, or 10 s]
+        head at rest until --to, or for 10 s]
     output:
         Movie (.mp4), or numbered images (.png or .exr), such as frames/%05d.png; the folder of images is
         created if necessary.
@@ -154,13 +154,14 @@ def animate(
         Render all numbered images again, including those that exist.
     hair_motion:
         Simulate the swing of long hair, which is at rest in the first frame. Otherwise hair moves rigidly
-        with the head.
+        with the head, as it always does without --motion for motions by the pulse of at most 0.5 mm.
     pulse:
-        Heartbeat of a person: a rate such as 72 [1/min], or a CSV file with the columns time [s] and value
-        (photoplethysmogram; more blood is higher). It changes the blood of the skin and moves the head.
+        Heartbeat of a person: a rate such as 72 [1/min], or a CSV file with the columns time [s] and value (a
+        photoplethysmogram, in which higher values mean more blood). It changes the blood volume of the skin,
+        and moves the head.
     pulse_record:
-        CSV file to write with the true pulse of each frame: time [s], relative change of the blood volume
-        without delay, and vertical motion of the face [mm].
+        CSV file to write with the true pulse at each frame: time [s], relative change of the blood volume
+        without delay, and upward motion of the face [mm].
     names:
         List the morph targets, bones and clips of the head without rendering.
     as_json:
@@ -171,16 +172,15 @@ def animate(
     from dermis.gpu.adapters import select_adapters
 
     started = time.perf_counter()
-    heartbeat, states = parse_pulse(pulse, pulse_options), parse_states(scene.state or ())
-    changing = tuple(event for event in states if not event.is_constant)
-    scene = replace(scene, state=list(_constant_state_texts(states)))
-    if pulse_record is not None and heartbeat is None:
-        refuse("--pulse-record", "--pulse with it", "there is none", "Add --pulse 72, or leave it out")
+    heartbeat = parse_pulse(pulse, pulse_options)
+    events, scene = _split_states(scene)
+    _check_pulse_record(pulse_record, heartbeat)
     span, target = parse_time_span(begin, end, fps, motion_fps), AnimationOutput(output, crf, overwrite)
     target.check_writable(scene.settings.get("size", (2, 2)))
-    is_still = motion is None and bool(heartbeat or states) and not _has_own_motion(head)
+    is_still = motion is None and bool(heartbeat or events or scene.state) and not _has_own_motion(head)
     motion_path = "" if is_still else motion_file(head, motion)
-    span = span.with_default_end() if is_still else span
+    span = span.with_default_end(heartbeat) if is_still else span
+    hair_motion = hair_motion and not (is_still and _is_almost_at_rest(heartbeat))
     with spinner("loading"):
         animated, settings = assemble_scene(head, scene)
         target.check_writable(settings.size)
@@ -195,9 +195,9 @@ def animate(
     note_subdivision(head, scene, animated.head)
     settings = shrink_atlas_on_cpu(animated, settings, select_adapters(adapter)[0][0].kind)
     animation = _AnimatedScene(
-        animated, settings, motion_clip, rate, numbers[0], hair_motion, heartbeat, changing
+        animated, settings, motion_clip, rate, numbers[0], hair_motion, heartbeat, events
     )
-    next(iter(animation.scenes(numbers[:1])))  # for errors before the file is written
+    list(animation.scenes([numbers[0], numbers[-1]]))  # so that errors come before the frames are rendered
     missing = target.frames_to_render(
         numbers, settings.size, _frame_digest(animation, scene, head, motion_path)
     )
@@ -222,13 +222,34 @@ def animate(
     return 0
 
 
-def _constant_state_texts(states: Iterable[StateEvent]) -> Iterator[str]:
-    """Yield values of --state for the states that do not change over time."""
-    yield from (f"{event.name}={event.weight!r}" for event in states if event.is_constant)
+def _split_states(options: SceneOptions) -> tuple[tuple[StateEvent, ...], SceneOptions]:
+    """Return the events of all states of --state that change over time, and options with the other states."""
+    states = parse_states(options.state or ())
+    changing = {event.name for event in states if not event.is_constant}
+    constant = [f"{event.name}={event.weight!r}" for event in states if event.name not in changing]
+    return tuple(event for event in states if event.name in changing), replace(options, state=constant)
+
+
+def _is_almost_at_rest(pulse: Pulse | None) -> bool:
+    """Return whether a head that only a pulse moves is so still that the swing of its hair cannot be seen."""
+    return pulse is None or pulse.head_motion_mm <= _STIFF_HAIR_MOTION_MM
+
+
+def _check_pulse_record(path: Path | None, pulse: Pulse | None) -> None:
+    """Raise DermisError if the file of --pulse-record has no pulse to contain, or cannot be written."""
+    from dermis.base.atomic_write import check_output
+
+    if path is None:
+        return
+    if pulse is None:
+        refuse("--pulse-record", "--pulse with it", "there is none", "Add --pulse 72, or leave it out")
+    if path.exists() and Path(pulse.waveform).exists() and path.samefile(pulse.waveform):
+        refuse("--pulse-record", "another file than that of the pulse", f"got {path}", "Choose another name")
+    check_output(path, (".csv",))
 
 
 def _has_own_motion(head_or_scene: str) -> bool:
-    """Return whether the file of a head can contain clips."""
+    """Return whether the head comes from a file of a format that can contain clips."""
     from dermis.formats.parts import is_gltf
 
     return is_gltf(str(_head_table(head_or_scene).get("name", head_or_scene)))
@@ -251,7 +272,7 @@ def _pulse_report(pulse: Pulse, frame_numbers: Sequence[int], rate: Fraction) ->
 
 
 def _write_pulse_record(path: Path, pulse: Pulse, frame_numbers: Sequence[int], rate: Fraction) -> None:
-    """Write the true pulse of each frame as a CSV file."""
+    """Write the true pulse at each frame as a CSV file."""
     from dermis.base.atomic_write import atomic_file
 
     rows = (pulse.truth_at(float(number / rate)) for number in frame_numbers)
@@ -327,11 +348,11 @@ def _common_exposure(animated_scene: _AnimatedScene, renderer: Renderer) -> floa
 def _frame_digest(animated_scene: _AnimatedScene, options: SceneOptions, *files: str) -> str:
     """Return a hash of everything that determines the frames; images from runs with an equal hash are reused.
 
-    files : head and motion as named on the command line; the hash includes the size and modification time of
-        each file
+    files : head and motion as named on the command line; of each file, size and modification time are hashed
     """
     scene = animated_scene.scene
-    names = [*files, scene.head.name, *map(str, options.head.values()), animated_scene.clip.name]
+    waveform = [animated_scene.pulse.waveform] if animated_scene.pulse else []
+    names = [*files, *waveform, scene.head.name, *map(str, options.head.values()), animated_scene.clip.name]
     metered_at = animated_scene.first if isinstance(animated_scene.settings.exposure, str) else None
     scene_values = scene.lights, scene.camera, scene.skin, scene.environment
     frame_values = *scene_values, animated_scene.settings, animated_scene.rate, metered_at
@@ -377,6 +398,7 @@ def _print_animatable_names(head_or_scene: str, options: SceneOptions, as_json: 
 
 _DEFAULT_FRAME_RATE = 30.0
 _STILL_SECONDS = 10
+_STIFF_HAIR_MOTION_MM = 0.5  # largest motion of the head by the pulse at which hair does not swing
 
 
 @dataclass(frozen=True)
@@ -394,11 +416,13 @@ class TimeSpan:
     rate: Fraction | None
     motion_rate: float | None
 
-    def with_default_end(self) -> TimeSpan:
-        """Return a time span that ends 10 s after its begin if no end is given."""
-        return (
-            self if self.end is not None else replace(self, end=(self.begin or Fraction(0)) + _STILL_SECONDS)
-        )
+    def with_default_end(self, pulse: Pulse | None) -> TimeSpan:
+        """Return a time span that ends, if no end is given, 10 s after its begin or with a recorded pulse."""
+        if self.end is not None:
+            return self
+        end = (self.begin or Fraction(0)) + _STILL_SECONDS
+        duration_s = pulse.signal().duration_s if pulse else math.inf
+        return replace(self, end=end if duration_s >= end else Fraction(duration_s))
 
     def frames(self, clip: Clip) -> tuple[range, Fraction]:
         """Return the frame numbers and the frame rate [1/s] for a clip; frame k is at time k / rate.

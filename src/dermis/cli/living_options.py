@@ -1,4 +1,4 @@
-"""Command line options of living skin: states such as a blush, and the pulse."""
+"""Command-line options for living skin: states such as a blush, and the pulse."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from cyclopts import Parameter
 
 from dermis.base.errors import refuse
 from dermis.cli.options import Options, check_fields, model_options, option_name
-from dermis.scene.pulse import Pulse
+from dermis.human.living import TYPICAL_BEAT
+from dermis.scene.pulse import FIELDS_OF_MODEL, Pulse
 
 STATE_OPTION, PULSE_OPTION = "--state", "--pulse"
 StatesOption = Annotated[
@@ -48,9 +49,9 @@ else:
 
 
 def parse_states(option_values: Sequence[str]) -> list[StateEvent]:
-    """Return the causes of states that values of --state describe, such as "blush=0.6@2-8,cold=1".
+    """Return the events that values of --state such as "blush=0.6@2-8,cold=1" describe.
 
-    Raises DermisError for values in another form, unknown states and numbers out of range.
+    Raises DermisError for invalid syntax, unknown states and numbers out of range.
     """
     return [_parse_state(part.strip()) for text in option_values for part in text.split(",")]
 
@@ -70,24 +71,31 @@ def _parse_state(item: str) -> StateEvent:
         refuse(STATE_OPTION, expected, f"got {item!r}", "Correct it")
     name = found["name"].strip()
     check_state_weights({name: weight}, STATE_OPTION)
-    if times.get("begin_s", 0.0) >= times.get("end_s", math.inf):
+    if not times.get("begin_s", -math.inf) < times.get("end_s", math.inf):
         refuse(STATE_OPTION, "a begin before the end", f"got {item!r}", "Correct it")
     return StateEvent(name, weight, **times)
 
 
 def check_constant_states(events: Iterable[StateEvent]) -> dict[str, float]:
-    """Return the weights of states without times; raise DermisError for states with times."""
-    weights: dict[str, float] = {}
-    for event in events:
+    """Return the weights of states without times; weights of the same state add up, to at most 1.
+
+    Raises DermisError for states with times.
+    """
+    from dermis.scene.living import StateEvent
+
+    constant = list(events)
+    for event in constant:
         if not event.is_constant:
-            actual, advice = f"{event.name} has a time", "Leave out what follows the sign @, or use animate"
-            refuse(STATE_OPTION, "states without times in a picture", actual, advice)
-        weights[event.name] = event.weight
-    return weights
+            actual, advice = (
+                f"{event.name} has times",
+                "Remove @ and the times after it, or use dermis animate",
+            )
+            refuse(STATE_OPTION, "states without times, except in animations", actual, advice)
+    return StateEvent.weights_at(constant, 0.0)
 
 
 def parse_pulse(pulse: str | None, options: Options) -> Pulse | None:
-    """Return the pulse of --pulse and of the options that belong to it; None without --pulse.
+    """Return the pulse that --pulse and its further options describe; None without --pulse.
 
     pulse : heart rate [1/min], or a CSV file with a recording
 
@@ -95,27 +103,39 @@ def parse_pulse(pulse: str | None, options: Options) -> Pulse | None:
     """
     if pulse is None:
         if options:
-            option = option_name(next(iter(options)), _PULSE_OPTION_NAMES)
-            refuse(option, f"{PULSE_OPTION} with it", "there is none", "Add --pulse 72, or leave it out")
+            actual, advice = "there is none", f"Add {PULSE_OPTION} 72, or leave it out"
+            refuse(_option(next(iter(options))), f"{PULSE_OPTION} with it", actual, advice)
         return None
-    names = {**_PULSE_OPTION_NAMES, "rate_per_min": "pulse", "waveform": "pulse_waveform"}
     try:
-        values: Options = {"rate_per_min": float(pulse)}
+        rate = float(pulse)
     except ValueError:
-        if not Path(pulse).suffix:
-            expected = "a heart rate [1/min], or a CSV file with the columns time and value"
-            refuse(PULSE_OPTION, expected, f"got {pulse!r}", "Write --pulse 72")
-        if "waveform" in options:
-            actual = "it is given beside a recording"
-            refuse("--pulse-waveform", "a heart rate in --pulse", actual, "Write --pulse 72, or leave it out")
-        values = {"waveform": pulse}
-    found = check_fields(Pulse, {**values, **options}, names)
-    if "waveform" in values and not found.is_recording:
-        actual = f"{pulse} has one column, the form of a beat"
-        refuse(
-            PULSE_OPTION,
-            "a recording with the columns time and value",
-            actual,
-            "Write --pulse 72 --pulse-waveform FILE",
-        )
-    return found
+        return _parse_recording(pulse, options)
+    waveform = str(options.get("waveform", TYPICAL_BEAT))
+    if Pulse(waveform=waveform).is_recording:
+        actual = f"{waveform} has two, as a recording"
+        advice = f"Write {PULSE_OPTION} {waveform}"
+        refuse(_option("waveform"), "a file with one column, the values of one beat", actual, advice)
+    return check_fields(
+        Pulse, {**options, "rate_per_min": rate}, _PULSE_OPTION_NAMES | {"rate_per_min": "pulse"}
+    )
+
+
+def _parse_recording(file_name: str, options: Options) -> Pulse:
+    """Return the pulse in a file that is named as the value of --pulse."""
+    if not Path(file_name).suffix:
+        expected = "a heart rate [1/min], or a CSV file with the columns time and value"
+        refuse(PULSE_OPTION, expected, f"got {file_name!r}", f"Write {PULSE_OPTION} 72")
+    if not Pulse(waveform=file_name).is_recording:
+        actual = f"{file_name} has one, as the values of one beat"
+        advice = f"Write {PULSE_OPTION} 72 {_option('waveform')} {file_name}"
+        refuse(PULSE_OPTION, "a recording with two columns, time and value", actual, advice)
+    for field in options:
+        if field == "waveform" or field in FIELDS_OF_MODEL:
+            actual, advice = f"{PULSE_OPTION} is a recording", f"Write {PULSE_OPTION} 72, or leave it out"
+            refuse(_option(field), f"a heart rate in {PULSE_OPTION}", actual, advice)
+    return check_fields(Pulse, {**options, "waveform": file_name}, _PULSE_OPTION_NAMES)
+
+
+def _option(field: str) -> str:
+    """Return the option of a field of `Pulse`, such as "--pulse-seed"."""
+    return option_name(field, _PULSE_OPTION_NAMES)

@@ -45,16 +45,23 @@ def capture_frame(frame_capture: FrameCapture, inputs: FrameInputs) -> CapturedF
 
 
 def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFrame:
-    """Return a captured frame with fewer but wider strands of scalp hair and beard.
+    """Return a captured frame whose picture has fewer but wider strands of scalp hair and beard.
 
-    The total area of the strands stays the same.
+    The total area of the strands stays the same, and so do the strands that cast shadows. Frames in which
+    equally many strands are drawn and cast shadows have few strands, and are unchanged.
 
     hair_divisor : number by which the number of strands is divided; 0 keeps all strands
     """
-    for _, record in (one for one in captured_frame.records if one[0] == "StrandView" and hair_divisor > 1):
-        count = int(record["coarse"]) // hair_divisor
-        record["width_scale"] *= record["coarse"] / max(1, count)
-        record["coarse"] = count
+    hairs = [record for name, record in captured_frame.records if name == "Hairs"]
+    if hair_divisor <= 1 or len({int(record["coarse"]) for record in hairs}) < 2:
+        return captured_frame
+    for view in (record for name, record in captured_frame.records if name == "StrandView"):
+        count = max(1, int(view["coarse"]) // hair_divisor)
+        widening = view["coarse"] / count
+        for record in (one for one in hairs if one["coarse"] == view["coarse"]):
+            record["width_scale"] *= widening
+            record["dye"] /= widening  # absorption per length
+        view["coarse"] = count
     return captured_frame
 
 

@@ -60,7 +60,7 @@ def close_lips(points_mm: Points) -> Points:
 
 
 class LipWall(NamedTuple):
-    """Middle of the inner surface of closed lips.
+    """Position of the inner surface of closed lips in the middle of the mouth.
 
     contact_y : height of the line on which the lips touch [mm]
     upper_z, lower_z : z of the inner surface of the upper and the lower lip [mm]
@@ -72,7 +72,10 @@ class LipWall(NamedTuple):
 
 
 def lip_wall(points_mm: Points) -> LipWall:
-    """Return the middle of the inner surface of a person's closed lips, from the points (n, 3) [mm]."""
+    """Return the position of the inner surface of the closed lips of a person.
+
+    points_mm : points (n, 3) of the person with closed lips [mm]
+    """
     left = _lip_pairs().rings[0]
     upper, lower = points_mm[left[0]], points_mm[left[-1]]
     return LipWall(float(upper[_CONTACT, 1]), float(upper[_WALL, 2]), float(lower[_WALL, 2]))

@@ -1,4 +1,4 @@
-"""Place and uv layout of the human's teeth: u along the dental arch, v upwards from the biting edge."""
+"""Position and uv layout of the human's teeth: u along the dental arch, v upwards from the biting edge."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ARCH_MIDDLE_U, BITING_EDGE_V = 0.5, 0.02
 """u of the gap between the two middle teeth, and v of the biting edge."""
 _ARCH_SAMPLE_COUNT = 2000
 _UPPER, _LOWER, _TONGUE = "helper-upper-teeth", "helper-lower-teeth", "helper-tongue"
-_SHOWN_MM, _OVERBITE_MM = 2.5, 2.0
+_VISIBLE_MM, _OVERBITE_MM = 2.5, 2.0
 """Length of the upper incisors below the line between closed lips, and overlap with the lower ones [mm]."""
 _LIP_CLEARANCE_MM = 1.0
 """Distance between the upper incisors and the inner surface of the lips [mm]."""
@@ -37,7 +37,7 @@ def place_teeth(points_mm: Points) -> Points:
     """
     placed, wall = points_mm.copy(), lip_wall(points_mm)
     upper, lower = (_incisor_points(points_mm, name) for name in (_UPPER, _LOWER))
-    edge_y = wall.contact_y - _SHOWN_MM
+    edge_y = wall.contact_y - _VISIBLE_MM
     forward = min(wall.upper_z, wall.lower_z) - _LIP_CLEARANCE_MM - upper[:, 2].max()
     lower_rise = edge_y + _OVERBITE_MM - lower[:, 1].max()
     for name, rise in ((_UPPER, edge_y - upper[:, 1].min()), (_LOWER, lower_rise), (_TONGUE, lower_rise)):

@@ -1,4 +1,4 @@
-"""State of living skin in a scene: blush and other states, and their course over time."""
+"""States of living skin in a scene, such as a blush, and their time course."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _MAX_BLOOD_CHANGE = 0.9
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SkinState(ShortRepr):
-    """Momentary state of the skin of a person: a blush or other states, and the pulse.
+    """State of the skin of a person at one time: weights of states such as a blush, and the pulse.
 
     Parameters
     ----------
     weights : mapping of str to float, optional
         Weights of states, 0 to 1: "blush", "pallor", "cold", "exertion" and "crying".
     blood : (16,) array, optional
-        Relative change of the blood volume by the pulse, where its amplitude is 1, for delays evenly spaced
-        from 0 to the longest delay of the face, as `Pulse.at` returns it [-]. None for no pulse.
+        Relative change of the blood volume by the pulse where the relative amplitude is 1, for delays evenly
+        spaced from 0 to the longest delay of the face, as `Pulse.at` returns it [-]. None for no pulse.
 
     Raises
     ------
@@ -66,9 +66,9 @@ class SkinState(ShortRepr):
 
 
 def check_living_head(head: Head, albedo: str) -> None:
-    """Raise DermisError for a head whose skin colour is not painted from pigments.
+    """Raise DermisError for a head whose skin is not painted from pigments, or not rendered in that colour.
 
-    albedo : source of the colour of the skin, see `Skin`
+    albedo : field of `Skin`
     """
     advice = "Use human, human:SEED or a person (.json) without a colour map, or leave the state out"
     if not head.maps.is_painted or head.maps.colour is not None:
@@ -81,7 +81,7 @@ def check_living_head(head: Head, albedo: str) -> None:
 
 @dataclass(frozen=True)
 class StateEvent:
-    """Cause of a state of the skin over a time span.
+    """Event that causes a state of the skin, such as an embarrassment a blush.
 
     Parameters
     ----------
@@ -90,9 +90,9 @@ class StateEvent:
     weight : float
         Weight that the state approaches, 0 to 1.
     begin_s : float
-        Time at which the state starts to rise [s]; by default it has its full weight from the start.
+        Time at which the state starts to rise [s]; by default, it has its full weight until `end_s`.
     end_s : float
-        Time at which the state starts to fall [s]; by default it stays.
+        Time at which the state starts to fall [s]; by default, it lasts.
 
     Raises
     ------
@@ -126,19 +126,19 @@ class StateEvent:
 
     @staticmethod
     def weights_at(events: Iterable[StateEvent], seconds: float) -> dict[str, float]:
-        """Return the weights of all states at a time; causes of the same state add up, to at most 1.
+        """Return the weights of states at a time; weights of the same state add up, to at most 1.
 
         Parameters
         ----------
         events : iterable of StateEvent
-            Causes of states.
+            Events that cause states.
         seconds : float
             Time [s].
 
         Returns
         -------
         dict of str to float
-            Weights by state, for `SkinState`.
+            Weights by name of the state, for `SkinState`.
         """
         weights: dict[str, float] = {}
         for event in events:
@@ -148,6 +148,10 @@ class StateEvent:
 
 
 def state_at(events: Iterable[StateEvent], seconds: float, base: SkinState | None = None) -> SkinState:
-    """Return the state of the skin at a time, with the weights of `base` for states without a cause."""
+    """Return the state of the skin at a time.
+
+    base : state whose pulse is kept, and whose weights apply to states without an event; None for skin at
+        rest
+    """
     weights = {**(base.weights if base else {}), **StateEvent.weights_at(events, seconds)}
     return SkinState(weights, base.blood if base else None)

@@ -1,4 +1,4 @@
-"""Pulse of the skin: settings, and the scene at a time of the heartbeat."""
+"""Pulse of the skin: settings, and scenes with the pulse at a time."""
 
 from __future__ import annotations
 
@@ -20,11 +20,12 @@ if TYPE_CHECKING:  # NumPy takes longer to import than the help of the command l
 
 _FACE_LEVER_MM = 90.0  # distance of the face in front of the joint of the head, about which the head nods
 _MAX_TIME_S = 1e6
-_FIELDS_OF_MODEL = ("rate_per_min", "variability_ms", "respiration_per_min", "seed")
+FIELDS_OF_MODEL = ("rate_per_min", "variability_ms", "respiration_per_min", "seed")
+"""Fields of `Pulse` that do not apply to recordings."""
 
 
 class PulseSample(NamedTuple):
-    """Pulse at a time.
+    """Blood volume and head rotation at a time of the pulse.
 
     blood : (16,) relative change of the blood volume, see `SkinState` [-]
     nod_degrees : rotation of the head about x by the recoil of the heartbeat [degrees]
@@ -35,9 +36,9 @@ class PulseSample(NamedTuple):
 
 
 class Pulse(FrozenModel):
-    """Heartbeat of a person: change of the blood volume of the skin over time, and recoil of the head.
+    """Heartbeat of a person, which changes the blood volume of the skin and moves the head.
 
-    Sources: [Tang2020] for the form of a beat, docs/living.md for amplitude and delays.
+    Sources: [Tang2020] for the waveform, docs/living.md for amplitudes and delays.
 
     Examples
     --------
@@ -51,47 +52,49 @@ class Pulse(FrozenModel):
     rate_per_min: Annotated[
         float,
         Field(ge=20, le=250, json_schema_extra=slider(40, 180)),
-        BoundsReason("1/min: hearts beat neither slower nor faster"),
+        BoundsReason("1/min: the range of human hearts"),
     ] = 72.0
     """Mean heart rate [1/min]."""
     amplitude: Annotated[
         float, Field(ge=0, le=0.5, json_schema_extra=slider(0, 0.2)), BoundsReason("of the blood volume")
     ] = 0.02
-    """Range of the blood volume of the forehead over a beat, from lowest to highest, relative to its mean."""
-    variability_ms: Annotated[float, Field(ge=0, le=200), BoundsReason("ms: more is an arrhythmia")] = 0.0
+    """Peak-to-peak range of the blood volume of the forehead over a beat, relative to its mean."""
+    variability_ms: Annotated[
+        float, Field(ge=0, le=200), BoundsReason("ms: larger values are arrhythmias")
+    ] = 0.0
     """Standard deviation of the intervals between beats [ms]."""
     respiration_per_min: Annotated[
         float, Field(ge=0, le=60), BoundsReason("1/min: nobody breathes faster")
     ] = 0.0
-    """Rate of breathing, which changes intervals, strength and blood volume; 0 for none [1/min]."""
+    """Rate of breathing, which modulates intervals, strength and blood volume; 0 for no effect [1/min]."""
     head_motion_mm: Annotated[
-        float, Field(ge=0, le=5, json_schema_extra=slider(0, 1)), BoundsReason("mm: more is a nod")
+        float, Field(ge=0, le=5, json_schema_extra=slider(0, 1)), BoundsReason("mm: larger motions are nods")
     ] = 0.1
-    """Vertical motion of the face by the recoil of the heartbeat, from lowest to highest [mm]."""
+    """Peak-to-peak vertical motion of the face by the recoil of the heartbeat [mm]."""
     waveform: str = TYPICAL_BEAT
-    """Form of a beat: "typical", a CSV file with one column for a beat at evenly spaced times, or a CSV file
-    with the columns time [s] and value for a recording (photoplethysmogram; more blood is higher)."""
-    seed: Annotated[int, Field(ge=0, lt=2**32), BoundsReason("seeds of 32 bits")] = 0
-    """Seed of the intervals between beats."""
+    """Waveform: "typical", a CSV file with one column (values of one beat at equal intervals), or a CSV file
+    with the columns time [s] and value (a photoplethysmogram, in which higher values mean more blood)."""
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1), BoundsReason("a seed has 32 bits")] = 0
+    """Seed of the random intervals between beats."""
 
     @model_validator(mode="after")
     def _check_recording(self) -> Pulse:
         if self.is_recording:
-            for name in _FIELDS_OF_MODEL:
+            for name in FIELDS_OF_MODEL:
                 if name in self.model_fields_set:
-                    advice = "Leave it out, or give the form of one beat"
-                    refuse(f"pulse: {name}", "no value beside a recording", "it is given", advice)
+                    advice = "Leave it out, or name a file with one beat"
+                    refuse(f"pulse: {name}", "no value for a recording", "it is given", advice)
         return self
 
     @property
     def is_recording(self) -> bool:
-        """Return whether the pulse comes from a recording, not from a heart rate and the form of a beat."""
+        """Return whether the pulse is a recording, not a sequence of beats of one waveform."""
         from dermis.human.living.heartbeat import RecordedPulse
 
         return self.waveform != TYPICAL_BEAT and isinstance(self.signal(), RecordedPulse)
 
     def signal(self) -> ModelledPulse | RecordedPulse:
-        """Return the pulse as a function of time; a file with the form of a beat is read and cached."""
+        """Return the pulse as a function of time; the contents of files are cached."""
         from dermis.scene.pulse_files import load_signal
 
         return load_signal(
@@ -104,7 +107,7 @@ class Pulse(FrozenModel):
         Parameters
         ----------
         seconds : float
-            Time since the start of a beat, at least 0 [s].
+            Time since the start of the first beat or of the recording, at least 0 [s].
 
         Returns
         -------
@@ -123,7 +126,8 @@ class Pulse(FrozenModel):
 
         signal = self.signal()
         end_s = min(signal.duration_s, _MAX_TIME_S)
-        time_s = checked_number("pulse: time", seconds, 0.0, end_s, "s: the length of the recording")
+        reason = "s: the length of the recording" if self.is_recording else "s"
+        time_s = checked_number("pulse: time", seconds, 0.0, end_s, reason)
         delays = np.linspace(0.0, longest_delay_s(), PULSE_SAMPLE_COUNT)
         nod_degrees = math.degrees(self.head_motion_mm / _FACE_LEVER_MM) * signal.recoil(time_s)
         return PulseSample(self.amplitude * signal.blood(time_s - delays), nod_degrees)
@@ -134,31 +138,31 @@ class Pulse(FrozenModel):
         Parameters
         ----------
         seconds : float
-            Time since the start of a beat, at least 0 [s].
+            Time since the start of the first beat or of the recording, at least 0 [s].
 
         Returns
         -------
         tuple of float
-            Time [s], relative change of the blood volume where the amplitude is 1, without delay [-], and
-            upward motion of the face by the recoil [mm].
+            Time [s], relative change of the blood volume where the relative amplitude is 1 and the delay is 0
+            [-], and upward motion of the face by the recoil [mm].
         """
         sample = self.at(seconds)
         return seconds, float(sample.blood[0]), -math.radians(sample.nod_degrees) * _FACE_LEVER_MM
 
     def scene_at(self, scene: Scene, seconds: float) -> Scene:
-        """Return a scene with the pulse at a time; states and the pose of the scene are kept.
+        """Return a copy of a scene with the pulse at a time, in addition to its states and its pose.
 
         Parameters
         ----------
         scene : Scene
             Scene with a person.
         seconds : float
-            Time since the start of a beat, at least 0 [s].
+            Time since the start of the first beat or of the recording, at least 0 [s].
 
         Returns
         -------
         Scene
-            The scene, in which blood volume and head are those of the time.
+            Scene with the blood volume and the head rotation at the time.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Files with the form of a beat or a recording of the pulse, and the motion of the head by the pulse."""
+"""Files with the waveform of a beat or a recording of the pulse, and poses of a head that the pulse moves."""
 
 from __future__ import annotations
 
@@ -13,7 +13,13 @@ from dermis.base.errors import format_value, refuse
 from dermis.base.reading import checked_path, read_text
 from dermis.base.tables import column_separator
 from dermis.human.living import TYPICAL_BEAT
-from dermis.human.living.heartbeat import ModelledPulse, RecordedPulse, normalised_beat, typical_beat
+from dermis.human.living.heartbeat import (
+    SPREAD_PERCENTILES,
+    ModelledPulse,
+    RecordedPulse,
+    normalised_beat,
+    typical_beat,
+)
 from dermis.mesh.pose import Pose, merge_poses
 from dermis.mesh.rotations import angles_matrix
 
@@ -26,23 +32,23 @@ _MIN_RECORDING_S, _MAX_RECORDING_S = 2.0, 1e6
 def load_signal(
     waveform: str, rate_per_min: float, variability_ms: float, respiration_per_min: float, seed: int
 ) -> ModelledPulse | RecordedPulse:
-    """Return a pulse as a function of time, for fields of `Pulse`.
+    """Return a pulse as a function of time, for values of the fields of `Pulse`.
 
-    Raises DermisError for files that cannot be read.
+    Raises DermisError for a file that cannot be read, or whose contents are no beat and no recording.
     """
     table = typical_beat()[:, None] if waveform == TYPICAL_BEAT else _read_columns(waveform)
     if table.shape[1] == 2:
         return RecordedPulse(*_checked_recording(waveform, table))
     beat = table[:, 0]
     if len(beat) < _MIN_BEAT_SAMPLES or np.ptp(beat) == 0.0:
-        expected = f"at least {_MIN_BEAT_SAMPLES} different values over one beat"
+        expected = f"at least {_MIN_BEAT_SAMPLES} values over one beat, which are not all equal"
         refuse(waveform, expected, f"got {len(beat)} with a range of {np.ptp(beat):g}", "Correct it")
     beat = normalised_beat(beat)
     return ModelledPulse(rate_per_min, beat, 1e-3 * variability_ms, respiration_per_min / 60.0, seed)
 
 
 def _read_columns(file_name: str) -> Doubles:
-    """Return the table (n, 1 or 2) of a CSV file, without a header line."""
+    """Return the numbers (n, 1 or 2) of a CSV file; comments and a header line are skipped."""
     expected = f"{TYPICAL_BEAT}, or a CSV file with one column (a beat) or two (time, value)"
     path = checked_path(file_name, expected)
     lines = [
@@ -63,7 +69,7 @@ def _read_columns(file_name: str) -> Doubles:
 
 
 def _numbers(line: str) -> list[float] | None:
-    """Return the numbers of a line of a table; None if it has others than finite numbers."""
+    """Return the numbers in a line of a table; None if it contains anything but finite numbers."""
     mark = column_separator(line)
     texts = line.split(mark) if mark == "," else line.replace(",", ".").split(mark)
     try:
@@ -81,13 +87,13 @@ def _checked_recording(file_name: str | Path, table: Doubles) -> tuple[Doubles, 
     if times[-1] < _MIN_RECORDING_S or times[-1] > _MAX_RECORDING_S:
         expected = f"a recording of {_MIN_RECORDING_S:g} to {_MAX_RECORDING_S:g} s"
         refuse(file_name, expected, f"it lasts {times[-1]:g} s", "Give times in seconds")
-    if np.ptp(np.percentile(table[:, 1], (2.5, 97.5))) == 0.0:
+    if np.ptp(np.percentile(table[:, 1], SPREAD_PERCENTILES)) == 0.0:
         refuse(file_name, "values that change", "they are constant", "Correct it")
     return times, table[:, 1]
 
 
 def with_nod(pose: Pose | None, nod_degrees: float) -> Pose:
-    """Return a pose in which the head is rotated about x, in addition to its rotation in `pose`."""
+    """Return a copy of a pose in which the head is also rotated about x by an angle [degrees]."""
     base = pose or Pose()
     before: Any = base.bones.get(_HEAD_BONE, (0.0, 0.0, 0.0))
     if np.shape(before) == (3,):

@@ -72,7 +72,7 @@ def _pose_tables(pose: Pose | None) -> list[str]:
 
 
 def _state_tables(state: SkinState | None) -> list[str]:
-    """Return the TOML table [state] of a state of the skin."""
+    """Return the TOML table [state] of a state of the skin; no table for skin at rest."""
     if state is None:
         return []
     if state.blood is not None:

@@ -222,6 +222,9 @@ def export_skin(
     target = replace(TARGETS[to].with_variant(variant), side=side, adapter=adapter)
     target = target if library is None else target.with_embedded_library(library)
     resolved, path = target.resolve_version(version), _check_output_path(target, output)
+    if state is not None and not target.shows_states:
+        actual = f"{target.title} gets parameters without maps"
+        refuse("state", "a target with maps, such as gltf", actual, "Leave it out, or choose another target")
     options = {"model": model, "profile": profile, "state": state, **head}
     if not isinstance(subject, Subject):
         subject = load_subject(subject, **options)

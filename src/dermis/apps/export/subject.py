@@ -60,7 +60,6 @@ class Subject:
     tissue : tissue of the skin; None for a table of Gaussians
     scene : scene with the head and its skin; None for a skin without a head
     person : parametric person to whom the head belongs; None for other heads
-    eye_state : state of the skin that the painted maps contain and that reddens the eyes; None for none
     """
 
     name: str
@@ -70,7 +69,6 @@ class Subject:
     tissue: Tissue | None = None
     scene: Scene | None = None
     person: Human | None = None
-    eye_state: SkinState | None = None
 
     @property
     def head(self) -> Head | None:
@@ -124,11 +122,13 @@ class Subject:
         eyes = self.head_or_ball.eyes
         if eyes is None:
             return None
-        look = reddened(eyes.look, self.eye_state or (self.scene.state if self.scene else None))
+        look = reddened(eyes.look, self.scene.state if self.scene else None)
         return run_on_device("auto", lambda device: paint_eye(device, look))
 
     def with_painted_maps(self, map_side: int, adapter: str) -> Subject:
         """Return a copy of the subject with the head's procedural maps replaced by arrays of texels.
+
+        The maps and the look of the eyes then show the state of the skin, which the scene no longer has.
 
         If the head has no procedural maps, the subject itself is returned.
 
@@ -138,12 +138,14 @@ class Subject:
         head, state = self.head, self.scene.state if self.scene else None
         if self.scene is None or head is None or not head.maps.is_painted:
             return self
-        from dermis.frame.features.surface.painting.painted_head import with_painted_maps
+        from dermis.frame.features.surface.painting.painted_head import reddened, with_painted_maps
         from dermis.gpu.failures import run_on_device
 
         painted = run_on_device(adapter, lambda device: with_painted_maps(device, head, map_side, state))
-        scene = replace(self.scene, head=painted, state=None)
-        return replace(self, scene=scene, eye_state=state)
+        if painted.eyes is not None:
+            eyes = replace(painted.eyes, look=reddened(painted.eyes.look, state))
+            painted = replace(painted, eyes=eyes)
+        return replace(self, scene=replace(self.scene, head=painted, state=None))
 
     def encode_maps(self) -> dict[str, bytes]:
         """Return the maps of the head as PNG files, by role.

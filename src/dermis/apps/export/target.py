@@ -114,6 +114,8 @@ class Target(ABC):
     """Names of alternative scattering methods or extensions; the first is the default."""
     needs_maps: ClassVar[bool] = False
     """Whether `write` needs the maps of a head as arrays, so that procedural maps are painted first."""
+    shows_states: ClassVar[bool] = True
+    """Whether the files contain the skin of a head, in which states such as a blush are visible."""
     limitations: ClassVar[str]
     """Differences from the reference that no parameters can remove, in one or two sentences."""
     part_limitations: ClassVar[str] = (
@@ -310,6 +312,7 @@ class JsonTarget(Target):
     """
 
     suffixes = (".json", "")
+    shows_states = False
     untested = True
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:

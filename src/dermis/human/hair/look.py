@@ -237,9 +237,11 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
 
 
 def restyled_fields(hair: HairLook, style_name: str) -> dict[str, Any]:
-    """Return the length and fade of a hair look in another style, longer or shorter than usual by as much.
+    """Return `length_mm` and `fade` of a hair look in another style.
 
-    style_name : name of the other style; the fields are empty for an unknown name
+    The ratio of its length to the usual length of the style is kept, within the limits of the new style.
+
+    style_name : name of the new style; the result is empty for an unknown name
     """
     if style_name not in styles():
         return {}

@@ -12,14 +12,18 @@ from dermis.base.arrays import Doubles
 _TABLE_SIZE = 512
 # Artist's values in the form of two Gaussians over the phase of a beat [Tang2020]: height, centre, width.
 _SYSTOLIC, _DIASTOLIC = (1.0, 0.22, 0.075), (0.45, 0.48, 0.10)
-# Chosen: effects of breathing on the intervals between beats, on strength of the pulse, and on blood volume.
+# Chosen: relative effects of breathing on the intervals between beats, the strength of the pulse, and the
+# blood volume.
 _INTERVAL_CHANGE, _STRENGTH_CHANGE, _BASELINE_CHANGE = 0.03, 0.10, 0.15
 _MIN_INTERVAL_FACTOR, _MAX_INTERVAL_FACTOR = 0.4, 2.5
-# Chosen: recoil of the head as a damped oscillation that starts with the pulse.
-_RECOIL_HZ, _RECOIL_DECAY_S, _RECOIL_BEATS = 4.0, 0.12, 3
+# Chosen: recoil of the head as a damped oscillation that starts with each beat.
+_RECOIL_HZ, _RECOIL_DECAY_S = 4.0, 0.12
+_RECOIL_BEATS = 3  # latest beats whose oscillations are added up
 _RECOIL_RANGE = 0.848  # from the lowest to the highest value of the damped oscillation
-_SPREAD_PERCENTILES = (2.5, 97.5)
-_MIN_BEAT_INTERVAL_S = 0.33  # shortest interval between beats that are found in a recording
+_MIN_BEAT_INTERVAL_S = 0.33  # shortest interval between detected beats of a recording
+_MIN_RELATIVE_SLOPE = 0.4  # slope of detected beats, relative to the steepest slopes of the recording
+SPREAD_PERCENTILES = (2.5, 97.5)
+"""Percentiles of the values of a recording whose difference is its range, so that outliers do not matter."""
 
 
 def typical_beat() -> Doubles:
@@ -34,7 +38,7 @@ def typical_beat() -> Doubles:
 
 
 def normalised_beat(samples: Doubles) -> Doubles:
-    """Return one beat, resampled to 512 points, with a mean of 0 and a range of 1 from lowest to highest."""
+    """Return a beat (512,), resampled and scaled to a mean of 0 and a peak-to-peak range of 1."""
     phase = np.arange(_TABLE_SIZE) / _TABLE_SIZE
     beat = np.interp(phase, np.arange(len(samples)) / len(samples), samples, period=1.0)
     return np.asarray((beat - beat.mean()) / np.ptp(beat))
@@ -49,13 +53,13 @@ def _recoil(seconds: Doubles) -> Doubles:
 
 @dataclass(frozen=True, eq=False)
 class ModelledPulse:
-    """Pulse from a model: beats of one form whose intervals vary at random and with breathing.
+    """Pulse from a model: beats of equal waveform, at intervals that vary at random and with breathing.
 
     rate_per_min : mean rate [1/min]
     beat : (n,) samples of one beat, from `normalised_beat`
     variability_s : standard deviation of the intervals between beats [s]
-    respiration_hz : frequency of breathing [1/s]; 0 for no effect of breathing
-    seed : seed of the intervals
+    respiration_hz : frequency of breathing [1/s]; 0 for a pulse without effects of breathing
+    seed : seed of the random intervals
     """
 
     rate_per_min: float
@@ -121,7 +125,8 @@ class RecordedPulse:
 
     @cached_property
     def _scaled(self) -> Doubles:
-        low, high = np.percentile(self.values, _SPREAD_PERCENTILES)
+        """Return the values scaled to a mean of 0 and a range of about 1 [-]."""
+        low, high = np.percentile(self.values, SPREAD_PERCENTILES)
         return np.asarray((self.values - self.values.mean()) / (high - low))
 
     @cached_property
@@ -133,7 +138,7 @@ class RecordedPulse:
         even = np.arange(0.0, self.times_s[-1], step)
         slope = np.gradient(np.interp(even, self.times_s, self._scaled), step)
         distance = max(1, round(_MIN_BEAT_INTERVAL_S / step))
-        peaks, _ = find_peaks(slope, distance=distance, height=0.4 * np.percentile(slope, 99))
+        peaks, _ = find_peaks(slope, distance=distance, height=_MIN_RELATIVE_SLOPE * np.percentile(slope, 99))
         return np.asarray(even[peaks])
 
     def blood(self, seconds: Doubles) -> Doubles:
@@ -154,5 +159,6 @@ class RecordedPulse:
 
 
 def _mean_rate(starts_s: Doubles, begin_s: float, end_s: float, default: float) -> float:
+    """Return the mean rate of the beats that start in a time span [1/min]; `default` for fewer than two."""
     inside = starts_s[(starts_s >= begin_s) & (starts_s <= end_s)]
     return default if len(inside) < 2 else float(60.0 * (len(inside) - 1) / (inside[-1] - inside[0]))

@@ -1,4 +1,4 @@
-"""Zones of the face that the pulse and states such as a blush change, and the time course of states."""
+"""Zones of the face in which the pulse and states such as a blush change the skin, and times of states."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ LARGEST_OXYGEN_DROP = 0.4
 
 
 class ZoneChanges(NamedTuple):
-    """Changes of four quantities of the skin, to be summed over the zones of the face.
+    """Changes of four quantities of the skin by zones of the face, which add up where zones overlap.
 
     zones : (k, 4) changes at the centre of each zone of zones.csv
-    masks : (3, 4) changes everywhere, of the lips, and of the edges of the lids
+    masks : (3, 4) changes everywhere, on the lips, and at the edges of the lids
     """
 
     zones: Floats
@@ -52,9 +52,10 @@ def _add(changes: ZoneChanges, zone: str, values: Iterable[float]) -> None:
 
 @cache
 def pulse_changes() -> ZoneChanges:
-    """Return zones with sums of weighted amplitude, weighted delay [s], and weight of the pulse.
+    """Return weighted amplitude, weighted delay [s] and weight of the pulse by zones.
 
-    The ratio of the sums is the amplitude [-] and the delay [s] of a point of the skin.
+    The fourth quantity is 0. At a point of the skin, amplitude [-] and delay [s] of the pulse are their sums
+    over the zones, divided by the sum of the weights.
     """
     changes = _no_changes()
     for row in read_rows(__package__, "pulse_zones"):
@@ -74,7 +75,7 @@ def longest_delay_s() -> float:
 
 
 class StateTimes(NamedTuple):
-    """Time course of a state of the skin: time constants of its rise and fall [s]."""
+    """Time constants with which a state of the skin rises and falls [s]."""
 
     rise_s: float
     fall_s: float
@@ -107,10 +108,10 @@ def check_state_weights(weights: Mapping[str, float], error_subject: str = "stat
 
 
 def state_changes(weights: Mapping[str, float]) -> ZoneChanges:
-    """Return the zones that states change, for weights of the states from 0 to 1.
+    """Return the changes of the skin by states with given weights, 0 to 1.
 
-    The four quantities are the binary logarithm of a factor of the blood volume, the change of the oxygen
-    saturation, the change of the specular strength relative to the default, and the change of the roughness.
+    The four quantities are the base-2 logarithm of the factor by which the blood volume changes, and the
+    changes of the oxygen saturation, of the specular strength relative to the default, and of the roughness.
     """
     changes = _no_changes()
     for row in read_rows(__package__, "states"):
@@ -126,12 +127,13 @@ def eye_redness(weights: Mapping[str, float]) -> float:
 
 
 def response(state: str, weight: float, begin_s: float, end_s: float, seconds: float) -> float:
-    """Return the weight of a state at a time, if it is caused from `begin_s` to `end_s`.
+    """Return the weight of a state at a time, for an event that lasts from `begin_s` to `end_s`.
 
-    The weight rises and falls exponentially with the time constants of the state. For `begin_s` = -inf, it
-    has its full value from the start.
+    From the begin on, the weight approaches `weight` exponentially with the rise time of the state; from the
+    end on, it decreases exponentially with the fall time. Before the end of an event with `begin_s` = -inf,
+    the result is `weight`.
 
-    weight : final weight of the rise, 0 to 1
+    weight : weight that the state approaches, 0 to 1
     seconds : time [s]
     """
     rise_s, fall_s = state_times()[state]

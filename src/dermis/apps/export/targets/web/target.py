@@ -21,7 +21,7 @@ from dermis.apps.export.targets.web import build
 from dermis.apps.export.targets.web.maps import with_reduced_maps
 from dermis.apps.export.targets.web.packing import encode_seven_bits
 from dermis.apps.export.targets.web.sliders import Slider, scene_sliders
-from dermis.base.errors import refuse
+from dermis.base.errors import notify, refuse
 from dermis.frame.features.diffusion.profiles import SkinProfiles
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.gaussians import GaussianSum
@@ -129,6 +129,10 @@ class Web(Target):
         if scene is None:
             actual = f"got the skin {subject.name}"
             refuse("subject", "a head, which the page renders", actual, "Name a head")
+        if scene.state is not None:
+            notify("state: the page shows it in maps without pores, and has no sliders of melanin and blood")
+            painted = subject.with_painted_maps(min(self.side, _MAX_MAP_SIDE), self.adapter)
+            scene = painted.scene or scene
         scene = replace(scene, head=with_reduced_maps(scene.head, min(self.side, _MAX_MAP_SIDE)))
         sliders, settings = scene_sliders(scene), Settings(atlas=_ATLAS_SIDE)
         sides, quality = build.PICTURE_SIDES, build.INTERACTIVE_QUALITY

@@ -1,4 +1,4 @@
-"""Maps of the skin that states such as a blush and the pulse change, and the passes that fill them."""
+"""Maps of skin whose colour and gloss change with states such as a blush and with the pulse."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ _LEAST_COLOUR = 1e-6  # replaces colours that are black, which have no logarithm
 
 @dataclass(frozen=True, eq=False)
 class LivingMaps:
-    """Maps of the skin that states and the pulse change, and the inputs of the passes that fill them.
+    """Specular and roughness maps of skin in a state, and the inputs of the passes that fill them.
 
     zone_bindings : dictionary from names in zone_sums.wgsl to resources
     gloss_bindings : dictionary from names in living_gloss.wgsl to resources
     bindings : dictionary from names in expression.wgsl to resources
     specular, roughness : textures with all mip levels
-    oxygen_per_layer : decrease of the oxygen saturation from the first to the second table of colours [-]
+    oxygen_per_layer : decrease of the oxygen saturation from the first to the second table [-]
     """
 
     zone_bindings: MutableBindings
@@ -61,9 +61,9 @@ class LivingMaps:
 def make_living_maps(
     device: Device, look: SkinLook, zone_bindings: MutableBindings, specular: Texture, roughness: Texture
 ) -> LivingMaps:
-    """Allocate the maps that states and the pulse change, and compute the map of the pulse.
+    """Allocate the maps of skin in a state, and compute the map of amplitudes and delays of the pulse.
 
-    zone_bindings : painted surface and its tables, as the shaders that paint skin bind them
+    zone_bindings : painted surface and its tables, by their names in the shaders that paint skin
     specular, roughness : painted maps at rest
     """
     side = specular.size[0]
@@ -88,9 +88,9 @@ def make_living_maps(
 def blood_tables(look: SkinLook) -> tuple[NDArray[np.float32], float]:
     """Return tables (3, n, n, 3) of the colour, and the difference of oxygen between the first two [-].
 
-    The first two tables are logarithms of the colour with the oxygen saturation of the cheek and with less.
-    The third table is the derivative of the first one by the logarithm of the blood fraction. The axes are
-    the square roots of the fractions of melanin and of blood, as in `ColourTable`.
+    The first table is the natural logarithm of the colour at the oxygen saturation of `look`, the second at a
+    lower saturation, and the third the derivative of the first with respect to the logarithm of the blood
+    fraction. The axes are the square roots of the fractions of melanin and of blood, as in `ColourTable`.
     """
     low = max(look.oxygen - LARGEST_OXYGEN_DROP, min(_LEAST_OXYGEN, 0.5 * look.oxygen))
     first, second = _log_colours(look, look.oxygen), _log_colours(look, low)
@@ -113,14 +113,14 @@ def _upload_tables(device: Device, tables: NDArray[np.float32]) -> Texture:
 
 
 def draw_state(graph: Graph, living: LivingMaps, skin_state: SkinState) -> None:
-    """Declare the passes that compute the gloss of skin in a state, and the changes of its blood."""
+    """Declare the passes that compute the specular and roughness maps and the blood of skin in a state."""
     draw_state_texels(graph, living, skin_state)
     for one in (living.specular, living.roughness):
         graph.add_replayable(map_mips.fill_mips, one)
 
 
 def draw_state_texels(recorder: Recorder, living: LivingMaps, skin_state: SkinState) -> None:
-    """Declare the passes of `draw_state` that fill the finest mip levels."""
+    """Declare the passes of `draw_state` that fill only the finest mip levels."""
     map_shape, changes = living.specular.size, state_changes(skin_state.weights)
     _draw_zone_sums(recorder, living.zone_bindings, map_shape, changes, has_blotches=True)
     shader = program(recorder.device, "surface/living/living_gloss.wgsl")

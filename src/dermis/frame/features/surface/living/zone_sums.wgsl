@@ -1,15 +1,15 @@
-// Sums over zones of the face of changes of the skin, such as gains of blood, at each texel of its maps.
+// Sums over the zones of the face of changes of the skin, such as of its blood, at each texel of its maps.
 //#include "surface/painting/spot.wgsl"
 
 //#fill const BLOTCH_ROWS: vec2u = vec2u({first_blotch_row}u, {end_blotch_row}u);
 const BLOTCHES: f32 = 0.35; // artistic value: relative variation of the changes by blotches
-const LID_MM: vec2f = vec2f(0.5, 2.2); // distances from the edge of the lids between which the mask of the lid edges ends
+const LID_MM: vec2f = vec2f(0.5, 2.2); // distances from the edge of the lids between which their mask falls from 1 to 0
 
 struct ZoneChanges {
-    everywhere: vec4f, // changes of four quantities
+    everywhere: vec4f, // changes of four quantities, see ZoneChanges in human/living/zones.py
     lips: vec4f,
     lid_edges: vec4f,
-    blotches: f32, // 1 for changes that vary in blotches, else 0
+    blotches: f32, // 1 if the changes vary in blotches, else 0
     //#fill zones: array<vec4f, {zones}>,
 }
 

@@ -1,4 +1,4 @@
-// Colour of a face with an expression, which moves blood; and of living skin, whose blood also follows its state and the pulse.
+// Colour of a face with an expression, which moves blood, and of living skin, whose blood also changes with its state and the pulse.
 
 struct Expression {
     flush: f32, // amount by which the face reddens
@@ -14,7 +14,7 @@ override LIVING: bool = false; // whether states and the pulse change the blood
 
 @group(0) @binding(0) var<uniform> expression: Expression;
 @group(0) @binding(1) var colour_at_rest: texture_2d<f32>;
-@group(0) @binding(2) var expression_deltas: texture_2d_array<f32>; // see expression_relief.wgsl; last the gain or loss of blood
+@group(0) @binding(2) var expression_deltas: texture_2d_array<f32>; // see expression_relief.wgsl; the last channel is the gain or loss of blood
 @group(0) @binding(5) var colour: texture_storage_2d<rgba16float, write>;
 
 //#if LIVING
@@ -27,9 +27,9 @@ struct Living {
 }
 
 @group(0) @binding(6) var roughness_at_rest: texture_2d<f32>; // zw: fractions of melanin and blood
-@group(0) @binding(7) var state_map: texture_2d<f32>; // doublings of blood, change of oxygen
+@group(0) @binding(7) var state_map: texture_2d<f32>; // base-2 logarithm of the factor of blood, and change of oxygen
 @group(0) @binding(8) var pulse_map: texture_2d<f32>; // sums of weighted amplitude and weighted delay [s], and of weights
-@group(0) @binding(9) var blood_tables: texture_2d_array<f32>; // logarithm of the colour at full and at low oxygen, and its derivative by the logarithm of blood, over the square roots of blood and melanin fractions
+@group(0) @binding(9) var blood_tables: texture_2d_array<f32>; // see blood_tables in living.py
 @group(0) @binding(10) var<uniform> living: Living;
 
 // Entry of a table for fractions of melanin and blood, interpolated bilinearly in their square roots.
@@ -44,7 +44,7 @@ fn blood_entry(table: u32, melanin: f32, blood: f32) -> vec3f {
     return mix(near, far, part.y).rgb;
 }
 
-// Relative change of the blood volume by the pulse, delayed as at a texel.
+// Relative change of the blood volume by the pulse, with the delay of a texel [s].
 fn pulse_at(delay_s: f32) -> f32 {
     let place = saturate(delay_s / living.longest_delay_s) * f32(PULSE_SAMPLES - 1u);
     let before = min(u32(place), PULSE_SAMPLES - 2u);
@@ -52,15 +52,15 @@ fn pulse_at(delay_s: f32) -> f32 {
     return mix(living.pulse[before / 4u][before % 4u], living.pulse[next / 4u][next % 4u], place - f32(before));
 }
 
-// Number from 0.01 to 0.99 that differs between texels and channels; rounding errors do not reach its limits.
+// Pseudo-random number from 0.01 to 0.99; with these limits, rounding errors do not change values that are exact half floats.
 fn threshold(index: u32) -> f32 {
     let mixed = (index * 747796405u + 2891336453u) ^ (index >> 7u);
     let word = ((mixed >> ((mixed >> 28u) + 4u)) ^ mixed) * 277803737u;
     return 0.01 + 0.98 * f32(((word >> 22u) ^ word) >> 8u) / 16777216.0;
 }
 
-// Half float next to a value, the lower one or the upper one such that the mean over texels is that of the values: the pulse is
-// smaller than the steps of half floats, and values at rest are half floats, so that rounding to the nearest would suppress it.
+// One of the two half floats around a value, such that the mean over many texels is that of the values. Rounding to the nearest
+// would suppress the pulse, because values at rest are half floats and the pulse is smaller than half of their steps.
 fn dithered_half(value: f32, index: u32) -> f32 {
     let step = ldexp(1.0, max(frexp(value).exp, -13) - 11);
     return floor(value / step + threshold(index)) * step;
@@ -72,7 +72,7 @@ fn living_colour(rest: vec3f, at: vec2u) -> vec3f {
     return vec3f(dithered_half(c.r, index), dithered_half(c.g, index + 1u), dithered_half(c.b, index + 2u));
 }
 
-// Factor of the colour by changes of blood and oxygen.
+// Factor by which changes of blood and oxygen multiply the colour.
 fn living_factor(at: vec2u) -> vec3f {
     let pigments = textureLoad(roughness_at_rest, at, 0).zw;
     let change = textureLoad(state_map, at, 0);

@@ -1,4 +1,4 @@
-// Relief of a face with an expression, whose folds deepen.
+// Relief of a face with an expression, which deepens folds.
 
 struct Relief {
     folding: array<vec4f, 2>, // amounts of the movements that deepen folds; the last number is not used
@@ -6,7 +6,7 @@ struct Relief {
 }
 
 @group(0) @binding(0) var<uniform> relief: Relief;
-@group(0) @binding(2) var expression_deltas: texture_2d_array<f32>; // heights that full movements add [mm], and last the gain or loss of blood
+@group(0) @binding(2) var expression_deltas: texture_2d_array<f32>; // heights that movements of weight 1 add [mm]; the last channel is the gain or loss of blood
 @group(0) @binding(3) var<storage, read> heights_at_rest: array<f32>; // with a border of one texel [mm]
 @group(0) @binding(4) var<storage, read_write> heights: array<f32>;
 

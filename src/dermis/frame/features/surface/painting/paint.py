@@ -312,7 +312,7 @@ class ExpressionMaps:
     bindings : dictionary from names in expression.wgsl and expression_relief.wgsl to resources
     heights : buffer of heights from which the relief is computed [mm]
     colour, relief : textures with all mip levels
-    living : maps that states of the skin and the pulse change, None if the skin has neither
+    living : maps of skin in a state or with a pulse; None for skin without both
     """
 
     bindings: MutableBindings
@@ -331,7 +331,7 @@ def draw_expression(
     """Declare the passes that compute the maps of skin with an expression, a state and a pulse.
 
     movement_strengths : (9,) strength of each facial movement, from `human.skin.face.movement_weights` [-]
-    skin_state : state and pulse of the skin; None if `expression_maps` has no `living` maps
+    skin_state : state and pulse of the skin; None for skin at rest, with `living` of the maps None too
     """
     side = expression_maps.colour.size[0]
     folding, (flush, pressed) = np.split(movement_strengths, [FOLD_MOVEMENT_COUNT])
@@ -415,7 +415,7 @@ def paint_textures(
 
 
 def _living_maps(device: Device, inputs: PaintInputs, look: SkinLook, maps: RestMaps) -> LivingMaps:
-    """Return the maps of a painted skin that states and the pulse change."""
+    """Return the maps of painted skin in a state or with a pulse."""
     map_side = maps.colour.size[0]
     zone_bindings: MutableBindings = {"paint": inputs.paint, "tables": inputs.tables}
     zone_bindings |= _surface_buffers(device, inputs, map_side)
