@@ -181,3 +181,12 @@ def test_crying_reddens_the_white_of_the_eyes(renderer: Renderer) -> None:
     assert white.sum() > 20
     green, red = ([one.picture[white, k].mean() for one in (rest, crying)] for k in (1, 0))
     assert green[1] / red[1] < 0.97 * green[0] / red[0]
+
+
+def test_frames_after_another_state_equal_those_of_a_fresh_renderer(renderer: Renderer, scene: Scene) -> None:
+    states = [None, SkinState({"blush": 0.8}), SkinState({"exertion": 1.0}, np.full(16, 0.05)), None]
+    scenes = [replace(scene, state=state) for state in states]
+    kept = [renderer.render(one, **SMALL) for one in scenes]
+    for picture, one in zip(kept[1:], scenes[1:], strict=True):
+        renderer.clear_cache()
+        np.testing.assert_array_equal(picture, renderer.render(one, **SMALL))
