@@ -149,7 +149,7 @@ def animate(
     end:
         End time within the motion; a frame at this time is not rendered [s]. [default: end of the motion]
     crf:
-        Constant rate factor of the movie, 0 (lossless) to 51 (lowest quality). [default: 18]
+        Constant rate factor of the movie, 0 (best quality) to 51 (lowest quality). [default: 18]
     overwrite:
         Render all numbered images again, including those that exist.
     hair_motion:

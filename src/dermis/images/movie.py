@@ -68,7 +68,7 @@ def check_movie(path: str | Path, frame_size: tuple[int, int], crf: int = DEFAUL
     """Check before a long computation that a movie can be written to a path, and return the path.
 
     frame_size : width and height of the frames [pixel]
-    crf : constant rate factor, from 0 (lossless) to 51
+    crf : constant rate factor, from 0 (only the conversion to 8-bit YUV 4:2:0 loses detail) to 51
 
     Raises DermisError when the path is not writable, a side is odd, the rate factor is invalid, or there is
     no encoder.
@@ -84,7 +84,7 @@ def check_movie(path: str | Path, frame_size: tuple[int, int], crf: int = DEFAUL
             actual,
             f"Use {even}, or write frames/%05d.png",
         )
-    checked_integer("--crf", crf, 0, _MAX_CRF, f"0 is lossless, {DEFAULT_CRF} the default")
+    checked_integer("--crf", crf, 0, _MAX_CRF, f"0 is the best quality, {DEFAULT_CRF} the default")
     _check_encoder(path)
     return target
 
@@ -113,7 +113,7 @@ class MovieWriter:
     rate : str, float or Fraction, optional
         Frames per second, such as 30, 23.976 or "24000/1001".
     crf : int, optional
-        Constant rate factor, from 0 (lossless) to 51.
+        Constant rate factor, from 0 (best: only the conversion to 8-bit YUV 4:2:0 loses detail) to 51.
 
     Raises
     ------
