@@ -12,7 +12,7 @@ import dermis
 from dermis.apps.gallery.script import run_gallery_script
 from dermis.human.expressions import expression
 
-WOMAN = dermis.Human(caucasian=0.5, african=0, asian=0.5, age=40)
+WOMAN = dermis.Human(caucasian=0.5, african=0, asian=0.5, age=40, hair=dermis.HairLook("bun"))
 NAMES = "joy", "plain-sadness", "plain-anger", "plain-fear", "plain-disgust", "plain-surprise"
 
 
