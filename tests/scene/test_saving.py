@@ -183,7 +183,10 @@ def test_point_positions_are_not_saved_as_text(tmp_path: Path) -> None:
         ('weights = 1', r"scene\.toml: pose: weights: expected"),
         ('bones = {head = [1, 2]}', r"scene\.toml: pose: bones\.head: expected three angles"),
         ('bones = {chin = [1, 2, 3]}', r"scene\.toml: pose: bones: .*no 'chin'"),
-        ('positions_mm = [[0, 0, 0]]', r"pose: positions_mm: expected one of expression, weights, bones"),
+        (
+            'positions_mm = [[0, 0, 0]]',
+            r"scene\.toml: pose: positions_mm: expected one of expression, weights, bones",
+        ),
     ],
 )  # fmt: skip
 def test_invalid_pose_names_file_and_key(tmp_path: Path, table: str, words: str) -> None:

@@ -88,9 +88,9 @@ _FIELD_RANGES = {
     "hair_eumelanin": (0.0, 10.0),
     "hair_pheomelanin": (0.0, 10.0),
 }
-_OPTIONAL_FIELDS = "ita", "skin_ancestry", "clothing", "glasses"
 _LOOK_TYPES = (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook))
 _WORN_TYPES: Mapping[str, type[Item]] = MappingProxyType({"clothing": Clothing, "glasses": Glasses})
+_OPTIONAL_FIELDS = ("ita", "skin_ancestry", *_WORN_TYPES)
 # fraction of Caucasian shapes that have one of `_OTHER_SKIN_ANCESTRIES`, if no ancestry is given
 _OTHER_SKIN_ANCESTRY_FRACTION = 0.45
 _OTHER_SKIN_ANCESTRIES = ("south asian", "iraqi", "arabian")
@@ -337,16 +337,10 @@ class Human:
         brown, 4 dark and 8 black hair; a eumelanin of 0.3 with a pheomelanin of 2 gives red hair.
     targets : mapping
         Weights of MakeHuman's morph targets, such as {"nose/nose-hump-incr": 0.5}, normally 0 to 1.
-    skin : SkinLook, optional
-        Look of the skin; by default typical for the person.
-    eyes : EyeLook, optional
-        Look of the eyes; by default typical for the person.
-    hair : HairLook, optional
-        Look of the hair; by default typical for the person.
-    clothing : Clothing, optional
-        Garment of the upper body, also as words such as "navy denim shirt"; by default none.
-    glasses : Glasses, optional
-        Glasses or sunglasses, also as words such as "brown square"; by default none.
+    skin, eyes, hair : SkinLook, EyeLook and HairLook, optional
+        Looks of skin, eyes and hair; by default typical for the person.
+    clothing, glasses : Clothing and Glasses, optional
+        Garment and glasses, or words such as "navy denim shirt" and "brown square"; by default none.
     skin_ancestry : str
         Name of a group of measured people, such as "south asian". The person gets the skin, eye and hair
         colours of this group, independently of the shape; "" for the colours of the shape's ancestries.
@@ -413,10 +407,9 @@ class Human:
         seed : int
             0 to 2**32 - 1; the same seed gives the same person.
         **given
-            Fields that are not sampled, such as `age=70` or `ita=-30`. For targets, skin, eyes and hair, it
-            is enough to give some of the values, such as `skin={"melanin": 0.1}`. Skin and hair are sampled
-            for the given age, sex and ancestry. If `ita` is given without an ancestry, the ancestry is
-            sampled from measured people with this angle.
+            Fields that are not sampled, such as `age=70`; for targets, skin, eyes and hair also some of the
+            values, such as `skin={"melanin": 0.1}`. Skin and hair fit the given age, sex and ancestry. With
+            `ita` and without an ancestry, the ancestry is sampled from measured people with this angle.
 
         Returns
         -------
@@ -487,9 +480,8 @@ class Human:
     def transfer_skin_to(self, head: Head) -> Head:
         """Return the head of another person with the skin and eyes of this person.
 
-        A pose `Pose(positions_mm=person.positions_mm)` gives the head the shape of this person too. This is
-        faster than building a new head, because only the skin is painted again. Hair and joints remain
-        unchanged.
+        A pose `Pose(positions_mm=person.positions_mm)` gives the head the shape of this person too, faster
+        than building a new head. Hair and joints remain unchanged.
 
         Parameters
         ----------
@@ -538,13 +530,8 @@ class Human:
         return typical_hair(self._demographics, self.hair_eumelanin, self.hair_pheomelanin)
 
     @property
-    def worn(self) -> dict[str, Item | None]:
-        """Return clothing and glasses by field of `Human`; None for a field without an item."""
-        return {name: getattr(self, name) for name in _WORN_TYPES}
-
-    @property
     def _outfit(self) -> Outfit:
-        return tuple(item for item in self.worn.values() if item is not None)
+        return tuple(item for item in worn_items(self).values() if item is not None)
 
     @property
     def _demographics(self) -> Demographics:
@@ -559,9 +546,8 @@ class Human:
     def positions_mm(self) -> NDArray[np.float32]:
         """Return the control points (p, 3) in rest pose, relative to the midpoint between the eyes [mm].
 
-        `Pose(positions_mm=...)` gives the head of any other person this shape, because all people have
-        corresponding points. The points of clothing and glasses come last; such a pose fits only heads with
-        the same items.
+        `Pose(positions_mm=...)` gives any head with the same clothing and glasses this shape, because all
+        people have corresponding points.
 
         Raises DermisError if `targets` contains names that are not morph targets of MakeHuman.
         """
@@ -606,6 +592,11 @@ class Human:
         }
 
     drawn = renamed_classmethod("drawn", "sampled")
+
+
+def worn_items(person: Human) -> dict[str, Item | None]:
+    """Return clothing and glasses of a person by field of `Human`; None for a field without an item."""
+    return {name: getattr(person, name) for name in _WORN_TYPES}
 
 
 def _check_skin_fields(skin_ancestry: object, ita: object) -> None:

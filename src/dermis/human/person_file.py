@@ -18,7 +18,7 @@ from dermis.base.reading import parse_json, read_text
 from dermis.formats.gltf.write import encode_head
 from dermis.human.hair.look import HairLook
 from dermis.human.makehuman import check_targets
-from dermis.human.person import Human
+from dermis.human.person import Human, worn_items
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import EyeTextures
@@ -36,7 +36,7 @@ def person_parameters(person: Human) -> dict[str, Any]:
     """
     numbers = {one.name: getattr(person, one.name) for one in fields(person)}
     numbers |= {"targets": dict(person.targets), "skin": asdict(person.look)}
-    numbers |= {name: asdict(item) if item else None for name, item in person.worn.items()}  # type: ignore[call-overload]
+    numbers |= {name: asdict(item) if item else None for name, item in worn_items(person).items()}  # type: ignore[call-overload]
     return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hair_look)}
 
 

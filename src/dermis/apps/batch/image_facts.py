@@ -10,7 +10,7 @@ from dermis.apps.batch.face_boxes import Box
 from dermis.apps.batch.sampling import Parameters, hashed_uniform, round_significant
 from dermis.apps.batch.spec import Spec
 from dermis.base.arrays import Doubles
-from dermis.human.person import Human
+from dermis.human.person import Human, worn_items
 from dermis.human.wear.look import NOTHING
 
 SPLITS = ("train", 0.8), ("val", 0.1), ("test", 0.1)
@@ -64,7 +64,7 @@ def person_facts(person: Human) -> dict[str, float | str | None]:
     values = {f"person.{name}": value for name, value in _scalar_fields(person).items()}
     for part, look in looks.items():
         values |= {f"person.{part}.{name}": value for name, value in _scalar_fields(look).items()}
-    values |= {f"person.{name}": item.text if item else NOTHING for name, item in person.worn.items()}
+    values |= {f"person.{name}": item.text if item else NOTHING for name, item in worn_items(person).items()}
     return values
 
 
