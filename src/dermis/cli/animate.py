@@ -27,6 +27,7 @@ from dermis.cli.options import (
     OutputPath,
 )
 from dermis.cli.output_options import AnimationOutput
+from dermis.cli.pulse_record import check_pulse_record, pulse_report, write_pulse_record
 from dermis.cli.scene_options import (
     DEFAULT_SCENE_OPTIONS,
     SceneOptions,
@@ -174,7 +175,7 @@ def animate(
     started = time.perf_counter()
     heartbeat = parse_pulse(pulse, pulse_options)
     events, scene = _split_states(scene)
-    _check_pulse_record(pulse_record, heartbeat)
+    check_pulse_record(pulse_record, heartbeat)
     span, target = parse_time_span(begin, end, fps, motion_fps), AnimationOutput(output, crf, overwrite)
     target.check_writable(scene.settings.get("size", (2, 2)))
     is_still = motion is None and bool(heartbeat or events or scene.state) and not _has_own_motion(head)
@@ -205,7 +206,7 @@ def animate(
     adapter_name = _render_frames(animation, missing, target, adapter) if missing else None
     now = time.perf_counter()
     if heartbeat and pulse_record:
-        _write_pulse_record(pulse_record, heartbeat, numbers, rate)
+        write_pulse_record(pulse_record, heartbeat, numbers, rate)
     report = {
         "file": str(output),
         "adapter": adapter_name,
@@ -216,7 +217,7 @@ def animate(
         "drawn": len(missing),
         "seconds": round(now - started, 3),
         "frames_per_s": round(len(missing) / (now - draw_started), 3),
-        **({"pulse": _pulse_report(heartbeat, numbers, rate)} if heartbeat else {}),
+        **({"pulse": pulse_report(heartbeat, numbers, rate)} if heartbeat else {}),
     }
     print_report(as_json, report, lambda: [_summary_line(report), *filter(None, [animated.head.attribution])])
     return 0
@@ -235,19 +236,6 @@ def _is_almost_at_rest(pulse: Pulse | None) -> bool:
     return pulse is None or pulse.head_motion_mm <= _STIFF_HAIR_MOTION_MM
 
 
-def _check_pulse_record(path: Path | None, pulse: Pulse | None) -> None:
-    """Raise DermisError if the file of --pulse-record has no pulse to contain, or cannot be written."""
-    from dermis.base.atomic_write import check_output
-
-    if path is None:
-        return
-    if pulse is None:
-        refuse("--pulse-record", "--pulse with it", "there is none", "Add --pulse 72, or leave it out")
-    if path.exists() and Path(pulse.waveform).exists() and path.samefile(pulse.waveform):
-        refuse("--pulse-record", "another file than that of the pulse", f"got {path}", "Choose another name")
-    check_output(path, (".csv",))
-
-
 def _has_own_motion(head_or_scene: str) -> bool:
     """Return whether the head comes from a file of a format that can contain clips."""
     from dermis.formats.parts import is_gltf
@@ -261,24 +249,6 @@ def _still_clip(time_span: TimeSpan) -> Clip:
     from dermis.mesh.pose import Pose
 
     return Clip("still", float(time_span.end or 0), None, (), (), (), lambda _: Pose())
-
-
-def _pulse_report(pulse: Pulse, frame_numbers: Sequence[int], rate: Fraction) -> Options:
-    """Return the settings of a pulse, and its mean rate over the frames [1/min]."""
-    begin, end = float(frame_numbers[0] / rate), float(frame_numbers[-1] / rate)
-    mean = pulse.signal().mean_rate_per_min(begin, end)
-    settings = pulse.model_dump(exclude={"rate_per_min"} if pulse.is_recording else set())
-    return {**settings, "mean_rate_per_min": None if math.isnan(mean) else round(mean, 3)}
-
-
-def _write_pulse_record(path: Path, pulse: Pulse, frame_numbers: Sequence[int], rate: Fraction) -> None:
-    """Write the true pulse at each frame as a CSV file."""
-    from dermis.base.atomic_write import atomic_file
-
-    rows = (pulse.truth_at(float(number / rate)) for number in frame_numbers)
-    lines = ["time_s,blood_change,face_up_mm", *(",".join(f"{value:.9g}" for value in row) for row in rows)]
-    with atomic_file(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _render_frames(
