@@ -54,7 +54,7 @@ def test_rims_are_in_front_of_the_skin(style: str) -> None:
 
 @pytest.mark.parametrize("style", ["square", "round"])
 def test_temples_rest_on_the_ears(style: str) -> None:
-    """The arms pass each ear at its top, to 6 mm, whatever the size of the head."""
+    """The arms pass within 6 mm of the top of each ear, for heads of all sizes."""
     for seed in PEOPLE:
         control = person(seed).positions_mm.astype(np.float64)
         points = np.concatenate([one.points for one in glasses_solids(style, control) if one.slot == "frame"])

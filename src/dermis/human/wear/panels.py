@@ -32,7 +32,7 @@ class Panel:
 
     bind : (m, n) weights of the n points of the sheet in each point of the panel
     triangles : (t, 3) indices of points, counter-clockwise seen from outside
-    height_mm : (m,) least height above the skin and what is worn below [mm]
+    height_mm : (m,) minimum height above the skin and the garment beneath [mm]
     fold_mm : (m,) height of folds above that [mm]
     uv_mm : (m, 2) position on the cloth along weft and warp [mm]
     slot : material, such as "cloth"
@@ -101,7 +101,7 @@ class Panel:
         """Return the points (m, 3) of the panel on a person [mm].
 
         skin_mm, skin_normals : (n, 3) points of the person's sheet, and unit normals there
-        cover_mm : (n,) height of what is worn below
+        cover_mm : (n,) height of the garment beneath
         """
         base, normal = np.asarray(self.bind @ skin_mm), unit_vectors(np.asarray(self.bind @ skin_normals))
         height = self.height_mm + np.asarray(self.bind @ cover_mm) * (self.height_mm > 0.0)
