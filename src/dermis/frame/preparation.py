@@ -127,12 +127,8 @@ class Preparation:
         view: str,
         requested_names: tuple[RequestedNames, RequestedNames],
     ) -> FrameInputs:
-        cached, device, head, environment = (
-            self.memo.get,
-            self.device,
-            scene.head.without_maps,
-            scene.environment,
-        )
+        cached, device = self.memo.get, self.device
+        head, environment = scene.head.without_maps, scene.environment
         (profile, *others), blend_weights = self._profiles(scene.skin, technique)
         name = environment.name if environment else None
         environment_map = cached(load_environment_map, device, name, min_cache_size=_KEPT_ENVIRONMENTS)
