@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any, Self
 
 from dermis.base.errors import format_value, refuse
@@ -184,3 +185,7 @@ class Glasses(Item):
         if self.colour is None:
             object.__setattr__(self, "colour", GLASSES_COLOURS[self.style])
         check_colour("colour", self.colour)
+
+
+ITEM_TYPES: Mapping[str, type[Item]] = MappingProxyType({"clothing": Clothing, "glasses": Glasses})
+"""Types of items by field of `Human`."""
