@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
+from contextlib import suppress
 from typing import TYPE_CHECKING, NoReturn, TypeVar
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ def exit_process(code: int) -> NoReturn:
     if any(thread.name == _THREAD_NAME for thread in threading.enumerate()):
         for stream in (sys.stdout, sys.stderr):
             if stream is not None:
-                stream.flush()
+                with suppress(OSError):  # the reader of a pipe may have closed it
+                    stream.flush()
         os._exit(code)
     sys.exit(code)
