@@ -149,7 +149,7 @@ fn radiance_of(knot: Knot) -> vec3f {
     var sky = SkyTransmittance(vec4f(0.0), vec4f(0.0));
     if (ENVIRONMENT) {
         sky = sky_transmittance_at(sky_grid(), knot.position);
-        let past_hair = saturate(sky.hair.w + COSINE_MEAN * dot(sky.hair.xyz, knot.normal));
+        let past_hair = irradiance_past_hair(knot.position, knot.normal);
         skin_irradiance += tinted(past_hair, absorbed) * panorama_at(knot.normal, 0u);
     }
     let below = skin_irradiance / PI * mix(strand_view.skin, dense_hair_reflectance(forth + back), dense);
