@@ -119,7 +119,7 @@ def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
 
 
 def sky_directions() -> NDArray[np.float64]:
-    """Return the directions (n, 3) of a Fibonacci lattice on the sphere, as sky_transmittance.wgsl has them."""
+    """Return the directions (n, 3) of sky_transmittance.wgsl, a Fibonacci lattice on the sphere."""
     k = np.arange(SKY_DIRECTIONS)
     z = 1.0 - (2.0 * k + 1.0) / SKY_DIRECTIONS
     turn = np.pi * (3.0 - np.sqrt(5.0)) * k
@@ -144,7 +144,7 @@ def sky_luminance(broad_luminance: NDArray[np.float32], environment: Environment
 
 
 def sky_moments(sky_light: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the moments (3, 4) of light from `sky_directions`, in the order of `SkyMoments` in strand_sky.wgsl.
+    """Return the moments (3, 4) of light from `sky_directions`, ordered as `SkyMoments` in strand_sky.wgsl.
 
     sky_light : (n,) light from each direction
     """
