@@ -39,10 +39,14 @@ def test_curves_go_through_their_knots() -> None:
 
 
 def test_files_contain_a_block_for_each_curve(tmp_path: Path) -> None:
-    write_curves(tmp_path / "a.txt", np.zeros((3, 4, 3)), np.full((3, 4), 0.05, np.float32))
-    blocks = (tmp_path / "a.txt").read_text("ascii").strip().split("\n\n")
-    assert len(blocks) == 3
-    assert all(len(block.splitlines()) == 6 for block in blocks)
+    knots = np.arange(3 * 4 * 3, dtype=np.float64).reshape(3, 4, 3)
+    write_curves(tmp_path / "a.txt", knots, np.full((3, 4), 0.05, np.float32))
+    *curves, minute = (tmp_path / "a.txt").read_text("ascii").strip().split("\n\n")
+    assert len(curves) == 3
+    assert all(len(block.splitlines()) == 6 for block in curves)
+    points = np.loadtxt(minute.splitlines())
+    np.testing.assert_allclose(points[:, :3], np.tile(knots[-1, -1], (4, 1)), atol=0.04)
+    assert len(points) == 4 and (points[:, 3] < 0.01).all()
 
 
 def test_hairs_are_grouped_by_absorption() -> None:

@@ -163,7 +163,9 @@ def _shared_bindings(
     curvature, light_count = shape_resources.curvature, sum(request.light_part_counts)
     return {
         "skin": memo.get(skin_record, program, skin, request.head.maps, request.profile, light_count),
-        "environment": environment_record(program, environment, skin, total, request.has_occlusion),
+        "environment": environment_record(
+            program, environment, request.environment_map, skin, total, request.has_occlusion
+        ),
         "shadow_maps": shadow_maps.texture,
         "shadow_bounds": shadow_maps.bounds,
         "strand_shadows": strands.shadows if strands else placeholder_strand_shadows(device),

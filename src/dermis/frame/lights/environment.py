@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.environment.isotropic_lobes import isotropic_lobe_table
 from dermis.environment.panorama import Sun, load_panorama
-from dermis.environment.prefilter import prefilter
+from dermis.environment.prefilter import LAYER_ROUGHNESSES, prefilter
 from dermis.frame.lights.records import sun_lights
 from dermis.gpu import ComputeProgram, Device, Memo, Texture, UniformRecord, make_texture, upload
+from dermis.images.colour import luminance
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.skin import Skin, lobe_name
 
 _MAX_HALF_FLOAT = 65504.0  # largest 16-bit float
 _MAX_BACKGROUND_ROWS = 2048  # limit of a panorama in the background
+SKY_DIRECTIONS = 32
+"""Number of directions in which the transmittance of hair is computed, see sky_transmittance.wgsl."""
+_BROAD_LAYER = int(np.searchsorted(LAYER_ROUGHNESSES, 0.3))
+_MIN_SKY_LUMINANCE = 0.2  # of a direction, relative to the mean of all directions
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +34,13 @@ class EnvironmentMap:
         increasing roughness; black without an environment
     suns : bright peaks of the panorama, which are rendered as lights
     peak_irradiance : largest irradiance in the panorama without its suns [-]
+    broad_luminance : (h, 2 h) luminance of the panorama under a broad lobe; empty without an environment
     """
 
     panorama: Texture
     suns: tuple[Sun, ...]
     peak_irradiance: float = 0.0
+    broad_luminance: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0), np.float32))
 
 
 def load_environment_map(device: Device, environment_name: str | None) -> EnvironmentMap:
@@ -50,6 +57,7 @@ def load_environment_map(device: Device, environment_name: str | None) -> Enviro
         _upload_panorama_layers(device, prefiltered.layers),
         prefiltered.suns,
         float(prefiltered.layers[0].max()),
+        np.asarray(luminance(prefiltered.layers[1 + _BROAD_LAYER]), np.float32),
     )
 
 
@@ -110,9 +118,48 @@ def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
     return environment + sum(max(light.irradiance) for light in scene.lights)
 
 
+def sky_directions() -> NDArray[np.float64]:
+    """Return the directions (n, 3) of sky_transmittance.wgsl, a Fibonacci lattice on the sphere."""
+    k = np.arange(SKY_DIRECTIONS)
+    z = 1.0 - (2.0 * k + 1.0) / SKY_DIRECTIONS
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * k
+    sine = np.sqrt(1.0 - z * z)
+    return np.stack([sine * np.cos(turn), sine * np.sin(turn), z], axis=-1)
+
+
+def sky_luminance(broad_luminance: NDArray[np.float32], environment: Environment) -> NDArray[np.float64]:
+    """Return the luminance (n,) of an environment in `sky_directions`, relative to its mean, at least 0.2.
+
+    broad_luminance : see `EnvironmentMap`
+    """
+    directions = sky_directions()
+    angle = np.radians(environment.rotation_degrees)
+    x = np.cos(angle) * directions[:, 0] - np.sin(angle) * directions[:, 2]
+    z = np.sin(angle) * directions[:, 0] + np.cos(angle) * directions[:, 2]
+    height, width = broad_luminance.shape
+    column = np.floor((0.5 + np.arctan2(x, -z) / (2.0 * np.pi)) * width).astype(int) % width
+    row = np.minimum(np.floor(np.arccos(directions[:, 1]) / np.pi * height).astype(int), height - 1)
+    found = broad_luminance[row, column].astype(np.float64)
+    return np.maximum(found / max(float(found.mean()), np.finfo(np.float32).tiny), _MIN_SKY_LUMINANCE)
+
+
+def sky_moments(sky_light: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the moments (3, 4) of light from `sky_directions`, ordered as `SkyMoments` in strand_sky.wgsl.
+
+    sky_light : (n,) light from each direction
+    """
+    directions = sky_directions()
+    light = sky_light[:, None]
+    first = np.append((light * directions).sum(axis=0), sky_light.sum())
+    squares = np.append((light * directions**2).sum(axis=0), 0.0)
+    mixed = np.append((light * directions * np.roll(directions, -1, axis=1)).sum(axis=0), 0.0)
+    return np.stack([first, squares, mixed])
+
+
 def environment_record(
     shading_program: ComputeProgram,
     environment: Environment | None,
+    environment_map: EnvironmentMap,
     skin: Skin,
     albedo: NDArray[np.float64],
     has_occlusion: bool,
@@ -123,17 +170,21 @@ def environment_record(
     of the skin that the environment lights.
 
     shading_program : program of the shading pass, which declares the record
+    environment_map : prefiltered panorama of the environment
     albedo : (3,) albedo of skin where its colour map is white [-]
     has_occlusion : whether the head hides parts of the environment from its own skin
     """
     if environment is None:
         return shading_program.make_record("Environment")
     angle = np.radians(environment.rotation_degrees)
+    sky_light = sky_luminance(environment_map.broad_luminance, environment)
     return shading_program.make_record(
         "Environment",
         turn=(np.cos(angle), np.sin(angle)),
         exposure=environment.exposure,
         albedo=np.minimum(albedo, 1.0),
         occluded=int(has_occlusion),
+        sky_light=sky_light.reshape(-1, 4),
+        sky_moments=sky_moments(sky_light),
         mirrors=isotropic_lobe_table(lobe_name(skin)).reshape(-1, 4),
     )

@@ -1,4 +1,5 @@
 // Light of the environment: irradiance and prefiltered reflections of a panorama, reduced by occlusion.
+//#include "environment_record.wgsl"
 
 override ENVIRONMENT: bool = false; // whether the scene has an environment
 
@@ -10,15 +11,6 @@ override ENVIRONMENT: bool = false; // whether the scene has an environment
 //#fill const SMOOTHEST_MIRROR: f32 = {mirror_smoothest}; // roughness of the first and of the last row of that table
 //#fill const ROUGHEST_MIRROR: f32 = {mirror_roughest};
 
-struct Environment {
-    turn: vec2f, // cosine and sine of the rotation about +Y
-    exposure: f32,
-    albedo: vec3f, // of skin whose colour map is white
-    occluded: u32, // whether there is an occlusion map
-    mirrors: array<vec4f, 960>, // by roughness, cosine and lobe: direction, roughness and weight
-}
-
-@group(0) @binding(20) var<uniform> environment: Environment;
 @group(0) @binding(21) var panorama: texture_2d_array<f32>; // irradiance, then mean radiance by roughness
 @group(0) @binding(22) var occlusion_map: texture_2d<f32>; // unoccluded fraction of the sky: the atlas, then the vertices
 

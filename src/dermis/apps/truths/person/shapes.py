@@ -300,6 +300,7 @@ LONGITUDINAL_ROUGHNESS, AZIMUTHAL_ROUGHNESS = 0.22, 0.5
 MAX_HAIR_GROUPS = 12
 """Largest number of hair groups; all fibres of a group get the group's mean optical depth."""
 _MIN_HAIR_RADIUS_MM = 1e-3
+_MINUTE_POINT_COUNT, _MINUTE_STEP_MM = 4, 0.01
 
 
 def hair_shapes(mi: Mitsuba, hairs: HairFibres, shape_name: str = "hairs") -> SceneDict:
@@ -352,16 +353,28 @@ def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating])
 def curves_text(knots_mm: Doubles, radius_mm: NDArray[np.floating]) -> str:
     """Return B-spline curves for Mitsuba as text: a line per control point, an empty line after each curve.
 
+    The text ends with a curve that is too small to be hit: for hits near the end of the last curve,
+    Mitsuba 3.9.1 reads the control points of the next one, and without one it reads invalid memory.
+
     knots_mm : (n, k, 3) points through which the curves pass [mm]
     radius_mm : (n, k) radius at these points [mm]
     """
     rows = np.concatenate([knots_mm, radius_mm[..., None].astype(np.float64)], axis=-1)
     points = bspline_control_points(rows)
     points[..., 3] = np.maximum(points[..., 3], _MIN_HAIR_RADIUS_MM)
-    curves = (
-        "".join(f"{x:.5f} {y:.5f} {z:.5f} {r:.5f}\n" for x, y, z, r in curve) for curve in points.tolist()
-    )
-    return "".join(f"{curve}\n" for curve in curves)
+    return "".join(f"{_curve_text(curve)}\n" for curve in (*points, _minute_curve(knots_mm[-1])))
+
+
+def _curve_text(control_points: Doubles) -> str:
+    return "".join(f"{x:.5f} {y:.5f} {z:.5f} {r:.5f}\n" for x, y, z, r in control_points.tolist())
+
+
+def _minute_curve(knots_mm: Doubles) -> Doubles:
+    """Return the control points of a minute curve that continues a curve at its tip."""
+    step = knots_mm[-1] - knots_mm[-2]
+    step *= _MINUTE_STEP_MM / max(float(np.linalg.norm(step)), _MINUTE_STEP_MM)
+    positions = knots_mm[-1] + np.arange(_MINUTE_POINT_COUNT)[:, None] * step
+    return np.column_stack([positions, np.full(_MINUTE_POINT_COUNT, _MIN_HAIR_RADIUS_MM)])
 
 
 def bspline_control_points(knots: Doubles) -> Doubles:

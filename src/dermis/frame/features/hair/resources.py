@@ -38,7 +38,7 @@ SKY_CELLS = 24, 32, 24
 """Number of cells of the grid of sky transmittance, along x, y and z, see strand_sky.wgsl."""
 SKY_CELLS_PER_WORKGROUP = 2
 """Number of cells of the grid for which one workgroup computes the transmittance."""
-_SKY_HEADER_WORDS, _SKY_CELL_WORDS = 6, 5
+_SKY_HEADER_WORDS, _SKY_CELL_WORDS = 6, 10
 VIEW_TEXEL_PIXELS = 4
 """Side of a texel of the deep opacity map of the picture, see view_map.wgsl [pixel]."""
 _SEGMENT_LINKS_PER_KNOT = 8

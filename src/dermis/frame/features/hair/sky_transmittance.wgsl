@@ -1,6 +1,7 @@
 // Marches from each cell of the grid of strand_sky.wgsl in directions all around, and fits linear functions of direction to the
-// transmittances: T(d) = c0 + c . d.
+// transmittances: T(d) = c0 + c . d. Also sums the moments of the light of the sky past hair.
 //#include "sky_grid.wgsl"
+//#include "environment_record.wgsl"
 
 const DIRECTIONS: u32 = 32u;
 //#fill const CELLS: u32 = {sky_cells_per_workgroup}; // of a workgroup
@@ -8,6 +9,7 @@ const RANDOM_CYLINDER: f32 = 0.7854; // mean extinction of a cylinder in all ori
 
 var<workgroup> of_hair: array<array<vec4f, DIRECTIONS>, CELLS>;
 var<workgroup> of_all: array<array<vec4f, DIRECTIONS>, CELLS>;
+var<workgroup> of_sky: array<array<SkyMoments, DIRECTIONS>, CELLS>;
 
 // Direction of a Fibonacci lattice on the sphere.
 fn direction_at(k: u32) -> vec3f {
@@ -56,11 +58,13 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     }
     of_hair[id.y][id.x] = passing.x * vec4f(3.0 * direction, 1.0);
     of_all[id.y][id.x] = passing.y * vec4f(3.0 * direction, 1.0);
+    of_sky[id.y][id.x] = sky_moments(direction, passing.x * environment.sky_light[id.x / 4u][id.x % 4u]);
     for (var offset = DIRECTIONS / 2u; offset > 0u; offset /= 2u) {
         workgroupBarrier();
         if (id.x < offset) {
             of_hair[id.y][id.x] += of_hair[id.y][id.x + offset];
             of_all[id.y][id.x] += of_all[id.y][id.x + offset];
+            of_sky[id.y][id.x] = sum_of(of_sky[id.y][id.x], of_sky[id.y][id.x + offset]);
         }
     }
     workgroupBarrier();
@@ -72,5 +76,11 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         atomicStore(&opacity[word + 1u], pack2x16float(hair.zw));
         atomicStore(&opacity[word + 2u], pack2x16float(head_and_hair.xy));
         atomicStore(&opacity[word + 3u], pack2x16float(head_and_hair.zw));
+        let sky = of_sky[id.y][0];
+        atomicStore(&opacity[word + 4u], pack2x16float(sky.first.xy));
+        atomicStore(&opacity[word + 5u], pack2x16float(sky.first.zw));
+        atomicStore(&opacity[word + 6u], pack2x16float(sky.squares.xy));
+        atomicStore(&opacity[word + 7u], pack2x16float(vec2f(sky.squares.z, sky.mixed.x)));
+        atomicStore(&opacity[word + 8u], pack2x16float(sky.mixed.yz));
     }
 }

@@ -66,45 +66,73 @@ fn sky_transmittance_of(cell: vec3u) -> SkyTransmittance {
     return SkyTransmittance(hair, all);
 }
 
+fn sky_moments_of(cell: vec3u) -> SkyMoments {
+    let word = transmittance_word(sky_cell_index(cell)) + 4u;
+    let first = vec4f(unpack2x16float(strand_shadows[word]), unpack2x16float(strand_shadows[word + 1u]));
+    let second = vec4f(unpack2x16float(strand_shadows[word + 2u]), unpack2x16float(strand_shadows[word + 3u]));
+    return SkyMoments(first, second.xyz, vec3f(second.w, unpack2x16float(strand_shadows[word + 4u])));
+}
+
 fn sky_grid() -> SkyGrid {
     let low = vec3u(strand_shadows[0], strand_shadows[1], strand_shadows[2]);
     let high = vec3u(strand_shadows[3], strand_shadows[4], strand_shadows[5]);
     return make_sky_grid(low, high);
 }
 
-// Transmittances at a point; outside the grid, those of its border, which increase to 1 with the distance.
+// Position in the grid: the cell with the lowest indices of the eight around a point, the weights of the upper ones, and how far the
+// point is outside, where transmittance increases to 1.
+struct SkyPosition {
+    low: vec3u,
+    upper: vec3f,
+    outside: f32,
+}
+
+fn sky_position(grid: SkyGrid, p: vec3f) -> SkyPosition {
+    let last = vec3f(SKY_CELLS) - 1.0;
+    let unclamped = (p - grid.low) / grid.cell - 0.5;
+    let at = clamp(unclamped, vec3f(0.0), last);
+    let low = min(vec3u(at), SKY_CELLS - 2u);
+    return SkyPosition(low, at - vec3f(low), saturate(length((unclamped - at) * grid.cell) / FADING_MM));
+}
+
+fn cell_corner(k: u32) -> vec3u {
+    return vec3u(k & 1u, (k >> 1u) & 1u, k >> 2u);
+}
+
+fn cell_weight(position: SkyPosition, corner: vec3u) -> f32 {
+    let w = mix(1.0 - position.upper, position.upper, vec3f(corner));
+    return w.x * w.y * w.z;
+}
+
 fn sky_transmittance_at(grid: SkyGrid, p: vec3f) -> SkyTransmittance {
     let clear = vec4f(vec3f(0.0), 1.0);
     if (any(grid.cell <= vec3f(0.0))) {
         return SkyTransmittance(clear, clear);
     }
-    let last = vec3f(SKY_CELLS) - 1.0;
-    let unclamped = (p - grid.low) / grid.cell - 0.5;
-    let at = clamp(unclamped, vec3f(0.0), last);
-    let outside = saturate(length((unclamped - at) * grid.cell) / FADING_MM);
-    let low = min(vec3u(at), SKY_CELLS - 2u);
-    let f = at - vec3f(low);
+    let position = sky_position(grid, p);
     var sum = SkyTransmittance(vec4f(0.0), vec4f(0.0));
     for (var k = 0u; k < 8u; k += 1u) {
-        let corner = vec3u(k & 1u, (k >> 1u) & 1u, k >> 2u);
-        let w = mix(1.0 - f, f, vec3f(corner));
-        let one = sky_transmittance_of(low + corner);
-        sum.hair += w.x * w.y * w.z * one.hair;
-        sum.all += w.x * w.y * w.z * one.all;
+        let w = cell_weight(position, cell_corner(k));
+        let one = sky_transmittance_of(position.low + cell_corner(k));
+        sum.hair += w * one.hair;
+        sum.all += w * one.all;
     }
-    return SkyTransmittance(mix(sum.hair, clear, outside), mix(sum.all, clear, outside));
+    return SkyTransmittance(mix(sum.hair, clear, position.outside), mix(sum.all, clear, position.outside));
 }
 
-// Fraction of the light of the sky that hair transmits to a surface. The transmittance is read below the surface, so that
-// directions from there pass through the whole layer of hair on it.
-// mean_direction: mean of the unit vectors of the directions from which light is collected
-fn sky_past_hair(p: vec3f, normal: vec3f, mean_direction: vec3f) -> f32 {
-    if (!STRANDS) {
-        return 1.0;
+// Light of the sky that a surface receives past hair, in units of `received`.
+// open: light without hair
+fn received_past_hair(grid: SkyGrid, p: vec3f, normal: vec3f, open: f32) -> f32 {
+    if (any(grid.cell <= vec3f(0.0))) {
+        return open;
     }
-    let grid = sky_grid();
-    let hair = sky_transmittance_at(grid, p - grid.cell * normal).hair;
-    return clamp(hair.w + dot(hair.xyz, mean_direction), 0.0, 1.0);
+    let position = sky_position(grid, p);
+    var sum = 0.0;
+    for (var k = 0u; k < 8u; k += 1u) {
+        let moments = sky_moments_of(position.low + cell_corner(k));
+        sum += cell_weight(position, cell_corner(k)) * received(moments, normal);
+    }
+    return mix(sum, open, position.outside);
 }
 
 // Mean depth of the strands between a point and an area light, behind the nearest strand of the window; negative if there are none.

@@ -38,7 +38,32 @@ fn content_word(index: u32) -> u32 {
     return SKY_HEAD + index;
 }
 
-// First of the four words with the transmittances of a cell: past hair alone, then past hair and head.
+// First of the words with the transmittances of a cell: past hair alone, past hair and head, then the moments of the light of the
+// sky past hair.
 fn transmittance_word(index: u32) -> u32 {
-    return SKY_HEAD + sky_cell_count() + 4u * index;
+    return SKY_HEAD + sky_cell_count() + (SKY_CELL_WORDS - 1u) * index;
+}
+
+// Moments of the light of the sky: sums over directions d of the light, and of the light times the components of d and their
+// products.
+struct SkyMoments {
+    first: vec4f, // x, y, z, and 1
+    squares: vec3f, // xx, yy, zz
+    mixed: vec3f, // xy, yz, zx
+}
+
+fn sky_moments(direction: vec3f, light: f32) -> SkyMoments {
+    let scaled = light * direction;
+    return SkyMoments(vec4f(scaled, light), scaled * direction, scaled * direction.yzx);
+}
+
+fn sum_of(a: SkyMoments, b: SkyMoments) -> SkyMoments {
+    return SkyMoments(a.first + b.first, a.squares + b.squares, a.mixed + b.mixed);
+}
+
+// Light that a surface receives, up to a constant factor: the clamped cosine c is approximated by (3 + 16 c + 15 c^2) / 32.
+// Source: [RamamoorthiHanrahan2001].
+fn received(moments: SkyMoments, normal: vec3f) -> f32 {
+    let square = dot(moments.squares, normal * normal) + 2.0 * dot(moments.mixed, normal * normal.yzx);
+    return 3.0 * moments.first.w + 16.0 * dot(moments.first.xyz, normal) + 15.0 * square;
 }

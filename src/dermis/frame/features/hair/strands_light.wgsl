@@ -148,8 +148,10 @@ fn radiance_of(knot: Knot) -> vec3f {
     let absorbed = 1.0 - forth - back;
     var sky = SkyTransmittance(vec4f(0.0), vec4f(0.0));
     if (ENVIRONMENT) {
-        sky = sky_transmittance_at(sky_grid(), knot.position);
-        let past_hair = saturate(sky.hair.w + COSINE_MEAN * dot(sky.hair.xyz, knot.normal));
+        // strands that are seen lie on top of the hair of their cell
+        let grid = sky_grid();
+        sky = sky_transmittance_at(grid, knot.position + 0.5 * grid.cell * knot.normal);
+        let past_hair = irradiance_past_hair(knot.position, knot.normal);
         skin_irradiance += tinted(past_hair, absorbed) * panorama_at(knot.normal, 0u);
     }
     let below = skin_irradiance / PI * mix(strand_view.skin, dense_hair_reflectance(forth + back), dense);

@@ -20,8 +20,6 @@ override SKIPS_UNLIT: bool = false;
 
 const MIN_OBLIQUE_COSINE: f32 = -0.75; // least cosine of oblique light at the point where it enters
 
-const COSINE_MEAN: f32 = 0.6667; // length of the mean of all directions above a surface, weighted by their cosines
-
 struct Lit {
     entered: vec3f, // irradiance that enters the skin, times its reflectance relative to normal incidence
     reflected: vec3f, // radiance reflected by the surface
@@ -81,12 +79,26 @@ fn total_visibility(light: Light, point: Point, l: vec3f) -> f32 {
     return visibility(light, point, l) * strand_transmittance(light, point.position);
 }
 
-// Fraction of the light of the sky that hair transmits to a point, see `sky_past_hair`; 1 without occlusion.
-fn sky_past_hair_at(point: Point, mean_direction: vec3f) -> f32 {
-    if (environment.occluded == 0u) {
+// Fraction of the irradiance by the sky that passes hair.
+fn irradiance_past_hair(p: vec3f, normal: vec3f) -> f32 {
+    let moments = SkyMoments(environment.sky_moments[0], environment.sky_moments[1].xyz, environment.sky_moments[2].xyz);
+    let open = max(received(moments, normal), 1e-4);
+    return saturate(received_past_hair(sky_grid(), p, normal, open) / open);
+}
+
+// Position at which transmittances are read for a surface: below it, so that directions from there pass through the whole layer of
+// hair on it.
+fn below_hair(point: Point) -> vec3f {
+    return point.position - sky_grid().cell * point.normal;
+}
+
+// Fraction of the light of the sky from a direction that hair transmits to a point; 1 without occlusion.
+fn sky_past_hair(point: Point, direction: vec3f) -> f32 {
+    if (!STRANDS || environment.occluded == 0u) {
         return 1.0;
     }
-    return sky_past_hair(point.position, point.normal, mean_direction);
+    let hair = sky_transmittance_at(sky_grid(), below_hair(point)).hair;
+    return saturate(hair.w + dot(hair.xyz, direction));
 }
 
 // Irradiance that enters from the environment and from other skin. With interreflection, the fit of `ambient` to the light from
@@ -97,7 +109,9 @@ fn ambient_entering(point: Point, surface: Surface, open: f32) -> vec3f {
     if (ENVIRONMENT) {
         let albedo = select(surface.colour * environment.albedo, vec3f(0.0), has_cells);
         entering = ambient(surface.normal, open, albedo) * enters_uniform(surface.roughness, surface.rho_s);
-        entering *= sky_past_hair_at(point, COSINE_MEAN * point.normal);
+        if (STRANDS && environment.occluded != 0u) {
+            entering *= irradiance_past_hair(below_hair(point), point.normal);
+        }
     }
     if (has_cells) {
         // with occlusion, cells give only the brightness of the occluded part
@@ -186,7 +200,7 @@ fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f
         //#if METALS
         albedo = mix(albedo, 1.0, metalness);
         //#end
-        lit.reflected += albedo * mirrored(point, mirror, v, surface.roughness, open) * sky_past_hair_at(point, mirror);
+        lit.reflected += albedo * mirrored(point, mirror, v, surface.roughness, open) * sky_past_hair(point, mirror);
     }
     return lit;
 }
