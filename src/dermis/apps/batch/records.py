@@ -92,7 +92,7 @@ def encode_record(
     give identical bytes.
     """
     files = {PICTURE_SUFFIX: encode_png(observation.picture, use_isal=True)}
-    for name in spec.outputs:
+    for name in spec.stored_outputs:
         suffix = f"{name}.{file_format(name, spec.encoding)}"
         files[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
     if spec.keep_linear:

@@ -13,6 +13,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dermis.apps.batch.cameras import camera_behind_lens, face_hull_indices, sampled_camera, sampled_lens
+from dermis.apps.batch.clips.capture import capture_pose, load_capture, moves_eyes, with_capture
+from dermis.apps.batch.clips.frames import PULSE_NAMES
+from dermis.apps.batch.clips.motion import clip_pulse, pulse_time_s
+from dermis.apps.batch.clips.table import GENERATED_MOTION
 from dermis.apps.batch.face_boxes import BoxPoints, box_points, face_boxes
 from dermis.apps.batch.image_facts import ImageFacts, person_facts
 from dermis.apps.batch.lighting import direction_from_angles, light_colour, sampled_lights
@@ -22,6 +26,7 @@ from dermis.apps.batch.spec_tables import GAZE_ANGLES, NO_ENVIRONMENT, table_val
 from dermis.base.reading import is_file
 from dermis.formats.motion.captures import find_rotation_bones
 from dermis.human.person import Human
+from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.mesh.rotations import angles_matrix, matrix_angles
@@ -93,8 +98,11 @@ class SceneBuilder:
             camera=camera,
             skin=person.skin.replace(**skin_values) if skin_values else person.skin,
             environment=self._sampled_environment(parameters),
-            pose=_pose_with_gaze(parameters, head, pose, camera.position),
+            pose=self._pose_with_gaze(parameters, head, pose, camera.position),
         )
+        if PULSE_NAMES[0] in parameters:
+            seed, clip = int(parameters[PULSE_NAMES[0]]), table_numbers(parameters, "clip")
+            scene = clip_pulse(seed, clip).scene_at(scene, pulse_time_s(seed, clip, clip["time_s"]))
         return scene, self.spec.render.replace(**_background_settings(parameters))
 
     def facts(self, parameters: Parameters, scene: Scene) -> ImageFacts:
@@ -104,6 +112,7 @@ class SceneBuilder:
         """
         person, camera = self._cached_person(parameters), scene.camera
         pose = scene.head.control_rig.rest if scene.pose_arrays is None else scene.pose_arrays
+        is_captured = self._captures_gaze(parameters, scene.head)
         errors = gaze_errors_deg(scene, _gaze_target(parameters, camera.position))
         lens = sampled_lens(parameters)
         if lens is not None:  # the camera of the scene shows what the lens shows, with another focal length
@@ -112,7 +121,7 @@ class SceneBuilder:
         boxes = face_boxes(scene.head, person.boxes, pose, picture_camera, lens)
         return ImageFacts(
             person.facts,
-            errors if _has_turning_eyes(scene.head) else None,
+            errors if _has_turning_eyes(scene.head) and not is_captured else None,
             boxes,
             None if self.spec.sensor is None else light_colour(scene),
             picture_camera.K,
@@ -120,11 +129,41 @@ class SceneBuilder:
 
     def _sampled_pose(self, parameters: Parameters, person: _Person) -> Pose:
         weights = self._pose_weights(parameters, person.head)
-        return Pose(weights, _bone_angles(_head_rotation(parameters), person.bones))
+        pose = Pose(weights, _bone_angles(_head_rotation(parameters), person.bones))
+        captured = self._captured_pose(parameters, person.head)
+        return pose if captured is None else with_capture(pose, captured)
+
+    def _capture(self, parameters: Parameters, head: Head) -> Clip | None:
+        name = parameters.get("clip.motion", GENERATED_MOTION)
+        return None if name == GENERATED_MOTION else load_capture(self._resolve_file(name), head)
+
+    def _captured_pose(self, parameters: Parameters, head: Head) -> Pose | None:
+        capture, clip = self._capture(parameters, head), self.spec.clip
+        if capture is None or clip is None:
+            return None
+        start, time_s = float(parameters["clip.motion_start"]), float(parameters["clip.time_s"])
+        return capture_pose(capture, start, time_s, clip.frames / clip.rate_hz, 1.0 / clip.rate_hz)
+
+    def _captures_gaze(self, parameters: Parameters, head: Head) -> bool:
+        capture = self._capture(parameters, head)
+        return capture is not None and moves_eyes(capture)
+
+    def _pose_with_gaze(
+        self, parameters: Parameters, head: Head, pose: Pose, camera_position_mm: tuple[float, float, float]
+    ) -> Pose:
+        """Return the pose with eyes rotated towards the gaze, if they can rotate and no capture does so.
+
+        camera_position_mm : position of the camera, the default gaze target [mm]
+        """
+        if not _has_turning_eyes(head) or self._captures_gaze(parameters, head):
+            return pose
+        return looking_at(head, _gaze_target(parameters, camera_position_mm), pose)
 
     def _sampled_camera(self, parameters: Parameters, person: _Person, pose: Pose) -> Camera:
         """Return the camera of an image without the distortion of its lens."""
         width, height = self.spec.size
+        if self.spec.clip is not None:  # the camera does not follow the motion
+            pose = Pose({}, _bone_angles(_resting_head_rotation(parameters), person.bones))
         pose_arrays = pose.to_arrays(person.head.control_rig)
         return sampled_camera(parameters, person.head, person.points, pose_arrays, width / height)
 
@@ -222,7 +261,15 @@ def _hair_count_fraction(picture_size: tuple[int, int]) -> float:
 
 
 def _head_rotation(parameters: Parameters) -> NDArray[np.float64]:
-    """Return the rotation matrix (3, 3) of the head for its sampled pitch, yaw and roll."""
+    """Return the rotation matrix (3, 3) of the head for its sampled pitch, yaw and roll, with its motion."""
+    rotation, moved = _resting_head_rotation(parameters), table_numbers(parameters, "clip")
+    if "head_yaw_deg" not in moved:
+        return rotation
+    angles = moved["head_pitch_deg"], moved["head_yaw_deg"], moved["head_roll_deg"]
+    return np.asarray(rotation @ np.array(angles_matrix(angles)))
+
+
+def _resting_head_rotation(parameters: Parameters) -> NDArray[np.float64]:
     head = table_numbers(parameters, "head")
     return np.array(angles_matrix((head["pitch_deg"], head["yaw_deg"], head["roll_deg"])))
 
@@ -243,18 +290,6 @@ def _bone_angles(
     return {name: angles[fraction] for name, fraction in rotation_fractions.items()}
 
 
-def _pose_with_gaze(
-    parameters: Parameters, head: Head, pose: Pose, camera_position_mm: tuple[float, float, float]
-) -> Pose:
-    """Return the pose with eyes rotated towards the sampled gaze, if the head has eyes that can rotate.
-
-    camera_position_mm : position of the camera, the default gaze target [mm]
-    """
-    if not _has_turning_eyes(head):
-        return pose
-    return looking_at(head, _gaze_target(parameters, camera_position_mm), pose)
-
-
 def _has_turning_eyes(head: Head) -> bool:
     return head.eyes is not None and head.control_rig.skeleton is not None
 
@@ -263,11 +298,17 @@ def _gaze_target(
     parameters: Parameters, camera_position_mm: tuple[float, float, float]
 ) -> NDArray[np.float64]:
     """Return the target (3,) of the gaze in an image, relative to the head's centre [mm]."""
+    axes = _resting_head_rotation(parameters)
     if parameters["gaze.at"] != GAZE_ANGLES:
-        return np.array(camera_position_mm)
-    gaze = table_numbers(parameters, "gaze")
-    direction = np.array(direction_from_angles(gaze["yaw_deg"], -gaze["pitch_deg"]))
-    return np.asarray(_head_rotation(parameters) @ direction * _GAZE_DISTANCE_MM)
+        target = np.array(camera_position_mm)
+    else:
+        gaze = table_numbers(parameters, "gaze")
+        direction = np.array(direction_from_angles(gaze["yaw_deg"], -gaze["pitch_deg"]))
+        target = np.asarray(axes @ direction * _GAZE_DISTANCE_MM)
+    if "clip.gaze_yaw_deg" not in parameters:
+        return target
+    shift = float(parameters["clip.gaze_pitch_deg"]), float(parameters["clip.gaze_yaw_deg"]), 0.0
+    return np.asarray(axes @ np.array(angles_matrix(shift)) @ axes.T @ target)
 
 
 def _background_settings(parameters: Parameters) -> dict[str, object]:

@@ -15,6 +15,10 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, BaseModel, Field, PrivateAttr
 
 from dermis.apps.batch import spec_tables as tables
+from dermis.apps.batch.clips.checks import check_clip, with_images_per_person
+from dermis.apps.batch.clips.flow import FLOW_OUTPUTS
+from dermis.apps.batch.clips.frames import ImageSequence
+from dermis.apps.batch.clips.table import ClipTable
 from dermis.apps.batch.distributions import Constant, Distribution, FileChoice
 from dermis.apps.batch.output_encoding import Encoding
 from dermis.apps.batch.sampling import Parameters, Sampler
@@ -63,7 +67,7 @@ _TOML_HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
 _MAX_MATCHING_FILES = 100_000
 _MAX_HASHED_BYTES = 4 << 30
 _MAX_KEY_LENGTH, _MIN_KEY_SIMILARITY = 80, 0.7  # limits for suggestions to unknown keys
-_FILE_PARAMETERS = "person.head", "environment.name", "skin.profile"
+_FILE_PARAMETERS = "person.head", "environment.name", "skin.profile", "clip.motion"
 """Parameters whose values may be files."""
 P = TypeVar("P", bound=FrozenModel)
 _DeviceTable = dict[str, Annotated[Distribution, tables.DistributionField()]]
@@ -129,6 +133,8 @@ class Spec(FrozenModel):
     """Environment light."""
     background: tables.BackgroundTable = tables.BackgroundTable()
     """Background."""
+    clip: ClipTable | None = None
+    """Frames of people in motion; without this table, images are single pictures."""
     lens: Annotated[_DeviceTable | None, AfterValidator(partial(_with_defaults, Lens))] = None
     """Distortion of the camera's lens; needs [sensor]."""
     sensor: Annotated[_DeviceTable | None, AfterValidator(partial(_with_defaults, Sensor))] = None
@@ -159,14 +165,30 @@ class Spec(FrozenModel):
                 refuse(name, "a table [sensor]", actual, advice)
         if self.lens is not None:
             check_lens(distributions, self.outputs)
+        if self.clip is not None:
+            check_clip(self.clip, distributions, self.folder)
+        if self.images_per_person % self.sequence.images:
+            expected = f"a multiple of {self.sequence.images}, the images of a clip with all its cameras"
+            refuse("images_per_person", expected, f"got {self.images_per_person}", "Correct it, or remove it")
         rows = {name: row for group in self.correlated for name, row in group.cholesky_rows().items()}
-        sampler = Sampler(self.seed, self.images_per_person, distributions, rows, expressions)
+        sampler = Sampler(self.seed, self.images_per_person, distributions, rows, expressions, self.sequence)
         BaseModel.__setattr__(self, "_sampler", sampler)
 
     @property
     def size(self) -> tuple[int, int]:
         """Return width and height of the pictures [pixel]."""
         return self.render.size
+
+    @property
+    def sequence(self) -> ImageSequence:
+        """Return the division of the images into clips and cameras."""
+        return ImageSequence(self.clip.frames, self.clip.rate_hz) if self.clip else ImageSequence()
+
+    @property
+    def stored_outputs(self) -> tuple[str, ...]:
+        """Return the names of all outputs that are written: `outputs`, and the flow of clips."""
+        flow = FLOW_OUTPUTS if self.clip is not None and self.clip.flow else ()
+        return (*self.outputs, *flow)
 
     @property
     def distributions(self) -> Mapping[str, Distribution]:
@@ -198,6 +220,13 @@ class Spec(FrozenModel):
         Raises DermisError if the data set has no image with this number.
         """
         return self._sampler.parameters(checked_integer("image", image_number, 0, self.count - 1))
+
+    def neighbour_parameters(self, image_number: int, frame_offset: int) -> Parameters:
+        """Return the parameters of another frame of an image's clip, which may be before or after the clip.
+
+        frame_offset : number of frames after the image
+        """
+        return self._sampler.parameters(image_number, frame_offset)
 
     def to_toml(self) -> str:
         """Return the spec as canonical TOML with all values; `parse_spec` converts it to an equal spec."""
@@ -262,6 +291,7 @@ def parse_spec(toml_data: Mapping[str, object], folder: Path = Path()) -> Spec:
         refuse("generator", f"{GENERATOR_VERSION}, the generator number of this version", actual, advice)
     _refuse_unknown_keys(toml_data)
     fields = {k: v if k == "files" else _expand_patterns(v, folder, k) for k, v in toml_data.items()}
+    fields = with_images_per_person(fields)
     fields["render"] = _parse_render_table(fields.pop("size", (512, 512)), fields.get("render", {}))
     if isinstance(groups := fields.get("correlated", ()), list | tuple):
         fields["correlated"] = tuple(_build_model(tables.CorrelationGroup, "correlated", g) for g in groups)

@@ -109,7 +109,7 @@ def _produce(
                 if spec.sensor is not None:
                     observation, facts = as_photograph(observation, parameters, facts)
                 record = make_record(number, observation, parameters, spec, tone, facts)
-                names = [*spec.outputs, *([LINEAR_PICTURE] if spec.keep_linear else [])]
+                names = [*spec.stored_outputs, *([LINEAR_PICTURE] if spec.keep_linear else [])]
                 outputs = {name: observation.outputs[name] for name in names}
                 fields = record_fields(record, f"image {number}") | outputs
                 if not _put(ready, arrays(fields | {"picture": observation.picture}), stop):
