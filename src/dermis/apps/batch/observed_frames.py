@@ -38,7 +38,7 @@ class PlannedImage(NamedTuple):
 
 
 class _Role(Enum):
-    """Purpose of a frame: a neighbour of an image's frame, the image itself, or its flow to the next frame."""
+    """Purpose of a frame: neighbour of an image's frame, the image itself, or its flow to the next frame."""
 
     BEFORE = 0
     IMAGE = 1
@@ -67,8 +67,9 @@ def observe_images(renderer: Renderer, spec: Spec, plans: Iterable[PlannedImage]
 
     Images without a background get an alpha channel.
     """
+    make_frames = _flow_frames if _has_flow(spec) else _image_frames
     for alpha, group in itertools.groupby(plans, lambda plan: plan.settings.background == "none"):
-        frames = _flow_frames(group, spec) if _has_flow(spec) else (_image_frame(plan) for plan in group)
+        frames = make_frames(group, spec)
         copies = itertools.tee(frames, 4)
         observations = renderer.observe(
             (frame.scene for frame in copies[0]),
@@ -94,6 +95,10 @@ def rendered_frame_outputs(spec: Spec) -> tuple[str, ...]:
 
 def _has_flow(spec: Spec) -> bool:
     return spec.clip is not None and bool(spec.clip.flow)
+
+
+def _image_frames(plans: Iterable[PlannedImage], spec: Spec) -> Iterator[_Frame]:
+    yield from map(_image_frame, plans)
 
 
 def _image_frame(plan: PlannedImage) -> _Frame:

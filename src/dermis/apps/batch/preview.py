@@ -122,32 +122,40 @@ def parameter_table_lines(rows: Sequence[ParameterRow]) -> list[str]:
 
 
 def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
-    """Return an sRGB picture (h, w, 3) with the first 16 images at reduced quality, labelled by number."""
+    """Return an sRGB picture (h, w, 3) with 16 images at reduced quality, labelled by number.
+
+    They are the first ones, or four frames of each of the first clips.
+    """
     from PIL import Image, ImageDraw
 
     width, height = (max(_SHEET_IMAGE_SIDE * side // max(spec.size), 1) for side in spec.size)
     limited = {name: min(side, getattr(spec.render, name)) for name, side in _MAX_PREVIEW_SIDES.items()}
     spec = spec.replace(render=spec.render.replace(size=(width, height), **limited))
-    count = min(spec.count, SHEET_IMAGE_COUNT)
+    numbers = range(0, spec.count, _sheet_step(spec))[:SHEET_IMAGE_COUNT]
+    count = len(numbers)
     columns = min(count, _SHEET_COLUMNS)
     rows = -(-count // columns)
     size = columns * (width + _SHEET_GAP) - _SHEET_GAP, rows * (height + _SHEET_GAP) - _SHEET_GAP
     sheet = Image.new("RGB", size, (20, 20, 20))
     draw = ImageDraw.Draw(sheet)
-    builder, renderer = SceneBuilder(spec), Renderer(adapter)
-    pictures = _sheet_pictures(spec, count, builder, renderer)
-    for k, picture in enumerate(pictures):
+    pictures = _sheet_pictures(spec, numbers, SceneBuilder(spec), Renderer(adapter))
+    for k, (number, picture) in enumerate(zip(numbers, pictures, strict=True)):
         x, y = (k % columns) * (width + _SHEET_GAP), (k // columns) * (height + _SHEET_GAP)
         sheet.paste(Image.fromarray(picture), (x, y))
-        draw.text((x + 4, y + 2), str(k), fill=(255, 255, 255), stroke_width=1, stroke_fill=(0, 0, 0))
+        draw.text((x + 4, y + 2), str(number), fill=(255, 255, 255), stroke_width=1, stroke_fill=(0, 0, 0))
     return np.array(sheet)
 
 
+def _sheet_step(spec: Spec) -> int:
+    """Return the difference between the numbers of images on the sheet, which has four frames of a clip."""
+    return max(spec.sequence.frames // _SHEET_COLUMNS, 1)
+
+
 def _sheet_pictures(
-    spec: Spec, count: int, builder: SceneBuilder, renderer: Renderer
+    spec: Spec, numbers: range, builder: SceneBuilder, renderer: Renderer
 ) -> Iterator[NDArray[np.uint8]]:
-    """Yield the first pictures of a data set as sRGB bytes (h, w, 3)."""
-    for k in range(count):
+    """Yield pictures of a data set as sRGB bytes (h, w, 3)."""
+    for k in numbers:
         parameters = spec.parameters(k)
         scene, settings = builder.build(parameters)
         if spec.sensor is None:

@@ -21,6 +21,7 @@ from dermis.apps.batch.clips.frames import (
 from dermis.apps.batch.clips.motion import MOVED_TARGETS
 from dermis.apps.batch.clips.table import GENERATED_MOTION
 from dermis.apps.batch.distributions import Constant, Distribution
+from dermis.apps.batch.rigs.views import VIEW_NAME
 from dermis.apps.batch.spec_tables import (
     GAZE_ANGLES,
     LAMP_RIG,
@@ -40,7 +41,7 @@ _UNIFORM_NUMBER_BITS = (
 _PERSON_PREFIX = "person."
 _HEAD_PARAMETER = "person.head"
 _SENSOR_PREFIX, _SENSOR_SEED = "sensor.", "sensor.seed"
-_RIG_VIEW = "rig.view"
+_LENS_NAME = "lens.k1"
 _SEED_COUNT = 2**32
 _EXPRESSION_VARIATION_KEYS = "intensity", "asymmetry", "variation"
 _LAMP_PREFIXES = tuple(f"light.{lamp}." for lamp in ("key", "fill", "rim"))
@@ -206,6 +207,7 @@ class Sampler:
         `CorrelationGroup.cholesky_rows`
     expressions : weights of morph targets by name of the expression
     sequence : division of the images into clips and cameras
+    lenses : parameters of the table [lens] for each calibrated camera of a rig; empty for other rigs
     """
 
     seed: int
@@ -214,6 +216,7 @@ class Sampler:
     cholesky_rows: Mapping[str, Mapping[str, float]]
     expressions: Mapping[str, Weights]
     sequence: ImageSequence = _SINGLE_PICTURES
+    lenses: tuple[Mapping[str, float], ...] = ()
 
     def parameters(self, image_number: int, frame_offset: int = 0) -> Parameters:
         """Return the sampled parameters of one image by dotted name, independently of other images.
@@ -223,7 +226,9 @@ class Sampler:
         place = self.sequence.place(image_number)
         sampled = self._image_parameters(image_number)
         if self.sequence.views > 1:
-            sampled[_RIG_VIEW] = place.view
+            sampled[VIEW_NAME] = place.view
+            lens = self.lenses[place.view] if self.lenses and _LENS_NAME in self.distributions else {}
+            sampled |= {name: round_significant(value) for name, value in lens.items()}
         if self.sequence.rate_hz:
             frame = place._replace(frame=place.frame + frame_offset)
             sampled |= self._frame_parameters(frame, image_number, sampled)
@@ -261,7 +266,7 @@ class Sampler:
         )
         names = [name for name in self.distributions if not name.startswith("pose.")]
         sensor = [_SENSOR_SEED] if self._has_sensor else []
-        rig = [_RIG_VIEW] if self.sequence.views > 1 else []
+        rig = [VIEW_NAME] if self.sequence.views > 1 else []
         clip = [*FRAME_NAMES, *MOTION_NAMES, *PULSE_NAMES] if self.sequence.rate_hz else []
         return *person, *names, *sensor, *rig, *clip, *(f"pose.{target}" for target in self.targets)
 

@@ -13,14 +13,15 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dermis.apps.batch.cameras import camera_behind_lens, face_hull_indices, sampled_camera, sampled_lens
-from dermis.apps.batch.clips.capture import capture_pose, load_capture, moves_eyes, with_capture
+from dermis.apps.batch.clips.capture import capture_pose, moves_eyes, with_capture
 from dermis.apps.batch.clips.frames import PULSE_NAMES
 from dermis.apps.batch.clips.motion import clip_pulse, pulse_time_s
 from dermis.apps.batch.clips.table import GENERATED_MOTION
 from dermis.apps.batch.face_boxes import BoxPoints, box_points, face_boxes
 from dermis.apps.batch.image_facts import ImageFacts, person_facts
 from dermis.apps.batch.lighting import direction_from_angles, light_colour, sampled_lights
-from dermis.apps.batch.sampling import Parameters, table_numbers
+from dermis.apps.batch.rigs.views import VIEW_NAME
+from dermis.apps.batch.sampling import Parameters, round_significant, table_numbers
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import GAZE_ANGLES, NO_ENVIRONMENT, table_values
 from dermis.base.reading import is_file
@@ -37,6 +38,8 @@ from dermis.scene.gaze import looking_at
 from dermis.scene.head_pose import gaze_errors_deg
 from dermis.scene.heads import MIN_HUMAN_SUBDIVISION_LEVELS, is_person_name, load_head, load_person
 from dermis.scene.model import Scene
+from dermis.scene.motion import load_motion
+from dermis.scene.opencv import OpenCvCamera
 from dermis.scene.people import skin_of
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
@@ -75,6 +78,7 @@ class SceneBuilder:
 
     def __init__(self, spec: Spec) -> None:
         self.spec = spec
+        self._latest_capture: tuple[int, str, Clip] | None = None
         self._people: OrderedDict[frozenset[tuple[str, float | str]], _Person] = OrderedDict()
 
     def build(self, parameters: Parameters) -> tuple[Scene, Settings]:
@@ -86,7 +90,8 @@ class SceneBuilder:
         """
         person = self._cached_person(parameters)
         head, pose = person.head, self._sampled_pose(parameters, person)
-        camera, lens = self._sampled_camera(parameters, person, pose), sampled_lens(parameters)
+        base, lens = self._sampled_camera(parameters, person, pose), sampled_lens(parameters)
+        camera = self._rig_camera(parameters, base)
         if lens is not None:
             camera = camera_behind_lens(camera, lens, self.spec.size)
         skin_values = table_values(parameters, "skin")
@@ -98,7 +103,7 @@ class SceneBuilder:
             camera=camera,
             skin=person.skin.replace(**skin_values) if skin_values else person.skin,
             environment=self._sampled_environment(parameters),
-            pose=self._pose_with_gaze(parameters, head, pose, camera.position),
+            pose=self._pose_with_gaze(parameters, head, pose, base.position),
         )
         if PULSE_NAMES[0] in parameters:
             seed, clip = int(parameters[PULSE_NAMES[0]]), table_numbers(parameters, "clip")
@@ -110,22 +115,45 @@ class SceneBuilder:
 
         scene : scene of the image, from `build`
         """
-        person, camera = self._cached_person(parameters), scene.camera
+        person, size = self._cached_person(parameters), self.spec.size
         pose = scene.head.control_rig.rest if scene.pose_arrays is None else scene.pose_arrays
-        is_captured = self._captures_gaze(parameters, scene.head)
-        errors = gaze_errors_deg(scene, _gaze_target(parameters, camera.position))
-        lens = sampled_lens(parameters)
-        if lens is not None:  # the camera of the scene shows what the lens shows, with another focal length
-            camera = self._sampled_camera(parameters, person, self._sampled_pose(parameters, person))
-        picture_camera = camera.to_opencv(self.spec.size)
-        boxes = face_boxes(scene.head, person.boxes, pose, picture_camera, lens)
+        base, lens = (
+            self._sampled_camera(parameters, person, self._sampled_pose(parameters, person)),
+            sampled_lens(parameters),
+        )
+        # with a lens, the camera of the scene shows what the lens shows, with another focal length
+        picture_camera = self._rig_camera(parameters, base).to_opencv(size)
+        errors = gaze_errors_deg(scene, _gaze_target(parameters, base.position))
+        has_gaze_error = _has_turning_eyes(scene.head) and not self._captures_gaze(parameters, scene.head)
+        captured = self._captured_pose(parameters, person.head)
         return ImageFacts(
             person.facts,
-            errors if _has_turning_eyes(scene.head) and not is_captured else None,
-            boxes,
+            errors if has_gaze_error else None,
+            face_boxes(scene.head, person.boxes, pose, picture_camera, lens),
             None if self.spec.sensor is None else light_colour(scene),
             picture_camera.K,
+            captured={} if captured is None else _recorded_weights(captured, parameters),
+            rig=self._rig_cameras(parameters, base),
         )
+
+    def _rig_camera(self, parameters: Parameters, base: Camera) -> Camera:
+        """Return the camera of an image's view, without the distortion of its lens.
+
+        base : camera that the table [camera] places
+        """
+        rig = self.spec.cameras
+        if rig is None:
+            return base
+        return rig.camera(int(parameters[VIEW_NAME]), base, table_numbers(parameters, "rig"), self.spec.size)
+
+    def _rig_cameras(self, parameters: Parameters, base: Camera) -> dict[str, OpenCvCamera]:
+        """Return the cameras of the rig by name; empty for a spec with one camera."""
+        rig = self.spec.cameras
+        names = () if rig is None else rig.names
+        return {
+            name: self._rig_camera({**parameters, VIEW_NAME: view}, base).to_opencv(self.spec.size)
+            for view, name in enumerate(names)
+        }
 
     def _sampled_pose(self, parameters: Parameters, person: _Person) -> Pose:
         weights = self._pose_weights(parameters, person.head)
@@ -135,7 +163,12 @@ class SceneBuilder:
 
     def _capture(self, parameters: Parameters, head: Head) -> Clip | None:
         name = parameters.get("clip.motion", GENERATED_MOTION)
-        return None if name == GENERATED_MOTION else load_capture(self._resolve_file(name), head)
+        if name == GENERATED_MOTION:
+            return None
+        path = self._resolve_file(name)
+        if self._latest_capture is None or self._latest_capture[:2] != (id(head), path):
+            self._latest_capture = id(head), path, load_motion(path, head)
+        return self._latest_capture[2]
 
     def _captured_pose(self, parameters: Parameters, head: Head) -> Pose | None:
         capture, clip = self._capture(parameters, head), self.spec.clip
@@ -258,6 +291,12 @@ def _hair_count_fraction(picture_size: tuple[int, int]) -> float:
     picture_size : width and height of the picture [pixel]
     """
     return min(1.0, max(_MIN_FRACTION_OF_STRANDS, max(picture_size) / _FULL_HAIR_PICTURE_SIDE))
+
+
+def _recorded_weights(captured: Pose, parameters: Parameters) -> dict[str, float]:
+    """Return the weights of a captured pose for the targets that records list, by name of the parameter."""
+    weights = {f"pose.{name}": round_significant(weight) for name, weight in captured.weights.items()}
+    return {name: weight for name, weight in weights.items() if name in parameters}
 
 
 def _head_rotation(parameters: Parameters) -> NDArray[np.float64]:

@@ -15,12 +15,14 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, BaseModel, Field, PrivateAttr
 
 from dermis.apps.batch import spec_tables as tables
-from dermis.apps.batch.clips.checks import check_clip, with_images_per_person
+from dermis.apps.batch.clips.checks import check_clip
 from dermis.apps.batch.clips.flow import FLOW_OUTPUTS
 from dermis.apps.batch.clips.frames import ImageSequence
 from dermis.apps.batch.clips.table import ClipTable
 from dermis.apps.batch.distributions import Constant, Distribution, FileChoice
 from dermis.apps.batch.output_encoding import Encoding
+from dermis.apps.batch.rigs.table import RigTable
+from dermis.apps.batch.rigs.views import Rig, check_rig, lens_values, load_rig, with_defaults
 from dermis.apps.batch.sampling import Parameters, Sampler
 from dermis.apps.batch.sensor.lens import Lens
 from dermis.apps.batch.sensor.model import Sensor
@@ -135,6 +137,8 @@ class Spec(FrozenModel):
     """Background."""
     clip: ClipTable | None = None
     """Frames of people in motion; without this table, images are single pictures."""
+    rig: Annotated[RigTable | None, AfterValidator(with_defaults)] = None
+    """Several cameras that see the same moment; without this table, there is one."""
     lens: Annotated[_DeviceTable | None, AfterValidator(partial(_with_defaults, Lens))] = None
     """Distortion of the camera's lens; needs [sensor]."""
     sensor: Annotated[_DeviceTable | None, AfterValidator(partial(_with_defaults, Sensor))] = None
@@ -167,11 +171,17 @@ class Spec(FrozenModel):
             check_lens(distributions, self.outputs)
         if self.clip is not None:
             check_clip(self.clip, distributions, self.folder)
+        if self.cameras is not None:
+            check_rig(self.cameras, distributions, self.size, has_lens=self.lens is not None)
         if self.images_per_person % self.sequence.images:
             expected = f"a multiple of {self.sequence.images}, the images of a clip with all its cameras"
             refuse("images_per_person", expected, f"got {self.images_per_person}", "Correct it, or remove it")
         rows = {name: row for group in self.correlated for name, row in group.cholesky_rows().items()}
-        sampler = Sampler(self.seed, self.images_per_person, distributions, rows, expressions, self.sequence)
+        rig = self.cameras
+        lenses = tuple(lens_values(rig, view) for view in range(len(rig.names))) if rig else ()
+        sampler = Sampler(
+            self.seed, self.images_per_person, distributions, rows, expressions, self.sequence, lenses
+        )
         BaseModel.__setattr__(self, "_sampler", sampler)
 
     @property
@@ -182,7 +192,17 @@ class Spec(FrozenModel):
     @property
     def sequence(self) -> ImageSequence:
         """Return the division of the images into clips and cameras."""
-        return ImageSequence(self.clip.frames, self.clip.rate_hz) if self.clip else ImageSequence()
+        frames, rate_hz = (self.clip.frames, self.clip.rate_hz) if self.clip else (1, 0.0)
+        return ImageSequence(frames, rate_hz, len(self.cameras.names) if self.cameras else 1)
+
+    @property
+    def cameras(self) -> Rig | None:
+        """Return the cameras of the rig; None for a spec with one camera."""
+        return (
+            None
+            if self.rig is None
+            else load_rig(self.rig, self.folder, self.files.get(self.rig.file or "", ""))
+        )
 
     @property
     def stored_outputs(self) -> tuple[str, ...]:
@@ -291,14 +311,14 @@ def parse_spec(toml_data: Mapping[str, object], folder: Path = Path()) -> Spec:
         refuse("generator", f"{GENERATOR_VERSION}, the generator number of this version", actual, advice)
     _refuse_unknown_keys(toml_data)
     fields = {k: v if k == "files" else _expand_patterns(v, folder, k) for k, v in toml_data.items()}
-    fields = with_images_per_person(fields)
     fields["render"] = _parse_render_table(fields.pop("size", (512, 512)), fields.get("render", {}))
     if isinstance(groups := fields.get("correlated", ()), list | tuple):
         fields["correlated"] = tuple(_build_model(tables.CorrelationGroup, "correlated", g) for g in groups)
-    spec = _build_model(Spec, "", fields | {"folder": folder})
+    spec = _build_model(Spec, "", _with_images_per_person(fields, folder) | {"folder": folder})
     if spec.sensor is not None:
         note_lamps_without_blue(spec.distributions)
     names = [name for name in spec.landmarks if name not in LANDMARK_SETS]
+    names += [spec.rig.file] if spec.rig is not None and spec.rig.file else []
     for parameter in spec.distributions.keys() & set(_FILE_PARAMETERS):
         names += map(str, spec.distributions[parameter].support)
     hashes = _file_hashes(names, folder)
@@ -337,6 +357,19 @@ def _tables_with_key(model: type[BaseModel], key: str, table_name: str = "") -> 
             if key in kind.model_fields:
                 yield path
             yield from _tables_with_key(kind, key, path)
+
+
+def _with_images_per_person(fields: dict[str, object], folder: Path) -> dict[str, object]:
+    """Return the parsed fields of a spec, in which each person has one clip or moment by default."""
+    if "images_per_person" in fields or not {"clip", "rig"} & fields.keys():
+        return fields
+    one = {name: fields[name] for name in ("clip", "rig") if name in fields}
+    tables_of_sequence = {"clip": ClipTable, "rig": RigTable}
+    built = {name: _build_model(tables_of_sequence[name], name, value) for name, value in one.items()}
+    frames = built["clip"].frames if "clip" in built else 1
+    rig = with_defaults(built.get("rig"))
+    views = len(load_rig(rig, folder).names) if rig else 1
+    return {**fields, **built, "images_per_person": frames * views}
 
 
 def _parse_render_table(picture_size: object, render_table: object) -> Settings:

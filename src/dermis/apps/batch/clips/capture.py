@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import lru_cache
-
 import numpy as np
 
 from dermis.base.errors import refuse
 from dermis.mesh.clip import Clip
-from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.mesh.rotations import angles_matrix, matrix_angles
-from dermis.scene.motion import load_motion
 
 _GAZE_WORD = "eyelook"
 Angles = tuple[float, float, float]
-
-
-@lru_cache(maxsize=4)
-def load_capture(path: str, head: Head) -> Clip:
-    """Return the motion in a file of a capture for a head; the latest ones are cached."""
-    return load_motion(path, head)
 
 
 def capture_pose(capture: Clip, start: float, time_s: float, clip_s: float, frame_s: float) -> Pose:
@@ -56,13 +45,6 @@ def with_capture(pose: Pose, captured: Pose) -> Pose:
             rotation = np.array(angles_matrix(bones[name])) @ rotation
         bones[name] = matrix_angles(rotation)
     return Pose({**pose.weights, **captured.weights}, bones)
-
-
-def captured_weights(
-    captured: Pose, target_names: Mapping[str, object] | tuple[str, ...]
-) -> dict[str, float]:
-    """Return the weights of a captured pose for those targets that records list."""
-    return {name: weight for name, weight in captured.weights.items() if name in target_names}
 
 
 def _angles(value: object) -> Angles:

@@ -28,12 +28,3 @@ def check_clip(clip: ClipTable, distributions: Mapping[str, Distribution], folde
     if any(0.0 < float(rate) < _MIN_PULSE_PER_MIN for rate in clip.pulse_per_min.support):
         expected = f"0 or {_MIN_PULSE_PER_MIN:g} and more"
         refuse("clip: pulse_per_min", expected, f"got {clip.pulse_per_min.spec_value()}", "Correct it")
-
-
-def with_images_per_person(fields: Mapping[str, object]) -> dict[str, object]:
-    """Return the parsed fields of a spec, in which people have one clip each unless the spec says otherwise."""
-    clip = fields.get("clip")
-    frames = clip.get("frames") if isinstance(clip, Mapping) else getattr(clip, "frames", None)
-    if isinstance(frames, int) and "images_per_person" not in fields:
-        return {**fields, "images_per_person": frames}
-    return dict(fields)

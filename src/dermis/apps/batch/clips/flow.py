@@ -1,4 +1,4 @@
-"""Flow of clips: where the point at each pixel is in the previous and in the next frame, and if it is hidden."""
+"""Flow of clips: where the point at each pixel is in the previous and next frame, and if it is hidden."""
 
 from __future__ import annotations
 
