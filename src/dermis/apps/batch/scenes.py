@@ -78,7 +78,7 @@ class SceneBuilder:
 
     def __init__(self, spec: Spec) -> None:
         self.spec = spec
-        self._latest_capture: tuple[int, str, Clip] | None = None
+        self._latest_capture: tuple[Head, str, Clip] | None = None
         self._people: OrderedDict[frozenset[tuple[str, float | str]], _Person] = OrderedDict()
 
     def build(self, parameters: Parameters) -> tuple[Scene, Settings]:
@@ -166,9 +166,10 @@ class SceneBuilder:
         if name == GENERATED_MOTION:
             return None
         path = self._resolve_file(name)
-        if self._latest_capture is None or self._latest_capture[:2] != (id(head), path):
-            self._latest_capture = id(head), path, load_motion(path, head)
-        return self._latest_capture[2]
+        latest = self._latest_capture
+        if latest is None or latest[0] is not head or latest[1] != path:
+            latest = self._latest_capture = head, path, load_motion(path, head)
+        return latest[2]
 
     def _captured_pose(self, parameters: Parameters, head: Head) -> Pose | None:
         capture, clip = self._capture(parameters, head), self.spec.clip
@@ -210,6 +211,7 @@ class SceneBuilder:
             _MAX_CACHED_FILE_HEADS if _HEAD_PARAMETER in parameters else _MAX_CACHED_SAMPLED_PEOPLE
         ):
             self._people.popitem(last=False)
+            self._latest_capture = None
         return self._people[key]
 
     def _build_person(self, parameters: Parameters) -> _Person:

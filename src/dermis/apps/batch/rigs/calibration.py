@@ -61,7 +61,11 @@ def load_calibrations(path: Path) -> tuple[Calibration, ...]:
     """
     text = read_text(path, "calibrations of cameras")
     with error_context(path):
-        data = parse_json(text, path) if path.suffix.lower() == ".json" else parse_opencv_yaml(text)
+        data = (
+            parse_json(text, path, "calibrations in JSON")
+            if path.suffix.lower() == ".json"
+            else parse_opencv_yaml(text)
+        )
         cameras = tuple(_calibration(name, one) for name, one in _camera_tables(data))
         if not 2 <= len(cameras) <= MAX_CAMERAS:
             refuse("cameras", f"2 to {MAX_CAMERAS} cameras", f"got {len(cameras)}", "Correct it")
@@ -131,7 +135,7 @@ def _logical_lines(text: str) -> Iterator[tuple[int, str]]:
 
 def _scalar(text: str) -> float | str | list[Any]:
     if text.startswith("["):
-        nested = parse_json(re.sub(r"(?<=\d)\.(?=\D)", ".0", text), "a list")
+        nested = parse_json(re.sub(r"(?<=\d)\.(?=\D)", ".0", text), "list", "numbers in [ ]")
         return list(nested) if isinstance(nested, list) else []
     try:
         return float(text)
