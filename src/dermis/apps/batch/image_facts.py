@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 
+from dermis.apps.batch.blur.samples import FOCUS_FACT_NAMES
 from dermis.apps.batch.face_boxes import Box
 from dermis.apps.batch.sampling import Parameters, hashed_uniform, round_significant
 from dermis.apps.batch.spec import Spec
@@ -48,6 +49,7 @@ class ImageFacts:
     captured : weights of morph targets by captured motion, which replace those of the expression, by
         parameter name such as "pose.jawOpen"
     rig : all cameras of the rig by name, without distortion; empty for a spec with one camera
+    blur : facts about the lens, by the names of `FOCUS_FACT_NAMES`; empty without depth of field
     """
 
     person: Mapping[str, float | str | None] = field(default_factory=lambda: _NO_FACTS)
@@ -58,6 +60,7 @@ class ImageFacts:
     sensor: Mapping[str, float] = field(default_factory=dict)
     captured: Mapping[str, float] = field(default_factory=dict)
     rig: Mapping[str, OpenCvCamera] = field(default_factory=dict)
+    blur: Mapping[str, float] = field(default_factory=dict)
 
 
 def person_facts(person: Human) -> dict[str, float | str | None]:
@@ -88,7 +91,8 @@ def text_fact_names() -> frozenset[str]:
 
 def fact_names(spec: Spec) -> tuple[str, ...]:
     """Return the names of all facts that records list among the parameters of an image of a spec."""
-    return (*person_fact_names(), *(SENSOR_FACT_NAMES if spec.sensor is not None else ()))
+    sensor = SENSOR_FACT_NAMES if spec.sensor is not None else ()
+    return (*person_fact_names(), *sensor, *(FOCUS_FACT_NAMES if spec.blur is not None else ()))
 
 
 def record_parameters(

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.batch.distributions import Constant
-from dermis.apps.batch.observed_photographs import as_photograph, rendered_outputs
+from dermis.apps.batch.finishing import finished_image
+from dermis.apps.batch.observed_frames import PlannedImage, observe_images
 from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.scenes import SceneBuilder
 from dermis.apps.batch.shards import Part
@@ -130,7 +131,9 @@ def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
 
     width, height = (max(_SHEET_IMAGE_SIDE * side // max(spec.size), 1) for side in spec.size)
     limited = {name: min(side, getattr(spec.render, name)) for name, side in _MAX_PREVIEW_SIDES.items()}
-    spec = spec.replace(render=spec.render.replace(size=(width, height), **limited))
+    clip = None if spec.clip is None else spec.clip.replace(flow=None)
+    render = spec.render.replace(size=(width, height), **limited)
+    spec = spec.replace(render=render, clip=clip, outputs=(), landmarks=())
     numbers = range(0, spec.count, _sheet_step(spec))[:SHEET_IMAGE_COUNT]
     count = len(numbers)
     columns = min(count, _SHEET_COLUMNS)
@@ -158,12 +161,15 @@ def _sheet_pictures(
     for k in numbers:
         parameters = spec.parameters(k)
         scene, settings = builder.build(parameters)
-        if spec.sensor is None:
-            yield renderer.draw(scene, settings, timed=False).srgb8()
-            continue
-        (observation,) = renderer.observe([scene], settings, linear=True, outputs=rendered_outputs(spec))
-        photo, _ = as_photograph(observation, parameters, builder.facts(parameters, scene))
-        yield photo.picture.astype(np.uint8, copy=False)
+        facts = builder.facts(parameters, scene)
+        blurred = builder.blur_scenes(k, parameters, scene)
+        plan = PlannedImage(k, parameters, facts, scene, settings, None, None, blurred)
+        (observation,) = observe_images(renderer, spec, [plan])
+        photo, _ = finished_image(observation, parameters, facts, spec)
+        picture = photo.picture
+        if picture.shape[2] == 4:  # on black
+            picture = picture[..., :3] * (picture[..., 3:] / 255.0)
+        yield np.asarray(picture, np.uint8)
 
 
 def _parameter_row(spec: Spec, parameter: str, samples: Sequence[Parameters]) -> ParameterRow:

@@ -122,7 +122,7 @@ def make_record(
         "split": image_split(spec, parameters),
         "licence": image_licence(parameters),
         "parameters": record_parameters(
-            spec, {**parameters, **facts.captured}, {**facts.person, **facts.sensor}
+            spec, {**parameters, **facts.captured}, {**facts.person, **facts.sensor, **facts.blur}
         ),
         "skin_tone": None if skin_tone is None else skin_tone.as_json(),
         "camera": _camera_record(camera),

@@ -26,6 +26,7 @@ from dermis.apps.batch.spec_tables import (
     GAZE_ANGLES,
     LAMP_RIG,
     NO_ENVIRONMENT,
+    PICTURE_BACKGROUND,
     RANDOM_EXPRESSION,
     table_values,
 )
@@ -54,7 +55,11 @@ _CONDITIONAL_PARAMETERS: tuple[tuple[str | tuple[str, ...], Callable[[Parameters
         lambda sampled: sampled["environment.name"] != NO_ENVIRONMENT,
     ),
     (_BACKGROUND_CHANNELS, lambda sampled: sampled["background.kind"] == "colour"),
-    ("background.blur", lambda sampled: sampled["background.kind"] == "environment"),
+    ("background.blur", lambda sampled: sampled["background.kind"] in ("environment", PICTURE_BACKGROUND)),
+    (
+        ("background.picture", "background.zoom", "background.crop"),
+        lambda sampled: sampled["background.kind"] == PICTURE_BACKGROUND,
+    ),
     ("camera.frame_mm", lambda sampled: "camera.focal_mm" not in sampled),
     ("sensor.white_kelvin", lambda sampled: sampled.get("sensor.white_balance") == "kelvin"),
     (
@@ -66,6 +71,7 @@ _CONDITIONAL_PARAMETERS: tuple[tuple[str | tuple[str, ...], Callable[[Parameters
         ("clip.blinks", "clip.gaze", "clip.head", "clip.speech", "clip.syllables"),
         lambda sampled: sampled.get("clip.motion") == GENERATED_MOTION,
     ),
+    ("blur.focus_mm", lambda sampled: bool(sampled.get("blur.f_number"))),
     ("clip.motion_start", lambda sampled: sampled.get("clip.motion") != GENERATED_MOTION),
     (
         ("clip.pulse_amplitude", "clip.pulse_variability", "clip.respiration"),
@@ -218,7 +224,7 @@ class Sampler:
     sequence: ImageSequence = _SINGLE_PICTURES
     lenses: tuple[Mapping[str, float], ...] = ()
 
-    def parameters(self, image_number: int, frame_offset: int = 0) -> Parameters:
+    def parameters(self, image_number: int, frame_offset: float = 0) -> Parameters:
         """Return the sampled parameters of one image by dotted name, independently of other images.
 
         frame_offset : number of frames after the image, in its clip or beyond

@@ -12,6 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from dermis.apps.batch.blur.samples import (
+    FOCUS_FACT_NAMES,
+    Aperture,
+    aperture_points,
+    camera_at,
+    shutter_times_ms,
+    thin_lens,
+)
 from dermis.apps.batch.cameras import camera_behind_lens, face_hull_indices, sampled_camera, sampled_lens
 from dermis.apps.batch.clips.capture import capture_pose, moves_eyes, with_capture
 from dermis.apps.batch.clips.frames import PULSE_NAMES
@@ -23,7 +31,7 @@ from dermis.apps.batch.lighting import direction_from_angles, light_colour, samp
 from dermis.apps.batch.rigs.views import VIEW_NAME
 from dermis.apps.batch.sampling import Parameters, round_significant, table_numbers
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.spec_tables import GAZE_ANGLES, NO_ENVIRONMENT, table_values
+from dermis.apps.batch.spec_tables import GAZE_ANGLES, NO_ENVIRONMENT, PICTURE_BACKGROUND, table_values
 from dermis.base.reading import is_file
 from dermis.formats.motion.captures import find_rotation_bones
 from dermis.human.person import Human
@@ -110,6 +118,41 @@ class SceneBuilder:
             scene = clip_pulse(seed, clip).scene_at(scene, pulse_time_s(seed, clip, clip["time_s"]))
         return scene, self.spec.render.replace(**_background_settings(parameters))
 
+    def blur_scenes(self, image_number: int, parameters: Parameters, scene: Scene) -> tuple[Scene, ...]:
+        """Return the scenes whose average is the picture of an image; none for sharp pictures.
+
+        scene : scene of the image at the middle of the exposure and of the aperture
+        """
+        table = self.spec.blur
+        if table is None:
+            return ()
+        aperture, count = self._aperture(parameters, scene), table.samples
+        times_ms = shutter_times_ms(count, float(parameters["blur.shutter_ms"]))
+        found = []
+        for point, time_ms in zip(aperture_points(count), times_ms.tolist(), strict=True):
+            moved = scene
+            if time_ms and self.spec.clip is not None:
+                offset = 1e-3 * time_ms * self.spec.clip.rate_hz
+                moved, _ = self.build(self.spec.neighbour_parameters(image_number, offset))
+            found.append(moved.replace(camera=camera_at(scene.camera, aperture, point, self.spec.size)))
+        return tuple(found)
+
+    def _aperture(self, parameters: Parameters, scene: Scene) -> Aperture:
+        """Return the aperture of an image's lens, which focuses on the nearer eye or the nearest point."""
+        person, rig = self._cached_person(parameters), scene.head.control_rig
+        pose = rig.rest if scene.pose_arrays is None else scene.pose_arrays
+        indices = person.points if scene.head.eyes is None else scene.head.eyes.apex
+        points = rig.pose_points(indices, pose) - np.array(scene.head.centre_mm)
+        values = table_numbers(parameters, "blur")
+        return thin_lens(points, scene.camera, values["f_number"], values.get("focus_mm", 0.0))
+
+    def _blur_facts(self, parameters: Parameters, scene: Scene) -> dict[str, float]:
+        if self.spec.blur is None or not parameters["blur.f_number"]:
+            return {}
+        aperture = self._aperture(parameters, scene)
+        values = aperture.focus_depth_mm, aperture.diameter_mm
+        return {name: round_significant(one) for name, one in zip(FOCUS_FACT_NAMES, values, strict=True)}
+
     def facts(self, parameters: Parameters, scene: Scene) -> ImageFacts:
         """Return the facts about an image that its record contains in addition to the parameters.
 
@@ -134,6 +177,7 @@ class SceneBuilder:
             picture_camera.K,
             captured={} if captured is None else _recorded_weights(captured, parameters),
             rig=self._rig_cameras(parameters, base),
+            blur=self._blur_facts(parameters, scene),
         )
 
     def _rig_camera(self, parameters: Parameters, base: Camera) -> Camera:
@@ -357,4 +401,6 @@ def _background_settings(parameters: Parameters) -> dict[str, object]:
     kind = parameters["background.kind"]
     if kind == "colour":
         return {"background": tuple(parameters[f"background.{one}"] for one in ("red", "green", "blue"))}
+    if kind == PICTURE_BACKGROUND:  # composed later
+        return {"background": "none"}
     return {"background": kind, "background_blur": parameters.get("background.blur", 0.0)}

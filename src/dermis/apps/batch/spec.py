@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, BaseModel, Field, PrivateAttr
 
 from dermis.apps.batch import spec_tables as tables
+from dermis.apps.batch.blur.table import BlurTable
 from dermis.apps.batch.clips.checks import check_clip
 from dermis.apps.batch.clips.flow import FLOW_OUTPUTS
 from dermis.apps.batch.clips.frames import ImageSequence
@@ -27,6 +28,8 @@ from dermis.apps.batch.sampling import Parameters, Sampler
 from dermis.apps.batch.sensor.lens import Lens
 from dermis.apps.batch.sensor.model import Sensor
 from dermis.apps.batch.spec_checks import (
+    check_backgrounds,
+    check_blur,
     check_landmarks,
     check_lens,
     check_sensor,
@@ -69,7 +72,7 @@ _TOML_HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
 _MAX_MATCHING_FILES = 100_000
 _MAX_HASHED_BYTES = 4 << 30
 _MAX_KEY_LENGTH, _MIN_KEY_SIMILARITY = 80, 0.7  # limits for suggestions to unknown keys
-_FILE_PARAMETERS = "person.head", "environment.name", "skin.profile", "clip.motion"
+_FILE_PARAMETERS = "person.head", "environment.name", "skin.profile", "clip.motion", "background.picture"
 """Parameters whose values may be files."""
 P = TypeVar("P", bound=FrozenModel)
 _DeviceTable = dict[str, Annotated[Distribution, tables.DistributionField()]]
@@ -139,6 +142,8 @@ class Spec(FrozenModel):
     """Frames of people in motion; without this table, images are single pictures."""
     rig: Annotated[RigTable | None, AfterValidator(with_defaults)] = None
     """Several cameras that see the same moment; without this table, there is one."""
+    blur: BlurTable | None = None
+    """Depth of field and motion blur of the pictures; without this table, pictures are sharp."""
     lens: Annotated[_DeviceTable | None, AfterValidator(partial(_with_defaults, Lens))] = None
     """Distortion of the camera's lens; needs [sensor]."""
     sensor: Annotated[_DeviceTable | None, AfterValidator(partial(_with_defaults, Sensor))] = None
@@ -171,6 +176,9 @@ class Spec(FrozenModel):
             check_lens(distributions, self.outputs)
         if self.clip is not None:
             check_clip(self.clip, distributions, self.folder)
+        if self.blur is not None:
+            check_blur(distributions, self.render, has_clip=self.clip is not None)
+        check_backgrounds(distributions, self.folder, has_rig=self.rig is not None)
         if self.cameras is not None:
             check_rig(self.cameras, distributions, self.size, has_lens=self.lens is not None)
         if self.images_per_person % self.sequence.images:
@@ -241,7 +249,7 @@ class Spec(FrozenModel):
         """
         return self._sampler.parameters(checked_integer("image", image_number, 0, self.count - 1))
 
-    def neighbour_parameters(self, image_number: int, frame_offset: int) -> Parameters:
+    def neighbour_parameters(self, image_number: int, frame_offset: float) -> Parameters:
         """Return the parameters of another frame of an image's clip, which may be before or after the clip.
 
         frame_offset : number of frames after the image

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 from dermis.apps.batch.atomic_files import remove_path
 from dermis.apps.batch.child_processes import LostProcessError
 from dermis.apps.batch.encoder_pool import EncodedImage, EncoderPool
+from dermis.apps.batch.finishing import finished_image
 from dermis.apps.batch.image_facts import ImageFacts
 from dermis.apps.batch.observed_frames import PlannedImage, observe_images
-from dermis.apps.batch.observed_photographs import as_photograph
 from dermis.apps.batch.parts import KeptImages, copy_images, join_parts, kept_images
 from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.sampling import Parameters
@@ -257,7 +257,8 @@ class Worker:
                 scene, settings = self._builder.build(parameters)
                 facts = self._builder.facts(parameters, scene)
                 neighbours = self._neighbour_scenes(number)
-                plan = PlannedImage(number, parameters, facts, scene, settings, *neighbours)
+                blurred = self._builder.blur_scenes(number, parameters, scene)
+                plan = PlannedImage(number, parameters, facts, scene, settings, *neighbours, blurred)
             except DermisError as fault:
                 if not self._options.keep_going:
                     raise DermisError(f"image {number}: {fault}") from fault
@@ -341,6 +342,5 @@ def _encode_image(
     skin_tone: SkinTone | None,
     facts: ImageFacts,
 ) -> EncodedImage:
-    if spec.sensor is not None:
-        observation, facts = as_photograph(observation, parameters, facts)
+    observation, facts = finished_image(observation, parameters, facts, spec)
     return image_number, encode_record(image_number, observation, parameters, spec, skin_tone, facts)

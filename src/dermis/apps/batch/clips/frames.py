@@ -25,11 +25,14 @@ Values = dict[str, float | int | str]
 
 
 class ImagePlace(NamedTuple):
-    """Place of an image in a data set: number of its moment or clip, of its camera, and of its frame."""
+    """Place of an image in a data set: number of its moment or clip, of its camera, and of its frame.
+
+    Between frames, the frame is not a whole number.
+    """
 
     moment: int
     view: int
-    frame: int
+    frame: float
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,8 @@ class ImageSequence:
     def place(self, image_number: int) -> ImagePlace:
         """Return the place of an image."""
         moment, within = divmod(image_number, self.images)
-        return ImagePlace(moment, *divmod(within, self.frames))
+        view, frame = divmod(within, self.frames)
+        return ImagePlace(moment, view, frame)
 
 
 def frame_parameters(
