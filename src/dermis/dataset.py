@@ -1,8 +1,8 @@
-"""Data sets in Python: specs, images as arrays, a stream, photographs, and exports of keypoints and movies."""
+"""Data sets in Python: specs, arrays, a stream, photographs, and exports of keypoints and movies."""
 
-from dermis.apps.batch.clips.movies import export_movies
 from dermis.apps.batch.image_facts import SPLIT_NAMES
 from dermis.apps.batch.keypoint_files import export_keypoints
+from dermis.apps.batch.movie_files import export_movies
 from dermis.apps.batch.reader import decode_image, read_dataset
 from dermis.apps.batch.sensor.lens import Lens
 from dermis.apps.batch.sensor.model import Sensor

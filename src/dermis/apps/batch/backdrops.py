@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.apps.batch.sampling import Parameters, table_numbers
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import PICTURE_BACKGROUND
-from dermis.base.arrays import Bytes, Floats
+from dermis.base.arrays import Floats
 from dermis.base.errors import refuse
 from dermis.frame.observation import Observation
 from dermis.images.colour import decode_srgb_levels, encode_srgb8
@@ -75,7 +76,7 @@ def picture_backdrop(path: Path, picture_size: tuple[int, int], crop: Crop, blur
     if blur:
         sd = blur * _BLUR_OF_HEIGHT * picture_size[1]
         backdrop = gaussian_filter(backdrop, (sd, sd, 0.0), mode="nearest")
-    return np.maximum(backdrop, 0.0).astype(np.float32)
+    return np.asarray(np.maximum(backdrop, 0.0), np.float32)
 
 
 def crop_box(
@@ -92,7 +93,7 @@ def crop_box(
     return left, upper, min(left + own_width, width), min(upper + own_height, height)
 
 
-def _over(picture: Bytes | Floats, backdrop: Floats) -> Bytes | Floats:
+def _over(picture: NDArray[np.uint8 | np.float32], backdrop: Floats) -> NDArray[np.uint8 | np.float32]:
     """Return a picture with alpha (h, w, 4) over a background: linear floats, or sRGB bytes.
 
     Colours of floats are already multiplied by alpha, those of bytes are not.

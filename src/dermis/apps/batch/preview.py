@@ -166,10 +166,8 @@ def _sheet_pictures(
         plan = PlannedImage(k, parameters, facts, scene, settings, None, None, blurred)
         (observation,) = observe_images(renderer, spec, [plan])
         photo, _ = finished_image(observation, parameters, facts, spec)
-        picture = photo.picture
-        if picture.shape[2] == 4:  # on black
-            picture = picture[..., :3] * (picture[..., 3:] / 255.0)
-        yield np.asarray(picture, np.uint8)
+        alpha = photo.picture[..., 3:] / 255.0 if photo.picture.shape[2] == 4 else 1.0
+        yield np.asarray(photo.picture[..., :3] * alpha, np.uint8)  # on black
 
 
 def _parameter_row(spec: Spec, parameter: str, samples: Sequence[Parameters]) -> ParameterRow:

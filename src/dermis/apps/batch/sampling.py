@@ -14,6 +14,7 @@ from dermis.apps.batch.clips.frames import (
     FRAME_NAMES,
     MOTION_NAMES,
     PULSE_NAMES,
+    VIEW_NAME,
     ImagePlace,
     ImageSequence,
     frame_parameters,
@@ -21,7 +22,6 @@ from dermis.apps.batch.clips.frames import (
 from dermis.apps.batch.clips.motion import MOVED_TARGETS
 from dermis.apps.batch.clips.table import GENERATED_MOTION
 from dermis.apps.batch.distributions import Constant, Distribution
-from dermis.apps.batch.rigs.views import VIEW_NAME
 from dermis.apps.batch.spec_tables import (
     GAZE_ANGLES,
     LAMP_RIG,

@@ -22,13 +22,12 @@ from dermis.apps.batch.blur.samples import (
 )
 from dermis.apps.batch.cameras import camera_behind_lens, face_hull_indices, sampled_camera, sampled_lens
 from dermis.apps.batch.clips.capture import capture_pose, moves_eyes, with_capture
-from dermis.apps.batch.clips.frames import PULSE_NAMES
+from dermis.apps.batch.clips.frames import PULSE_NAMES, VIEW_NAME
 from dermis.apps.batch.clips.motion import clip_pulse, pulse_time_s
 from dermis.apps.batch.clips.table import GENERATED_MOTION
 from dermis.apps.batch.face_boxes import BoxPoints, box_points, face_boxes
 from dermis.apps.batch.image_facts import ImageFacts, person_facts
 from dermis.apps.batch.lighting import direction_from_angles, light_colour, sampled_lights
-from dermis.apps.batch.rigs.views import VIEW_NAME
 from dermis.apps.batch.sampling import Parameters, round_significant, table_numbers
 from dermis.apps.batch.spec import Spec
 from dermis.apps.batch.spec_tables import GAZE_ANGLES, NO_ENVIRONMENT, PICTURE_BACKGROUND, table_values

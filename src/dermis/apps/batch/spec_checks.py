@@ -7,6 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from dermis.apps.batch.clips.flow import FLOW_OUTPUTS
 from dermis.apps.batch.distributions import Distribution
 from dermis.apps.batch.lighting import LAMP_NAMES
 from dermis.apps.batch.sensor.lens import Lens
@@ -110,8 +111,8 @@ def check_lens(distributions: Mapping[str, Distribution], outputs: Sequence[str]
     outputs : outputs of the spec
     """
     _check_table("lens", distributions, list(Lens.model_fields), Lens)
-    if "motion" in outputs:
-        expected = "outputs without motion, which is that of a pinhole camera"
+    if {"motion", "motion_depth", *FLOW_OUTPUTS} & {*outputs}:
+        expected = "outputs without motion and flow, which are those of a pinhole camera"
         refuse("outputs", expected, "the spec has a table [lens]", "Remove motion or [lens]")
 
 

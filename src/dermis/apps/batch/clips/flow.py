@@ -19,7 +19,7 @@ FLOW_INPUTS = "depth", "motion", "motion_depth"
 """Outputs of a frame from which its flow is computed."""
 FLOW_OUTPUTS: Mapping[str, Output] = MappingProxyType(
     {
-        f"{quantity}_{direction}": Output(f"{quantity}_{direction}", _STAGE, *fields)  # type: ignore[arg-type]
+        f"{quantity}_{direction}": Output(f"{quantity}_{direction}", _STAGE, *fields)
         for direction, frame in (("backward", "previous"), ("forward", "next"))
         for quantity, fields in (
             (

@@ -19,6 +19,8 @@ MOTION_NAMES = (
 )
 """Parameters of generated motion at the time of a frame."""
 PULSE_NAMES = "clip.pulse_seed", "clip.pulse_blood"
+VIEW_NAME = "rig.view"
+"""Parameter with the number of the camera."""
 FRAME_NAMES = "clip.number", "clip.frame", "clip.time_s"
 _SEED_COUNT = 2**32
 Values = dict[str, float | int | str]

@@ -17,7 +17,7 @@ from dermis.base.reading import parse_json, read_text
 from dermis.scene.camera import Camera
 
 MAX_CAMERAS = 256
-_MAX_NUMBER = 1e9
+_BOUNDS = -1e9, 1e9
 _FORMS = 'a list "cameras" with K, R, t and size, or the K1, D1, K2, D2, R, T of a stereo calibration'
 _KEYS: Mapping[str, tuple[str, ...]] = {
     "K": ("K", "camera_matrix", "cameraMatrix", "intrinsic_matrix"),
@@ -166,7 +166,7 @@ def _camera_tables(data: object) -> list[tuple[str, Mapping[str, Any]]]:
 
 def _stereo_tables(data: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
     """Return the tables of the two cameras of cv2.stereoCalibrate, of which the first is the world."""
-    tables = []
+    tables: list[tuple[str, Mapping[str, Any]]] = []
     for k, (R, t) in enumerate([(np.eye(3).tolist(), [0.0, 0.0, 0.0]), (data["R"], data["T"])], 1):
         own = {
             name: next((data[f"{key}{k}"] for key in keys if f"{key}{k}" in data), None)
@@ -183,7 +183,7 @@ def _value(table: Mapping[str, Any], name: str) -> Any:
     if found is None and name == "size" and {"image_width", "image_height"} <= table.keys():
         return [table["image_width"], table["image_height"]]
     if isinstance(found, Mapping) and {"rows", "cols", "data"} <= found.keys():
-        matrix = np.ravel(checked_array(name, found["data"], (0,), -_MAX_NUMBER, _MAX_NUMBER))
+        matrix = np.ravel(checked_array(name, found["data"], (0,), *_BOUNDS))
         shape = int(found["rows"]), int(found["cols"])
         if matrix.size != shape[0] * shape[1]:
             refuse(name, f"{shape[0]} x {shape[1]} numbers", f"got {matrix.size}", "Correct it")
@@ -201,17 +201,20 @@ def _calibration(name: str, table: Mapping[str, Any]) -> Calibration:
         width, height = np.ravel(checked_array("size", np.ravel(_value(table, "size")), (2,), 1, 1e6)).astype(
             int
         )
-        parts = {"K": (3, 3), "R": (3, 3), "t": (3,)}
-        defaults = {"R": np.eye(3), "t": np.zeros(3)}
-        arrays = {}
-        for part, shape in parts.items():
-            value = _value(table, part)
-            value = defaults.get(part) if value is None else value
-            value = np.ravel(value) if part == "t" else value
-            arrays[part] = checked_array(part, value, shape, -_MAX_NUMBER, _MAX_NUMBER)
+        K, R = (_matrix(table, part) for part in ("K", "R"))
+        stated_t = _value(table, "t")
+        t = checked_array("t", np.ravel([0.0] * 3 if stated_t is None else stated_t), (3,), *_BOUNDS)
         size = int(width), int(height)
-        Camera.from_opencv(**arrays, size=size)  # refuses invalid matrices
-        return Calibration(name, arrays["K"], _lens(_value(table, "dist")), arrays["R"], arrays["t"], size)
+        Camera.from_opencv(K, R, t, size)  # refuses invalid matrices
+        return Calibration(name, K, _lens(_value(table, "dist")), R, t, size)
+
+
+def _matrix(table: Mapping[str, Any], name: str) -> Doubles:
+    """Return a matrix (3, 3) of a camera; the rotation is 1 if it is missing."""
+    value = _value(table, name)
+    if value is None and name == "K":
+        refuse(name, "the intrinsic matrix of the camera", "there is none", "Add it")
+    return checked_array(name, np.eye(3) if value is None else value, (3, 3), *_BOUNDS)
 
 
 def _lens(coefficients: object) -> Lens:

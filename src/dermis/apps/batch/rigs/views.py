@@ -18,8 +18,6 @@ from dermis.base.errors import refuse
 from dermis.mesh.rotations import angles_matrix
 from dermis.scene.camera import Camera
 
-VIEW_NAME = "rig.view"
-"""Parameter with the number of the camera."""
 _KEYS_OF_KIND: Mapping[str, tuple[str, ...]] = {
     "stereo": ("baseline_mm", "parallel"),
     "orbit": ("count", "arc_deg"),

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from itertools import chain, groupby
 from pathlib import Path
 
-from dermis.apps.batch.clips.frames import FRAME_NAMES
+from dermis.apps.batch.clips.frames import FRAME_NAMES, VIEW_NAME
 from dermis.apps.batch.reader import ImageFields, read_dataset
-from dermis.apps.batch.rigs.views import VIEW_NAME
 from dermis.base.atomic_write import refuse_output, temporary_folder
 from dermis.base.errors import refuse
 from dermis.base.reading import checked_path
