@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from moving_head import CAPTURE, write_moving_head
 from small_set import drawn_here
 
 import dermis
 from dermis.apps.batch.clips.flow import hidden_points
 from dermis.apps.batch.clips.motion import motion_at, pulse_time_s
+from dermis.apps.batch.goodness_of_fit import fit_tests
 from dermis.apps.batch.scenes import SceneBuilder
 from dermis.apps.batch.spec import Spec, parse_spec
 from dermis.apps.batch.worker import RunOptions, Worker
@@ -228,3 +230,31 @@ def test_invalid_tables_are_refused(table: dict[str, Any], message: str) -> None
         parse_spec({"clip": table})
     with pytest.raises(DermisError, match="images_per_person: expected a multiple of 4"):
         parse_spec({"clip": {"frames": 4}, "images_per_person": 6})
+
+
+def test_records_have_the_weights_of_captures(tmp_path: Path) -> None:
+    write_moving_head(tmp_path / "moving.glb")
+    (tmp_path / "take.csv").write_text(CAPTURE)  # jawOpen: 0, 1, 0 in half a second
+    clip = {"frames": 4, "rate_hz": 16, "motion": "take.csv", "motion_start": 0, "flow": True}
+    tables = {"person": {"head": "moving.glb"}, "landmarks": [], "outputs": ["depth"], "clip": clip}
+    spec = parse_spec({**SMALL, **tables, "count": 4, "size": [32, 32]}, tmp_path)
+    assert drawn_here(spec, tmp_path / "out").is_complete
+    images = list(dermis.read_dataset(tmp_path / "out"))
+    opened = [image["parameters"]["pose.jawOpen"] for image in images]
+    np.testing.assert_allclose(opened, [0.25, 0.5, 0.75, 1.0], atol=1e-5)
+    assert all(np.abs(image["flow_backward"]).max() > 0.2 for image in images)
+    assert np.abs(images[2]["flow_backward"]).max() == pytest.approx(
+        np.abs(images[1]["flow_forward"]).max(), abs=0.1
+    )
+
+
+def test_moments_count_once_in_tests_of_the_fit(tmp_path: Path) -> None:
+    """Otherwise, equal frames of a clip would make all distributions differ from the spec."""
+    tables = {"clip": {"frames": 20}, "rig": {"kind": "orbit", "count": 2}}
+    spec = parse_spec({**SMALL, **tables, "count": 12_000, "head": {"yaw_deg": {"uniform": [-20, 20]}}})
+    rows = [{"number": k, **spec.parameters(k)} for k in range(0, spec.count, 10)]
+    columns = {name: [row[name] for row in rows] for name in ("number", "person.number", "head.yaw_deg")}
+    pyarrow = pytest.importorskip("pyarrow")
+    pytest.importorskip("pyarrow.parquet").write_table(pyarrow.table(columns), tmp_path / "index.parquet")
+    (found,) = fit_tests(tmp_path, spec)
+    assert found.sample_count == 300 and found.p_value > 1e-3

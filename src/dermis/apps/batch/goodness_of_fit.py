@@ -75,8 +75,10 @@ def fit_tests(dataset_folder: Path, spec: Spec) -> Iterator[FitTest]:
         if "person.number" in names:  # rows of the first image of each person
             people = np.array(file.read(columns=["person.number"]).column(0).to_pylist(), np.int64)
             first = np.unique(people, return_index=True)[1]
-        numbers = np.array(file.read(columns=["number"]).column(0).to_pylist(), np.int64)
-        moments = np.unique(numbers // spec.sequence.images, return_index=True)[1]
+        moments: NDArray[np.int64] | slice = slice(None)
+        if spec.sequence.images > 1:  # rows of the first image of each moment
+            numbers = np.array(file.read(columns=["number"]).column(0).to_pylist(), np.int64)
+            moments = np.unique(numbers // spec.sequence.images, return_index=True)[1]
         for name, distribution in spec.distributions.items():
             column = _index_column(name)
             moves = spec.clip is not None and name.startswith("pose.")  # values are those of the frame

@@ -78,7 +78,7 @@ def scaled_intrinsics(calibration: Calibration, picture_size: tuple[int, int]) -
     Raises DermisError for a size with another ratio of width to height.
     """
     (width, height), (own_width, own_height) = picture_size, calibration.size
-    if abs(width * own_height - height * own_width) > 0.01 * height * own_width:
+    if abs(height - width * own_height / own_width) > 1.0:  # pixels
         expected = (
             f"pictures in the ratio of {own_width} x {own_height}, the size of camera {calibration.name}"
         )
