@@ -12,6 +12,7 @@ import pytest
 from small_set import contents, drawn_here, write_spec
 
 import dermis
+from dermis.apps.batch.preview import dry_run
 from dermis.apps.batch.rigs.calibration import load_calibrations, parse_opencv_yaml
 from dermis.apps.batch.spec import Spec, parse_spec
 from dermis.base.errors import DermisError
@@ -236,3 +237,13 @@ def test_without_the_table_specs_are_unchanged() -> None:
     for number in range(9):  # the moments are the images without the rig
         shared = {k: v for k, v in rig.parameters(number).items() if not k.startswith("rig.")}
         assert shared == plain.parameters(number // 3)
+
+
+def test_the_preview_shows_frames_of_clips_from_each_camera(tmp_path: Path) -> None:
+    tables = {"rig": {"kind": "orbit", "count": 3}, "clip": {"frames": 8, "flow": True}}
+    spec = spec_of(tmp_path, count=24, **tables)
+    rows, sheet, estimate = dry_run(spec, "cpu")
+    assert sheet.shape == (3 * 192 + 2 * 4, 4 * 192 + 3 * 4, 3)  # four frames from each of three cameras
+    views = [sheet[k * 196 : k * 196 + 192, :192].astype(int) for k in range(3)]
+    assert np.abs(views[0] - views[1]).max() > 20
+    assert estimate["bytes"] > 24 * 1000 and {row["parameter"] for row in rows} >= {"rig.view", "clip.frame"}

@@ -46,16 +46,20 @@ def with_backdrop(observation: Observation, parameters: Parameters, spec: Spec) 
     values, picture = table_numbers(parameters, "background"), observation.picture
     crop = Crop(values["zoom"], values["crop_x"], values["crop_y"])
     path = spec.folder / str(parameters["background.picture"])
-    backdrop = picture_backdrop(path, spec.size, crop, values["blur"])
+    digest = spec.files.get(str(parameters["background.picture"]), "")
+    backdrop = picture_backdrop(path, spec.size, crop, values["blur"], digest)
     return replace(observation, picture=_over(picture, backdrop))
 
 
 @lru_cache(maxsize=4)
-def picture_backdrop(path: Path, picture_size: tuple[int, int], crop: Crop, blur: float) -> Floats:
+def picture_backdrop(
+    path: Path, picture_size: tuple[int, int], crop: Crop, blur: float, digest: str = ""
+) -> Floats:
     """Return a part of a picture file as a background (h, w, 3) in linear Rec. 709.
 
     picture_size : width and height of the background [pixel]
     blur : blur from 0 to 1; at 1 a Gaussian whose standard deviation is a tenth of the height [-]
+    digest : hash of the file, by which results are cached
 
     Raises DermisError for files that are not pictures.
     """

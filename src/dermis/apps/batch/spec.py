@@ -155,10 +155,12 @@ class Spec(FrozenModel):
 
     _sampler: Sampler = PrivateAttr()
     _digest: str = PrivateAttr("")
+    _cameras: Rig | None = PrivateAttr(None)
 
     def model_post_init(self, context: object) -> None:
         """Check that the distributions of all tables are consistent, and create the sampler."""
         distributions = _table_distributions("", self)
+        BaseModel.__setattr__(self, "_cameras", load_rig(self.rig, self.folder))
         expressions = {**EXPRESSIONS, **self.expressions}
         with error_context("outputs"):
             check_outputs(self.outputs)
@@ -204,11 +206,7 @@ class Spec(FrozenModel):
     @property
     def cameras(self) -> Rig | None:
         """Return the cameras of the rig; None for a spec with one camera."""
-        return (
-            None
-            if self.rig is None
-            else load_rig(self.rig, self.folder, self.files.get(self.rig.file or "", ""))
-        )
+        return self._cameras
 
     @property
     def stored_outputs(self) -> tuple[str, ...]:
@@ -376,7 +374,8 @@ def _with_images_per_person(fields: dict[str, object], folder: Path) -> dict[str
         frames = clip.frames
     if "rig" in fields:
         built["rig"] = table = with_defaults(_build_model(RigTable, "rig", fields["rig"]))
-        views = len(load_rig(table, folder).names) if table else 1
+        rig = load_rig(table, folder)
+        views = len(rig.names) if rig else 1
     return {**fields, **built, "images_per_person": frames * views}
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -99,13 +98,13 @@ class Rig:
         return Camera.from_opencv(scaled_intrinsics(one, picture_size), R, t, picture_size)
 
 
-@lru_cache(maxsize=8)
-def load_rig(table: RigTable, folder: Path, digest: str = "") -> Rig:
-    """Return the rig of a spec.
+def load_rig(table: RigTable | None, folder: Path) -> Rig | None:
+    """Return the rig of a spec; None without a table.
 
     folder : folder of the spec, to which the file is relative
-    digest : digest of the file's content, for the cache
     """
+    if table is None:
+        return None
     calibrations = load_calibrations(folder / table.file) if table.file else ()
     return Rig(table, calibrations)
 
