@@ -11,7 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import dermis
+from dermis.apps.batch.blur.table import BlurTable
+from dermis.apps.batch.clips.table import ClipTable
 from dermis.apps.batch.distributions import Distribution
+from dermis.apps.batch.rigs.table import RigTable
 from dermis.apps.batch.sensor.lens import Lens
 from dermis.apps.batch.sensor.model import Sensor
 from dermis.apps.batch.spec import Spec
@@ -65,6 +68,9 @@ SPEC_TABLES: dict[str, type[FrozenModel]] = {
     "[light.key], [light.fill], [light.rim]": LampTable,
     "[environment]": EnvironmentTable,
     "[background]": BackgroundTable,
+    "[clip]": ClipTable,
+    "[rig]": RigTable,
+    "[blur]": BlurTable,
     "[lens]": Lens,
     "[sensor]": Sensor,
     "[[correlated]]": CorrelationGroup,

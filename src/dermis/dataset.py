@@ -1,7 +1,8 @@
-"""Data sets in Python: specs, images as arrays, a stream, photographs, and exports of keypoints."""
+"""Data sets in Python: specs, arrays, a stream, photographs, and exports of keypoints and movies."""
 
 from dermis.apps.batch.image_facts import SPLIT_NAMES
 from dermis.apps.batch.keypoint_files import export_keypoints
+from dermis.apps.batch.movie_files import export_movies
 from dermis.apps.batch.reader import decode_image, read_dataset
 from dermis.apps.batch.sensor.lens import Lens
 from dermis.apps.batch.sensor.model import Sensor
@@ -19,6 +20,7 @@ __all__ = [
     "arrays",
     "decode_image",
     "export_keypoints",
+    "export_movies",
     "load_spec",
     "parameter_names",
     "parse_spec",

@@ -15,7 +15,7 @@ from dermis.base.errors import refuse
 from dermis.frame.features.outputs.output_images import OutputArray
 from dermis.images.codecs import encode_png
 from dermis.images.io import encode_exr_parts
-from dermis.scene.outputs import OUTPUTS, Output
+from dermis.scene.outputs import OUTPUTS, Output, Quantisation
 
 FileFormat = Literal["exr", "png", "npy"]
 _MAX_PNG_LEVEL = 65535
@@ -70,14 +70,20 @@ def write_multipart(path: Path, picture: OutputArray, output_arrays: Mapping[str
 
 
 def quantise(output_name: str, output_array: OutputArray) -> NDArray[np.uint8 | np.uint16]:
-    """Return an output as integers for a PNG file, (h, w) or (h, w, 3).
+    """Return an output of a frame as integers for a PNG file, see `quantise_levels`."""
+    return quantise_levels(output_array, OUTPUTS[output_name].quantisation)
+
+
+def quantise_levels(
+    output_array: OutputArray, quantisation: Quantisation | None
+) -> NDArray[np.uint8 | np.uint16]:
+    """Return an output as integers for a PNG file, (h, w) or (h, w, 3); bytes are returned unchanged.
 
     Outputs with two channels get a third channel of zeros, because PNG has no format with two colour
     channels.
     """
     if output_array.dtype == np.uint8:
         return output_array
-    quantisation = OUTPUTS[output_name].quantisation
     assert quantisation is not None, "check_formats accepts only quantised outputs"
     words = np.clip(np.rint(output_array / quantisation.step + quantisation.zero), 0, _MAX_PNG_LEVEL).astype(
         np.uint16

@@ -56,6 +56,7 @@ from dermis.mesh.outline import Outline
 from dermis.mesh.rig import PoseArrays
 from dermis.scene.lights import Light
 from dermis.scene.model import Scene
+from dermis.scene.outputs import OUTPUTS
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
@@ -112,7 +113,7 @@ class Preparation:
         inputs = self._prepare_inputs(
             scene, settings, TECHNIQUES[settings.technique], view, (outputs, landmarks)
         )
-        if "motion" in outputs:
+        if any(OUTPUTS[name].stage == "motion" for name in outputs):
             inputs = replace(inputs, previous=self._previous_scene(scene, previous or scene, inputs))
         if hair_frame is not None:
             inputs = replace(inputs, swing=self._swing(scene, inputs.resources, hair_frame))

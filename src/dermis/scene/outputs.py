@@ -165,6 +165,16 @@ _BUILT_IN_OUTPUTS = (
         _MOTION_QUANTISATION,
     ),
     Output(
+        "motion_depth",
+        "motion",
+        "Z",
+        _FLOAT_CHANNEL,
+        "mm",
+        "depth of the visible point in the previous scene",
+        0.0,
+        _LENGTH_QUANTISATION,
+    ),
+    Output(
         "alpha",
         "alpha",
         "A",

@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps.batch.lighting import direction_from_angles
 from dermis.apps.batch.sampling import Parameters, table_numbers
-from dermis.apps.batch.sensor.lens import Lens, view_scale
+from dermis.apps.batch.sensor.lens import Lens, view_scales
 from dermis.mesh.head import Head
 from dermis.mesh.rig import PoseArrays
 from dermis.scene.camera import Camera
 
 _SENSOR_HEIGHT_MM = 24.0
+_CENTRAL_POINT = 0.5, 0.5
 _MAX_FACE_COORDINATE = 0.96  # largest distance of the face from the picture's centre; 1 is the edge
 _AIM_BISECTION_STEPS = 12
 _FACE_BOX_MM = ((-90.0, -95.0, 5.0), (90.0, 100.0, 130.0))
@@ -114,8 +115,14 @@ def camera_behind_lens(camera: Camera, lens: Lens, picture_size: tuple[int, int]
 
     Raises DermisError if the lens cannot image the corners of the picture.
     """
-    scale = view_scale(lens, camera.to_opencv(picture_size).K, picture_size)
-    return camera.replace(frame_mm=scale * camera.frame_mm)
+    pinhole = camera.to_opencv(picture_size)
+    scale_x, scale_y = view_scales(lens, pinhole.K, picture_size)
+    if camera.principal_point == _CENTRAL_POINT:
+        return camera.replace(frame_mm=max(scale_x, scale_y) * camera.frame_mm)
+    (width, height), K = picture_size, pinhole.K.copy()
+    K[0, 0], K[1, 1] = K[0, 0] / scale_x, K[1, 1] / scale_y
+    K[:2, 2] = 0.5 * width - 0.5, 0.5 * height - 0.5
+    return Camera.from_opencv(K, pinhole.R, pinhole.t, picture_size)
 
 
 def _aim_camera(

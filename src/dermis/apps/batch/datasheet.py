@@ -14,7 +14,7 @@ from dermis.apps.batch.atomic_files import atomic_write
 from dermis.apps.batch.goodness_of_fit import FitTest, fit_tests
 from dermis.apps.batch.index import parameter_summaries
 from dermis.apps.batch.licences import asset_licences
-from dermis.apps.batch.output_encoding import LINEAR_PICTURE, file_format, storage_description
+from dermis.apps.batch.output_encoding import LINEAR_PICTURE, file_format, storage_description, stored_output
 from dermis.apps.batch.shard_formats import ShardManifest
 from dermis.apps.batch.shards import list_shards, read_manifest, shard_exists, shard_path
 from dermis.apps.batch.spec import Spec
@@ -22,7 +22,6 @@ from dermis.base.tables import read_rows
 from dermis.human.labels.classes import label_classes
 from dermis.human.landmarks.points import read_landmark_table
 from dermis.human.landmarks.sets import LANDMARK_SETS
-from dermis.scene.outputs import OUTPUTS
 
 README_FILE, DESCRIPTION_FILE = "README.md", "dataset.json"
 _MAX_LISTED_FAILURES = 50
@@ -161,8 +160,8 @@ class OutputFormat(TypedDict):
 def output_formats(spec: Spec) -> dict[str, OutputFormat]:
     """Return the file format of each output of a spec."""
     formats: dict[str, OutputFormat] = {}
-    for name in spec.outputs:
-        output, file = OUTPUTS[name], file_format(name, spec.encoding)
+    for name in spec.stored_outputs:
+        output, file = stored_output(name), file_format(name, spec.encoding)
         step, zero = (1.0, 0) if output.quantisation is None or file != "png" else output.quantisation
         formats[name] = {
             "file": file,

@@ -64,7 +64,8 @@ class FitTest(NamedTuple):
 def fit_tests(dataset_folder: Path, spec: Spec) -> Iterator[FitTest]:
     """Yield a goodness-of-fit test of each parameter that is not constant, from a data set's index.
 
-    A parameter that describes a person has one sample per person, for any number of images of that person.
+    A parameter that describes a person has one sample per person, for any number of images of that person;
+    other parameters have one per moment or clip.
 
     Raises DermisError if there is no index.
     """
@@ -74,12 +75,17 @@ def fit_tests(dataset_folder: Path, spec: Spec) -> Iterator[FitTest]:
         if "person.number" in names:  # rows of the first image of each person
             people = np.array(file.read(columns=["person.number"]).column(0).to_pylist(), np.int64)
             first = np.unique(people, return_index=True)[1]
+        moments: NDArray[np.int64] | slice = slice(None)
+        if spec.sequence.images > 1:  # rows of the first image of each moment
+            numbers = np.array(file.read(columns=["number"]).column(0).to_pylist(), np.int64)
+            moments = np.unique(numbers // spec.sequence.images, return_index=True)[1]
         for name, distribution in spec.distributions.items():
             column = _index_column(name)
-            if isinstance(distribution, Constant) or column not in names:
+            moves = spec.clip is not None and name.startswith("pose.")  # values are those of the frame
+            if isinstance(distribution, Constant) or column not in names or moves:
                 continue
             values = np.array(file.read(columns=[column]).column(0).to_pylist(), object)
-            sampled = values[first] if name.startswith("person.") else values
+            sampled = values[first] if name.startswith("person.") else values[moments]
             if present := [value for value in sampled if value is not None]:
                 yield _parameter_test(name, distribution, present, spec)
 

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 
+from dermis.apps.batch.blur.samples import FOCUS_FACT_NAMES
 from dermis.apps.batch.face_boxes import Box
 from dermis.apps.batch.sampling import Parameters, hashed_uniform, round_significant
 from dermis.apps.batch.spec import Spec
 from dermis.base.arrays import Doubles
 from dermis.human.person import Human, worn_items
 from dermis.human.wear.look import NOTHING
+from dermis.scene.opencv import OpenCvCamera
 
 SPLITS = ("train", 0.8), ("val", 0.1), ("test", 0.1)
 """Names and fractions of the parts into which a data set is split by person."""
@@ -44,6 +46,10 @@ class ImageFacts:
     light_colour : colour of the lights, see `lighting.light_colour`; None for a spec without [sensor]
     picture_K : intrinsic matrix (3, 3) of the picture, without the distortion of its lens; None if unknown
     sensor : facts about the exposure, by the names of `SENSOR_FACT_NAMES`; empty for a spec without [sensor]
+    captured : weights of morph targets by captured motion, which replace those of the expression, by
+        parameter name such as "pose.jawOpen"
+    rig : all cameras of the rig by name, without distortion; empty for a spec with one camera
+    blur : facts about the lens, by the names of `FOCUS_FACT_NAMES`; empty without depth of field
     """
 
     person: Mapping[str, float | str | None] = field(default_factory=lambda: _NO_FACTS)
@@ -52,6 +58,9 @@ class ImageFacts:
     light_colour: tuple[float, float, float] | None = None
     picture_K: Doubles | None = None
     sensor: Mapping[str, float] = field(default_factory=dict)
+    captured: Mapping[str, float] = field(default_factory=dict)
+    rig: Mapping[str, OpenCvCamera] = field(default_factory=dict)
+    blur: Mapping[str, float] = field(default_factory=dict)
 
 
 def person_facts(person: Human) -> dict[str, float | str | None]:
@@ -82,7 +91,8 @@ def text_fact_names() -> frozenset[str]:
 
 def fact_names(spec: Spec) -> tuple[str, ...]:
     """Return the names of all facts that records list among the parameters of an image of a spec."""
-    return (*person_fact_names(), *(SENSOR_FACT_NAMES if spec.sensor is not None else ()))
+    sensor = SENSOR_FACT_NAMES if spec.sensor is not None else ()
+    return (*person_fact_names(), *sensor, *(FOCUS_FACT_NAMES if spec.blur is not None else ()))
 
 
 def record_parameters(

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from dermis.apps.batch.clips.table import GENERATED_MOTION
 from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.spec import Spec
 from dermis.formats.samples import SAMPLES
 from dermis.human.model import MAKEHUMAN_CREDIT
 
-_ASSET_PARAMETERS = "person.head", "environment.name"
+_ASSET_PARAMETERS = "person.head", "environment.name", "background.picture", "clip.motion"
 _HUMAN, _HUMAN_PREFIX = "human", "human:"
-_NAMES_WITHOUT_FILES = {"none", "uniform", _HUMAN}
+_NAMES_WITHOUT_FILES = {"none", "uniform", _HUMAN, GENERATED_MOTION}
 _OWNER_LICENCE = "set by its owner: state it here"
 
 
@@ -42,7 +43,8 @@ def image_licence(parameters: Parameters) -> str:
     head = str(parameters.get("person.head") or _HUMAN)
     is_human = head == _HUMAN or head.startswith(_HUMAN_PREFIX)
     assets = [_human_asset()] if is_human else list(_file_asset("person.head", head))
-    assets += _file_asset("environment.name", str(parameters.get("environment.name") or "none"))
+    for name in _ASSET_PARAMETERS[1:]:
+        assets += _file_asset(name, str(parameters.get(name) or "none"))
     return "; ".join(dict.fromkeys(f"{one.author}: {one.licence}" for one in assets))
 
 

@@ -8,8 +8,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.apps.batch.clips.flow import FLOW_OUTPUTS
 from dermis.base.errors import refuse
-from dermis.frame.output_files import quantise
+from dermis.frame.output_files import quantise_levels
 from dermis.images.codecs import decode_up_filtered_png, decode_with_pillow, encode_png
 from dermis.images.hdr import decode_exr, encode_exr
 from dermis.images.sizes import check_size
@@ -23,12 +24,17 @@ _NPY_MAGIC = b"\x93NUMPY\x01\x00"
 _MAX_HALF_FLOAT = 65504.0
 
 
+def stored_output(output_name: str) -> Output:
+    """Return the description of an output of an image: one of a frame, or the flow of clips."""
+    return FLOW_OUTPUTS.get(output_name) or OUTPUTS[output_name]
+
+
 def file_format(output_name: str, encoding: Encoding) -> str:
     """Return the file format in which an output is stored: png, exr or npy.
 
     encoding : requested format; if it is png, outputs that 16-bit integers cannot hold are stored as exr
     """
-    output = OUTPUTS[output_name]
+    output = stored_output(output_name)
     if encoding == "npy" or not output.channels:
         return "npy"
     fits = output.quantisation is not None or output.kind == "uint8"
@@ -40,7 +46,7 @@ def storage_description(output_name: str, encoding: Encoding) -> str:
 
     In this example, a value of the output is 1/64 of the stored integer ("level").
     """
-    output, kind = OUTPUTS[output_name], file_format(output_name, encoding)
+    output, kind = stored_output(output_name), file_format(output_name, encoding)
     if kind == "png" and output.quantisation is not None:
         step, zero = output.quantisation
         size = f"{step:g}" if step >= 1e-3 else f"1/{1 / step:.0f}"
@@ -58,9 +64,10 @@ def encode_output(output_name: str, output_array: Array, encoding: Encoding) -> 
     """
     if not np.isfinite(output_array).all():
         refuse(f"output {output_name}", "finite numbers", "some are not", "Report this with the spec, please")
-    kind, dtype = file_format(output_name, encoding), _stored_dtype(OUTPUTS[output_name], encoding)
+    kind, dtype = file_format(output_name, encoding), _stored_dtype(stored_output(output_name), encoding)
     if kind == "png":
-        return encode_png(np.atleast_3d(quantise(output_name, output_array)), use_isal=True)
+        levels = quantise_levels(output_array, stored_output(output_name).quantisation)
+        return encode_png(np.atleast_3d(levels), use_isal=True)
     limited = (
         np.clip(output_array, -_MAX_HALF_FLOAT, _MAX_HALF_FLOAT) if dtype.itemsize == 2 else output_array
     )
@@ -100,9 +107,9 @@ def decode_output(output_name: str, format_name: str, file_bytes: bytes) -> Arra
     )
     if not np.isfinite(picture).all():
         raise ValueError("it has numbers that are not finite")
-    if output_name not in OUTPUTS:
+    if output_name not in OUTPUTS and output_name not in FLOW_OUTPUTS:
         return picture[..., 0] if picture.shape[2] == 1 else picture
-    output = OUTPUTS[output_name]
+    output = stored_output(output_name)
     if picture.shape[2] < output.channels:
         raise ValueError(f"it has {picture.shape[2]} channels, not {output.channels}")
     picture = picture[..., : output.channels or None]

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.batch.distributions import Constant
-from dermis.apps.batch.observed_photographs import as_photograph, rendered_outputs
+from dermis.apps.batch.finishing import finished_image
+from dermis.apps.batch.observed_frames import PlannedImage, observe_images
 from dermis.apps.batch.sampling import Parameters
 from dermis.apps.batch.scenes import SceneBuilder
 from dermis.apps.batch.shards import Part
@@ -84,8 +85,8 @@ def estimate_size_and_duration(spec: Spec, adapter: str = "auto") -> Estimate:
     These images are rendered by a `Worker`. The first two of them, which fill caches, are not timed.
     """
     count = min(spec.count, spec.shard_size, _MEASURED_IMAGE_COUNT)
-    times = [time.monotonic()]
-    with TemporaryDirectory() as name, closing(Worker(adapter, RunOptions(spec, Path(name)))) as worker:
+    times, measured = [time.monotonic()], spec.replace(count=count)  # a whole shard
+    with TemporaryDirectory() as name, closing(Worker(adapter, RunOptions(measured, Path(name)))) as worker:
         send = lambda event: times.extend([time.monotonic()] * event.images)  # noqa: E731
         worker.run_tasks([Part(0, 0, count)], send)
         size = sum(path.stat().st_size for path in Path(name).rglob("*") if path.is_file())
@@ -122,40 +123,51 @@ def parameter_table_lines(rows: Sequence[ParameterRow]) -> list[str]:
 
 
 def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
-    """Return an sRGB picture (h, w, 3) with the first 16 images at reduced quality, labelled by number."""
+    """Return an sRGB picture (h, w, 3) with 16 images at reduced quality, labelled by number.
+
+    They are the first ones, or four frames of each of the first clips.
+    """
     from PIL import Image, ImageDraw
 
     width, height = (max(_SHEET_IMAGE_SIDE * side // max(spec.size), 1) for side in spec.size)
     limited = {name: min(side, getattr(spec.render, name)) for name, side in _MAX_PREVIEW_SIDES.items()}
-    spec = spec.replace(render=spec.render.replace(size=(width, height), **limited))
-    count = min(spec.count, SHEET_IMAGE_COUNT)
+    clip = None if spec.clip is None else spec.clip.replace(flow=None)
+    render = spec.render.replace(size=(width, height), **limited)
+    spec = spec.replace(render=render, clip=clip, outputs=(), landmarks=())
+    numbers = range(0, spec.count, _sheet_step(spec))[:SHEET_IMAGE_COUNT]
+    count = len(numbers)
     columns = min(count, _SHEET_COLUMNS)
     rows = -(-count // columns)
     size = columns * (width + _SHEET_GAP) - _SHEET_GAP, rows * (height + _SHEET_GAP) - _SHEET_GAP
     sheet = Image.new("RGB", size, (20, 20, 20))
     draw = ImageDraw.Draw(sheet)
-    builder, renderer = SceneBuilder(spec), Renderer(adapter)
-    pictures = _sheet_pictures(spec, count, builder, renderer)
-    for k, picture in enumerate(pictures):
+    pictures = _sheet_pictures(spec, numbers, SceneBuilder(spec), Renderer(adapter))
+    for k, (number, picture) in enumerate(zip(numbers, pictures, strict=True)):
         x, y = (k % columns) * (width + _SHEET_GAP), (k // columns) * (height + _SHEET_GAP)
         sheet.paste(Image.fromarray(picture), (x, y))
-        draw.text((x + 4, y + 2), str(k), fill=(255, 255, 255), stroke_width=1, stroke_fill=(0, 0, 0))
+        draw.text((x + 4, y + 2), str(number), fill=(255, 255, 255), stroke_width=1, stroke_fill=(0, 0, 0))
     return np.array(sheet)
 
 
+def _sheet_step(spec: Spec) -> int:
+    """Return the difference between the numbers of images on the sheet, which has four frames of a clip."""
+    return max(spec.sequence.frames // _SHEET_COLUMNS, 1)
+
+
 def _sheet_pictures(
-    spec: Spec, count: int, builder: SceneBuilder, renderer: Renderer
+    spec: Spec, numbers: range, builder: SceneBuilder, renderer: Renderer
 ) -> Iterator[NDArray[np.uint8]]:
-    """Yield the first pictures of a data set as sRGB bytes (h, w, 3)."""
-    for k in range(count):
+    """Yield pictures of a data set as sRGB bytes (h, w, 3)."""
+    for k in numbers:
         parameters = spec.parameters(k)
         scene, settings = builder.build(parameters)
-        if spec.sensor is None:
-            yield renderer.draw(scene, settings, timed=False).srgb8()
-            continue
-        (observation,) = renderer.observe([scene], settings, linear=True, outputs=rendered_outputs(spec))
-        photo, _ = as_photograph(observation, parameters, builder.facts(parameters, scene))
-        yield photo.picture.astype(np.uint8, copy=False)
+        facts = builder.facts(parameters, scene)
+        blurred = builder.blur_scenes(k, parameters, scene)
+        plan = PlannedImage(k, parameters, facts, scene, settings, None, None, blurred)
+        (observation,) = observe_images(renderer, spec, [plan])
+        photo, _ = finished_image(observation, parameters, facts, spec)
+        alpha = photo.picture[..., 3:] / 255.0 if photo.picture.shape[2] == 4 else 1.0
+        yield np.asarray(photo.picture[..., :3] * alpha, np.uint8)  # on black
 
 
 def _parameter_row(spec: Spec, parameter: str, samples: Sequence[Parameters]) -> ParameterRow:

@@ -8,14 +8,21 @@ from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from pathlib import Path
 from random import Random
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.batch.image_facts import SPLIT_NAMES
 from dermis.apps.batch.output_encoding import Array, decode_output, decode_png
-from dermis.apps.batch.records import PICTURE_SUFFIX, RECORD_SUFFIX, LandmarksRecord, NestedNumbers, Record
+from dermis.apps.batch.records import (
+    PICTURE_SUFFIX,
+    RECORD_SUFFIX,
+    CameraRecord,
+    LandmarksRecord,
+    NestedNumbers,
+    Record,
+)
 from dermis.apps.batch.shard_formats import MANIFEST_NAME, TarMember, tar_members
 from dermis.apps.batch.shards import SHARD_DESCRIPTION, shard_index
 from dermis.base.errors import DermisError, error_text, refuse
@@ -43,10 +50,15 @@ _OUTPUT_FILE_PATTERN = re.compile(r"([a-z0-9_]+)\.(png|exr|npy)")
 FIELDS_WITHOUT_OUTPUTS = frozenset(
     (
         *("number", "picture", "parameters", "camera", "head_pose", "gaze", "landmarks", "skin_tone"),
-        *("gaze_error_deg", "boxes", "split", "licence"),
+        *("gaze_error_deg", "boxes", "split", "licence", "rig"),
     )
 )
 """Keys of an image that are not names of outputs."""
+_CAMERA_SHAPES: tuple[tuple[Literal["K", "R", "t"], tuple[int, ...]], ...] = (
+    ("K", (3, 3)),
+    ("R", (3, 3)),
+    ("t", (3,)),
+)
 UNKNOWN_OCCLUSION = 255
 """Occlusion of landmarks in data sets of earlier versions, which do not state it."""
 
@@ -92,8 +104,8 @@ def read_dataset(
         directions to the target of the spec, or None; "boxes", left, upper, right and lower edge of each box
         by name, or None; "landmarks", `LandmarkPoints` by the name of the set; "skin_tone", a dictionary that
         describes the colour of the skin, or None; "split", "train", "val" or "test" by person; and "licence".
-        The last two are "" in data sets of earlier versions. `dermis.dataset.arrays` converts an image into
-        arrays for batches.
+        Data sets of rigs also have "rig", all cameras of the moment by name. Split and licence are "" in data
+        sets of earlier versions. `dermis.dataset.arrays` converts an image into arrays for batches.
 
     Raises
     ------
@@ -295,16 +307,22 @@ def record_fields(record: Record, error_subject: object) -> ImageFields:
 
 def _decode_pose(record: Record) -> ImageFields:
     """Return the arrays of camera, head pose, gaze and boxes in a record."""
-    camera, gaze = record["camera"], record["gaze"]
+    gaze = record["gaze"]
     errors, boxes = record.get("gaze_error_deg"), record.get("boxes")  # missing in old data sets
-    K, R, t = _to_array(camera["K"], (3, 3)), _to_array(camera["R"], (3, 3)), _to_array(camera["t"], (3,))
+    rig = {name: _decode_camera(one) for name, one in record.get("rig", {}).items()}
     return {
-        "camera": OpenCvCamera(K, R, t),
+        "camera": _decode_camera(record["camera"]),
+        **({"rig": rig} if rig else {}),
         "head_pose": _to_array(record["head_pose"], (3, 4)),
         "gaze": None if gaze is None else _to_array(gaze, (2, 3)),
         "gaze_error_deg": None if errors is None else _to_array(errors, (2,)),
         "boxes": None if boxes is None else {name: _to_array(box, (4,)) for name, box in boxes.items()},
     }
+
+
+def _decode_camera(record: CameraRecord) -> OpenCvCamera:
+    K, R, t = (_to_array(record[name], shape) for name, shape in _CAMERA_SHAPES)
+    return OpenCvCamera(K, R, t)
 
 
 def _decode_landmarks(record: LandmarksRecord) -> LandmarkPoints:

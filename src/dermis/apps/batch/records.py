@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TypedDict, Union
+from typing import NotRequired, TypedDict, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,7 @@ from dermis.apps.batch.spec import Spec
 from dermis.frame.observation import Observation
 from dermis.images.codecs import encode_png
 from dermis.images.skin_tone import SkinTone
+from dermis.scene.opencv import OpenCvCamera
 
 PICTURE_SUFFIX, RECORD_SUFFIX = "png", "json"
 """File name suffixes of the picture and of the record."""
@@ -55,7 +56,8 @@ class Record(TypedDict):
     """Description of one image as stored in its JSON file, with the same keys for all images of a data set.
 
     For `head_pose` and `gaze`, see `Observation`; for `gaze_error_deg` and `boxes`, see `ImageFacts`. `split`
-    is "train", "val" or "test", by person.
+    is "train", "val" or "test", by person. For a spec with [rig],
+    `rig` has all cameras of the moment by name.
     """
 
     number: int
@@ -64,6 +66,7 @@ class Record(TypedDict):
     parameters: dict[str, float | int | str | None]
     skin_tone: dict[str, float | int | str] | None
     camera: CameraRecord
+    rig: NotRequired[dict[str, CameraRecord]]
     head_pose: NestedNumbers
     gaze: NestedNumbers | None
     gaze_error_deg: NestedNumbers | None
@@ -92,7 +95,7 @@ def encode_record(
     give identical bytes.
     """
     files = {PICTURE_SUFFIX: encode_png(observation.picture, use_isal=True)}
-    for name in spec.outputs:
+    for name in spec.stored_outputs:
         suffix = f"{name}.{file_format(name, spec.encoding)}"
         files[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
     if spec.keep_linear:
@@ -118,13 +121,12 @@ def make_record(
         "number": image_number,
         "split": image_split(spec, parameters),
         "licence": image_licence(parameters),
-        "parameters": record_parameters(spec, parameters, {**facts.person, **facts.sensor}),
+        "parameters": record_parameters(
+            spec, {**parameters, **facts.captured}, {**facts.person, **facts.sensor, **facts.blur}
+        ),
         "skin_tone": None if skin_tone is None else skin_tone.as_json(),
-        "camera": {
-            "K": _rounded_list(camera.K, MM_DECIMALS),
-            "R": _rounded_list(camera.R, _DIRECTION_DECIMALS),
-            "t": _rounded_list(camera.t, MM_DECIMALS),
-        },
+        "camera": _camera_record(camera),
+        **({"rig": {name: _camera_record(one) for name, one in facts.rig.items()}} if facts.rig else {}),  # type: ignore[typeddict-item]
         "head_pose": _rounded_list(observation.head_pose, _DIRECTION_DECIMALS),
         "gaze": None if gaze is None else _rounded_list(gaze, _DIRECTION_DECIMALS),
         "gaze_error_deg": None if errors is None else _rounded_list(errors, _DEGREE_DECIMALS),
@@ -140,6 +142,14 @@ def make_record(
             }
             for path, one in observation.landmarks.items()
         },
+    }
+
+
+def _camera_record(camera: OpenCvCamera) -> CameraRecord:
+    return {
+        "K": _rounded_list(camera.K, MM_DECIMALS),
+        "R": _rounded_list(camera.R, _DIRECTION_DECIMALS),
+        "t": _rounded_list(camera.t, MM_DECIMALS),
     }
 
 

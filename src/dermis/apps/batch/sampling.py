@@ -10,16 +10,28 @@ from math import exp
 
 from scipy.special import ndtr, ndtri
 
+from dermis.apps.batch.clips.frames import (
+    FRAME_NAMES,
+    MOTION_NAMES,
+    PULSE_NAMES,
+    VIEW_NAME,
+    ImagePlace,
+    ImageSequence,
+    frame_parameters,
+)
+from dermis.apps.batch.clips.motion import MOVED_TARGETS
+from dermis.apps.batch.clips.table import GENERATED_MOTION
 from dermis.apps.batch.distributions import Constant, Distribution
 from dermis.apps.batch.spec_tables import (
     GAZE_ANGLES,
     LAMP_RIG,
     NO_ENVIRONMENT,
+    PICTURE_BACKGROUND,
     RANDOM_EXPRESSION,
     table_values,
 )
 from dermis.base.tables import read_rows
-from dermis.human.expressions import TARGET_SIDES, Weights, expand_sides, expand_targets
+from dermis.human.expressions import EXPRESSIONS, TARGET_SIDES, Weights, expand_sides, expand_targets
 
 Parameters = dict[str, float | int | str]
 _JAW_MORPH_TARGET = "jawOpen"
@@ -30,6 +42,7 @@ _UNIFORM_NUMBER_BITS = (
 _PERSON_PREFIX = "person."
 _HEAD_PARAMETER = "person.head"
 _SENSOR_PREFIX, _SENSOR_SEED = "sensor.", "sensor.seed"
+_LENS_NAME = "lens.k1"
 _SEED_COUNT = 2**32
 _EXPRESSION_VARIATION_KEYS = "intensity", "asymmetry", "variation"
 _LAMP_PREFIXES = tuple(f"light.{lamp}." for lamp in ("key", "fill", "rim"))
@@ -42,7 +55,11 @@ _CONDITIONAL_PARAMETERS: tuple[tuple[str | tuple[str, ...], Callable[[Parameters
         lambda sampled: sampled["environment.name"] != NO_ENVIRONMENT,
     ),
     (_BACKGROUND_CHANNELS, lambda sampled: sampled["background.kind"] == "colour"),
-    ("background.blur", lambda sampled: sampled["background.kind"] == "environment"),
+    ("background.blur", lambda sampled: sampled["background.kind"] in ("environment", PICTURE_BACKGROUND)),
+    (
+        ("background.picture", "background.zoom", "background.crop"),
+        lambda sampled: sampled["background.kind"] == PICTURE_BACKGROUND,
+    ),
     ("camera.frame_mm", lambda sampled: "camera.focal_mm" not in sampled),
     ("sensor.white_kelvin", lambda sampled: sampled.get("sensor.white_balance") == "kelvin"),
     (
@@ -50,6 +67,16 @@ _CONDITIONAL_PARAMETERS: tuple[tuple[str | tuple[str, ...], Callable[[Parameters
         lambda sampled: bool(sampled.get("sensor.iso")),
     ),
     (("sensor.contrast", "sensor.shoulder"), lambda sampled: sampled.get("sensor.tone_curve") == "phone"),
+    (
+        ("clip.blinks", "clip.gaze", "clip.head", "clip.speech", "clip.syllables"),
+        lambda sampled: sampled.get("clip.motion") == GENERATED_MOTION,
+    ),
+    ("blur.focus_mm", lambda sampled: bool(sampled.get("blur.f_number"))),
+    ("clip.motion_start", lambda sampled: sampled.get("clip.motion") != GENERATED_MOTION),
+    (
+        ("clip.pulse_amplitude", "clip.pulse_variability", "clip.respiration"),
+        lambda sampled: bool(sampled.get("clip.pulse_per_min")),
+    ),
 )
 """Prefixes of parameters that only some images have, and the condition under which an image has them."""
 
@@ -172,6 +199,9 @@ def _is_one_sided(target_name: str) -> bool:
     )
 
 
+_SINGLE_PICTURES = ImageSequence()
+
+
 @dataclass(frozen=True)
 class Sampler:
     """Sampler of the parameters of each image of a data set.
@@ -182,6 +212,8 @@ class Sampler:
     cholesky_rows : weights of independent normal numbers for each correlated parameter, see
         `CorrelationGroup.cholesky_rows`
     expressions : weights of morph targets by name of the expression
+    sequence : division of the images into clips and cameras
+    lenses : parameters of the table [lens] for each calibrated camera of a rig; empty for other rigs
     """
 
     seed: int
@@ -189,9 +221,31 @@ class Sampler:
     distributions: Mapping[str, Distribution]
     cholesky_rows: Mapping[str, Mapping[str, float]]
     expressions: Mapping[str, Weights]
+    sequence: ImageSequence = _SINGLE_PICTURES
+    lenses: tuple[Mapping[str, float], ...] = ()
 
-    def parameters(self, image_number: int) -> Parameters:
-        """Return the sampled parameters of one image by dotted name, independently of other images."""
+    def parameters(self, image_number: int, frame_offset: float = 0) -> Parameters:
+        """Return the sampled parameters of one image by dotted name, independently of other images.
+
+        frame_offset : number of frames after the image, in its clip or beyond
+        """
+        place = self.sequence.place(image_number)
+        sampled = self._image_parameters(image_number)
+        if self.sequence.views > 1:
+            sampled[VIEW_NAME] = place.view
+            lens = self.lenses[place.view] if self.lenses and _LENS_NAME in self.distributions else {}
+            sampled |= {name: round_significant(value) for name, value in lens.items()}
+        if self.sequence.rate_hz:
+            frame = place._replace(frame=place.frame + frame_offset)
+            sampled |= self._frame_parameters(frame, image_number, sampled)
+        return sampled
+
+    def _frame_parameters(self, frame: ImagePlace, image_number: int, sampled: Parameters) -> Parameters:
+        uniform = lambda name: self._uniform_number(image_number, name)  # noqa: E731
+        return frame_parameters(self.sequence, frame, sampled, uniform, round_significant)
+
+    def _image_parameters(self, image_number: int) -> Parameters:
+        """Return the parameters of an image without those of its frame and its camera."""
         person = image_number // self.images_per_person
         sampled: Parameters = {"person.number": person}
         if _HEAD_PARAMETER not in self.distributions:
@@ -218,7 +272,9 @@ class Sampler:
         )
         names = [name for name in self.distributions if not name.startswith("pose.")]
         sensor = [_SENSOR_SEED] if self._has_sensor else []
-        return *person, *names, *sensor, *(f"pose.{target}" for target in self.targets)
+        rig = [VIEW_NAME] if self.sequence.views > 1 else []
+        clip = [*FRAME_NAMES, *MOTION_NAMES, *PULSE_NAMES] if self.sequence.rate_hz else []
+        return *person, *names, *sensor, *rig, *clip, *(f"pose.{target}" for target in self.targets)
 
     @cached_property
     def _has_sensor(self) -> bool:
@@ -244,9 +300,8 @@ class Sampler:
         )
 
     def _uniform_number(self, image_number: int, parameter: str) -> float:
-        number = (
-            image_number // self.images_per_person if parameter.startswith(_PERSON_PREFIX) else image_number
-        )
+        is_of_person = parameter.startswith(_PERSON_PREFIX)
+        number = image_number // (self.images_per_person if is_of_person else self.sequence.images)
         return hashed_uniform(self.seed, number, parameter)
 
     def _normal_number(self, image_number: int, parameter: str) -> float:
@@ -293,4 +348,8 @@ class Sampler:
                     names.update(*(movement.target_weights for movement in movements))
             else:
                 names |= set(self.expressions[name])
+        if self.sequence.rate_hz:
+            names |= set(MOVED_TARGETS)
+            if set(self.distributions["clip.motion"].support) != {GENERATED_MOTION}:
+                names.update(*EXPRESSIONS.values())  # the targets of captures
         return tuple(sorted(expand_targets(sorted(names))))

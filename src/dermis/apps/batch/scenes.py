@@ -12,16 +12,29 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from dermis.apps.batch.blur.samples import (
+    FOCUS_FACT_NAMES,
+    Aperture,
+    aperture_points,
+    camera_at,
+    shutter_times_ms,
+    thin_lens,
+)
 from dermis.apps.batch.cameras import camera_behind_lens, face_hull_indices, sampled_camera, sampled_lens
+from dermis.apps.batch.clips.capture import capture_pose, moves_eyes, with_capture
+from dermis.apps.batch.clips.frames import PULSE_NAMES, VIEW_NAME
+from dermis.apps.batch.clips.motion import clip_pulse, pulse_time_s
+from dermis.apps.batch.clips.table import GENERATED_MOTION
 from dermis.apps.batch.face_boxes import BoxPoints, box_points, face_boxes
 from dermis.apps.batch.image_facts import ImageFacts, person_facts
 from dermis.apps.batch.lighting import direction_from_angles, light_colour, sampled_lights
-from dermis.apps.batch.sampling import Parameters, table_numbers
+from dermis.apps.batch.sampling import Parameters, round_significant, table_numbers
 from dermis.apps.batch.spec import Spec
-from dermis.apps.batch.spec_tables import GAZE_ANGLES, NO_ENVIRONMENT, table_values
+from dermis.apps.batch.spec_tables import GAZE_ANGLES, NO_ENVIRONMENT, PICTURE_BACKGROUND, table_values
 from dermis.base.reading import is_file
 from dermis.formats.motion.captures import find_rotation_bones
 from dermis.human.person import Human
+from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
 from dermis.mesh.rotations import angles_matrix, matrix_angles
@@ -32,6 +45,8 @@ from dermis.scene.gaze import looking_at
 from dermis.scene.head_pose import gaze_errors_deg
 from dermis.scene.heads import MIN_HUMAN_SUBDIVISION_LEVELS, is_person_name, load_head, load_person
 from dermis.scene.model import Scene
+from dermis.scene.motion import load_motion
+from dermis.scene.opencv import OpenCvCamera
 from dermis.scene.people import skin_of
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
@@ -70,6 +85,7 @@ class SceneBuilder:
 
     def __init__(self, spec: Spec) -> None:
         self.spec = spec
+        self._latest_capture: tuple[Head, str, Clip] | None = None
         self._people: OrderedDict[frozenset[tuple[str, float | str]], _Person] = OrderedDict()
 
     def build(self, parameters: Parameters) -> tuple[Scene, Settings]:
@@ -81,7 +97,8 @@ class SceneBuilder:
         """
         person = self._cached_person(parameters)
         head, pose = person.head, self._sampled_pose(parameters, person)
-        camera, lens = self._sampled_camera(parameters, person, pose), sampled_lens(parameters)
+        base, lens = self._sampled_camera(parameters, person, pose), sampled_lens(parameters)
+        camera = self._rig_camera(parameters, base)
         if lens is not None:
             camera = camera_behind_lens(camera, lens, self.spec.size)
         skin_values = table_values(parameters, "skin")
@@ -93,38 +110,137 @@ class SceneBuilder:
             camera=camera,
             skin=person.skin.replace(**skin_values) if skin_values else person.skin,
             environment=self._sampled_environment(parameters),
-            pose=_pose_with_gaze(parameters, head, pose, camera.position),
+            pose=self._pose_with_gaze(parameters, head, pose, base.position),
         )
+        if PULSE_NAMES[0] in parameters:
+            seed, clip = int(parameters[PULSE_NAMES[0]]), table_numbers(parameters, "clip")
+            scene = clip_pulse(seed, clip).scene_at(scene, pulse_time_s(seed, clip, clip["time_s"]))
         return scene, self.spec.render.replace(**_background_settings(parameters))
+
+    def blur_scenes(self, image_number: int, parameters: Parameters, scene: Scene) -> tuple[Scene, ...]:
+        """Return the scenes whose average is the picture of an image; none for sharp pictures.
+
+        scene : scene of the image at the middle of the exposure and of the aperture
+        """
+        table = self.spec.blur
+        if table is None:
+            return ()
+        aperture, count = self._aperture(parameters, scene), table.samples
+        times_ms = shutter_times_ms(count, float(parameters["blur.shutter_ms"]))
+        found = []
+        for point, time_ms in zip(aperture_points(count), times_ms.tolist(), strict=True):
+            moved = scene
+            if time_ms and self.spec.clip is not None:
+                offset = 1e-3 * time_ms * self.spec.clip.rate_hz
+                moved, _ = self.build(self.spec.neighbour_parameters(image_number, offset))
+            found.append(moved.replace(camera=camera_at(scene.camera, aperture, point, self.spec.size)))
+        return tuple(found)
+
+    def _aperture(self, parameters: Parameters, scene: Scene) -> Aperture:
+        """Return the aperture of an image's lens, which focuses on the nearer eye or the nearest point."""
+        person, rig = self._cached_person(parameters), scene.head.control_rig
+        pose = rig.rest if scene.pose_arrays is None else scene.pose_arrays
+        indices = person.points if scene.head.eyes is None else scene.head.eyes.apex
+        points = rig.pose_points(indices, pose) - np.array(scene.head.centre_mm)
+        values = table_numbers(parameters, "blur")
+        return thin_lens(points, scene.camera, values["f_number"], values.get("focus_mm", 0.0))
+
+    def _blur_facts(self, parameters: Parameters, scene: Scene) -> dict[str, float]:
+        if self.spec.blur is None or not parameters["blur.f_number"]:
+            return {}
+        aperture = self._aperture(parameters, scene)
+        values = aperture.focus_depth_mm, aperture.diameter_mm
+        return {name: round_significant(one) for name, one in zip(FOCUS_FACT_NAMES, values, strict=True)}
 
     def facts(self, parameters: Parameters, scene: Scene) -> ImageFacts:
         """Return the facts about an image that its record contains in addition to the parameters.
 
         scene : scene of the image, from `build`
         """
-        person, camera = self._cached_person(parameters), scene.camera
+        person, size = self._cached_person(parameters), self.spec.size
         pose = scene.head.control_rig.rest if scene.pose_arrays is None else scene.pose_arrays
-        errors = gaze_errors_deg(scene, _gaze_target(parameters, camera.position))
-        lens = sampled_lens(parameters)
-        if lens is not None:  # the camera of the scene shows what the lens shows, with another focal length
-            camera = self._sampled_camera(parameters, person, self._sampled_pose(parameters, person))
-        picture_camera = camera.to_opencv(self.spec.size)
-        boxes = face_boxes(scene.head, person.boxes, pose, picture_camera, lens)
+        base, lens = (
+            self._sampled_camera(parameters, person, self._sampled_pose(parameters, person)),
+            sampled_lens(parameters),
+        )
+        # with a lens, the camera of the scene shows what the lens shows, with another focal length
+        picture_camera = self._rig_camera(parameters, base).to_opencv(size)
+        errors = gaze_errors_deg(scene, _gaze_target(parameters, base.position))
+        has_gaze_error = _has_turning_eyes(scene.head) and not self._captures_gaze(parameters, scene.head)
+        captured = self._captured_pose(parameters, person.head)
         return ImageFacts(
             person.facts,
-            errors if _has_turning_eyes(scene.head) else None,
-            boxes,
+            errors if has_gaze_error else None,
+            face_boxes(scene.head, person.boxes, pose, picture_camera, lens),
             None if self.spec.sensor is None else light_colour(scene),
             picture_camera.K,
+            captured={} if captured is None else _recorded_weights(captured, parameters),
+            rig=self._rig_cameras(parameters, base),
+            blur=self._blur_facts(parameters, scene),
         )
+
+    def _rig_camera(self, parameters: Parameters, base: Camera) -> Camera:
+        """Return the camera of an image's view, without the distortion of its lens.
+
+        base : camera that the table [camera] places
+        """
+        rig = self.spec.cameras
+        if rig is None:
+            return base
+        return rig.camera(int(parameters[VIEW_NAME]), base, table_numbers(parameters, "rig"), self.spec.size)
+
+    def _rig_cameras(self, parameters: Parameters, base: Camera) -> dict[str, OpenCvCamera]:
+        """Return the cameras of the rig by name; empty for a spec with one camera."""
+        rig = self.spec.cameras
+        names = () if rig is None else rig.names
+        return {
+            name: self._rig_camera({**parameters, VIEW_NAME: view}, base).to_opencv(self.spec.size)
+            for view, name in enumerate(names)
+        }
 
     def _sampled_pose(self, parameters: Parameters, person: _Person) -> Pose:
         weights = self._pose_weights(parameters, person.head)
-        return Pose(weights, _bone_angles(_head_rotation(parameters), person.bones))
+        pose = Pose(weights, _bone_angles(_head_rotation(parameters), person.bones))
+        captured = self._captured_pose(parameters, person.head)
+        return pose if captured is None else with_capture(pose, captured)
+
+    def _capture(self, parameters: Parameters, head: Head) -> Clip | None:
+        name = parameters.get("clip.motion", GENERATED_MOTION)
+        if name == GENERATED_MOTION:
+            return None
+        path = self._resolve_file(name)
+        latest = self._latest_capture
+        if latest is None or latest[0] is not head or latest[1] != path:
+            latest = self._latest_capture = head, path, load_motion(path, head)
+        return latest[2]
+
+    def _captured_pose(self, parameters: Parameters, head: Head) -> Pose | None:
+        capture, clip = self._capture(parameters, head), self.spec.clip
+        if capture is None or clip is None:
+            return None
+        start, time_s = float(parameters["clip.motion_start"]), float(parameters["clip.time_s"])
+        return capture_pose(capture, start, time_s, clip.frames / clip.rate_hz, 1.0 / clip.rate_hz)
+
+    def _captures_gaze(self, parameters: Parameters, head: Head) -> bool:
+        capture = self._capture(parameters, head)
+        return capture is not None and moves_eyes(capture)
+
+    def _pose_with_gaze(
+        self, parameters: Parameters, head: Head, pose: Pose, camera_position_mm: tuple[float, float, float]
+    ) -> Pose:
+        """Return the pose with eyes rotated towards the gaze, if they can rotate and no capture does so.
+
+        camera_position_mm : position of the camera, the default gaze target [mm]
+        """
+        if not _has_turning_eyes(head) or self._captures_gaze(parameters, head):
+            return pose
+        return looking_at(head, _gaze_target(parameters, camera_position_mm), pose)
 
     def _sampled_camera(self, parameters: Parameters, person: _Person, pose: Pose) -> Camera:
         """Return the camera of an image without the distortion of its lens."""
         width, height = self.spec.size
+        if self.spec.clip is not None:  # the camera does not follow the motion
+            pose = Pose({}, _bone_angles(_resting_head_rotation(parameters), person.bones))
         pose_arrays = pose.to_arrays(person.head.control_rig)
         return sampled_camera(parameters, person.head, person.points, pose_arrays, width / height)
 
@@ -138,6 +254,7 @@ class SceneBuilder:
             _MAX_CACHED_FILE_HEADS if _HEAD_PARAMETER in parameters else _MAX_CACHED_SAMPLED_PEOPLE
         ):
             self._people.popitem(last=False)
+            self._latest_capture = None
         return self._people[key]
 
     def _build_person(self, parameters: Parameters) -> _Person:
@@ -221,8 +338,22 @@ def _hair_count_fraction(picture_size: tuple[int, int]) -> float:
     return min(1.0, max(_MIN_FRACTION_OF_STRANDS, max(picture_size) / _FULL_HAIR_PICTURE_SIDE))
 
 
+def _recorded_weights(captured: Pose, parameters: Parameters) -> dict[str, float]:
+    """Return the weights of a captured pose for the targets that records list, by name of the parameter."""
+    weights = {f"pose.{name}": round_significant(weight) for name, weight in captured.weights.items()}
+    return {name: weight for name, weight in weights.items() if name in parameters}
+
+
 def _head_rotation(parameters: Parameters) -> NDArray[np.float64]:
-    """Return the rotation matrix (3, 3) of the head for its sampled pitch, yaw and roll."""
+    """Return the rotation matrix (3, 3) of the head for its sampled pitch, yaw and roll, with its motion."""
+    rotation, moved = _resting_head_rotation(parameters), table_numbers(parameters, "clip")
+    if "head_yaw_deg" not in moved:
+        return rotation
+    angles = moved["head_pitch_deg"], moved["head_yaw_deg"], moved["head_roll_deg"]
+    return np.asarray(rotation @ np.array(angles_matrix(angles)))
+
+
+def _resting_head_rotation(parameters: Parameters) -> NDArray[np.float64]:
     head = table_numbers(parameters, "head")
     return np.array(angles_matrix((head["pitch_deg"], head["yaw_deg"], head["roll_deg"])))
 
@@ -243,18 +374,6 @@ def _bone_angles(
     return {name: angles[fraction] for name, fraction in rotation_fractions.items()}
 
 
-def _pose_with_gaze(
-    parameters: Parameters, head: Head, pose: Pose, camera_position_mm: tuple[float, float, float]
-) -> Pose:
-    """Return the pose with eyes rotated towards the sampled gaze, if the head has eyes that can rotate.
-
-    camera_position_mm : position of the camera, the default gaze target [mm]
-    """
-    if not _has_turning_eyes(head):
-        return pose
-    return looking_at(head, _gaze_target(parameters, camera_position_mm), pose)
-
-
 def _has_turning_eyes(head: Head) -> bool:
     return head.eyes is not None and head.control_rig.skeleton is not None
 
@@ -263,11 +382,17 @@ def _gaze_target(
     parameters: Parameters, camera_position_mm: tuple[float, float, float]
 ) -> NDArray[np.float64]:
     """Return the target (3,) of the gaze in an image, relative to the head's centre [mm]."""
+    axes = _resting_head_rotation(parameters)
     if parameters["gaze.at"] != GAZE_ANGLES:
-        return np.array(camera_position_mm)
-    gaze = table_numbers(parameters, "gaze")
-    direction = np.array(direction_from_angles(gaze["yaw_deg"], -gaze["pitch_deg"]))
-    return np.asarray(_head_rotation(parameters) @ direction * _GAZE_DISTANCE_MM)
+        target = np.array(camera_position_mm)
+    else:
+        gaze = table_numbers(parameters, "gaze")
+        direction = np.array(direction_from_angles(gaze["yaw_deg"], -gaze["pitch_deg"]))
+        target = np.asarray(axes @ direction * _GAZE_DISTANCE_MM)
+    if "clip.gaze_yaw_deg" not in parameters:
+        return target
+    shift = float(parameters["clip.gaze_pitch_deg"]), float(parameters["clip.gaze_yaw_deg"]), 0.0
+    return np.asarray(axes @ np.array(angles_matrix(shift)) @ axes.T @ target)
 
 
 def _background_settings(parameters: Parameters) -> dict[str, object]:
@@ -275,4 +400,6 @@ def _background_settings(parameters: Parameters) -> dict[str, object]:
     kind = parameters["background.kind"]
     if kind == "colour":
         return {"background": tuple(parameters[f"background.{one}"] for one in ("red", "green", "blue"))}
+    if kind == PICTURE_BACKGROUND:  # composed later
+        return {"background": "none"}
     return {"background": kind, "background_blur": parameters.get("background.blur", 0.0)}

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import difflib
 import hashlib
-import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from importlib import resources
 from pathlib import Path
@@ -15,21 +14,31 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, BaseModel, Field, PrivateAttr
 
 from dermis.apps.batch import spec_tables as tables
-from dermis.apps.batch.distributions import Constant, Distribution, FileChoice
+from dermis.apps.batch.blur.table import BlurTable
+from dermis.apps.batch.clips.checks import check_clip
+from dermis.apps.batch.clips.flow import FLOW_OUTPUTS
+from dermis.apps.batch.clips.frames import ImageSequence
+from dermis.apps.batch.clips.table import ClipTable
+from dermis.apps.batch.distributions import Constant, Distribution
 from dermis.apps.batch.output_encoding import Encoding
+from dermis.apps.batch.rigs.table import RigTable
+from dermis.apps.batch.rigs.views import Rig, check_rig, lens_values, load_rig, with_defaults
 from dermis.apps.batch.sampling import Parameters, Sampler
 from dermis.apps.batch.sensor.lens import Lens
 from dermis.apps.batch.sensor.model import Sensor
 from dermis.apps.batch.spec_checks import (
+    check_backgrounds,
+    check_blur,
     check_landmarks,
     check_lens,
     check_sensor,
     check_spec,
     note_lamps_without_blue,
 )
+from dermis.apps.batch.spec_files import check_hashes, expand_patterns, file_hashes
 from dermis.base.errors import error_context, format_value, refuse, shorten
 from dermis.base.quantities import checked_integer
-from dermis.base.reading import checked_path, is_file, read_file, read_toml
+from dermis.base.reading import checked_path, read_toml
 from dermis.human.expressions import EXPRESSIONS, expand_targets
 from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.scene.field_errors import BoundsReason, InvalidFieldsError
@@ -60,10 +69,8 @@ NON_RENDER_SETTINGS = {
 """Settings that are not keys of [render], and where a spec states them instead."""
 _TargetWeight = Annotated[float, Field(ge=0, le=1)]
 _TOML_HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
-_MAX_MATCHING_FILES = 100_000
-_MAX_HASHED_BYTES = 4 << 30
 _MAX_KEY_LENGTH, _MIN_KEY_SIMILARITY = 80, 0.7  # limits for suggestions to unknown keys
-_FILE_PARAMETERS = "person.head", "environment.name", "skin.profile"
+_FILE_PARAMETERS = "person.head", "environment.name", "skin.profile", "clip.motion", "background.picture"
 """Parameters whose values may be files."""
 P = TypeVar("P", bound=FrozenModel)
 _DeviceTable = dict[str, Annotated[Distribution, tables.DistributionField()]]
@@ -129,6 +136,12 @@ class Spec(FrozenModel):
     """Environment light."""
     background: tables.BackgroundTable = tables.BackgroundTable()
     """Background."""
+    clip: ClipTable | None = None
+    """Frames of people in motion; without this table, images are single pictures."""
+    rig: Annotated[RigTable | None, AfterValidator(with_defaults)] = None
+    """Several cameras that see the same moment; without this table, there is one."""
+    blur: BlurTable | None = None
+    """Depth of field and motion blur of the pictures; without this table, pictures are sharp."""
     lens: Annotated[_DeviceTable | None, AfterValidator(partial(_with_defaults, Lens))] = None
     """Distortion of the camera's lens; needs [sensor]."""
     sensor: Annotated[_DeviceTable | None, AfterValidator(partial(_with_defaults, Sensor))] = None
@@ -142,10 +155,12 @@ class Spec(FrozenModel):
 
     _sampler: Sampler = PrivateAttr()
     _digest: str = PrivateAttr("")
+    _cameras: Rig | None = PrivateAttr(None)
 
     def model_post_init(self, context: object) -> None:
         """Check that the distributions of all tables are consistent, and create the sampler."""
         distributions = _table_distributions("", self)
+        BaseModel.__setattr__(self, "_cameras", load_rig(self.rig, self.folder))
         expressions = {**EXPRESSIONS, **self.expressions}
         with error_context("outputs"):
             check_outputs(self.outputs)
@@ -158,15 +173,46 @@ class Spec(FrozenModel):
                 actual, advice = "there is none", "Add [sensor], which can be empty, or remove this key"
                 refuse(name, "a table [sensor]", actual, advice)
         if self.lens is not None:
-            check_lens(distributions, self.outputs)
+            check_lens(distributions, self.stored_outputs)
+        if self.clip is not None:
+            check_clip(self.clip, distributions, self.folder)
+        if self.blur is not None:
+            check_blur(distributions, self.render, has_clip=self.clip is not None)
+        check_backgrounds(distributions, self.folder, has_rig=self.rig is not None)
+        if self.cameras is not None:
+            check_rig(self.cameras, distributions, self.size, has_lens=self.lens is not None)
+        if self.images_per_person % self.sequence.images:
+            expected = f"a multiple of {self.sequence.images}, the images of a clip with all its cameras"
+            refuse("images_per_person", expected, f"got {self.images_per_person}", "Correct it, or remove it")
         rows = {name: row for group in self.correlated for name, row in group.cholesky_rows().items()}
-        sampler = Sampler(self.seed, self.images_per_person, distributions, rows, expressions)
+        rig = self.cameras
+        lenses = tuple(lens_values(rig, view) for view in range(len(rig.names))) if rig else ()
+        sampler = Sampler(
+            self.seed, self.images_per_person, distributions, rows, expressions, self.sequence, lenses
+        )
         BaseModel.__setattr__(self, "_sampler", sampler)
 
     @property
     def size(self) -> tuple[int, int]:
         """Return width and height of the pictures [pixel]."""
         return self.render.size
+
+    @property
+    def sequence(self) -> ImageSequence:
+        """Return the division of the images into clips and cameras."""
+        frames, rate_hz = (self.clip.frames, self.clip.rate_hz) if self.clip else (1, 0.0)
+        return ImageSequence(frames, rate_hz, len(self.cameras.names) if self.cameras else 1)
+
+    @property
+    def cameras(self) -> Rig | None:
+        """Return the cameras of the rig; None for a spec with one camera."""
+        return self._cameras
+
+    @property
+    def stored_outputs(self) -> tuple[str, ...]:
+        """Return the names of all outputs that are written: `outputs`, and the flow of clips."""
+        flow = FLOW_OUTPUTS if self.clip is not None and self.clip.flow else ()
+        return (*self.outputs, *flow)
 
     @property
     def distributions(self) -> Mapping[str, Distribution]:
@@ -198,6 +244,13 @@ class Spec(FrozenModel):
         Raises DermisError if the data set has no image with this number.
         """
         return self._sampler.parameters(checked_integer("image", image_number, 0, self.count - 1))
+
+    def neighbour_parameters(self, image_number: int, frame_offset: float) -> Parameters:
+        """Return the parameters of another frame of an image's clip, which may be before or after the clip.
+
+        frame_offset : number of frames after the image
+        """
+        return self._sampler.parameters(image_number, frame_offset)
 
     def to_toml(self) -> str:
         """Return the spec as canonical TOML with all values; `parse_spec` converts it to an equal spec."""
@@ -261,19 +314,20 @@ def parse_spec(toml_data: Mapping[str, object], folder: Path = Path()) -> Spec:
         advice = "Remove it to start another data set, or use the version of dermis that wrote it"
         refuse("generator", f"{GENERATOR_VERSION}, the generator number of this version", actual, advice)
     _refuse_unknown_keys(toml_data)
-    fields = {k: v if k == "files" else _expand_patterns(v, folder, k) for k, v in toml_data.items()}
+    fields = {k: v if k == "files" else expand_patterns(v, folder, k) for k, v in toml_data.items()}
     fields["render"] = _parse_render_table(fields.pop("size", (512, 512)), fields.get("render", {}))
     if isinstance(groups := fields.get("correlated", ()), list | tuple):
         fields["correlated"] = tuple(_build_model(tables.CorrelationGroup, "correlated", g) for g in groups)
-    spec = _build_model(Spec, "", fields | {"folder": folder})
+    spec = _build_model(Spec, "", _with_images_per_person(fields, folder) | {"folder": folder})
     if spec.sensor is not None:
         note_lamps_without_blue(spec.distributions)
     names = [name for name in spec.landmarks if name not in LANDMARK_SETS]
+    names += [spec.rig.file] if spec.rig is not None and spec.rig.file else []
     for parameter in spec.distributions.keys() & set(_FILE_PARAMETERS):
         names += map(str, spec.distributions[parameter].support)
-    hashes = _file_hashes(names, folder)
+    hashes = file_hashes(names, folder)
     if spec.files:
-        _check_hashes(spec.files, hashes)
+        check_hashes(spec.files, hashes)
     return spec.replace(files=hashes) if hashes else spec
 
 
@@ -307,6 +361,22 @@ def _tables_with_key(model: type[BaseModel], key: str, table_name: str = "") -> 
             if key in kind.model_fields:
                 yield path
             yield from _tables_with_key(kind, key, path)
+
+
+def _with_images_per_person(fields: dict[str, object], folder: Path) -> dict[str, object]:
+    """Return the parsed fields of a spec, in which each person has one clip or moment by default."""
+    if "images_per_person" in fields or not {"clip", "rig"} & fields.keys():
+        return fields
+    built: dict[str, object] = {}
+    frames, views = 1, 1
+    if "clip" in fields:
+        built["clip"] = clip = _build_model(ClipTable, "clip", fields["clip"])
+        frames = clip.frames
+    if "rig" in fields:
+        built["rig"] = table = with_defaults(_build_model(RigTable, "rig", fields["rig"]))
+        rig = load_rig(table, folder)
+        views = len(rig.names) if rig else 1
+    return {**fields, **built, "images_per_person": frames * views}
 
 
 def _parse_render_table(picture_size: object, render_table: object) -> Settings:
@@ -369,70 +439,3 @@ def _toml_lines(table_name: str, table_values: Mapping[str, object]) -> list[str
     if sub_lines and not own_values:
         return sub_lines
     return [table_text(f"[{table_name}]" if table_name else "", own_values), *sub_lines]
-
-
-def _expand_patterns(spec_value: object, folder: Path, dotted_name: str) -> object:
-    """Return a spec value with each {files = PATTERN} replaced by a `FileChoice` of the matching files.
-
-    folder : folder of the spec, to which patterns are relative
-    dotted_name : dotted name of the value in error messages
-
-    Raises DermisError for a pattern that matches no file.
-    """
-    if not isinstance(spec_value, Mapping):
-        return spec_value
-    if spec_value.keys() == {"files"} and isinstance(spec_value["files"], str):
-        return _match_files(spec_value["files"], folder, dotted_name)
-    return {name: _expand_patterns(one, folder, f"{dotted_name}.{name}") for name, one in spec_value.items()}
-
-
-def _match_files(pattern: str, folder: Path, dotted_name: str) -> FileChoice:
-    names = []
-    try:
-        for path in folder.glob(pattern):
-            if is_file(path):
-                names.append(Path(os.path.relpath(path, folder)).as_posix())
-            if len(names) > _MAX_MATCHING_FILES:
-                break
-    except (ValueError, NotImplementedError, OSError, RecursionError) as fault:
-        actual = f"got {pattern!r} ({fault or type(fault).__name__})"
-        refuse(
-            dotted_name,
-            "a pattern of files below the spec's folder, such as heads/*.json",
-            actual,
-            "Correct it",
-        )
-    if not 0 < len(names) <= _MAX_MATCHING_FILES:
-        actual = f"more than {_MAX_MATCHING_FILES:,} match" if names else "none matches"
-        refuse(
-            dotted_name, f"files that match {pattern!r} in the spec's folder", actual, "Correct the pattern"
-        )
-    return FileChoice(pattern, tuple(sorted(names)))
-
-
-def _file_hashes(file_names: Iterable[str], folder: Path) -> dict[str, str]:
-    """Return the SHA-256 of each named file that exists in the spec's folder, sorted by name."""
-    found = {}
-    for name in sorted(set(file_names)):
-        if is_file(folder / name):
-            data = read_file(folder / name, "a file that the spec names", _MAX_HASHED_BYTES)
-            found[name] = hashlib.sha256(data).hexdigest()
-    return found
-
-
-def _check_hashes(expected_hashes: Mapping[str, str], actual_hashes: Mapping[str, str]) -> None:
-    """Raise DermisError if files have changed since the spec was written.
-
-    expected_hashes : SHA-256 by file name, as stored in the spec
-    actual_hashes : SHA-256 of the present files, by file name
-    """
-    for name in sorted(expected_hashes.keys() | actual_hashes.keys()):
-        if expected_hashes.get(name) != actual_hashes.get(name):
-            refuse(
-                f"files: {name}",
-                f"a file with SHA-256 {expected_hashes[name][:16]}..."
-                if name in expected_hashes
-                else "no such file",
-                f"it has {actual_hashes[name][:16]}..." if name in actual_hashes else "there is none",
-                "Restore the file, or remove [files] to start another data set",
-            )

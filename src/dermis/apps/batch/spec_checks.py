@@ -7,6 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from dermis.apps.batch.clips.flow import FLOW_OUTPUTS
 from dermis.apps.batch.distributions import Distribution
 from dermis.apps.batch.lighting import LAMP_NAMES
 from dermis.apps.batch.sensor.lens import Lens
@@ -96,10 +97,7 @@ def check_sensor(distributions: Mapping[str, Distribution], render: Settings) ->
     if "none" in distributions["background.kind"].support:
         advice = 'Exclude "none", or remove [sensor]'
         refuse("background: kind", "a background, as photographs have no alpha", 'it can be "none"', advice)
-    for name, value in _SENSOR_RENDER_SETTINGS.items():
-        if getattr(render, name) != value:
-            expected, actual = f"{value!r} with [sensor]", f"got {getattr(render, name)!r}"
-            refuse(f"render: {name}", expected, actual, "Use tone_curve of [sensor] instead")
+    _check_linear_pictures(render, "[sensor]", "Use tone_curve of [sensor] instead")
     filtered = set(distributions["sensor.demosaicing"].support) != {"none"}
     if filtered and min(render.size) < MIN_DEMOSAICED_SIDE:
         expected = f"{MIN_DEMOSAICED_SIDE} pixels or more along each side for demosaicing"
@@ -113,9 +111,52 @@ def check_lens(distributions: Mapping[str, Distribution], outputs: Sequence[str]
     outputs : outputs of the spec
     """
     _check_table("lens", distributions, list(Lens.model_fields), Lens)
-    if "motion" in outputs:
-        expected = "outputs without motion, which is that of a pinhole camera"
+    if {"motion", "motion_depth", *FLOW_OUTPUTS} & {*outputs}:
+        expected = "outputs without motion and flow, which are those of a pinhole camera"
         refuse("outputs", expected, "the spec has a table [lens]", "Remove motion or [lens]")
+
+
+def check_blur(distributions: Mapping[str, Distribution], render: Settings, *, has_clip: bool) -> None:
+    """Raise DermisError for a table [blur] that has no effect, or contradicts other tables.
+
+    distributions : distribution of each parameter by its dotted name
+    render : settings of the table [render]
+    has_clip : whether people move
+    """
+    exposure = distributions["blur.shutter_ms"].support
+    if not has_clip and exposure != (0.0,):
+        advice = "Add [clip], or remove the key"
+        refuse("blur: shutter_ms", "a table [clip], whose people move", "there is none", advice)
+    if exposure == (0.0,) == distributions["blur.f_number"].support:
+        actual = "both are 0"
+        refuse("blur", "f_number or shutter_ms above 0", actual, "Set one of them, or remove [blur]")
+    _check_linear_pictures(render, "[blur]", "Remove it")
+
+
+def _check_linear_pictures(render: Settings, table_name: str, advice: str) -> None:
+    """Raise DermisError for settings of the renderer's tone curve, where a table needs linear pictures."""
+    for name, value in _SENSOR_RENDER_SETTINGS.items():
+        if getattr(render, name) != value:
+            actual = f"got {getattr(render, name)!r}"
+            refuse(f"render: {name}", f"{value!r} with {table_name}", actual, advice)
+
+
+def check_backgrounds(distributions: Mapping[str, Distribution], folder: Path, *, has_rig: bool) -> None:
+    """Raise DermisError for pictures of backgrounds that do not exist, or that several cameras would share.
+
+    distributions : distribution of each parameter by its dotted name
+    folder : folder to which file names in the spec are relative
+    has_rig : whether the spec has several cameras
+    """
+    pictures = distributions.get("background.picture")
+    if pictures is None:
+        return
+    for name in map(str, pictures.support):
+        if not is_file(folder / name):
+            refuse("background: picture", "files in the spec's folder", f"{name!r} is none", "Correct it")
+    if has_rig:
+        expected, actual = "one camera", "the cameras of [rig] would show the same picture"
+        refuse("background: picture", expected, actual, 'Use kind = "environment", which has the right view')
 
 
 def note_lamps_without_blue(distributions: Mapping[str, Distribution]) -> None:

@@ -19,7 +19,8 @@ LAMP_RIG = "rig"
 RANDOM_EXPRESSION = "mixture"
 NO_ENVIRONMENT = "none"
 GAZE_CAMERA, GAZE_ANGLES = "camera", "angles"
-BACKGROUND_KINDS = "none", "gradient", "environment", "colour"
+PICTURE_BACKGROUND = "picture"
+BACKGROUND_KINDS = "none", "gradient", "environment", "colour", PICTURE_BACKGROUND
 _DISTRIBUTION_RANGE_NOTE = "; normal extends 6 sd to both sides, truncated to its limits"
 
 
@@ -320,11 +321,14 @@ class EnvironmentTable(FrozenModel):
     """Factor of the environment's radiance [-]."""
 
 
+_PICTURE_DEFAULTS = {"zoom": Constant(1.0), "crop_x": Uniform(0, 1), "crop_y": Uniform(0, 1)}
+
+
 class BackgroundTable(FrozenModel):
     """TOML table of a data set's spec with the picture's background, which emits no light."""
 
     kind: Annotated[Distribution, NameField(lambda: BACKGROUND_KINDS)] = Constant("gradient")
-    """"none" for alpha, "gradient", "colour", or "environment" (a gradient if there is no environment)."""
+    """"none" for alpha, "gradient", "colour", "picture", or "environment" (a gradient if there is none)."""
     red: Annotated[Distribution, _FRACTION_FIELD] = Uniform(0, 0.6)
     """Red of the colour, linear Rec. 709."""
     green: Annotated[Distribution, _FRACTION_FIELD] = Uniform(0, 0.6)
@@ -332,4 +336,25 @@ class BackgroundTable(FrozenModel):
     blue: Annotated[Distribution, _FRACTION_FIELD] = Uniform(0, 0.6)
     """Blue of the colour, linear Rec. 709."""
     blur: Annotated[Distribution, _FRACTION_FIELD] = Constant(0.0)
-    """Blur of the environment behind the head: the roughness of a mirror that blurs it as much [-]."""
+    """Blur of the environment behind the head: the roughness of a mirror that blurs it as much; or of a
+    picture, from 0 to a standard deviation of a tenth of the height [-]."""
+    picture: Annotated[Distribution | None, NameField()] = None
+    """Files of pictures for the kind "picture", which cover the background and keep their shape."""
+    zoom: Annotated[Distribution | None, NumberField(1, 20, "1 shows as much as possible")] = None
+    """Factor by which the shown part of a picture is smaller than the largest possible, by default 1."""
+    crop_x: Annotated[Distribution | None, _FRACTION_FIELD] = None
+    """Position of the shown part between the left (0) and the right end, by default uniform [-]."""
+    crop_y: Annotated[Distribution | None, _FRACTION_FIELD] = None
+    """Position of the shown part between the upper (0) and the lower end, by default uniform [-]."""
+
+    @model_validator(mode="after")
+    def _check_pictures(self) -> BackgroundTable:
+        keys = [name for name in ("picture", *_PICTURE_DEFAULTS) if getattr(self, name) is not None]
+        if PICTURE_BACKGROUND not in self.kind.support:
+            require(not keys, f'kind = "picture" for the keys {", ".join(keys)}')
+        else:
+            require(self.picture is not None, 'picture = {files = "PATTERN"} for the kind "picture"')
+            for name, default in _PICTURE_DEFAULTS.items():
+                if getattr(self, name) is None:
+                    object.__setattr__(self, name, default)
+        return self

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import itertools
 import os
 import warnings
 from collections import deque
@@ -18,8 +17,9 @@ from typing import Any, NamedTuple
 from dermis.apps.batch.atomic_files import remove_path
 from dermis.apps.batch.child_processes import LostProcessError
 from dermis.apps.batch.encoder_pool import EncodedImage, EncoderPool
+from dermis.apps.batch.finishing import finished_image
 from dermis.apps.batch.image_facts import ImageFacts
-from dermis.apps.batch.observed_photographs import as_photograph, rendered_outputs
+from dermis.apps.batch.observed_frames import PlannedImage, observe_images
 from dermis.apps.batch.parts import KeptImages, copy_images, join_parts, kept_images
 from dermis.apps.batch.records import encode_record
 from dermis.apps.batch.sampling import Parameters
@@ -42,7 +42,6 @@ from dermis.gpu.failures import DeviceError
 from dermis.images.skin_tone import SkinTone, skin_tone
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
-from dermis.scene.settings import Settings
 
 _MAX_CACHED_FRAMES = 16  # occlusion stays cached for this many images without an environment
 
@@ -107,22 +106,6 @@ class WorkerEvent:
 
 
 _ObservedImage = tuple[int, Observation, Parameters, SkinTone | None, ImageFacts]
-
-
-class _PlannedImage(NamedTuple):
-    """Image to render, with its scene and settings.
-
-    facts : properties of the person, gaze errors and boxes, for the record
-    previous : scene of the preceding image, from which motion vectors are computed; None if no motion vectors
-        can be computed
-    """
-
-    number: int
-    parameters: Parameters
-    facts: ImageFacts
-    scene: Scene
-    settings: Settings
-    previous: Scene | None
 
 
 class Worker:
@@ -240,9 +223,10 @@ class Worker:
         """
         groups = deque([image_numbers])
         while groups:
-            image_numbers, in_flight = groups.popleft(), deque[_PlannedImage]()
+            image_numbers, in_flight = groups.popleft(), deque[PlannedImage]()
+            plans = self._plan_images(image_numbers, in_flight, failures)
             try:
-                for observation in self._render_images(self._plan_images(image_numbers, in_flight, failures)):
+                for observation in observe_images(self._renderer, self._options.spec, plans):
                     done = in_flight.popleft()
                     tone = _head_skin_tone(done.scene.head)
                     yield done.number, observation, done.parameters, tone, done.facts
@@ -259,8 +243,8 @@ class Worker:
                 groups.extendleft(reversed([*single, image_numbers]))
 
     def _plan_images(
-        self, image_numbers: Iterator[int], images_in_flight: deque[_PlannedImage], failures: list[Failure]
-    ) -> Iterator[_PlannedImage]:
+        self, image_numbers: Iterator[int], images_in_flight: deque[PlannedImage], failures: list[Failure]
+    ) -> Iterator[PlannedImage]:
         """Yield each image whose scene can be built, after appending the image to `images_in_flight`.
 
         image_numbers : numbers of the images still to plan
@@ -272,8 +256,9 @@ class Worker:
             try:
                 scene, settings = self._builder.build(parameters)
                 facts = self._builder.facts(parameters, scene)
-                previous = self._previous_scene(number)
-                plan = _PlannedImage(number, parameters, facts, scene, settings, previous)
+                neighbours = self._neighbour_scenes(number)
+                blurred = self._builder.blur_scenes(number, parameters, scene)
+                plan = PlannedImage(number, parameters, facts, scene, settings, *neighbours, blurred)
             except DermisError as fault:
                 if not self._options.keep_going:
                     raise DermisError(f"image {number}: {fault}") from fault
@@ -282,40 +267,26 @@ class Worker:
             images_in_flight.append(plan)
             yield plan
 
-    def _render_images(self, planned_images: Iterable[_PlannedImage]) -> Iterator[Observation]:
-        """Render the planned images; yield the picture and the output arrays of each.
+    def _neighbour_scenes(self, image_number: int) -> tuple[Scene | None, Scene | None]:
+        """Return the scenes of the frames before and after an image, as far as outputs need them.
 
-        Images without a background get an alpha channel.
+        Frames of clips have neighbours in motion also before the first and after the last frame. The scene
+        before another image is that of the same camera in the preceding moment; it is None if this shows
+        another person, or if the scene cannot be built.
         """
-        spec = self._options.spec
-        for alpha, group in itertools.groupby(
-            planned_images, lambda plan: plan.settings.background == "none"
-        ):
-            copies = itertools.tee(group, 3)
-            yield from self._renderer.observe(
-                (plan.scene for plan in copies[0]),
-                (plan.settings for plan in copies[1]),
-                alpha=alpha,
-                linear=spec.sensor is not None,
-                # motion is relative to these scenes, not to the frame rendered before
-                previous=(plan.previous for plan in copies[2]),
-                outputs=rendered_outputs(spec),
-                landmarks=spec.landmark_tables.values(),
-            )
-
-    def _previous_scene(self, image_number: int) -> Scene | None:
-        """Return the scene of the preceding image, from which motion vectors are computed.
-
-        The result is None if the spec does not request the output "motion", if the preceding image shows
-        another person, or if its scene cannot be built.
-        """
-        spec = self._options.spec
-        if "motion" not in spec.outputs or image_number % spec.images_per_person == 0:
-            return None
+        spec, sequence = self._options.spec, self._options.spec.sequence
+        has_flow = spec.clip is not None and bool(spec.clip.flow)
+        if not has_flow and not {"motion", "motion_depth"} & {*spec.outputs}:
+            return None, None
+        if spec.clip is not None:
+            before, after = (spec.neighbour_parameters(image_number, offset) for offset in (-1, 1))
+            return self._builder.build(before)[0], self._builder.build(after)[0] if has_flow else None
+        if image_number % spec.images_per_person < sequence.images:
+            return None, None
         try:
-            return self._builder.build(spec.parameters(image_number - 1))[0]
+            return self._builder.build(spec.parameters(image_number - sequence.images))[0], None
         except DermisError:  # that image is left out of the data set
-            return None
+            return None, None
 
 
 def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
@@ -371,6 +342,5 @@ def _encode_image(
     skin_tone: SkinTone | None,
     facts: ImageFacts,
 ) -> EncodedImage:
-    if spec.sensor is not None:
-        observation, facts = as_photograph(observation, parameters, facts)
+    observation, facts = finished_image(observation, parameters, facts, spec)
     return image_number, encode_record(image_number, observation, parameters, spec, skin_tone, facts)

@@ -151,7 +151,15 @@ class Lens(FrozenModel):
 def view_scale(lens: Lens, K: Doubles, picture_size: tuple[int, int]) -> float:
     """Return the size of the pinhole picture that a picture with distortion shows, relative to its own.
 
-    Both pictures have their principal point in the middle.
+    It is the larger of `view_scales`.
+    """
+    return max(view_scales(lens, K, picture_size))
+
+
+def view_scales(lens: Lens, K: Doubles, picture_size: tuple[int, int]) -> tuple[float, float]:
+    """Return width and height of the pinhole picture that a picture with distortion shows, relative to it.
+
+    The pinhole picture has its principal point in the middle.
 
     K : intrinsic matrix of the picture with distortion [pixel]
     picture_size : width and height [pixel]
@@ -168,7 +176,8 @@ def view_scale(lens: Lens, K: Doubles, picture_size: tuple[int, int]) -> float:
         expected = f"a lens that images the corners of the picture, at r = {corner:.3g}"
         advice = "Bring k1, k2 and k3 closer to 0, or show a smaller angle"
         refuse("lens", expected, f"its distortion folds the picture at r = {lens.fold_radius:.3g}", advice)
-    return float((np.abs(seen - K[:2, 2]) / (0.5 * np.array([width, height]))).max())
+    scale_x, scale_y = (np.abs(seen - K[:2, 2]) / (0.5 * np.array([width, height]))).max(axis=0).tolist()
+    return scale_x, scale_y
 
 
 def to_plane(pixels: ArrayLike, K: ArrayLike) -> Doubles:

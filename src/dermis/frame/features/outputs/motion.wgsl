@@ -1,4 +1,4 @@
-// Motion vectors: displacement in the picture of each visible point since the previous scene.
+// Motion vectors: displacement in the picture of each visible point since the previous scene, and its depth there.
 //#include "each_hit.wgsl"
 
 //#include <motion_outputs>
@@ -23,13 +23,22 @@ fn interpolated(w: vec3f, a: vec3f, b: vec3f, c: vec3f) -> vec3f {
     return w.x * a + w.y * b + w.z * c;
 }
 
+fn position_before(hit: SurfaceHit) -> vec3f {
+    let t = hit.corners;
+    return interpolated(hit.weights, previous_position(t.x), previous_position(t.y), previous_position(t.z));
+}
+
 // The difference is taken before scaling to pixels, so that it is 0 for equal positions despite fused multiply-adds.
 fn motion_output(hit: SurfaceHit) -> vec2f {
     let t = hit.corners;
     let now = interpolated(hit.weights, position_of(t.x), position_of(t.y), position_of(t.z));
-    let before = interpolated(hit.weights, previous_position(t.x), previous_position(t.y), previous_position(t.z));
+    let before = position_before(hit);
     let offset = project_ndc(camera.rays, now).xy - project_ndc(previous.rays, before).xy;
     return vec2f(0.5, -0.5) * offset * vec2f(textureDimensions(centres));
+}
+
+fn motion_depth_output(hit: SurfaceHit) -> f32 {
+    return dot(position_before(hit) - previous.rays.eye, previous.rays.forward);
 }
 
 fn write_outputs(hit: SurfaceHit, found_hit: bool, slot: PixelSlot) {

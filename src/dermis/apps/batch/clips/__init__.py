@@ -1,0 +1,1 @@
+"""Clips of data sets: people in smooth motion, with flow between frames."""

@@ -1,0 +1,30 @@
+"""Checks of the table [clip], and the default of `images_per_person` for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from dermis.apps.batch.clips.table import GENERATED_MOTION, ClipTable
+from dermis.apps.batch.distributions import Distribution
+from dermis.base.errors import refuse
+from dermis.base.reading import is_file
+
+_MIN_PULSE_PER_MIN = 20.0
+_CAPTURE_SUFFIXES = ".csv", ".tsv", ".json", ".jsonl", ".ndjson"
+
+
+def check_clip(clip: ClipTable, distributions: Mapping[str, Distribution], folder: Path) -> None:
+    """Raise DermisError for values of [clip] that contradict each other, and for missing captures.
+
+    distributions : distribution of each parameter by its dotted name
+    folder : folder to which file names in the spec are relative
+    """
+    for name in map(str, clip.motion.support):
+        if name == GENERATED_MOTION or (name.lower().endswith(_CAPTURE_SUFFIXES) and is_file(folder / name)):
+            continue
+        expected = f'"{GENERATED_MOTION}", or captures ({", ".join(_CAPTURE_SUFFIXES)}) in the spec\'s folder'
+        refuse("clip: motion", expected, f"{name!r} is neither", "Correct it")
+    if any(0.0 < float(rate) < _MIN_PULSE_PER_MIN for rate in clip.pulse_per_min.support):
+        expected = f"0 or {_MIN_PULSE_PER_MIN:g} and more"
+        refuse("clip: pulse_per_min", expected, f"got {clip.pulse_per_min.spec_value()}", "Correct it")
