@@ -28,11 +28,10 @@ from dermis.formats.gltf.materials import (
 from dermis.formats.gltf.primitives import METRES_PER_MM, PrimitiveSource, SurfacePrimitive
 from dermis.formats.part_pictures import PartPictures
 from dermis.mesh.eyeball import EyeTextures
-from dermis.mesh.grown_strands import grow_strands, is_beard
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material
 from dermis.mesh.skeleton import Skeleton
-from dermis.mesh.strands import Strands
+from dermis.mesh.strand_groups import strand_groups
 
 _HAIR_KNOTS = {"brows": 3, "lashes": 4, "beard": 3}
 _MAX_GROWN_STRANDS = 10_000  # of hair and beard
@@ -166,17 +165,7 @@ def _hair_parts(deformable_mesh: DeformableMesh, pictures: dict[str, bytes]) -> 
     pictures : PNG files by name; this function adds the colours of the hairs
     """
     head = deformable_mesh.head
-    groups = dict[str, Strands]()
-    if (fine := head.strands) is not None:
-        is_lash = np.zeros(len(fine), bool) if fine.is_lash is None else fine.is_lash
-        groups |= {"brows": fine.select(~is_lash), "lashes": fine.select(is_lash)}
-    if head.hair is not None:
-        grown = grow_strands(head.hair, head.mesh, head.mesh.points_mm, _MAX_GROWN_STRANDS)
-        beard = is_beard(head.hair, _MAX_GROWN_STRANDS)
-        groups |= {"beard": grown.select(beard), "hair": grown.select(~beard)}
-    for name, strands in groups.items():
-        if not len(strands):
-            continue
+    for name, strands in strand_groups(head, _MAX_GROWN_STRANDS).items():
         if name in _HAIR_KNOTS:
             fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_TUBES, _HAIR_KNOTS[name])
             source: PrimitiveSource = TubePrimitive(deformable_mesh, fibres)

@@ -33,7 +33,7 @@ class Usd(OpenPbr):
     variants = ()
     limitations = (
         "Correct in renderers that support the MaterialX nodes and random walks as OpenPBR specifies. Others "
-        "use UsdPreviewSurface, which has no subsurface scattering. Hairs do not follow the head's motion. "
+        "use UsdPreviewSurface, which has no subsurface scattering. Scalp hair follows one bone only. "
         "Programs that convert the unit of a stage must also scale the radii."
     )
     part_limitations = ""
