@@ -12,7 +12,13 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdSkel
 
 from dermis.apps.export.targets.openpbr.materials import MAP_TYPES, InputValue, OpenPbrMaterial, hair_material
 from dermis.apps.export.targets.usd.expressions import add_expressions
-from dermis.apps.export.targets.usd.geometry import add_mesh, add_mesh_blend_shapes, add_rig, unique_usd_names
+from dermis.apps.export.targets.usd.geometry import (
+    Rig,
+    add_mesh,
+    add_mesh_blend_shapes,
+    add_rig,
+    unique_usd_names,
+)
 from dermis.apps.export.targets.usd.hair import HairCurves
 from dermis.formats.deformable_mesh import DeformableMesh
 from dermis.mesh.head import Head
@@ -54,29 +60,30 @@ def build_stage(
         stage.GetRootLayer().customLayerData = {"attribution": head.attribution}
     path = root.AppendChild("mesh")
     subsets = add_mesh(stage, path, head, deformable)
+    rig = add_rig(stage, root, stage.GetPrimAtPath(path), deformable) if _has_rig(deformable) else None
     _add_materials(stage, root.AppendChild("materials"), subsets, materials, file_prefix)
     hairs = {name: HairCurves(name, strands, deformable) for name, strands in strand_groups(head).items()}
     _add_hairs(stage, root, hairs)
-    if _has_rig(deformable):
-        _add_deformation(stage, root, deformable, hairs)
+    if rig is not None:
+        _add_blend_shapes(stage, root, rig, deformable, hairs)
+        add_expressions(top, rig.animation, deformable.rig)
     return stage
 
 
-def _add_deformation(
+def _add_blend_shapes(
     usd_stage: Usd.Stage,
     root_path: Sdf.Path,
+    rig: Rig,
     deformable_mesh: DeformableMesh,
     hairs: Mapping[str, HairCurves],
 ) -> None:
-    """Add the skeleton, the blend shapes of mesh and hairs, and the expressions."""
-    mesh = usd_stage.GetPrimAtPath(root_path.AppendChild("mesh"))
-    rig = add_rig(usd_stage, root_path, mesh, deformable_mesh)
+    """Add the blend shapes of mesh and hairs, and bind the hairs to the skeleton."""
     targets = dict(zip(rig.names, deformable_mesh.targets(), strict=True))
+    mesh = usd_stage.GetPrimAtPath(root_path.AppendChild("mesh"))
     add_mesh_blend_shapes(usd_stage, mesh, deformable_mesh, targets)
     for name, curves in hairs.items():
         prim = usd_stage.GetPrimAtPath(root_path.AppendChild(name))
         curves.add_blend_shapes(usd_stage, curves.bind(rig.skeleton_path, prim), targets)
-    add_expressions(usd_stage.GetDefaultPrim(), rig.animation, deformable_mesh.rig)
 
 
 def _has_rig(deformable_mesh: DeformableMesh) -> bool:
