@@ -67,7 +67,7 @@ def build_stage(
     if rig is not None:
         _add_blend_shapes(stage, root, rig, deformable, hairs)
         add_expressions(top, rig.animation, deformable.rig)
-        top.SetChildrenReorder(["mesh"])  # variants otherwise put the skeleton first
+        top.SetChildrenReorder(["mesh", "skeleton", "materials"])  # variants otherwise put the skeleton first
     return stage
 
 
