@@ -94,8 +94,12 @@ class EnginePage(Target):
     suffixes: ClassVar[tuple[str, ...]] = (".html",)
     needs_maps: ClassVar[bool] = True
     part_limitations: ClassVar[str] = ""
-    licence: ClassVar[str]
-    """Licence of the library."""
+    import_steps: ClassVar[tuple[str, ...]] = (
+        "Open the page in a browser with WebGL 2, such as Chrome, Firefox or Safari.",
+        "Drag with the mouse to turn the head, scroll to approach it.",
+        "Change lights and expressions with the panel of the page.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {"*.html": "web page with head, pictures and script"}
     drawing_script: ClassVar[Path]
     """Script that draws the head."""
     library_files: ClassVar[Mapping[str, tuple[LibraryFile, ...]]]

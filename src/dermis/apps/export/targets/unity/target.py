@@ -7,8 +7,10 @@ multiplier. The world scale must be the length of a scene unit in metres.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from string import Template
+from typing import ClassVar
 
 import numpy as np
 
@@ -53,6 +55,12 @@ class Unity(Target):
     suffixes = (".asset", "")
     versions = tuple(_FILE_VERSION_BY_HDRP_VERSION)
     needs_maps = True
+    import_steps = (
+        "Copy the files into the folder Assets of a project with HDRP.",
+        "Add the diffusion profile to the list in the HDRP Global Settings or the default volume.",
+        "Create a material HDRP/Lit with the type Subsurface Scattering, and set profile and maps.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {"*.asset": "diffusion profile"}
     limitations = (
         "The filter is truncated at 99.7 % of the widest channel. In a scene that is not in metres, "
         "worldScale must be set to the length of a unit."

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -48,6 +49,12 @@ class Unreal(Target):
     suffixes = ("", ".py")
     versions = (*_VERSIONS_BEFORE_5_8, "5.8")
     needs_maps = True
+    import_steps = (
+        "Enable the plug-in Python Editor Script.",
+        "Run the script: Tools > Execute Python Script.",
+        "Set the material's shading model to Subsurface Profile, and choose the profile.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {"*.py": "script that creates the profile and imports maps"}
     limitations = (
         "The base colour of the material, not the profile, colours the light. Before 5.8, thicknesses are "
         "wrong by a factor of about 100 for light through thin parts, which no parameter corrects; in 5.8 "
