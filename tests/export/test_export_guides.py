@@ -54,7 +54,7 @@ def test_readme_has_a_picture_and_a_licence(tmp_path: Path) -> None:
     head = write_head(tmp_path / "face.obj")
     report = export_skin(head, "gltf", tmp_path / "a.glb", side=256, adapter="cpu", picture_width=64)
     picture = next(file for file in report.files if file.suffix == ".png")
-    assert picture.name == "a.glb.preview.png" and png_size(picture.read_bytes())[:2] == (64, 80)
+    assert picture.name == "a.glb.preview.png" and png_size(picture.read_bytes())[:2] == (64, 64)
     page = (tmp_path / "a.glb.md").read_text("utf-8")
     assert f"]({picture.name})" in page and "as its owner states" in page
     assert "MakeHuman" not in page

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path, PurePath
 
@@ -11,9 +10,8 @@ from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import EXPORT_JSON_MEANING, Target
 
 PREVIEW_SUFFIX = "preview.png"
-_FRAME_ASPECT = 1.25  # height per width of the picture
+_PREVIEW_MEANING = {f"*{PREVIEW_SUFFIX}": "the head in the light rig `studio`, rendered by dermis"}
 _COMMON_FILES = {
-    f"*{PREVIEW_SUFFIX}": "picture of the head by dermis, in the light rig `portrait`",
     "export.json": EXPORT_JSON_MEANING,
     "*.json": EXPORT_JSON_MEANING,
     "*_colour.png": "diffuse reflectance of the skin; sRGB",
@@ -30,7 +28,7 @@ _NO_RIGHTS = "The authors of dermis claim no rights in the written files."
 
 def file_meaning(target: Target, file_name: str) -> str:
     """Return what a file of an export contains; an empty text if neither target nor package describe it."""
-    for patterns in (target.file_meanings, _COMMON_FILES):
+    for patterns in (_PREVIEW_MEANING, target.file_meanings, _COMMON_FILES):
         for pattern, meaning in patterns.items():
             if fnmatch(file_name, pattern) or fnmatch(PurePath(file_name).name, pattern):
                 return meaning
@@ -78,21 +76,13 @@ def licence_text(subject: Subject, target: Target) -> str:
 
 
 def write_preview(subject: Subject, file: Path, width: int, adapter: str) -> Path:
-    """Render the head of a subject with the defaults of `dermis render`, and write the picture.
+    """Render the scene of a subject, with the camera and lights that exports of scenes contain.
 
-    width : width of the picture [pixel]
+    width : width and height of the picture [pixel]
     """
     from dermis.frame.renderer import render
     from dermis.images.io import write_image
-    from dermis.scene.camera import headshot
-    from dermis.scene.files import load_lights
-    from dermis.scene.settings import PHOTOGRAPHIC_SETTINGS
 
     assert subject.scene is not None
-    head = subject.scene.head
-    scene = replace(subject.scene, lights=load_lights("portrait", head))
-    if subject.person is not None:
-        scene = replace(scene, camera=headshot(head))
-    size = (width, round(_FRAME_ASPECT * width))
-    write_image(file, render(scene, adapter=adapter, size=size, **PHOTOGRAPHIC_SETTINGS))
+    write_image(file, render(subject.scene, adapter=adapter, size=(width, width), background="gradient"))
     return file

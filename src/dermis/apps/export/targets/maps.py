@@ -96,7 +96,6 @@ class MapFolder(Target):
     file_meanings: ClassVar[Mapping[str, str]] = {
         "maps.json": "units, ranges, quantisation of the PNG files, and missing maps with the reason",
         "*.exr": "map with linear values",
-        "*preview.png": "picture of the head by dermis, in the light rig `portrait`",
         "*.png": "map for viewing",
     }
     limitations = (
