@@ -41,7 +41,7 @@ def document(head: Head, tmp_path_factory: pytest.TempPathFactory) -> Document:
 
 def test_landmarks_are_at_vertices_of_gltf(table: dict[str, Any], document: Document) -> None:
     meshes = {mesh["name"]: mesh["primitives"][0]["attributes"] for mesh in document.tree["meshes"]}
-    positions = {name: 1e3 * document.read_accessor(one["POSITION"]) for name, one in meshes.items()}
+    positions = {name: 1e3 * document.read_floats(one["POSITION"]) for name, one in meshes.items()}
     for rows in table["landmarks"].values():
         for row in rows:
             at = np.array(row["weights"]) @ positions[row["mesh"]][row["vertices"]]

@@ -34,7 +34,7 @@ def correspondence_table(head: Head) -> dict[str, Any]:
         "unit": "mm",
         "axes": _AXES,
         "indices": _INDICES,
-        "points": int(head.mesh.point.max()) + 1,
+        "points": len(np.unique(head.mesh.point)),
         "licence": head.attribution,
         "landmarks": {name: _landmark_rows(head, landmark_points(head, name)) for name in sets},
         "blend_shapes": blend_shape_rows(head.control_rig.targets.names),
@@ -44,14 +44,15 @@ def correspondence_table(head: Head) -> dict[str, Any]:
 def _landmark_rows(head: Head, landmarks: LandmarkPoints) -> list[dict[str, Any]]:
     positions = DeformableMesh(head).positions_mm
     mesh, rows = head.mesh, []
-    first = np.unique(mesh.point, return_index=True)[1]
+    stage_points, first = np.unique(mesh.point, return_index=True)
     for name, point, weight in zip(landmarks.names, landmarks.point, landmarks.weight, strict=True):
         material = _material_of_points(mesh, point)
-        at = weight.astype(np.float64) @ positions[first[point]].astype(np.float64)
+        row = np.searchsorted(stage_points, point)
+        at = weight.astype(np.float64) @ positions[first[row]].astype(np.float64)
         rows.append(
             {
                 "name": name,
-                "points": point.tolist(),
+                "points": row.tolist(),
                 "weights": [round(float(one), 6) for one in weight],
                 "mesh": part_name(mesh.materials[material]),
                 "vertices": _gltf_vertices(mesh, material, point).tolist(),

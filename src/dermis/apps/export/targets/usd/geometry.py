@@ -49,7 +49,10 @@ def mesh_polygons(mesh: Mesh) -> Polygons:
 
 
 def first_vertex_by_point(mesh: Mesh) -> NDArray[np.intp]:
-    """Return the index (p,) of the first vertex at each point; the vertices at a uv seam share a point."""
+    """Return the index of the first vertex at each point of the stage, in the order of the points.
+
+    The vertices at a uv seam share a point. Points of the mesh without vertices are not in the stage.
+    """
     return np.unique(mesh.point, return_index=True)[1]
 
 
@@ -67,7 +70,8 @@ def add_mesh(
     prim.CreatePointsAttr(points)
     prim.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
     prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(polygons.vertex_counts))
-    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.point[polygons.vertices].astype(np.int32)))
+    corner = np.searchsorted(mesh.point[vertex], mesh.point[polygons.vertices]).astype(np.int32)
+    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(corner))
     prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(deformable_mesh.normals[vertex])))
     prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
@@ -153,10 +157,9 @@ def add_rig(
     joints = _add_joints(skeleton, deformable_mesh.rig.skeleton)
     rest = UsdSkel.Animation.Define(usd_stage, path.AppendChild("rest"))
     UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([rest.GetPath()])
-    mesh, count = deformable_mesh.head.mesh, int(deformable_mesh.head.mesh.point.max()) + 1
-    bone, weight = np.zeros((count, 1)), np.ones((count, 1))
+    vertex = first_vertex_by_point(deformable_mesh.head.mesh)
+    bone, weight = np.zeros((len(vertex), 1)), np.ones((len(vertex), 1))
     if deformable_mesh.rig.skeleton is not None:
-        vertex = first_vertex_by_point(mesh)
         bone, weight = (values[vertex] for values in deformable_mesh.bone_influences)
     bind_to_skeleton(path, mesh_prim, bone, weight)
     rest.CreateJointsAttr(joints)
