@@ -66,7 +66,7 @@ def write_files(output_folder: Path, names_and_contents: Iterable[tuple[str, byt
     written = []
     for name, content in names_and_contents:
         written.append(output_folder / name)
-        written[-1].parent.mkdir(exist_ok=True)
+        written[-1].parent.mkdir(parents=True, exist_ok=True)
         written[-1].write_bytes(content)
     return written
 

@@ -18,7 +18,6 @@ from dermis.mesh.strands import Roots, Strands
 
 _MAX_KNOT_COUNT = 22  # of a ribbon
 _MAX_DEVIATION_MM = 1.5  # largest distance of nine tenths of the knots of hairs from their ribbons
-_MAX_KNOTS = 30_000  # of all ribbons
 _COLOUR_COUNT, _ROWS_PER_COLOUR = 8, 64
 _TEXTURE_COLUMNS, _COLUMNS_PER_RIBBON = 256, 36
 _STREAK_WIDTH, _GAP_WIDTH = 4, 2  # columns of a streak, which shows one hair, and between streaks
@@ -38,10 +37,12 @@ class RibbonPrimitive:
 
     deformable : mesh of the head with its deformation
     strands : all hairs
+    max_knots : largest number of knots of all ribbons
     """
 
     deformable: DeformableMesh
     strands: Strands
+    max_knots: int
 
     @cached_property
     def _ribbons(self) -> tuple[Strands, Doubles]:
@@ -52,7 +53,7 @@ class RibbonPrimitive:
         mesh = self.deformable.head.mesh
         points = replace(mesh, positions=self.deformable.positions_mm).points_mm
         knot = sufficient_knots(self.strands, _MAX_DEVIATION_MM, _MAX_KNOT_COUNT)
-        kept = min(len(self.strands), _MAX_KNOTS // len(knot))
+        kept = min(len(self.strands), self.max_knots // len(knot))
         roots = Roots(self.strands.roots.quad[:kept], self.strands.roots.position[:kept])
         fewer = Strands(
             roots,

@@ -23,7 +23,7 @@ from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_
 from dermis.apps.truths.cycles import cycles_camera
 from dermis.apps.truths.lights import CYCLES_LIGHTS, cycles_lamp
 from dermis.apps.truths.scene_description import CYCLES_UNIT_MM, SceneDict, cycles_world
-from dermis.formats.gltf.materials import gltf_material_name
+from dermis.formats.gltf.materials import skin_material_names
 from dermis.formats.gltf.write import encode_head
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
@@ -138,12 +138,6 @@ def _encode_head(subject: Subject, scene: Scene) -> bytes:
         slopes=relief_slopes(scene.head),
         eyes=subject.eye_pictures(),
     )
-
-
-def skin_material_names(head: Head) -> list[str]:
-    """Return the names of the skin materials in the .glb file."""
-    used = [head.mesh.materials[index] for index in np.unique(head.mesh.material)]
-    return [gltf_material_name(material) for material in used if material.kind == "skin"]
 
 
 def blender_script_text(export_data: Mapping[str, object]) -> str:
