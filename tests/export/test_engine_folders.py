@@ -6,8 +6,11 @@ import ast
 import io
 import json
 import re
+import runpy
+import sys
 from pathlib import Path
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -144,6 +147,34 @@ def test_unreal_script_refers_to_the_written_files(unreal: Path, person: Subject
     assert (
         packed[..., 1].mean() == pytest.approx(scalars["Roughness"], abs=0.15) and (packed[..., 2] == 0).all()
     )
+
+
+def test_unreal_script_connects_maps_and_sets_the_skin(unreal: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    editor = MagicMock()
+    slots = [MagicMock(), MagicMock()]
+    for slot, name in zip(slots, ("skin", "hair"), strict=True):
+        slot.get_editor_property.return_value = name
+    mesh_class = type("SkeletalMesh", (MagicMock,), {})
+    mesh = mesh_class()
+    mesh.get_editor_property.return_value = slots
+    editor.SkeletalMesh = mesh_class
+    editor.EditorAssetLibrary.does_asset_exist.return_value = False
+    editor.EditorAssetLibrary.load_asset.side_effect = lambda path: mesh if path == "mesh" else MagicMock()
+    editor.AssetImportTask.return_value.get_editor_property.return_value = ["mesh", "texture"]
+    monkeypatch.setitem(sys.modules, "unreal", editor)
+    runpy.run_path(str(unreal / f"{NAME}.py"))
+    library, properties = editor.MaterialEditingLibrary, editor.MaterialProperty
+    wired = [one.args[1:] for one in library.connect_material_property.call_args_list]
+    assert sorted(wired, key=str) == sorted([
+        ("R", properties.MP_SPECULAR), ("G", properties.MP_ROUGHNESS), ("", properties.MP_OPACITY),
+        ("RGB", properties.MP_BASE_COLOR), ("RGB", properties.MP_NORMAL),
+    ], key=str)  # fmt: skip
+    made = editor.AssetToolsHelpers.get_asset_tools.return_value.create_asset
+    assert [one.args[0] for one in made.call_args_list] == [NAME, f"M_{NAME}", f"MI_{NAME}"]
+    set_on_skin, set_on_hair = (one.set_editor_property.call_args_list for one in slots)
+    assert {one.args for one in set_on_skin} == {
+        ("material_interface", made.return_value)
+    } and not set_on_hair
 
 
 def test_single_files_stay_without_meshes(person: Subject, tmp_path: Path) -> None:

@@ -30,7 +30,8 @@ surface_albedo tint transmission_tint_color world_unit_scale"""
 UNREAL = """
 AssetImportTask AssetToolsHelpers EditorAssetLibrary LinearColor Material MaterialEditingLibrary
 MaterialFactoryNew MaterialExpressionScalarParameter MaterialExpressionTextureSampleParameter2D
-MaterialExpressionVectorParameter MaterialInstanceConstant MaterialInstanceConstantFactoryNew MaterialProperty MaterialSamplerType
+MaterialExpressionVectorParameter
+MaterialInstanceConstant MaterialInstanceConstantFactoryNew MaterialProperty MaterialSamplerType
 MaterialShadingModel SkeletalMesh SubsurfaceProfile SubsurfaceProfileFactory TextureCompressionSettings log"""
 EVIL = '"; import os; os._exit(3) # \n'
 
