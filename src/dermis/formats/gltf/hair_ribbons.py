@@ -66,10 +66,7 @@ class RibbonPrimitive:
     @property
     def root_bone(self) -> int:
         """Return the index of the bone that moves the roots of the hair most."""
-        mesh = self.deformable.head.mesh
-        bone, weight = self.deformable.bone_influences
-        vertex = mesh.triangles[mesh.quads[self._ribbons[0].roots.quad, 0], 0]
-        return int(np.bincount(bone[vertex].ravel(), weight[vertex].ravel()).argmax())
+        return self.deformable.root_bone(self._ribbons[0].roots)
 
     def add_primitive(self, buffer_builder: BufferBuilder) -> Tree:
         """Append the vertices and triangles of the ribbons to the buffer, and return a glTF primitive.

@@ -31,7 +31,7 @@ from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material
 from dermis.mesh.skeleton import Skeleton
-from dermis.mesh.strand_groups import strand_groups
+from dermis.mesh.strand_groups import SCALP_HAIR, strand_groups
 
 _HAIR_KNOTS = {"brows": 3, "lashes": 4, "beard": 3}
 _MAX_GROWN_STRANDS = 10_000  # of hair and beard
@@ -65,6 +65,7 @@ def encode_head(
     skin_additions: SkinMaterialAdditions | None = None,
     compact: bool = False,
     hair_detail: float = 1.0,
+    scalp_hair: bool = True,
 ) -> bytes:
     """Encode a head as a .glb file in metres, with one mesh per material, morph targets and joints.
 
@@ -79,13 +80,14 @@ def encode_head(
     skin_additions : properties to add to the material of skin
     compact : whether to leave out maps that no other program reads, and small changes by morph targets
     hair_detail : fraction of the tubes and ribbons that represent hairs; fewer ones are wider
+    scalp_hair : whether to write scalp hair
     """
     binary, deformable = BufferBuilder(), DeformableMesh(head)
     pictures, roles = encode_skin_maps(head.maps, slopes, compact)
     pictures |= {} if skin_additions is None else skin_additions.pictures
     parts = [
         *_surface_parts(deformable, pictures, roles, roughness, eyes, compact),
-        *_hair_parts(deformable, pictures, hair_detail),
+        *_hair_parts(deformable, pictures, hair_detail, scalp_hair),
     ]
     materials = [part.material for part in parts]
     if skin_additions is not None:
@@ -163,15 +165,17 @@ def part_name(material: Material) -> str:
 
 
 def _hair_parts(
-    deformable_mesh: DeformableMesh, pictures: dict[str, bytes], hair_detail: float
+    deformable_mesh: DeformableMesh, pictures: dict[str, bytes], hair_detail: float, scalp_hair: bool
 ) -> Iterator[ExportedPart]:
     """Yield brows, lashes, beard and hair.
 
     pictures : PNG files by name; this function adds the colours of the hairs
-    hair_detail : see `encode_head`
+    hair_detail, scalp_hair : see `encode_head`
     """
     head = deformable_mesh.head
     for name, strands in strand_groups(head, _MAX_GROWN_STRANDS).items():
+        if name == SCALP_HAIR and not scalp_hair:
+            continue
         if name in _HAIR_KNOTS:
             fibres = FibreTubes.from_strands(
                 strands, head.mesh, round(hair_detail * _MAX_TUBES), _HAIR_KNOTS[name]

@@ -69,20 +69,13 @@ class HairCurves:
 
     def bind(self, skeleton_path: Sdf.Path, curves_prim: Usd.Prim) -> UsdSkel.BindingAPI:
         """Bind the curves to the skeleton: scalp hair to the bone of its roots, other hair as the skin is."""
-        vertex = root_vertices(self.deformable.head.mesh, self.strands.roots)
-        if self.deformable.rig.skeleton is None:
-            bone, weight = np.zeros((1, 1)), np.ones((1, 1))
-        else:
-            bone, weight = (values[vertex] for values in self.deformable.bone_influences)
-            if self.name == SCALP_HAIR:
-                bone, weight = (
-                    np.array([[np.bincount(bone.ravel(), weight.ravel()).argmax()]]),
-                    np.ones((1, 1)),
-                )
-            else:
-                bone, weight = (
-                    np.repeat(values, self._knots[0].shape[1], axis=0) for values in (bone, weight)
-                )
+        bone, weight = np.zeros((1, 1)), np.ones((1, 1))
+        if self.deformable.rig.skeleton is not None and self.name == SCALP_HAIR:
+            bone[:] = self.deformable.root_bone(self.strands.roots)
+        elif self.deformable.rig.skeleton is not None:
+            vertex = root_vertices(self.deformable.head.mesh, self.strands.roots)
+            per_knot = np.repeat(vertex, self._knots[0].shape[1])
+            bone, weight = (values[per_knot] for values in self.deformable.bone_influences)
         return bind_to_skeleton(skeleton_path, curves_prim, bone, weight, is_rigid=len(bone) == 1)
 
     def add_blend_shapes(
