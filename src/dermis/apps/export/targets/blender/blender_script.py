@@ -225,7 +225,7 @@ def save_and_render(options: argparse.Namespace) -> None:
         cycles.use_denoising = False
     if options.save is not None:
         bpy.ops.file.pack_all()
-        bpy.ops.wm.save_as_mainfile(filepath=str(options.save.resolve()))
+        bpy.ops.wm.save_as_mainfile(filepath=str(options.save.resolve()), compress=True)
     if options.render is not None:
         linear = options.render.suffix.lower() == ".exr"
         scene.render.image_settings.file_format = "OPEN_EXR" if linear else "PNG"

@@ -207,7 +207,8 @@ class Blender(Target):
     )
     file_meanings: ClassVar[Mapping[str, str]] = {
         "*.py": "script that builds the scene",
-        "*.glb": "head, eyes, hair and rig, which the script imports",
+        "*.glb": "head, eyes, brows, lashes, beard and rig, which the script imports",
+        "*.npz": "scalp hair, from which the script makes hair curves",
         "*.npy": "panorama of the environment, which the script reads",
         "*.blend": "scene with all pictures",
     }
