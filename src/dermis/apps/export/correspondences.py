@@ -66,7 +66,7 @@ def _material_of_points(mesh: Mesh, points: Index) -> int:
     """Return the material of which all of the points are corners."""
     corners = mesh.point[mesh.triangles]
     used = [set(mesh.material[(corners == point).any(axis=1)].tolist()) for point in np.unique(points)]
-    return min(set.intersection(*used))
+    return int(min(set.intersection(*used)))
 
 
 def _gltf_vertices(mesh: Mesh, material: int, points: Index) -> Index:

@@ -13,6 +13,7 @@ from pathlib import Path
 from pprint import pformat
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -134,7 +135,7 @@ def _write_script_files(
         files[-1].write_bytes(_encode_head(subject, scene))
         if (hair := _scalp_hair(scene.head)) is not None:
             files.append(files[-1].with_suffix(_HAIR_SUFFIX))
-            np.savez_compressed(files[-1], **hair.arrays)
+            hair.write(files[-1])
             scene_dict["hair"] = {
                 "file": files[-1].name,
                 "bone": hair.bone,
@@ -158,6 +159,13 @@ class _ScalpHair(NamedTuple):
 
     arrays: dict[str, Floats32]
     bone: str
+
+    def write(self, path: Path) -> None:
+        """Write the arrays as a compressed NumPy archive."""
+        with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+            for name, values in self.arrays.items():
+                with archive.open(f"{name}.npy", "w") as member:
+                    np.save(member, values, allow_pickle=False)
 
 
 def _scalp_hair(head: Head) -> _ScalpHair | None:

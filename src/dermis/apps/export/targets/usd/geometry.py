@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
 
+from dermis.base.arrays import Numbers
 from dermis.formats.deformable_mesh import DeformableMesh, VertexMorphTarget
 from dermis.formats.gltf.write import part_name
 from dermis.mesh.eyeball import eye_uv
@@ -120,7 +121,7 @@ def _add_uv(mesh_prim: UsdGeom.Mesh, uv: Floats, polygons: Polygons) -> None:
     primvar.SetIndices(Vt.IntArray.FromNumpy(polygons.vertices))
 
 
-def rest_points_mm(deformable_mesh: DeformableMesh) -> Floats:
+def rest_points_mm(deformable_mesh: DeformableMesh) -> Doubles:
     """Return the points (p, 3) of the mesh with all morph targets at weight 0 [mm]."""
     return replace(deformable_mesh.head.mesh, positions=deformable_mesh.positions_mm).points_mm
 
@@ -158,7 +159,8 @@ def add_rig(
     rest = UsdSkel.Animation.Define(usd_stage, path.AppendChild("rest"))
     UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([rest.GetPath()])
     vertex = first_vertex_by_point(deformable_mesh.head.mesh)
-    bone, weight = np.zeros((len(vertex), 1)), np.ones((len(vertex), 1))
+    bone: Numbers = np.zeros((len(vertex), 1))
+    weight: Numbers = np.ones((len(vertex), 1))
     if deformable_mesh.rig.skeleton is not None:
         bone, weight = (values[vertex] for values in deformable_mesh.bone_influences)
     bind_to_skeleton(path, mesh_prim, bone, weight)

@@ -17,7 +17,7 @@ from dermis.apps.export.targets.usd.geometry import (
     rest_points_mm,
     to_metres,
 )
-from dermis.base.arrays import Doubles, Floats, Index
+from dermis.base.arrays import Doubles, Floats, Index, Numbers
 from dermis.formats.deformable_mesh import DeformableMesh, VertexMorphTarget
 from dermis.formats.gltf.hair_colours import hair_albedo
 from dermis.mesh.strand_groups import SCALP_HAIR, moved_strands, root_vertices, sufficient_knots
@@ -69,9 +69,10 @@ class HairCurves:
 
     def bind(self, skeleton_path: Sdf.Path, curves_prim: Usd.Prim) -> UsdSkel.BindingAPI:
         """Bind the curves to the skeleton: scalp hair to the bone of its roots, other hair as the skin is."""
-        bone, weight = np.zeros((1, 1)), np.ones((1, 1))
+        bone: Numbers = np.zeros((1, 1))
+        weight: Numbers = np.ones((1, 1))
         if self.deformable.rig.skeleton is not None and self.name == SCALP_HAIR:
-            bone[:] = self.deformable.root_bone(self.strands.roots)
+            bone = np.full((1, 1), self.deformable.root_bone(self.strands.roots))
         elif self.deformable.rig.skeleton is not None:
             vertex = root_vertices(self.deformable.head.mesh, self.strands.roots)
             per_knot = np.repeat(vertex, self._knots[0].shape[1])
