@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import ast
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 from small_head import write_head
 
+from dermis import Human
 from dermis.apps.export.fitting import fit_burley_width, profile_error
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, load_subject
@@ -28,6 +31,7 @@ from dermis.apps.export.targets.blender.target import (
 )
 from dermis.apps.truths.half_space import diffuse_albedo, directional_albedo
 from dermis.base.errors import DermisError
+from dermis.formats.gltf.document import read_document
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
@@ -182,3 +186,32 @@ def test_scene_stands_upright_in_metres() -> None:
     # Blender's irradiance is P / 4 pi^2 d^2 times pi: a lamp's power is spread over a sphere
     assert export["lights"][0]["set"]["energy"] / (4 * np.pi * 0.5**2) == pytest.approx(2.0)
     assert panorama is None
+
+
+def test_scalp_hair_is_written_as_curves_of_a_bone(tmp_path: Path) -> None:
+    subject = load_subject("human:7", subdivide=0)
+    assert subject.scene is not None
+    head = replace(Human.sampled(7).head(subdivide=0, hairs=0.05), maps=Maps(colour=np.full((8, 8, 3), 0.3)))
+    target = TARGET.with_variant(None)
+    rows = target.parameters(subject, "5.2")
+    files = target.write(replace(subject, scene=replace(subject.scene, head=head)), rows, tmp_path, "5.2")
+    assert [file.name for file in files] == ["skin.py", "head.glb", "head.npz"]
+    meshes = {mesh["name"] for mesh in read_document(files[1]).tree["meshes"]}
+    assert {"head", "eye_left", "brows", "lashes"} <= meshes and "hair" not in meshes
+    hair = export_in(files[0].read_text("utf-8"))["hair"]
+    assert (hair["file"], hair["bone"], hair["ior"]) == ("head.npz", "head", 1.55)
+    with np.load(files[2]) as stored:
+        points, radius, absorption, colour = (stored[name] for name in stored.files)
+    assert points.shape[:2] == radius.shape and absorption.shape == colour.shape == (len(points), 3)
+    skin = 1e-3 * head.mesh.points_mm @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # y up to z up
+    scalp = skin[:, 2] > points[:, 0, 2].min() - 0.01
+    assert cKDTree(skin[scalp]).query(points[:, 0])[0].max() < 0.015  # roots are on the head
+    assert 1e-5 < radius.max() < 2e-3 and (absorption > 0).all() and (colour < 1).all()
+    darker = absorption[:, 2] >= absorption[:, 0]
+    assert darker.mean() > 0.9 and (colour[darker, 2] <= colour[darker, 0]).all()  # melanin absorbs blue
+
+
+def test_switches_of_lamps_stay_switches() -> None:
+    scene = Scene(Head("ball", uv_sphere(90.0, 8, 4), Maps()), lights=[PointLight(position=(0, 0, 500))])
+    (lamp,) = describe_scene(scene, np.zeros(3))[0]["lights"]
+    assert lamp["set"]["use_soft_falloff"] is False  # Blender refuses 0.0

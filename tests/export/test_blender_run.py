@@ -42,6 +42,29 @@ answer = {
 open(sys.argv[-1], "w").write(json.dumps(answer))
 """
 
+OBJECTS = """
+import json, sys
+import bpy
+import numpy as np
+bpy.ops.wm.open_mainfile(filepath=sys.argv[-2])
+objects = bpy.context.scene.objects
+hair = objects["hair"]
+points = np.empty(3 * len(hair.data.points))
+hair.data.points.foreach_get("position", points)
+keyed = [one for one in objects if one.type == "MESH" and one.data.shape_keys]
+skin = max(keyed, key=lambda one: len(one.data.vertices))
+corners = np.array([skin.matrix_world @ vertex.co for vertex in skin.data.vertices])
+world = points.reshape(-1, 3) @ np.array(hair.matrix_world)[:3, :3].T + np.array(hair.matrix_world)[:3, 3]
+answer = {
+    "kinds": {one.name: one.type for one in objects},
+    "curves": len(hair.data.curves), "parent": hair.parent_bone,
+    "keys": [key.name for key in skin.data.shape_keys.key_blocks],
+    "hair": [world.min(0).tolist(), world.max(0).tolist()],
+    "head": [corners.min(0).tolist(), corners.max(0).tolist()],
+}
+open(sys.argv[-1], "w").write(json.dumps(answer))
+"""
+
 pytestmark = pytest.mark.skipif(not PYTHON, reason=f"{PYTHON_VARIABLE} is not set")
 
 
@@ -68,6 +91,23 @@ def test_head_is_saved_upright_with_its_skin(tmp_path: Path, version: str) -> No
     assert answer["size_m"] == pytest.approx([0.16, 0.19, 0.24], rel=0.03)  # 240 mm high, its face to -Y
     assert answer["lights"] >= 1 and answer["camera"][1] < -1.0
     assert "head.obj" in answer["name"]
+
+
+def test_person_has_named_objects_and_hair_curves(tmp_path: Path, version: str) -> None:
+    file, answer_file = tmp_path / "person.blend", tmp_path / "answer.json"
+    export_skin("human:7", "blender", file, version=version, side=256, subdivide=0, glasses="round")
+    (tmp_path / "query.py").write_text(OBJECTS)
+    command = [PYTHON, "-I", str(tmp_path / "query.py"), str(file), str(answer_file)]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
+    answer: dict[str, Any] = json.loads(answer_file.read_text())
+    kinds = answer["kinds"]
+    for name in ("head", "eye_left", "eye_right", "teeth_upper", "brows", "lashes", "glasses_frame"):
+        assert name in kinds or f"{name}_mesh" in kinds, name
+    assert kinds["hair"] == "CURVES" and answer["curves"] > 10_000 and answer["parent"] == "head"
+    assert len(answer["keys"]) == 53 and {"Basis", "jawOpen"} <= set(answer["keys"])
+    low, high = np.array(answer["hair"]), np.array(answer["head"])
+    assert np.abs(low.mean(0) - high.mean(0)).max() < 0.15  # the hair is around the head
+    assert file.stat().st_size < 60e6
 
 
 def test_parameters_of_another_blender_version_are_refused(tmp_path: Path, version: str) -> None:

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -26,6 +27,12 @@ KNOWN = """
 boundary_color_bleed enable_burley enable_mean_free_path extinction_scale implementation ior lobe_mix
 mean_free_path_color mean_free_path_distance normal_scale roughness0 roughness1 scattering_distribution
 surface_albedo tint transmission_tint_color world_unit_scale"""
+UNREAL = """
+AssetImportTask AssetToolsHelpers EditorAssetLibrary LinearColor Material MaterialEditingLibrary
+MaterialFactoryNew MaterialExpressionScalarParameter MaterialExpressionTextureSampleParameter2D
+MaterialExpressionVectorParameter
+MaterialInstanceConstant MaterialInstanceConstantFactoryNew MaterialProperty MaterialSamplerType
+MaterialShadingModel SkeletalMesh SubsurfaceProfile SubsurfaceProfileFactory TextureCompressionSettings log"""
 EVIL = '"; import os; os._exit(3) # \n'
 
 
@@ -78,7 +85,7 @@ class _Settings:
 
 
 def _editor(settings: _Settings, saved: list[Any]) -> ModuleType:
-    """Return a stub of the module `unreal` with the functions that the script may use."""
+    """Return a stub of the module `unreal` with the functions that the script may use for a bare skin."""
     stored = {}
     profile = SimpleNamespace(
         get_editor_property={"settings": settings}.__getitem__,
@@ -86,14 +93,12 @@ def _editor(settings: _Settings, saved: list[Any]) -> ModuleType:
         get_path_name=lambda: "/Game/Dermis/x",
     )
     tools = SimpleNamespace(create_asset=lambda *arguments: saved.append(arguments) or profile)
-    unreal: Any = ModuleType("unreal")
+    unreal: Any = MagicMock(spec_set=UNREAL.split())
     unreal.AssetToolsHelpers = SimpleNamespace(get_asset_tools=lambda: tools)
     unreal.EditorAssetLibrary = SimpleNamespace(
         does_asset_exist=lambda path: False, save_loaded_asset=saved.append
     )
-    unreal.SubsurfaceProfile, unreal.SubsurfaceProfileFactory = object, object
     unreal.LinearColor = lambda *channels: channels
-    unreal.log = lambda text: None
     return unreal  # type: ignore[no-any-return]
 
 
@@ -112,7 +117,8 @@ def test_unreal_runs_its_script(
     path_mm = 10.0 * np.array(found["mean_free_path_color"][:3]) * found["mean_free_path_distance"]
     d = path_mm / (0.6 * (1.85 - A + 7.0 * np.abs(A - 0.8) ** 3))
     np.testing.assert_allclose(d, report.d_mm, rtol=1e-4)
-    assert saved[0][:2] == ("skin1", "/Game/Dermis") and len(saved) == 2
+    created = [one[:2] for one in saved if isinstance(one, tuple)]
+    assert created == [(name, "/Game/Dermis") for name in ("skin1", "M_skin1", "MI_skin1")]
 
 
 @pytest.mark.parametrize("name", [*LOBES, "arnold"])

@@ -18,6 +18,7 @@ from dermis.apps.export.targets.openpbr.document import standard_library
 from dermis.apps.export.targets.openpbr.materials import OpenPbrMaterial, skin_material
 from dermis.apps.export.targets.usd.geometry import unique_usd_names
 from dermis.apps.export.targets.usd.stage import build_stage
+from dermis.formats.deformable_mesh import DeformableMesh
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
@@ -71,6 +72,12 @@ def test_quads_are_restored() -> None:
     stage = build_stage(head, "head", mesh_materials(head), "a_")
     counts = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/head/mesh")).GetFaceVertexCountsAttr().Get())
     assert (counts == 4).sum() == len(head.mesh.quads) and counts.sum() == 4 * len(head.mesh.quads)
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/head/mesh"))
+    points = 1000.0 * np.array(mesh.GetPointsAttr().Get())
+    corners = points[np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 4)]
+    first, second = head.mesh.triangles[head.mesh.quads].transpose(1, 0, 2)
+    expected = DeformableMesh(head).positions_mm[np.column_stack([first, second[:, 1]])]
+    np.testing.assert_allclose(corners, expected, atol=SINGLE_MM)
 
 
 def test_targets_and_bones_deform_as_in_the_package(rigged: Head, tmp_path: Path) -> None:

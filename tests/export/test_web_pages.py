@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import io
 import json
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from chromium_input import CHROMIUM
 from numpy.typing import NDArray
 from PIL import Image
 
+from dermis import Human
 from dermis.apps.export.fitting import cumulative_burley_profile, fit_burley_width
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.run import evaluate_export, export_skin
@@ -24,6 +27,8 @@ from dermis.apps.export.targets.babylon.target import spiral_profile
 from dermis.apps.export.targets.pages.engine_page import page_camera_json
 from dermis.apps.export.targets.pages.html import csp_hash, escape_script
 from dermis.base.errors import DermisError
+from dermis.formats.gltf.document import read_document
+from dermis.mesh.maps import Maps
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 HOSTILE = '"; import os</script><script>alert(1)</script>$head'
@@ -79,7 +84,7 @@ def test_the_page_holds_the_head_in_metres_and_the_parameters(
     head = re.search(r'id="head">([^<]*)<', text)
     settings_text = re.search(r'id="settings">([^<]*)<', text)
     assert head is not None and settings_text is not None
-    assert base64.b64decode(head[1]).startswith(b"glTF")
+    assert gzip.decompress(base64.b64decode(head[1])).startswith(b"glTF")
     settings = json.loads(settings_text[1])
     report = evaluate_export(skin, TARGETS[target].with_variant(None), TARGETS[target].versions[-1])
     assert settings["skin"] == json.loads(
@@ -187,3 +192,20 @@ def test_camera_is_that_of_the_scene() -> None:
     babylon = TARGETS["babylon"].with_variant(None)
     rows = babylon.parameters(human, babylon.versions[-1])
     assert babylon._page_settings_json(human, rows, babylon.versions[-1])["camera"] == exported  # type: ignore[attr-defined]
+
+
+def test_pages_hold_the_head_at_rest_without_its_rig(target: str, tmp_path: Path) -> None:
+    person = load_subject("human:7", subdivide=0)
+    assert person.scene is not None
+    head = replace(Human.sampled(7).head(subdivide=0, hairs=0.05), maps=Maps(colour=np.full((8, 8, 3), 0.3)))
+    text = page_text(replace(person, scene=person.scene.replace(head=head)), target, tmp_path)
+    packed = re.search(r'id="head">([^<]*)<', text)
+    assert packed is not None
+    (tmp_path / "head.glb").write_bytes(gzip.decompress(base64.b64decode(packed[1])))
+    document = read_document(tmp_path / "head.glb")
+    meshes = {mesh["name"]: mesh["primitives"][0] for mesh in document.tree["meshes"]}
+    assert {"head", "eye_left", "hair", "brows"} <= set(meshes) and "skins" not in document.tree
+    assert not any("targets" in primitive for primitive in meshes.values())
+    points = 1e3 * document.read_floats(meshes["head"]["attributes"]["POSITION"])
+    skin = head.mesh.positions[np.unique(head.mesh.triangles[head.mesh.material == 0])]
+    np.testing.assert_allclose(points, skin, atol=1e-3)

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from dermis.apps.export.registry import TARGETS
 from dermis.base.console import print_report, spinner
 from dermis.base.errors import refuse
+from dermis.base.quantities import checked_integer
 from dermis.cli.head_options import HeadOptions, check_head_options
 from dermis.cli.living_options import StatesOption, check_constant_states, parse_states
 from dermis.cli.options import NO_OPTIONS, AdapterOption, FlagOption, JsonOption, OutputPath, drop_none
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 else:
     TargetName = Annotated[str, Parameter(help=f"Program to write for: {', '.join(TARGETS)}.")]
 
+_MAX_PICTURE_WIDTH = 2048
 ProfileModelName = Literal["montecarlo", "layered", "multipole", "dipole", "better-dipole"]
 
 
@@ -35,6 +37,7 @@ def export(
     profile: str | None = None,
     library: Path | None = None,
     map_side: int = 2048,
+    picture_width: int = 320,
     head: HeadOptions = NO_OPTIONS,
     state: StatesOption = None,
     adapter: AdapterOption = "auto",
@@ -71,8 +74,9 @@ def export(
         A skin (skin1, dj3, medium, gpu-gems-3 ..., a .toml or .csv file) or a head (human, human:SEED, a
         person (.json), a sample or a mesh file).
     output:
-        File to write; a name without suffix is a folder, created if necessary. A table of the parameters,
-        their meaning and the errors is written beside the file or into the folder, as Markdown and JSON.
+        File to write; a name without suffix is a folder, created if necessary. A README is written beside the
+        file or into the folder: files, steps of the import, a picture, the licence, and the parameters with
+        their meaning and errors, which are also written as JSON.
     version:
         Version of the program. [default: newest supported]
     variant:
@@ -89,6 +93,8 @@ def export(
         library from a public server]
     map_side:
         Side of the painted maps, a power of two from 256 to 4096 [texel].
+    picture_width:
+        Width of the picture of the head in the README [pixel]; 0 for no picture.
     naive:
         Also print the parameters that a user might choose without knowing their meaning in the program.
     as_json:
@@ -103,8 +109,15 @@ def export(
             refuse("--diffuse-transmission", "no other variant", actual, "Remove one of them")
         variant = "diffuse-transmission"
     weights = check_constant_states(parse_states(state or ())) or None
+    checked_integer("--picture-width", picture_width, 0, _MAX_PICTURE_WIDTH)
     options = drop_none(
-        state=weights, version=version, variant=variant, model=model, profile=profile, library=library
+        picture_width=picture_width,
+        state=weights,
+        version=version,
+        variant=variant,
+        model=model,
+        profile=profile,
+        library=library,
     )
     with spinner(f"exporting {subject}"):
         report = export_skin(subject, to, output, side=map_side, adapter=adapter, **options, **head)

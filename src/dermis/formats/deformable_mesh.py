@@ -20,6 +20,8 @@ from dermis.mesh.geometry import vertex_normals
 from dermis.mesh.head import Head
 from dermis.mesh.rig import Rig
 from dermis.mesh.skeleton import BONES_PER_POINT, Skeleton
+from dermis.mesh.strand_groups import root_vertices
+from dermis.mesh.strands import Roots
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -127,6 +129,12 @@ class DeformableMesh:
         dtype = np.uint8 if bone.max() < 256 else np.uint16
         point = self.head.mesh.point
         return bone[point].astype(dtype), weight[point].astype(np.float32)
+
+    def root_bone(self, roots: Roots) -> int:
+        """Return the index of the bone that moves the roots of hairs most."""
+        bone, weight = self.bone_influences
+        vertex = root_vertices(self.head.mesh, roots)
+        return int(np.bincount(bone[vertex].ravel(), weight[vertex].ravel()).argmax())
 
     def _control_displacements(self, target_index: int) -> Doubles:
         """Return the displacements (p, 3) of the control points by a morph target at weight 1 [mm]."""

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from dermis.apps.export.fitting import ProfileError, fit_burley_width, profile_error
+from dermis.apps.export.guide import PREVIEW_SUFFIX, guide_lines, write_preview
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import ModelName, Subject, load_subject
 from dermis.apps.export.target import Parameters, ParameterValue, Target
@@ -119,9 +120,12 @@ class ExportReport:
         )
         return [f"{text} at another radius.", self.limitations]
 
-    def markdown(self) -> str:
-        """Return the report as a Markdown page."""
-        lines = [f"# {_as_single_line(self.subject)} for {self.title} {self.version}".rstrip(), ""]
+    def markdown(self, guide: Sequence[str] = ()) -> str:
+        """Return the report as a Markdown page.
+
+        guide : lines of Markdown that precede the parameters and errors
+        """
+        lines = [f"# {_as_single_line(self.subject)} for {self.title} {self.version}".rstrip(), "", *guide]
         lines += [
             f"```\n{chr(10).join(map(_as_single_line, self.lines(with_naive_parameters=True)))}\n```",
             "",
@@ -164,6 +168,7 @@ def export_skin(
     side: int = _DEFAULT_MAP_SIDE,
     adapter: str = "auto",
     state: SkinState | Mapping[str, float] | None = None,
+    picture_width: int = 0,
     **head: Any,
 ) -> ExportReport:
     """Write a skin or a head for another program, and report the predicted errors of the rendered skin.
@@ -196,6 +201,8 @@ def export_skin(
         Graphics adapter on which maps are generated.
     state : SkinState or mapping, optional
         State of the skin of a person, such as {"blush": 0.6}, which the painted maps show.
+    picture_width : int, default 0
+        Width of a picture of the head for the README [pixel]; 0 writes no picture.
     **head
         Options of `load_head`.
 
@@ -232,13 +239,22 @@ def export_skin(
         refuse(given[0], "a subject by name or file", "it is given with a Subject", "Omit this option")
     if subject.part_pictures is not None and target.part_limitations:
         notify(f"{subject.name}: {target.part_limitations}")
+    shown = subject
     if target.needs_maps:
         subject = subject.with_painted_maps(side, adapter)
     report = evaluate_export(subject, target, resolved)
     with _staging_path(path) as staged:
         root, final_root = (one.parent if path.suffix else one for one in (staged, path))
-        files = target.write(subject, report.parameters, staged, resolved)
-        files += _write_report(replace(report, files=tuple(file.relative_to(root) for file in files)), staged)
+        files, picture = target.write(subject, report.parameters, staged, resolved), ""
+        if picture_width and subject.head is not None:
+            files.append(write_preview(shown, _beside(staged, PREVIEW_SUFFIX), picture_width, adapter))
+            picture = files[-1].name
+        report = replace(report, files=tuple(file.relative_to(root) for file in files))
+        page, data_file = _report_files(staged)
+        guide = guide_lines(target, subject, [*report.files, data_file.relative_to(root)], picture)
+        page.write_text(report.markdown(guide), encoding="utf-8")
+        data_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
+        files += [page, data_file]
     return replace(report, files=tuple(final_root / file.relative_to(root) for file in files))
 
 
@@ -300,11 +316,13 @@ def _move_written_files(staged_path: Path, output_path: Path) -> None:
         staged_path.replace(temporary)
 
 
-def _write_report(report: ExportReport, output: Path) -> list[Path]:
-    """Write the report as two files, beside the output file or into the output folder; return their paths."""
-    single = bool(output.suffix)
-    page = output.with_name(f"{output.name}.md") if single else output / _REPORT_MARKDOWN_FILE
-    data_file = output.with_name(f"{output.name}.json") if single else output / REPORT_JSON_FILE
-    page.write_text(report.markdown(), encoding="utf-8")
-    data_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
-    return [page, data_file]
+def _report_files(output: Path) -> tuple[Path, Path]:
+    """Return the paths of the report as Markdown and as JSON, beside the output or in its folder."""
+    if output.suffix:
+        return _beside(output, "md"), _beside(output, "json")
+    return output / _REPORT_MARKDOWN_FILE, output / REPORT_JSON_FILE
+
+
+def _beside(output: Path, suffix: str) -> Path:
+    """Return the path of a file beside an output file, whose name it extends, or in an output folder."""
+    return output.with_name(f"{output.name}.{suffix}") if output.suffix else output / suffix

@@ -16,6 +16,7 @@ from dermis.apps.export.subject import Subject
 from dermis.base.errors import format_value, refuse
 from dermis.optics.cumulative_profile import CumulativeProfile
 
+EXPORT_JSON_MEANING = "parameters, predicted errors and files as JSON"
 ParameterValue = bool | int | float | str | tuple[float, ...]
 T = TypeVar("T", bound="Target")
 
@@ -65,7 +66,7 @@ def write_files(output_folder: Path, names_and_contents: Iterable[tuple[str, byt
     written = []
     for name, content in names_and_contents:
         written.append(output_folder / name)
-        written[-1].parent.mkdir(exist_ok=True)
+        written[-1].parent.mkdir(parents=True, exist_ok=True)
         written[-1].write_bytes(content)
     return written
 
@@ -124,6 +125,12 @@ class Target(ABC):
     """Limitations of eyes and other parts that are not skin; reported if these parts have texture images."""
     untested: ClassVar[bool] = False
     """Whether the exported files have not been tested in the program."""
+    import_steps: ClassVar[tuple[str, ...]] = ()
+    """Three steps that import the files into the program, for the README."""
+    file_meanings: ClassVar[Mapping[str, str]] = {}
+    """Contents of the target's files by the patterns of their names; see `guide.file_meaning` for others."""
+    licence: ClassVar[str] = ""
+    """Licence of the program's code that the files contain or load."""
 
     def with_variant(self: T, variant: str | None) -> T:
         """Return a copy of this target with a selected variant; None selects the first of `variants`.
@@ -314,6 +321,11 @@ class JsonTarget(Target):
     suffixes = (".json", "")
     shows_states = False
     untested = True
+    file_meanings: ClassVar[Mapping[str, str]] = {
+        "*.json.json": EXPORT_JSON_MEANING,
+        "export.json": EXPORT_JSON_MEANING,
+        "*.json": "parameters of the material",
+    }
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write a JSON file of the parameters with their units and meanings.

@@ -120,7 +120,7 @@ def cycles_light(
     energy_per_irradiance: float,
     position: Vector,
     forward: Vector,
-    **lamp_properties: float | str,
+    **lamp_properties: float | str | bool,
 ) -> SceneDict:
     """Return Cycles' description of a light.
 
@@ -139,7 +139,7 @@ def cycles_light(
         **lamp_properties,
     }
     for name, value in lamp_properties.items():  # NumPy's numbers are not valid JSON
-        fields[name] = value if isinstance(value, str) else float(value)
+        fields[name] = value if isinstance(value, str | bool) else float(value)
     return {"type": lamp_type, "set": fields, "to_world": cycles_look_at(position, forward)}
 
 

@@ -7,17 +7,17 @@ from functools import cached_property
 
 import numpy as np
 
-from dermis.base.arrays import Doubles, Floats, Index, Intp
+from dermis.base.arrays import Doubles, Floats, Index
 from dermis.formats.deformable_mesh import DeformableMesh, VertexMorphTarget
 from dermis.formats.gltf.binary import VERTEX_TARGET, BufferBuilder
 from dermis.formats.gltf.document import Tree
 from dermis.formats.gltf.hair_colours import grouped_colours
 from dermis.formats.gltf.primitives import to_metres
+from dermis.mesh.strand_groups import sufficient_knots
 from dermis.mesh.strands import Roots, Strands
 
-_KNOT_COUNTS = 4, 5, 6, 8, 10, 13, 17, 22  # possible numbers of knots per ribbon
+_MAX_KNOT_COUNT = 22  # of a ribbon
 _MAX_DEVIATION_MM = 1.5  # largest distance of nine tenths of the knots of hairs from their ribbons
-_MAX_KNOTS = 30_000  # of all ribbons
 _COLOUR_COUNT, _ROWS_PER_COLOUR = 8, 64
 _TEXTURE_COLUMNS, _COLUMNS_PER_RIBBON = 256, 36
 _STREAK_WIDTH, _GAP_WIDTH = 4, 2  # columns of a streak, which shows one hair, and between streaks
@@ -37,10 +37,12 @@ class RibbonPrimitive:
 
     deformable : mesh of the head with its deformation
     strands : all hairs
+    max_knots : largest number of knots of all ribbons
     """
 
     deformable: DeformableMesh
     strands: Strands
+    max_knots: int
 
     @cached_property
     def _ribbons(self) -> tuple[Strands, Doubles]:
@@ -50,13 +52,8 @@ class RibbonPrimitive:
         """
         mesh = self.deformable.head.mesh
         points = replace(mesh, positions=self.deformable.positions_mm).points_mm
-        last = self.strands.knots_mm.shape[1] - 1
-        sample = self.strands.knots_mm[:2000].astype(np.float64)
-        for count in _KNOT_COUNTS:
-            knot = np.unique(np.rint(np.linspace(0, last, count)).astype(int))
-            if _deviation_mm(sample, knot) < _MAX_DEVIATION_MM:
-                break
-        kept = min(len(self.strands), _MAX_KNOTS // len(knot))
+        knot = sufficient_knots(self.strands, _MAX_DEVIATION_MM, _MAX_KNOT_COUNT)
+        kept = min(len(self.strands), self.max_knots // len(knot))
         roots = Roots(self.strands.roots.quad[:kept], self.strands.roots.position[:kept])
         fewer = Strands(
             roots,
@@ -69,10 +66,7 @@ class RibbonPrimitive:
     @property
     def root_bone(self) -> int:
         """Return the index of the bone that moves the roots of the hair most."""
-        mesh = self.deformable.head.mesh
-        bone, weight = self.deformable.bone_influences
-        vertex = mesh.triangles[mesh.quads[self._ribbons[0].roots.quad, 0], 0]
-        return int(np.bincount(bone[vertex].ravel(), weight[vertex].ravel()).argmax())
+        return self.deformable.root_bone(self._ribbons[0].roots)
 
     def add_primitive(self, buffer_builder: BufferBuilder) -> Tree:
         """Append the vertices and triangles of the ribbons to the buffer, and return a glTF primitive.
@@ -161,19 +155,6 @@ class RibbonPrimitive:
         v = (group[:, None] + inside) / _COLOUR_COUNT
         uv = np.stack([u.ravel(), v.ravel()], axis=1).astype(np.float32)
         return picture.reshape(-1, _TEXTURE_COLUMNS, 4), uv
-
-
-def _deviation_mm(knots_mm: Doubles, kept: Intp) -> float:
-    """Return the 90th percentile of the distances of knots from polylines through some of them [mm].
-
-    knots_mm : (n, k, 3) knots of hairs
-    kept : indices of the knots through which the polylines run
-    """
-    place = np.interp(np.arange(knots_mm.shape[1]), kept, np.arange(len(kept)))
-    first = np.minimum(place.astype(int), len(kept) - 2)
-    part = (place - first)[:, None]
-    on_line = (1.0 - part) * knots_mm[:, kept[first]] + part * knots_mm[:, kept[first + 1]]
-    return float(np.percentile(np.linalg.norm(knots_mm - on_line, axis=-1), 90.0))
 
 
 def _unit(vectors: Doubles) -> Doubles:

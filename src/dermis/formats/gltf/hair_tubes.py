@@ -8,14 +8,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.arrays import Doubles, Floats, Index, Intp
+from dermis.base.arrays import Doubles, Floats, Index
 from dermis.formats.deformable_mesh import DeformableMesh, VertexMorphTarget
 from dermis.formats.gltf.binary import BufferBuilder
 from dermis.formats.gltf.document import Tree
 from dermis.formats.gltf.hair_colours import HAIR_COLOUR_COUNT, grouped_colours
 from dermis.formats.gltf.primitives import bone_attributes, to_metres, vertex_attributes
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Roots, Strands, quad_weights, root_frames
+from dermis.mesh.strand_groups import moved_strands, root_vertices
+from dermis.mesh.strands import Roots, Strands, root_frames
 
 _TUBE_SIDES = 3
 # ratio at which a tube is as wide on average as a round hair
@@ -51,7 +52,9 @@ class TubePrimitive:
         attributes |= bone_attributes(
             buffer_builder,
             self.deformable,
-            np.repeat(self.fibres.root_vertices, self.fibres.vertices_per_hair),
+            np.repeat(
+                root_vertices(self.fibres.mesh, self.fibres.strands.roots), self.fibres.vertices_per_hair
+            ),
             compact=True,
         )
         index = buffer_builder.add_triangles(self.fibres.triangles(), len(positions))
@@ -130,14 +133,6 @@ class FibreTubes:
         """Return the number of vertices of the tubes of all hairs, n * m."""
         return self.vertices_per_hair * len(self.strands)
 
-    @property
-    def root_vertices(self) -> Intp:
-        """Return the index of the skin vertex nearest to the root of each hair, (n,)."""
-        nearest = quad_weights(self.strands.roots.position).argmax(axis=1)
-        first, second = self.mesh.quads[self.strands.roots.quad].T
-        corners = np.column_stack([self.mesh.triangles[first], self.mesh.triangles[second, 1]])
-        return np.asarray(corners[np.arange(len(corners)), nearest], np.intp)
-
     @cached_property
     def _tube_rings(self) -> tuple[Doubles, Doubles]:
         """Return the vertices [mm] and normals of the tubes, in the frame at the root of each hair.
@@ -180,18 +175,11 @@ class FibreTubes:
         points_mm : (p, 3) points of the skin mesh at rest
         delta_mm : (p, 3) displacements of these points
         """
-        first, second = self.mesh.quads[self.strands.roots.quad].T
-        corners = self.mesh.point[np.column_stack([self.mesh.triangles[first], self.mesh.triangles[second]])]
-        hair = np.flatnonzero((np.abs(delta_mm).max(axis=1) > 0)[corners].any(axis=1))
-        roots, offsets = self.strands.roots, self._tube_rings[0][hair]
-        roots = Roots(roots.quad[hair], roots.position[hair])
-        (before, rest), (after, frame) = (
-            root_frames(self.mesh, roots, points) for points in (points_mm, points_mm + delta_mm)
+        hair, delta = moved_strands(
+            self.mesh, self.strands.roots, self._tube_rings[0], points_mm, delta_mm, _MIN_DISPLACEMENT_MM
         )
-        delta = (after - before)[:, None] + np.einsum("nic,nki->nkc", frame - rest, offsets)
-        moving = np.flatnonzero(np.abs(delta).max(axis=(1, 2), initial=0.0) >= _MIN_DISPLACEMENT_MM)
-        vertex = hair[moving][:, None] * self.vertices_per_hair + np.arange(self.vertices_per_hair)
-        return vertex.ravel(), delta[moving].reshape(-1, 3)
+        vertex = hair[:, None] * self.vertices_per_hair + np.arange(self.vertices_per_hair)
+        return vertex.ravel(), delta.reshape(-1, 3)
 
     def triangles(self) -> Index:
         """Return the vertex indices of the f triangles of all tubes, (f, 3)."""

@@ -14,6 +14,7 @@ from dermis.formats.part_pictures import PartPictures, PartRole, encode_linear8,
 from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.eyeball import EyeTextures
+from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material
 from dermis.specular.hair import KERATIN_ETA
@@ -143,6 +144,12 @@ def gltf_material_name(material: Material) -> str:
     """Return the name of a material in the file; that of skin contains the word "skin"."""
     is_named = material.kind != "skin" or "skin" in material.name.casefold()
     return material.name if is_named else f"{material.name} skin"
+
+
+def skin_material_names(head: Head) -> list[str]:
+    """Return the names of the skin materials in the .glb file."""
+    used = [head.mesh.materials[index] for index in np.unique(head.mesh.material)]
+    return [gltf_material_name(material) for material in used if material.kind == "skin"]
 
 
 def encode_part_pictures(part_maps: PartPictures) -> dict[str, bytes]:

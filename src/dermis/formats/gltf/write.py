@@ -28,14 +28,14 @@ from dermis.formats.gltf.materials import (
 from dermis.formats.gltf.primitives import METRES_PER_MM, PrimitiveSource, SurfacePrimitive
 from dermis.formats.part_pictures import PartPictures
 from dermis.mesh.eyeball import EyeTextures
-from dermis.mesh.grown_strands import grow_strands, is_beard
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material
 from dermis.mesh.skeleton import Skeleton
-from dermis.mesh.strands import Strands
+from dermis.mesh.strand_groups import SCALP_HAIR, strand_groups
 
 _HAIR_KNOTS = {"brows": 3, "lashes": 4, "beard": 3}
 _MAX_GROWN_STRANDS = 10_000  # of hair and beard
+_MAX_RIBBON_KNOTS = 30_000  # of scalp hair
 _MAX_TUBES = 1_000  # of brows, lashes or beard; more hairs are represented by fewer, wider ones
 _SIDE_WORDS = "left", "right", "upper", "lower"
 
@@ -64,6 +64,8 @@ def encode_head(
     eyes: EyeTextures | None = None,
     skin_additions: SkinMaterialAdditions | None = None,
     compact: bool = False,
+    hair_detail: float = 1.0,
+    scalp_hair: bool = True,
 ) -> bytes:
     """Encode a head as a .glb file in metres, with one mesh per material, morph targets and joints.
 
@@ -77,13 +79,15 @@ def encode_head(
     eyes : maps of the eyeballs; None for eyes in a uniform colour
     skin_additions : properties to add to the material of skin
     compact : whether to leave out maps that no other program reads, and small changes by morph targets
+    hair_detail : fraction of the tubes and ribbons that represent hairs; fewer ones are wider
+    scalp_hair : whether to write scalp hair
     """
     binary, deformable = BufferBuilder(), DeformableMesh(head)
     pictures, roles = encode_skin_maps(head.maps, slopes, compact)
     pictures |= {} if skin_additions is None else skin_additions.pictures
     parts = [
         *_surface_parts(deformable, pictures, roles, roughness, eyes, compact),
-        *_hair_parts(deformable, pictures),
+        *_hair_parts(deformable, pictures, hair_detail, scalp_hair),
     ]
     materials = [part.material for part in parts]
     if skin_additions is not None:
@@ -160,29 +164,28 @@ def part_name(material: Material) -> str:
     return "_".join([*(word for word in words if word not in sides), *sides]) or "part"
 
 
-def _hair_parts(deformable_mesh: DeformableMesh, pictures: dict[str, bytes]) -> Iterator[ExportedPart]:
+def _hair_parts(
+    deformable_mesh: DeformableMesh, pictures: dict[str, bytes], hair_detail: float, scalp_hair: bool
+) -> Iterator[ExportedPart]:
     """Yield brows, lashes, beard and hair.
 
     pictures : PNG files by name; this function adds the colours of the hairs
+    hair_detail, scalp_hair : see `encode_head`
     """
     head = deformable_mesh.head
-    groups = dict[str, Strands]()
-    if (fine := head.strands) is not None:
-        is_lash = np.zeros(len(fine), bool) if fine.is_lash is None else fine.is_lash
-        groups |= {"brows": fine.select(~is_lash), "lashes": fine.select(is_lash)}
-    if head.hair is not None:
-        grown = grow_strands(head.hair, head.mesh, head.mesh.points_mm, _MAX_GROWN_STRANDS)
-        beard = is_beard(head.hair, _MAX_GROWN_STRANDS)
-        groups |= {"beard": grown.select(beard), "hair": grown.select(~beard)}
-    for name, strands in groups.items():
-        if not len(strands):
+    for name, strands in strand_groups(head, _MAX_GROWN_STRANDS).items():
+        if name == SCALP_HAIR and not scalp_hair:
             continue
         if name in _HAIR_KNOTS:
-            fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_TUBES, _HAIR_KNOTS[name])
+            fibres = FibreTubes.from_strands(
+                strands, head.mesh, round(hair_detail * _MAX_TUBES), _HAIR_KNOTS[name]
+            )
             source: PrimitiveSource = TubePrimitive(deformable_mesh, fibres)
             pictures[name] = encode_colours_png(fibres.palette_and_uv()[0])
         else:
-            source = ribbons = RibbonPrimitive(deformable_mesh, strands)
+            source = ribbons = RibbonPrimitive(
+                deformable_mesh, strands, round(hair_detail * _MAX_RIBBON_KNOTS)
+            )
             pictures[name] = encode_colours_png(ribbons.streaks_and_uv()[0])
         yield ExportedPart(name, source, hair_material(name, has_alpha=name not in _HAIR_KNOTS))
 

@@ -26,6 +26,11 @@ class Arnold(JsonTarget):
     name = "arnold"
     title = "Arnold"
     versions = ("7",)
+    import_steps = (
+        "Create a `standard_surface` material in a scene in centimetres.",
+        "Set each parameter to the value in the .json file.",
+        "Apply the maps of an export to `maps` to its colour, roughness and normal.",
+    )
     limitations = (
         "How the renderer converts a colour to a scattering albedo is not published; tabulated random walks "
         "of this package are used instead. A single medium cannot represent layers."

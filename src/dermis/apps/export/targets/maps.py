@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,6 +88,16 @@ class MapFolder(Target):
     suffixes = ("",)
     versions = ("1",)
     variants = ("opengl", "directx")
+    import_steps = (
+        "Read maps.json for the unit and the range of each map.",
+        "Load the OpenEXR files as linear data; the PNG files are for viewing.",
+        "Apply the maps in the uv layout of the head, which exports to `gltf` and `usd` contain.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {
+        "maps.json": "units, ranges, quantisation of the PNG files, and missing maps with the reason",
+        "*.exr": "map with linear values",
+        "*.png": "map for viewing",
+    }
     limitations = (
         "Light is baked for one pose and one scene, in the direction of the normal. The profile is the sum "
         "of Gaussians of the renderer. Specular reflection is not included, as it depends on the viewer."

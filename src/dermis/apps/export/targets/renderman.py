@@ -29,6 +29,11 @@ class RenderMan(JsonTarget):
     name = "renderman"
     title = "RenderMan"
     versions = ("26",)
+    import_steps = (
+        "Create a `PxrSurface` material in a scene in millimetres.",
+        "Set each parameter to the value in the .json file.",
+        "Apply the maps of an export to `maps` to its colour, roughness and normal.",
+    )
     limitations = (
         "The model has no published closed form; the profile of its authors' paper is used. The path-traced "
         "and multiple models differ."

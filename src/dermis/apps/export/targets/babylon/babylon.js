@@ -61,7 +61,7 @@ const drawHead = async () => {
   const scene = new BABYLON.Scene(engine);
   Object.assign(scene, {useRightHandedSystem: true, clearColor: new BABYLON.Color4(0, 0, 0, 1)});
   addCamera(scene);
-  await BABYLON.ImportMeshAsync(readHead(), scene, {pluginExtension: ".glb"});
+  await BABYLON.ImportMeshAsync(await readHead(), scene, {pluginExtension: ".glb"});
   const lights = settings.lights.map((light) => addLight(light, scene));
   lights.forEach((light) => addShadow(light, scene));
   scene.materials.forEach((material) => { material.maxSimultaneousLights = lights.length; });

@@ -15,6 +15,7 @@ from typing import Any
 
 import bpy  # type: ignore[import-not-found,unused-ignore]
 import numpy as np
+from mathutils import Matrix  # type: ignore[import-not-found,unused-ignore]
 
 from dermis.apps.truths.cycles_script import add_light, add_object, set_camera, set_world
 
@@ -89,6 +90,63 @@ def place_head() -> None:
     slots = [slot for mesh in meshes if mesh.users_scene for slot in mesh.material_slots]
     for material in {slot.material for slot in slots if is_skin_name(slot.material.name)}:
         set_skin_inputs(next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED"))
+    if EXPORT["hair"] is not None:
+        armatures = [added for added in bpy.data.objects if added not in before and added.type == "ARMATURE"]
+        add_hair(EXPORT["hair"], armatures)
+
+
+def add_hair(description: dict[str, Any], armatures: list[Any]) -> None:
+    """Add scalp hair as hair curves, which follow a bone.
+
+    description : name of the file of hair, and of the bone
+    armatures : imported armatures, one or none
+    """
+    with np.load(find_data_folder() / description["file"], allow_pickle=False) as stored:
+        arrays = dict(stored)
+    points = arrays["points_m"]
+    hair = bpy.data.hair_curves.new("hair")
+    hair.add_curves([points.shape[1]] * len(points))
+    hair.points.foreach_set("position", points.ravel())
+    hair.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", arrays["radius_m"].ravel())
+    for name in ("absorption", "colour"):
+        attribute = hair.attributes.new(name, "FLOAT_VECTOR", "CURVE")
+        attribute.data.foreach_set("vector", arrays[name].ravel())
+    hair.materials.append(make_hair_material(description))
+    curves = add_object("hair", hair)
+    if armatures and description["bone"]:
+        curves.parent, curves.parent_type = armatures[0], "BONE"
+        curves.parent_bone = description["bone"]
+        bpy.context.view_layer.update()
+        curves.matrix_world = Matrix()
+
+
+def make_hair_material(description: dict[str, Any]) -> Any:
+    """Return a material of hair, whose absorption or colour is an attribute of the curves.
+
+    Cycles uses the absorption coefficient times the radius in the Principled Hair BSDF of [Chiang2016]; EEVEE
+    uses the colour in a Principled BSDF.
+
+    description : roughness along and around the hairs, and their index of refraction
+    """
+    material = bpy.data.materials.new("hair")
+    material.use_nodes = True
+    tree, is_eevee = material.node_tree, EXPORT["method"] == "EEVEE"
+    attribute = tree.nodes.new("ShaderNodeAttribute")
+    attribute.attribute_name = "colour" if is_eevee else "absorption"
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    if not is_eevee:
+        tree.nodes.remove(shader)
+        shader = tree.nodes.new("ShaderNodeBsdfHairPrincipled")
+        shader.model, shader.parametrization = "CHIANG", "ABSORPTION"
+        along, around = description["roughness"]
+        values = {"Roughness": along, "Radial Roughness": around, "IOR": description["ior"]}
+        for name, value in values.items():
+            shader.inputs[name].default_value = value
+    target = shader.inputs["Base Color" if is_eevee else "Absorption Coefficient"]
+    tree.links.new(attribute.outputs["Vector"], target)
+    tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    return material
 
 
 def is_skin_name(material_name: str) -> bool:
@@ -167,7 +225,7 @@ def save_and_render(options: argparse.Namespace) -> None:
         cycles.use_denoising = False
     if options.save is not None:
         bpy.ops.file.pack_all()
-        bpy.ops.wm.save_as_mainfile(filepath=str(options.save.resolve()))
+        bpy.ops.wm.save_as_mainfile(filepath=str(options.save.resolve()), compress=True)
     if options.render is not None:
         linear = options.render.suffix.lower() == ".exr"
         scene.render.image_settings.file_format = "OPEN_EXR" if linear else "PNG"

@@ -8,9 +8,12 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from pprint import pformat
 from tempfile import TemporaryDirectory
+from typing import NamedTuple
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,19 +26,25 @@ from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_
 from dermis.apps.truths.cycles import cycles_camera
 from dermis.apps.truths.lights import CYCLES_LIGHTS, cycles_lamp
 from dermis.apps.truths.scene_description import CYCLES_UNIT_MM, SceneDict, cycles_world
-from dermis.formats.gltf.materials import gltf_material_name
+from dermis.formats.deformable_mesh import DeformableMesh
+from dermis.formats.gltf.hair_colours import hair_albedo
+from dermis.formats.gltf.materials import skin_material_names
 from dermis.formats.gltf.write import encode_head
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
+from dermis.mesh.strand_groups import SCALP_HAIR, strand_groups, sufficient_knots
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+from dermis.specular.hair import AZIMUTHAL_ROUGHNESS, KERATIN_ETA, LONGITUDINAL_ROUGHNESS
 
 Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
 VersionRange = tuple[list[int], list[int] | None]
 """First version of Blender for which parameters are valid, and first later version for which they are
 invalid; the latter is None if they are valid for all later versions."""
 SCRIPT_FILE, HEAD_FILE, PANORAMA_FILE = "skin.py", "head.glb", "panorama.npy"
+_HAIR_SUFFIX = ".npz"  # of the file of scalp hair, whose name is that of the head
 """Names of the files in an output folder."""
 METRES_PER_MM = 1e-3
 _CYCLES_UNIT_M = CYCLES_UNIT_MM * METRES_PER_MM
@@ -52,6 +61,7 @@ _BLENDER_TASK = BlenderTask(
 _BLENDER_TIMEOUT_S = 600.0
 _GGX_PER_BECKMANN_ROUGHNESS = 0.5
 """Ratio of GGX roughness to Beckmann roughness, from a least squares fit of the lobes' square roots [-]."""
+_MAX_KNOT_DEVIATION_MM, _MAX_KNOT_COUNT = 0.3, 40  # of a curve from a hair; knots of a curve
 _MAX_FILE_NAME_LENGTH = 60  # characters; Blender truncates names to 63
 _EXPORT_DATA_LINE = "EXPORT: dict[str, Any] = {}\n"
 _HELPER_IMPORT_PATTERN = re.compile(r"from dermis\.apps\.truths\.cycles_script import (.*)\n")
@@ -101,6 +111,7 @@ def _describe_skin(
         "smoother": float(np.sqrt(skin.roughness_factor * _GGX_PER_BECKMANN_ROUGHNESS)),
         "ball_m": BALL_DIAMETER_MM * METRES_PER_MM,
         "head": None,
+        "hair": None,
         "skin_materials": skin_material_names(subject.head_or_ball),
         "size": list(Settings().size),
     }
@@ -122,6 +133,15 @@ def _write_script_files(
         scene_dict["head"] = head_name
         files.append(script_path.with_name(head_name))
         files[-1].write_bytes(_encode_head(subject, scene))
+        if (hair := _scalp_hair(scene.head)) is not None:
+            files.append(files[-1].with_suffix(_HAIR_SUFFIX))
+            hair.write(files[-1])
+            scene_dict["hair"] = {
+                "file": files[-1].name,
+                "bone": hair.bone,
+                "roughness": [LONGITUDINAL_ROUGHNESS, AZIMUTHAL_ROUGHNESS],
+                "ior": KERATIN_ETA,
+            }
     if panorama is not None:
         files.append(script_path.with_name(PANORAMA_FILE))
         np.save(files[-1], panorama)
@@ -129,21 +149,55 @@ def _write_script_files(
     return files
 
 
+class _ScalpHair(NamedTuple):
+    """Scalp hair for Blender.
+
+    arrays : points_m (n, k, 3) with Z up and radius_m (n, k) [m] of n hairs, absorption (n, 3), which is the
+        absorption coefficient times the radius [-], and colour (n, 3) of many such hairs [-]
+    bone : name of the bone that the hair follows; empty without bones
+    """
+
+    arrays: dict[str, Floats32]
+    bone: str
+
+    def write(self, path: Path) -> None:
+        """Write the arrays as a compressed NumPy archive."""
+        with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+            for name, values in self.arrays.items():
+                with archive.open(f"{name}.npy", "w") as member:
+                    np.save(member, values, allow_pickle=False)
+
+
+def _scalp_hair(head: Head) -> _ScalpHair | None:
+    strands, deformable = strand_groups(head).get(SCALP_HAIR), DeformableMesh(head)
+    if strands is None:
+        return None
+    kept = sufficient_knots(strands, _MAX_KNOT_DEVIATION_MM, _MAX_KNOT_COUNT)
+    points_mm = replace(head.mesh, positions=deformable.positions_mm).points_mm
+    knots_mm = strands.knot_positions_mm(head.mesh, points_mm)[:, kept]
+    radius_mm = strands.radius_mm[:, kept]
+    arrays = {
+        "points_m": METRES_PER_MM * knots_mm @ _Y_UP_TO_Z_UP[:3, :3].T,
+        "radius_m": METRES_PER_MM * radius_mm,
+        "absorption": strands.absorption * radius_mm.max(axis=1, keepdims=True),
+        "colour": hair_albedo(strands),
+    }
+    skeleton = deformable.rig.skeleton
+    bone = "" if skeleton is None else skeleton.names[deformable.root_bone(strands.roots)]
+    return _ScalpHair({name: values.astype(np.float32) for name, values in arrays.items()}, bone)
+
+
 def _encode_head(subject: Subject, scene: Scene) -> bytes:
-    """Return a .glb file of the head with morph targets, bones, eyes and hairs."""
+    """Return a .glb file of the head with morph targets, bones, eyes, brows, lashes and beard."""
     return encode_head(
         scene.head,
         roughness=scene.skin.roughness,
         weights={} if scene.pose is None else dict(scene.pose.weights),
         slopes=relief_slopes(scene.head),
         eyes=subject.eye_pictures(),
+        compact=True,
+        scalp_hair=False,
     )
-
-
-def skin_material_names(head: Head) -> list[str]:
-    """Return the names of the skin materials in the .glb file."""
-    used = [head.mesh.materials[index] for index in np.unique(head.mesh.material)]
-    return [gltf_material_name(material) for material in used if material.kind == "skin"]
 
 
 def blender_script_text(export_data: Mapping[str, object]) -> str:
@@ -164,7 +218,7 @@ def blender_script_text(export_data: Mapping[str, object]) -> str:
         names += sorted(called & functions.keys() - {*names})
     copied = "\n\n\n".join(str(ast.get_source_segment(source, functions[name])) for name in names)
     literal = pformat(dict(export_data), width=110, sort_dicts=False)
-    text = _HELPER_IMPORT_PATTERN.sub("from mathutils import Matrix\n", text).replace(_BPY_TYPE_COMMENT, "")
+    text = _HELPER_IMPORT_PATTERN.sub("", text).replace(_BPY_TYPE_COMMENT, "")
     text = text.replace(_MAIN_GUARD, f"{copied}\n\n\n{_MAIN_GUARD}")
     return text.replace(_EXPORT_DATA_LINE, f"EXPORT: dict[str, Any] = {literal}\n")
 

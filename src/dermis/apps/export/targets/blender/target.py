@@ -5,10 +5,10 @@ The formulas follow the source of the kernels in the releases 4.5, 5.0 and 5.2 o
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -199,6 +199,19 @@ class Blender(Target):
     versions = ("4.5", "5.0", "5.1", "5.2")
     variants = ("random-walk-skin", "random-walk", "burley", "eevee")
     needs_maps = True
+    import_steps = (
+        "Keep the files together, and run `blender --python skin.py`, or run the script in the text editor; "
+        "open a .blend file directly.",
+        "Choose the camera view (numpad 0) and rendered shading.",
+        "Set expressions with the shape keys of the meshes, and poses with the bones.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {
+        "*.py": "script that builds the scene",
+        "*.glb": "head, eyes, brows, lashes, beard and rig, which the script imports",
+        "*.npz": "scalp hair, from which the script makes hair curves",
+        "*.npy": "panorama of the environment, which the script reads",
+        "*.blend": "scene with all pictures",
+    }
     limitations = (
         "Random walks return less light than the base colour along the normal, and more at grazing angles;"
         " Burley's profile ignores thin parts. All methods use one layer, so the red of layered skin is lost."

@@ -19,11 +19,14 @@ _MULTISCATTER_ROLE = "multiscatter"
 _MULTISCATTER_TABLE_SIZE = 1024
 
 
-def encode_glb(subject: Subject, material_extensions: Extensions, draft_notice: str) -> bytes:
+def encode_glb(
+    subject: Subject, material_extensions: Extensions, draft_notice: str, hair_detail: float = 1.0
+) -> bytes:
     """Return a .glb file of the head with eyes, hairs and rig, or of a ball for a skin without a head.
 
     material_extensions : dictionary from the name of each extension of the skin's material to its JSON
     draft_notice : notice that an extension is a draft, stored in the file; "" if all extensions are ratified
+    hair_detail : fraction of the tubes and ribbons that represent hairs
     """
     head = subject.head_or_ball
     notes: dict[str, object] = {"draft": draft_notice} if draft_notice else {}
@@ -39,6 +42,7 @@ def encode_glb(subject: Subject, material_extensions: Extensions, draft_notice: 
         eyes=subject.eye_pictures(),
         skin_additions=_skin_additions(subject, head, material_extensions, draft_notice),
         compact=True,
+        hair_detail=hair_detail,
     )
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -48,6 +50,14 @@ class Gltf(Target):
     versions = ("2.0",)
     variants = (CORE_VARIANT, TRANSMISSION_VARIANT, SCATTER_VARIANT)
     needs_maps = True
+    import_steps = (
+        "Open or import the .glb file: in Blender with File > Import > glTF, or in any viewer.",
+        "Set expressions with the 52 morph targets of the mesh `head`, which have the names of ARKit.",
+        "Turn head, neck and eyes with the bones.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {
+        "*.glb": "head, eyes, hair and rig with their pictures; metres, Y up",
+    }
     limitations = (
         f"The variants {CORE_VARIANT} and {TRANSMISSION_VARIANT} look like skin in all programs, but light is"
         f" not diffused: shadow edges stay sharp. The variant {SCATTER_VARIANT} uses {DRAFT_NOTICE}: ray"

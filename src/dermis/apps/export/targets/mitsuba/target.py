@@ -7,9 +7,10 @@ lights therefore need an index-matched surface, for which another medium is fitt
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +67,18 @@ class Mitsuba(Target):
     versions = ("3",)
     variants = ("matched", "rough", "smooth")
     needs_maps = True
+    import_steps = (
+        "Install Mitsuba 3: `pip install mitsuba`.",
+        "Render with `mitsuba scene.xml`, or in Python with `mi.render(mi.load_file('scene.xml'))`.",
+        "For another boundary of the skin, include another of the files `boundary_*.xml`.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {
+        "scene.xml": "scene with camera and lights",
+        "boundary_*.xml": "skin with one kind of boundary",
+        "meshes/*": "triangles of one material",
+        "textures/*": "pictures of the materials",
+        "hairs/*": "hairs with similar absorption",
+    }
     limitations = (
         "One medium per channel cannot represent layers, whose red light spreads differently. Through rough "
         "and smooth surfaces, point, spot and parallel lights cannot be sampled and are black. The matched "

@@ -43,12 +43,16 @@ _STANDARD_SURFACE_NAMES: Mapping[str, str] = {
     "geometry_opacity": "opacity",
     "emission_color": "emission_color",
     "emission_luminance": "emission",
+    "fuzz_weight": "sheen",
+    "fuzz_color": "sheen_color",
+    "fuzz_roughness": "sheen_roughness",
 }
 _METRES_PER_MM = 1e-3
 _MAX_MATERIAL_NAME_LENGTH = 40
 _CORNEA_IOR = 1.376
 _ROUGHNESS_BY_KIND = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a part of the material's name
 _DEFAULT_PART_ROUGHNESS = 0.8
+_FUZZ_WHITENESS, _FUZZ_ROUGHNESS = 0.5, 0.4  # of cloth, as in parts.wgsl and sheen.wgsl
 _PART_IOR = 1.5  # of the metallic-roughness model
 PART_PREFIX = "parts_"
 """Prefix of a map's role if the map belongs to a part of the head that is not skin."""
@@ -162,6 +166,10 @@ def untextured_part_material(material: Material) -> OpenPbrMaterial:
     }
     if material.metalness > 0.0:
         values["base_metalness"] = material.metalness
+    if material.fabric is not None:
+        fibres = np.array(material.colour) * (1.0 - _FUZZ_WHITENESS) + _FUZZ_WHITENESS
+        values |= {"fuzz_weight": min(material.fabric.sheen, 1.0), "fuzz_roughness": _FUZZ_ROUGHNESS}
+        values["fuzz_color"] = flat_tuple(fibres)
     return OpenPbrMaterial(material.name, values, {})
 
 

@@ -6,6 +6,7 @@ medium. The parameters are fitted so that the random walk has the skin's profile
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar
 
@@ -56,6 +57,15 @@ class OpenPbr(Target):
     versions = ("1.1.1",)
     variants = tuple(_SHADER_BY_VARIANT)
     needs_maps = True
+    import_steps = (
+        "Import a mesh of the same head, such as an export to `usd` or `gltf`, into a scene in metres.",
+        "Import the .mtlx file with the MaterialX editor of the program.",
+        "Assign each material to the part with its name.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {
+        "*.mtlx": "MaterialX document with one material for each part",
+        "*_roughness.png": "roughness of OpenPBR, the square root of Beckmann's m; linear",
+    }
     limitations = (
         "Correct in renderers with random walks as OpenPBR specifies, and, in the variants for a profile, in "
         "renderers with MaterialX's profile, whose d is the radius. Interpreted as d, the radii of random "

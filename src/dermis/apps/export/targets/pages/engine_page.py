@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import hashlib
 import json
 import math
@@ -94,8 +95,12 @@ class EnginePage(Target):
     suffixes: ClassVar[tuple[str, ...]] = (".html",)
     needs_maps: ClassVar[bool] = True
     part_limitations: ClassVar[str] = ""
-    licence: ClassVar[str]
-    """Licence of the library."""
+    import_steps: ClassVar[tuple[str, ...]] = (
+        "Open the page in a browser with WebGL 2, such as Chrome, Firefox or Safari.",
+        "Drag with the mouse to turn the head, scroll to approach it.",
+        "Change light and roughness with the panel of the page.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {"*.html": "web page with head, pictures and script"}
     drawing_script: ClassVar[Path]
     """Script that draws the head."""
     library_files: ClassVar[Mapping[str, tuple[LibraryFile, ...]]]
@@ -117,7 +122,7 @@ class EnginePage(Target):
             policy=_TEXTURE_CSP_DIRECTIVES,
             script_sources=sources,
             settings=html_safe_json(self._page_settings_json(subject, parameters, version)),
-            head=base64.b64encode(encode_glb(subject, {"KHR_materials_ior": {"ior": SKIN_ETA}}, "")).decode(),
+            head=base64.b64encode(gzip.compress(_encode_still_head(subject), mtime=0)).decode(),
             libraries=libraries,
         )
         output.write_text(text, encoding="utf-8")
@@ -142,6 +147,15 @@ class EnginePage(Target):
             "smooth": True,
             "no_library": _LOAD_ERROR_TEXT.format(self.title, self.library_files[version][0].url),
         }
+
+
+def _encode_still_head(subject: Subject) -> bytes:
+    """Return a .glb file of the head at rest, without the morph targets and bones, which no page uses."""
+    if subject.scene is not None:
+        subject = replace(
+            subject, scene=subject.scene.replace(head=replace(subject.scene.head, rig=None), pose=None)
+        )
+    return encode_glb(subject, {"KHR_materials_ior": {"ior": SKIN_ETA}}, "")
 
 
 def html_safe_json(json_value: Json) -> str:

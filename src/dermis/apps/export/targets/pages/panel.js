@@ -11,7 +11,12 @@ const hasWebGl = () => {
   try { return document.createElement("canvas").getContext("webgl2") !== null; } catch { return false; }
 };
 
-const readHead = () => Uint8Array.from(atob(document.getElementById("head").textContent.trim()), (c) => c.charCodeAt(0));
+// Return the .glb file of the head, which the page contains as gzip in base64.
+const readHead = async () => {
+  const packed = Uint8Array.from(atob(document.getElementById("head").textContent.trim()), (c) => c.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+};
 
 const isSkin = (material) => /skin/i.test(material.name);
 

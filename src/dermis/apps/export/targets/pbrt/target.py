@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -175,6 +175,17 @@ class Pbrt(Target):
     versions = ("4",)
     needs_maps = True
     untested = True
+    import_steps = (
+        "Build pbrt-v4, and keep the files together.",
+        "Render: `pbrt NAME.pbrt`, with the name of the scene.",
+        "Convert the OpenEXR picture with `imgtool convert`.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {
+        "*_hair_*.pbrt": "hairs with similar absorption",
+        "*_brows_and_lashes_*.pbrt": "brows and lashes with similar absorption",
+        "*.pbrt": "scene with camera, lights and materials; millimetres",
+        "*.ply": "triangles of one material",
+    }
     limitations = (
         "Diffusion assumes a plane at every point, so thin parts and folds are wrong. Specular reflection "
         "cannot be reduced, as the material has no such parameter. Colours of eyes are omitted. "

@@ -63,7 +63,7 @@ const drawHead = async () => {
   renderer.shadowMap.enabled = true;
   const scene = new THREE.Scene();
   const {camera, controls} = addCamera(THREE, OrbitControls);
-  const {scene: head} = await new GLTFLoader().parseAsync(readHead().buffer, "");
+  const {scene: head} = await new GLTFLoader().parseAsync((await readHead()).buffer, "");
   scene.add(head);
   const ball = new THREE.Box3().setFromObject(head).getBoundingSphere(new THREE.Sphere());
   const lights = settings.lights.map((light) => addLight(THREE, scene, light, ball));

@@ -7,8 +7,10 @@ multiplier. The world scale must be the length of a scene unit in metres.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from string import Template
+from typing import ClassVar
 
 import numpy as np
 
@@ -24,6 +26,8 @@ from dermis.apps.export.target import (
     replace_values,
     write_files,
 )
+from dermis.apps.export.targets.engine_files import LOD_FILE_MEANINGS
+from dermis.apps.export.targets.unity.project import project_files
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import BurleyProfile, unity_parameters
 from dermis.optics.media import Floats
@@ -46,13 +50,36 @@ _FILE_VERSION_BY_HDRP_VERSION = {
 
 
 class Unity(Target):
-    """Export to a DiffusionProfileSettings asset; the user sets the skin's colour as base colour in Unity."""
+    """Export to a DiffusionProfileSettings asset or, for a head in a folder, to a project of Unity."""
 
     name = "unity"
     title = "Unity HDRP"
     suffixes = (".asset", "")
     versions = tuple(_FILE_VERSION_BY_HDRP_VERSION)
     needs_maps = True
+    import_steps = (
+        "Open the folder as a project in the Unity Hub, and run Window > Rendering > HDRP Wizard > Fix All, "
+        "or copy the subfolder of Assets into a project with HDRP and glTFast. A single .asset goes "
+        "into Assets.",
+        "Drag the mesh NAME_LOD0 into the scene, and set the material of its part `head` to NAME_Skin; the "
+        "mesh NAME_LOD1 is the second level for a LOD Group.",
+        "Select NAME_Skin, choose the diffusion profile in its field, and press Fix to add the profile to "
+        "the list of the project.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {
+        "*.meta": "import settings and GUID of the file with this name",
+        "Packages/manifest.json": "packages of the project: HDRP, and glTFast for the meshes",
+        "ProjectSettings/ProjectVersion.txt": "version of the editor",
+        "*.asset": "diffusion profile",
+        "*_Skin.mat": "material of the skin: HDRP/Lit with subsurface scattering and the maps",
+        "*_BaseMap.png": "colour of the skin; sRGB",
+        "*_MaskMap.png": "smoothness of the skin in alpha, no occlusion in green; linear",
+        "*_Normal.png": "normals in tangent space, green up; linear",
+        **LOD_FILE_MEANINGS,
+    }
+    part_limitations = (
+        "Only skin is exported to a single file; an export to a folder contains the other parts."
+    )
     limitations = (
         "The filter is truncated at 99.7 % of the widest channel. In a scene that is not in metres, "
         "worldScale must be set to the length of a unit."
@@ -94,7 +121,11 @@ class Unity(Target):
         return cumulative_burley_profile(colour * multiplier / scale, subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the asset, and the maps of a head beside it."""
+        """Write the asset and the maps of a head beside it; a head in a folder becomes a Unity project."""
+        if not output.suffix and subject.head is not None:
+            stem = subject.identifier
+            profile = asset_text(f"{stem}_DiffusionProfile", parameters, version)
+            return write_files(output, project_files(subject, stem, profile, version))
         asset = self.main_file(output, subject)
         asset.write_text(asset_text(asset.stem, parameters, version), encoding="utf-8")
         maps = ((f"{asset.stem}_{role}.png", data) for role, data in subject.encode_maps().items())

@@ -7,8 +7,9 @@ divided by 0.6 s(A). Here A is the albedo, and s is Burley's factor for light at
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,9 +24,18 @@ from dermis.apps.export.target import (
     get_numbers,
     write_files,
 )
+from dermis.apps.export.targets.engine_files import (
+    LOD_FILE_MEANINGS,
+    colour_png,
+    engine_maps,
+    lod_files,
+    normal_png,
+    packed_png,
+)
+from dermis.formats.gltf.materials import skin_material_names
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import UNREAL_SHAPE_RATIO, BurleyProfile, shape_factor, unreal_parameters
-from dermis.optics.media import Floats
+from dermis.optics.media import SKIN_ETA, Floats
 
 ALBEDO_NAME, MEAN_FREE_PATH_COLOUR_NAME, MEAN_FREE_PATH_DISTANCE_NAME = (
     "surface_albedo",
@@ -36,7 +46,9 @@ WORLD_UNIT_SCALE_NAME, DISTANCE_SCALE_NAME = "world_unit_scale", "distance_scale
 _MIN_MEAN_FREE_PATH_COLOUR, _MAX_DISTANCE_CM, _MIN_ALBEDO = 0.001, 50.0, 1e-3
 _MIN_ENGINE_COLOUR = 0.009  # lower limit that the engine applies
 _MM_PER_CM = 10.0
-_IMPORTED_MAP_ROLES = "colour", "normal", "roughness"
+COLOUR_PARAMETER = "BaseColor"
+_F0_AT_FULL_SPECULAR = 0.08
+_SKIN_SPECULAR = ((SKIN_ETA - 1.0) / (SKIN_ETA + 1.0)) ** 2 / _F0_AT_FULL_SPECULAR  # for a strength of 1
 _VERSIONS_BEFORE_5_8 = ("5.3", "5.4", "5.5", "5.6", "5.7")
 
 
@@ -48,6 +60,23 @@ class Unreal(Target):
     suffixes = ("", ".py")
     versions = (*_VERSIONS_BEFORE_5_8, "5.8")
     needs_maps = True
+    import_steps = (
+        "Keep the files together, and enable the plug-ins Python Editor Script and Interchange.",
+        "Choose Tools > Execute Python Script, and select the script: it imports meshes and maps, and "
+        "creates the subsurface profile, the material and its instance in /Game/Dermis.",
+        "Drag the skeletal mesh SK_NAME_LOD0 into the level; SK_NAME_LOD1 is the second level of detail for "
+        "its LOD settings.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {
+        "*.py": "script for the editor",
+        "T_*_BC.png": "colour of the skin; sRGB",
+        "T_*_N.png": "normals in tangent space, green up (the script flips it); linear",
+        "T_*_SRM.png": "specular in red, roughness in green, metallic in blue; linear",
+        **LOD_FILE_MEANINGS,
+    }
+    part_limitations = (
+        "Only skin is exported to a single file; an export to a folder contains the other parts."
+    )
     limitations = (
         "The base colour of the material, not the profile, colours the light. Before 5.8, thicknesses are "
         "wrong by a factor of about 100 for light through thin parts, which no parameter corrects; in 5.8 "
@@ -88,12 +117,29 @@ class Unreal(Target):
         )
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the editor script, and the maps of a head beside it."""
-        file, maps = self.main_file(output, subject), subject.encode_maps()
-        names = {role: f"{file.stem}_{role}.png" for role in maps}
-        imported = {role: name for role, name in names.items() if role in _IMPORTED_MAP_ROLES}
-        file.write_text(_editor_script(subject, parameters, imported, version), encoding="utf-8")
-        return [file, *write_files(file.parent, zip(names.values(), maps.values(), strict=True))]
+        """Write the editor script, and beside it the maps of a head and, into a folder, the meshes."""
+        file = self.main_file(output, subject)
+        maps = {name: (f"T_{file.stem}_{suffix}.png", data) for name, suffix, data in _map_files(subject)}
+        meshes = [] if output.suffix else list(lod_files(subject, f"SK_{file.stem}"))
+        names = {parameter: name for parameter, (name, _) in maps.items()}
+        script = _editor_script(subject, parameters, names, [name for name, _ in meshes], version)
+        file.write_text(script, encoding="utf-8")
+        return [file, *write_files(file.parent, [*maps.values(), *meshes])]
+
+
+def _map_files(subject: Subject) -> Iterator[tuple[str, str, bytes]]:
+    """Yield the texture parameter, the suffix of the file name, and the file of each map.
+
+    SRM: red specular (0.08 is F0 at 1), green roughness, blue metallic.
+    """
+    maps = engine_maps(subject)
+    if "colour" in maps:
+        yield COLOUR_PARAMETER, "BC", colour_png(maps["colour"])
+    if "normal" in maps:
+        yield "Normal", "N", normal_png(maps["normal"])
+    if "roughness" in maps:
+        strength = maps.get("specular", subject.skin.specular_strength)
+        yield "SRM", "SRM", packed_png(_SKIN_SPECULAR * strength, maps["roughness"], 0.0)
 
 
 def _profile_parameters(albedo: Floats, mean_free_path_cm: Floats, version: str) -> Parameters:
@@ -120,19 +166,33 @@ def _profile_parameters(albedo: Floats, mean_free_path_cm: Floats, version: str)
 
 
 def _editor_script(
-    subject: Subject, parameters: Parameters, map_files: Mapping[str, str], version: str
+    subject: Subject,
+    parameters: Parameters,
+    map_files: Mapping[str, str],
+    mesh_files: Sequence[str],
+    version: str,
 ) -> str:
-    """Return a Python script for the editor that creates the profile and imports the maps beside the script.
+    """Return a Python script for the editor that creates the profile and imports the files beside the script.
 
-    map_files : dictionary from the role of each map to its file name
+    map_files : dictionary from the texture parameter that each map sets to the name of the map
+    mesh_files : names of the meshes
     """
+    skin = subject.skin
     settings = [
         f"    {json.dumps(one.name)}: {_python_literal(one.value)},  # {one.unit}\n" for one in parameters
     ]
-    files = [f"    {json.dumps(role)}: {json.dumps(name)},\n" for role, name in map_files.items()]
+    files = [
+        f"    {json.dumps(parameter)}: ({json.dumps(name)}, {parameter == COLOUR_PARAMETER}),\n"
+        for parameter, name in map_files.items()
+    ]
     text = Path(__file__).with_name("editor_script.txt").read_text("utf-8")
-    fields = {"NAME": json.dumps(subject.identifier), "VERSION": version}
+    fields = {"NAME": json.dumps(subject.identifier), "TITLE": subject.identifier, "VERSION": version}
     fields |= {"SETTINGS": "".join(settings), "MAPS": "".join(files)}
+    fields["MESHES"] = ", ".join(map(json.dumps, mesh_files))
+    fields["SLOTS"] = ", ".join(map(json.dumps, skin_material_names(subject.head_or_ball)))
+    fields["ROUGHNESS"] = f"{np.sqrt(skin.roughness * skin.roughness_factor):.6g}"
+    fields["SPECULAR"] = f"{_SKIN_SPECULAR * skin.specular_strength:.6g}"
+    fields["COLOUR"] = ", ".join(f"{x:.6g}" for x in subject.clipped_albedo())
     for field, value in fields.items():
         text = text.replace(f"@{field}@", value)
     return text

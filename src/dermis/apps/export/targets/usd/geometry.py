@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
 
-from dermis.formats.deformable_mesh import DeformableMesh, point_bone_influences
+from dermis.base.arrays import Numbers
+from dermis.formats.deformable_mesh import DeformableMesh, VertexMorphTarget
+from dermis.formats.gltf.write import part_name
 from dermis.mesh.eyeball import eye_uv
 from dermis.mesh.head import Head
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.skeleton import Skeleton
-from dermis.mesh.strands import Strands
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
@@ -48,7 +50,10 @@ def mesh_polygons(mesh: Mesh) -> Polygons:
 
 
 def first_vertex_by_point(mesh: Mesh) -> NDArray[np.intp]:
-    """Return the index (p,) of the first vertex at each point; the vertices at a uv seam share a point."""
+    """Return the index of the first vertex at each point of the stage, in the order of the points.
+
+    The vertices at a uv seam share a point. Points of the mesh without vertices are not in the stage.
+    """
     return np.unique(mesh.point, return_index=True)[1]
 
 
@@ -66,7 +71,8 @@ def add_mesh(
     prim.CreatePointsAttr(points)
     prim.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
     prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(polygons.vertex_counts))
-    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.point[polygons.vertices].astype(np.int32)))
+    corner = np.searchsorted(mesh.point[vertex], mesh.point[polygons.vertices]).astype(np.int32)
+    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(corner))
     prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(deformable_mesh.normals[vertex])))
     prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
@@ -74,11 +80,19 @@ def add_mesh(
         prim.CreateDoubleSidedAttr(True)
     _add_uv(prim, texture_coordinates(head), polygons)
     subsets, family, tokens = {}, "materialBind", UsdGeom.Tokens
-    for k in np.unique(polygons.material).tolist():
+    used = np.unique(polygons.material).tolist()
+    taken = deformable_mesh.rig.targets.names  # blend shapes are children of the mesh, too
+    names = unique_usd_names([*taken, *(_subset_name(mesh.materials[k]) for k in used)])[len(taken) :]
+    for k, name in zip(used, names, strict=True):
         faces = Vt.IntArray.FromNumpy(np.flatnonzero(polygons.material == k).astype(np.int32))
-        subsets[k] = UsdGeom.Subset.CreateGeomSubset(prim, f"part_{k}", tokens.face, faces, family)
+        subsets[k] = UsdGeom.Subset.CreateGeomSubset(prim, name, tokens.face, faces, family)
     UsdGeom.Subset.SetFamilyType(prim, family, tokens.partition)
     return subsets
+
+
+def _subset_name(material: Material) -> str:
+    """Return the name of the subset with a material: "skin", "eye_left", "teeth_upper" ..."""
+    return (material.name or "skin") if material.kind == "skin" else part_name(material)
 
 
 def texture_coordinates(head: Head) -> Floats:
@@ -107,22 +121,9 @@ def _add_uv(mesh_prim: UsdGeom.Mesh, uv: Floats, polygons: Polygons) -> None:
     primvar.SetIndices(Vt.IntArray.FromNumpy(polygons.vertices))
 
 
-def add_hairs(
-    usd_stage: Usd.Stage, curves_path: Sdf.Path, head: Head, strands: Strands
-) -> UsdGeom.BasisCurves:
-    """Add hairs in the rest pose to the stage, as linear curves with a width at each knot."""
-    knots = strands.knot_positions_mm(head.mesh, head.mesh.points_mm)
-    prim = UsdGeom.BasisCurves.Define(usd_stage, curves_path)
-    count = np.full(len(knots), knots.shape[1], np.int32)
-    points = Vt.Vec3fArray.FromNumpy(to_metres(knots.reshape(-1, 3)))
-    widths = Vt.FloatArray.FromNumpy((2.0 * METRES_PER_MM * strands.radius_mm.ravel()).astype(np.float32))
-    prim.CreateTypeAttr(UsdGeom.Tokens.linear)
-    prim.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(count))
-    prim.CreatePointsAttr(points)
-    prim.CreateWidthsAttr(widths)
-    prim.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
-    prim.CreateExtentAttr(UsdGeom.Curves.ComputeExtent(points, widths))
-    return prim
+def rest_points_mm(deformable_mesh: DeformableMesh) -> Doubles:
+    """Return the points (p, 3) of the mesh with all morph targets at weight 0 [mm]."""
+    return replace(deformable_mesh.head.mesh, positions=deformable_mesh.positions_mm).points_mm
 
 
 def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
@@ -130,10 +131,23 @@ def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
     return np.ascontiguousarray(METRES_PER_MM * positions_mm.astype(np.float64), np.float32)
 
 
+class Rig(NamedTuple):
+    """Skeleton of a stage, with the animation that poses it.
+
+    skeleton_path : path of the skeleton
+    animation : animation with the rest pose and the weights of the blend shapes
+    names : names of the blend shapes in the stage, in the order of the head's morph targets
+    """
+
+    skeleton_path: Sdf.Path
+    animation: UsdSkel.Animation
+    names: list[str]
+
+
 def add_rig(
     usd_stage: Usd.Stage, rig_root_path: Sdf.Path, mesh_prim: Usd.Prim, deformable_mesh: DeformableMesh
-) -> None:
-    """Add blend shapes and a skeleton, which programs can pose, and an animation that holds the rest pose.
+) -> Rig:
+    """Add a skeleton and an animation that holds the rest pose, and bind the mesh to them.
 
     rig_root_path : path of the UsdSkelRoot
     mesh_prim : mesh that the blend shapes and the skeleton deform
@@ -143,21 +157,69 @@ def add_rig(
     skeleton = UsdSkel.Skeleton.Define(usd_stage, path)
     joints = _add_joints(skeleton, deformable_mesh.rig.skeleton)
     rest = UsdSkel.Animation.Define(usd_stage, path.AppendChild("rest"))
-    binding = UsdSkel.BindingAPI.Apply(mesh_prim)
-    binding.CreateSkeletonRel().SetTargets([path])
     UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([rest.GetPath()])
-    _bind_joints(binding, deformable_mesh)
+    vertex = first_vertex_by_point(deformable_mesh.head.mesh)
+    bone: Numbers = np.zeros((len(vertex), 1))
+    weight: Numbers = np.ones((len(vertex), 1))
+    if deformable_mesh.rig.skeleton is not None:
+        bone, weight = (values[vertex] for values in deformable_mesh.bone_influences)
+    bind_to_skeleton(path, mesh_prim, bone, weight)
     rest.CreateJointsAttr(joints)
     rest.SetTransforms(skeleton.GetRestTransformsAttr().Get())
     names = unique_usd_names(deformable_mesh.rig.targets.names)
     if names:
-        _add_blend_shapes(usd_stage, mesh_prim, deformable_mesh, names)
-        binding.CreateBlendShapesAttr(names)
-        shapes = [mesh_prim.GetPath().AppendChild(name) for name in names]
-        binding.CreateBlendShapeTargetsRel().SetTargets([Sdf.Path(str(shape)) for shape in shapes])
-        weights = deformable_mesh.rig.targets.rest
         rest.CreateBlendShapesAttr(names)
-        rest.CreateBlendShapeWeightsAttr([0.0] * len(names) if weights is None else weights.tolist())
+    return Rig(path, rest, names)
+
+
+def bind_to_skeleton(
+    skeleton_path: Sdf.Path,
+    bound_prim: Usd.Prim,
+    bone: NDArray[np.number],
+    weight: NDArray[np.number],
+    is_rigid: bool = False,
+) -> UsdSkel.BindingAPI:
+    """Bind points to the joints of a skeleton.
+
+    bone, weight : (n, b) joint indices and weights of each point; (1, b) for all points if `is_rigid`
+    is_rigid : whether all points move as one rigid body
+    """
+    binding = UsdSkel.BindingAPI.Apply(bound_prim)
+    binding.CreateSkeletonRel().SetTargets([skeleton_path])
+    indices = Vt.IntArray.FromNumpy(np.ascontiguousarray(bone, np.int32).ravel())
+    weights = Vt.FloatArray.FromNumpy(np.ascontiguousarray(weight, np.float32).ravel())
+    binding.CreateJointIndicesPrimvar(is_rigid, bone.shape[1]).Set(indices)
+    binding.CreateJointWeightsPrimvar(is_rigid, bone.shape[1]).Set(weights)
+    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
+    return binding
+
+
+def bind_blend_shapes(binding: UsdSkel.BindingAPI, shape_names: Sequence[str]) -> None:
+    """Set the blend shapes of a bound prim, which are children of the prim."""
+    if shape_names:
+        path = binding.GetPrim().GetPath()
+        binding.CreateBlendShapesAttr(list(shape_names))
+        binding.CreateBlendShapeTargetsRel().SetTargets([path.AppendChild(name) for name in shape_names])
+
+
+def add_blend_shape(
+    usd_stage: Usd.Stage,
+    shape_path: Sdf.Path,
+    point: NDArray[np.integer],
+    delta_mm: NDArray[np.floating],
+    normal: NDArray[np.floating] | None = None,
+) -> UsdSkel.BlendShape:
+    """Add a blend shape to the stage.
+
+    point : (n,) indices of the moved points
+    delta_mm, normal : (n, 3) changes of position [mm], and of the unit normals
+    """
+    shape = UsdSkel.BlendShape.Define(usd_stage, shape_path)
+    shape.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(to_metres(delta_mm)))
+    if normal is not None:
+        shape.CreateNormalOffsetsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(normal, np.float32)))
+    shape.CreatePointIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(point, np.int32)))
+    return shape
 
 
 def unique_usd_names(original_names: Sequence[str]) -> list[str]:
@@ -200,33 +262,26 @@ def _bone_transforms(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
     return np.asarray(parent @ skeleton.local @ reduce), np.asarray(bind)
 
 
-def _bind_joints(mesh_binding: UsdSkel.BindingAPI, deformable_mesh: DeformableMesh) -> None:
-    rig, count = deformable_mesh.rig, int(deformable_mesh.head.mesh.point.max()) + 1
-    rigid = np.zeros((count, 1), np.int64), np.ones((count, 1))
-    bone, weight = (
-        rigid if rig.skeleton is None else point_bone_influences(rig, deformable_mesh.subdivision_matrix)
-    )
-    indices = Vt.IntArray.FromNumpy(np.ascontiguousarray(bone, np.int32).ravel())
-    weights = Vt.FloatArray.FromNumpy(np.ascontiguousarray(weight, np.float32).ravel())
-    mesh_binding.CreateJointIndicesPrimvar(False, bone.shape[1]).Set(indices)
-    mesh_binding.CreateJointWeightsPrimvar(False, bone.shape[1]).Set(weights)
-    mesh_binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
-
-
-def _add_blend_shapes(
-    usd_stage: Usd.Stage, mesh_prim: Usd.Prim, deformable_mesh: DeformableMesh, shape_names: Sequence[str]
+def add_mesh_blend_shapes(
+    usd_stage: Usd.Stage,
+    mesh_prim: Usd.Prim,
+    deformable_mesh: DeformableMesh,
+    targets: Mapping[str, VertexMorphTarget],
 ) -> None:
+    """Add the blend shapes of the mesh.
+
+    targets : morph targets of the head by their names in the stage
+    """
     vertex = first_vertex_by_point(deformable_mesh.head.mesh)
     point = np.full(len(deformable_mesh.head.mesh.positions), -1, np.int32)
     point[vertex] = np.arange(len(vertex))
     titles = deformable_mesh.rig.targets.names
-    for name, title, target in zip(shape_names, titles, deformable_mesh.targets(), strict=True):
-        shape = UsdSkel.BlendShape.Define(usd_stage, mesh_prim.GetPath().AppendChild(name))
+    for (name, target), title in zip(targets.items(), titles, strict=True):
         points = point[target.vertex]
         order = np.flatnonzero(points >= 0)
         order = order[np.argsort(points[order])]
-        shape.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(to_metres(target.delta_mm[order])))
-        shape.CreateNormalOffsetsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(target.normal[order])))
-        shape.CreatePointIndicesAttr(Vt.IntArray.FromNumpy(points[order]))
+        path = mesh_prim.GetPath().AppendChild(name)
+        shape = add_blend_shape(usd_stage, path, points[order], target.delta_mm[order], target.normal[order])
         if name != title:
             shape.GetPrim().SetDisplayName(title)
+    bind_blend_shapes(UsdSkel.BindingAPI(mesh_prim), list(targets))

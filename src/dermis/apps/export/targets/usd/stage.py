@@ -11,10 +11,18 @@ import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdSkel
 
 from dermis.apps.export.targets.openpbr.materials import MAP_TYPES, InputValue, OpenPbrMaterial, hair_material
-from dermis.apps.export.targets.usd.geometry import add_hairs, add_mesh, add_rig, unique_usd_names
+from dermis.apps.export.targets.usd.expressions import add_expressions
+from dermis.apps.export.targets.usd.geometry import (
+    Rig,
+    add_mesh,
+    add_mesh_blend_shapes,
+    add_rig,
+    unique_usd_names,
+)
+from dermis.apps.export.targets.usd.hair import HairCurves
 from dermis.formats.deformable_mesh import DeformableMesh
-from dermis.mesh.grown_strands import hair_strands
 from dermis.mesh.head import Head
+from dermis.mesh.strand_groups import strand_groups
 
 _IMAGE_NODE_BY_TYPE = {"color3": "ND_image_color3", "float": "ND_image_float", "vector3": "ND_image_vector3"}
 _PREVIEW_INPUTS = {
@@ -52,11 +60,31 @@ def build_stage(
         stage.GetRootLayer().customLayerData = {"attribution": head.attribution}
     path = root.AppendChild("mesh")
     subsets = add_mesh(stage, path, head, deformable)
-    if _has_rig(deformable):
-        add_rig(stage, root, stage.GetPrimAtPath(path), deformable)
+    rig = add_rig(stage, root, stage.GetPrimAtPath(path), deformable) if _has_rig(deformable) else None
     _add_materials(stage, root.AppendChild("materials"), subsets, materials, file_prefix)
-    _add_hairs(stage, root, head)
+    hairs = {name: HairCurves(name, strands, deformable) for name, strands in strand_groups(head).items()}
+    _add_hairs(stage, root, hairs)
+    if rig is not None:
+        _add_blend_shapes(stage, root, rig, deformable, hairs)
+        add_expressions(top, rig.animation, deformable.rig)
+        top.SetChildrenReorder(["mesh", "skeleton", "materials"])  # variants otherwise put the skeleton first
     return stage
+
+
+def _add_blend_shapes(
+    usd_stage: Usd.Stage,
+    root_path: Sdf.Path,
+    rig: Rig,
+    deformable_mesh: DeformableMesh,
+    hairs: Mapping[str, HairCurves],
+) -> None:
+    """Add the blend shapes of mesh and hairs, and bind the hairs to the skeleton."""
+    targets = dict(zip(rig.names, deformable_mesh.targets(), strict=True))
+    mesh = usd_stage.GetPrimAtPath(root_path.AppendChild("mesh"))
+    add_mesh_blend_shapes(usd_stage, mesh, deformable_mesh, targets)
+    for name, curves in hairs.items():
+        prim = usd_stage.GetPrimAtPath(root_path.AppendChild(name))
+        curves.add_blend_shapes(usd_stage, curves.bind(rig.skeleton_path, prim), targets)
 
 
 def _has_rig(deformable_mesh: DeformableMesh) -> bool:
@@ -79,11 +107,10 @@ def _add_materials(
         UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
 
 
-def _add_hairs(usd_stage: Usd.Stage, root_path: Sdf.Path, head: Head) -> None:
-    for name, strands in (("lashes_and_brows", head.strands), ("hair", hair_strands(head))):
-        if strands is None:
-            continue
-        curves = add_hairs(usd_stage, root_path.AppendChild(name), head, strands)
+def _add_hairs(usd_stage: Usd.Stage, root_path: Sdf.Path, hairs: Mapping[str, HairCurves]) -> None:
+    for name, hair in hairs.items():
+        curves = hair.define(usd_stage, root_path.AppendChild(name))
+        strands = hair.strands
         definition = hair_material(strands.absorption, float(np.median(strands.radius_mm)))
         material = _add_material(usd_stage, root_path.AppendPath(f"materials/{name}"), definition, "")
         UsdShade.MaterialBindingAPI.Apply(curves.GetPrim()).Bind(material)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import ClassVar
 
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters
@@ -31,9 +33,20 @@ class Usd(OpenPbr):
     title = "USD with OpenPBR"
     suffixes = (".usda", _BINARY_SUFFIX, ".usd", _PACKAGE_SUFFIX, "")
     variants = ()
+    import_steps = (
+        "Open the stage in usdview, or import it: in Blender with File > Import > Universal Scene Desc.",
+        "Keep the unit at metres; if the program converts it, scale `subsurface_radius` as well.",
+        "Choose an expression with the variant set `expression` of the top prim, or set the weights of blend "
+        "shapes in `skeleton/rest`.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {
+        "*.usd?": "stage with mesh, rig, hairs and materials; metres, Y up",
+        "*.usd": "stage with mesh, rig, hairs and materials; metres, Y up",
+        "*_roughness.png": "roughness of OpenPBR, the square root of Beckmann's m; linear",
+    }
     limitations = (
         "Correct in renderers that support the MaterialX nodes and random walks as OpenPBR specifies. Others "
-        "use UsdPreviewSurface, which has no subsurface scattering. Hairs do not follow the head's motion. "
+        "use UsdPreviewSurface, which has no subsurface scattering. Scalp hair follows one bone only. "
         "Programs that convert the unit of a stage must also scale the radii."
     )
     part_limitations = ""

@@ -7,8 +7,10 @@ import gzip
 import io
 import json
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +97,14 @@ class Web(Target):
     title = "WebGPU"
     versions = ("1",)
     suffixes = (".html",)
+    import_steps = (
+        "Open the page in a browser with WebGPU, such as Chrome, Edge or Safari.",
+        "Drag with the mouse to turn the head.",
+        "Change light, skin and expression with the panel of the page.",
+    )
+    file_meanings: ClassVar[Mapping[str, str]] = {
+        "*.html": "web page that renders the head by itself",
+    }
     limitations = (
         "The page renders square pictures with an atlas of 512 texels. Maps have at most 1024 texels per "
         "side, 8 bits per channel and WebP compression. Expressions move skin without folds and flushing. "

@@ -1,0 +1,73 @@
+"""READMEs of exports: files, import, picture and licence."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from small_head import write_head
+
+from dermis.apps.export.guide import file_meaning, guide_lines
+from dermis.apps.export.registry import TARGETS
+from dermis.apps.export.run import export_skin
+from dermis.apps.export.subject import Subject
+from dermis.apps.export.target import Target
+from dermis.images.codecs import png_size
+
+
+def table_rows(page: str) -> dict[str, str]:
+    """Return the contents of files by their names, from the table of a README."""
+    rows = (line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| `"))
+    return {name.split("`")[1]: meaning for name, meaning in rows}
+
+
+@pytest.mark.parametrize("name", list(TARGETS))
+def test_readme_describes_all_files_and_the_import(name: str, skin1: Subject, tmp_path: Path) -> None:
+    pytest.importorskip("pxr")
+    pytest.importorskip("MaterialX")
+    target, suffix = TARGETS[name], "" if "" in TARGETS[name].suffixes else TARGETS[name].suffixes[0]
+    if name in ("maps", "web"):  # these need heads
+        described = {"maps": "maps.json", "web": "page.html"}[name]
+        page, names = "\n".join(guide_lines(target, skin1, [Path(described)], "")), [described]
+    else:
+        report = export_skin(skin1, name, tmp_path / f"ball{suffix}")
+        pages = [file for file in report.files if file.suffix == ".md"]
+        page = pages[0].read_text("utf-8")
+        names = [file.relative_to(pages[0].parent).as_posix() for file in report.files if file not in pages]
+    rows = table_rows(page)
+    similar = [int(number) for number in re.findall(r"and (\d+) more like it", page)]
+    assert set(rows) <= set(names) and len(rows) + sum(similar) == len(names) and all(rows.values())
+    steps = [line for line in page.splitlines() if line[:1].isdigit() and line[1:3] == ". "]
+    assert [step[0] for step in steps] == ["1", "2", "3"]
+    sections = [line for line in page.splitlines() if line.startswith("## ")]
+    assert sections == [
+        "## Files",
+        f"## Import into {target.title}",
+        "## Licence",
+        "## Parameters and errors",
+    ]
+    assert ("Not run in" in page) == target.untested
+
+
+def test_readme_has_a_picture_and_a_licence(tmp_path: Path) -> None:
+    head = write_head(tmp_path / "face.obj")
+    report = export_skin(head, "gltf", tmp_path / "a.glb", side=256, adapter="cpu", picture_width=64)
+    picture = next(file for file in report.files if file.suffix == ".png")
+    assert picture.name == "a.glb.preview.png" and png_size(picture.read_bytes())[:2] == (64, 64)
+    page = (tmp_path / "a.glb.md").read_text("utf-8")
+    assert f"]({picture.name})" in page and "as its owner states" in page
+    assert "MakeHuman" not in page
+
+
+def test_similar_files_share_a_row(skin1: Subject) -> None:
+    files = [Path(f"a_hair_{number}.pbrt") for number in range(12)]
+    rows = [line for line in guide_lines(TARGETS["pbrt"], skin1, files, "") if line.startswith("| `")]
+    assert rows == ["| `a_hair_0.pbrt` and 11 more like it | hairs with similar absorption |"]
+
+
+def test_roughness_of_a_target_has_its_own_meaning() -> None:
+    def meaning(target: Target) -> str:
+        return file_meaning(target, "human_roughness.png")
+
+    assert "square root" in meaning(TARGETS["usd"]) and "square root" not in meaning(TARGETS["unreal"])
