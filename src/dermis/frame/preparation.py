@@ -29,6 +29,7 @@ from dermis.frame.features.occlusion.moving import (
     sky_views_record,
 )
 from dermis.frame.features.outputs.stage_inputs import PreviousScene
+from dermis.frame.features.surface.bands import head_in_bands, light_in_bands
 from dermis.frame.features.shading.shade import shade_program
 from dermis.frame.features.shading.view import (
     EyePoses,
@@ -54,6 +55,7 @@ from dermis.human.skin.face import movement_weights
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import PoseArrays
+from dermis.optics.bands import Bands
 from dermis.scene.lights import Light
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -94,6 +96,7 @@ class Preparation:
         previous: Scene | None = None,
         landmarks: tuple[str, ...] = (),
         hair_frame: HairFrame | None = None,
+        bands: Bands | None = None,
     ) -> FrameInputs:
         """Return the inputs of a frame.
 
@@ -106,11 +109,12 @@ class Preparation:
         previous : scene of the same head for motion vectors; without it, motion is 0
         landmarks : names of landmark sets
         hair_frame : frame of an animation in which hair swings; None for hair that follows the head stiffly
+        bands : wavelengths in the place of red, green and blue
 
         Raises DermisError for sizes that exceed the limits of the device.
         """
         inputs = self._prepare_inputs(
-            scene, settings, TECHNIQUES[settings.technique], view, (outputs, landmarks)
+            scene, settings, TECHNIQUES[settings.technique], view, (outputs, landmarks), bands
         )
         if "motion" in outputs:
             inputs = replace(inputs, previous=self._previous_scene(scene, previous or scene, inputs))
@@ -126,12 +130,18 @@ class Preparation:
         technique: Technique,
         view: str,
         requested_names: tuple[RequestedNames, RequestedNames],
+        bands: Bands | None,
     ) -> FrameInputs:
         cached, device = self.memo.get, self.device
+        if bands is not None:
+            lights = tuple(light_in_bands(light, bands) for light in scene.lights)
+            scene = replace(scene, head=cached(head_in_bands, scene.head, bands), lights=lights)
         head, environment = scene.head.without_maps, scene.environment
-        (profile, *others), blend_weights = self._profiles(scene.skin, technique)
+        (profile, *others), blend_weights = self._profiles(scene.skin, technique, bands)
         name = environment.name if environment else None
-        environment_map = cached(load_environment_map, device, name, min_cache_size=_KEPT_ENVIRONMENTS)
+        environment_map = cached(
+            load_environment_map, device, name, bands, min_cache_size=_KEPT_ENVIRONMENTS
+        )
         scene = add_suns(self.memo, scene, environment_map)
         state = self._head_state(head, scene.pose_arrays)
         light_inputs = head, tuple(scene.lights), state.outline, settings.shadow_size
@@ -156,6 +166,7 @@ class Preparation:
             blend_weights=blend_weights,
             outputs=requested_names[0],
             landmarks=requested_names[1],
+            bands=bands,
         )
         try:
             resources = cached(make_resources, self.memo, device, request, technique)
@@ -186,15 +197,17 @@ class Preparation:
             centre_mm=head.centre_mm,
         )
 
-    def _profiles(self, skin: Skin, technique: Technique) -> ProfileMix:
+    def _profiles(self, skin: Skin, technique: Technique, bands: Bands | None) -> ProfileMix:
         """Return the diffusion profiles of the skin and their blend weights.
 
         For techniques that cannot blend profiles, the result is the first profile alone, and None for the
         weights.
+
+        bands : wavelengths in the place of red, green and blue
         """
         if technique.mixes_profiles:
-            return self.profiles.mixture(skin)
-        return (self.profiles.profile(skin),), None
+            return self.profiles.mixture(skin, bands)
+        return (self.profiles.profile(skin, bands),), None
 
     def _sky_view(
         self, head: Head, pose_arrays: PoseArrays | None, outline: Outline

@@ -13,6 +13,7 @@ from dermis.environment.panorama import Sun, load_panorama
 from dermis.environment.prefilter import prefilter
 from dermis.frame.lights.records import sun_lights
 from dermis.gpu import ComputeProgram, Device, Memo, Texture, UniformRecord, make_texture, upload
+from dermis.optics.bands import Bands
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.skin import Skin, lobe_name
@@ -36,8 +37,12 @@ class EnvironmentMap:
     peak_irradiance: float = 0.0
 
 
-def load_environment_map(device: Device, environment_name: str | None) -> EnvironmentMap:
+def load_environment_map(
+    device: Device, environment_name: str | None, bands: Bands | None = None
+) -> EnvironmentMap:
     """Return the prefiltered panorama of an environment, or a black panorama if the name is None.
+
+    bands : wavelengths in the place of red, green and blue
 
     Raises DermisError when there is no such environment.
     """
@@ -46,11 +51,11 @@ def load_environment_map(device: Device, environment_name: str | None) -> Enviro
             make_texture(device, (1, 1), "rgba16float", layer_count=2, content_source="map"), ()
         )
     prefiltered = prefilter(environment_name)
-    return EnvironmentMap(
-        _upload_panorama_layers(device, prefiltered.layers),
-        prefiltered.suns,
-        float(prefiltered.layers[0].max()),
-    )
+    layers, suns = prefiltered.layers, prefiltered.suns
+    if bands is not None:
+        layers = np.asarray(layers @ bands.of_rgb.T.astype(np.float32), np.float32)
+        suns = tuple(replace(sun, irradiance=bands.reflectance(sun.irradiance)) for sun in suns)
+    return EnvironmentMap(_upload_panorama_layers(device, layers), suns, float(layers[0].max()))
 
 
 def unfiltered_panorama(device: Device, environment_name: str) -> Texture:

@@ -27,7 +27,7 @@ def colour_weights(illuminant: str) -> Floats:
     """
     if illuminant == "D65":
         return rgb_weights()
-    rows = read_rows(__package__ or "", "illuminants")
+    rows = read_rows("dermis.optics", "data/spectra/illuminants")
     fine, light = float_columns(rows, f"wavelength_nm {ILLUMINANTS[illuminant]}").T
     observer = np.array([interpolate_spectrum("cie-1931-d65", f"{axis}_bar", fine) for axis in "xyz"])
     hats = np.array([np.interp(fine, WAVELENGTHS_NM, unit) for unit in np.eye(len(WAVELENGTHS_NM))])

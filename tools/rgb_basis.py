@@ -1,0 +1,63 @@
+"""Compute the spectra of red, green and blue, from which `dermis.optics.bands` upsamples RGB colours.
+
+Usage: python tools/rgb_basis.py [OUTPUT.csv]
+
+The method is that of [MallettYuksel2019]: the smoothest reflectances that sum to 1 at each wavelength and have,
+under D65, the colours of the primaries of Rec. 709.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize
+
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
+
+_TABLE = Path(__file__).parents[1] / "src/dermis/optics/data/spectra/rgb-basis.csv"
+_HEADING = """\
+# quantity: reflectances with the colours of the primaries of Rec. 709 under D65; they sum to 1
+# unit: wavelength in nm, reflectance dimensionless
+# source: computed by tools/rgb_basis.py, by the method of [MallettYuksel2019]
+# licence: CC0-1.0
+wavelength_nm,red,green,blue
+"""
+
+
+def smooth_basis() -> np.ndarray:
+    """Return the reflectances (31, 3) of red, green and blue at `WAVELENGTHS_NM` [-]."""
+    n = len(WAVELENGTHS_NM)
+    slope = np.kron(np.diff(np.eye(n), axis=0), np.eye(3))
+    colours = np.kron(rgb_weights(WAVELENGTHS_NM), np.eye(3))
+    sums = np.kron(np.eye(n), np.ones(3))
+    # The sums follow from eight of the nine equations of the colours and the rest of the wavelengths.
+    matrix, target = np.vstack([sums, colours]), np.concatenate([np.ones(n), np.eye(3).ravel()])
+    vectors, scales, rows = np.linalg.svd(matrix, full_matrices=False)
+    kept = scales > 1e-9 * scales[0]
+    matrix, target = rows[kept], (vectors[:, kept].T @ target) / scales[kept]
+    energy = slope.T @ slope
+    solution = minimize(
+        lambda x: x @ energy @ x,
+        np.full(3 * n, 1.0 / 3.0),
+        jac=lambda x: 2.0 * energy @ x,
+        bounds=[(0.0, 1.0)] * (3 * n),
+        constraints={"type": "eq", "fun": lambda x: matrix @ x - target, "jac": lambda x: matrix},
+        method="SLSQP",
+        options={"maxiter": 1000, "ftol": 1e-12},
+    )
+    return np.asarray(solution.x.reshape(n, 3))
+
+
+def main() -> None:
+    """Write the table."""
+    rows = (
+        f"{wavelength:.0f},{','.join(f'{value:.7f}' for value in values)}\n"
+        for wavelength, values in zip(WAVELENGTHS_NM, np.clip(smooth_basis(), 0.0, 1.0), strict=True)
+    )
+    Path(sys.argv[1] if len(sys.argv) > 1 else _TABLE).write_text(_HEADING + "".join(rows), "utf-8")
+
+
+if __name__ == "__main__":
+    main()
