@@ -10,16 +10,91 @@ import numpy as np
 from dermis.base.errors import refuse
 from dermis.base.number_table import read_number_table
 from dermis.optics.media import Floats
-from dermis.optics.pigments.spectra import LONGEST_VISIBLE_NM, interpolate_spectrum
+from dermis.optics.pigments.spectra import (
+    LONGEST_VISIBLE_NM,
+    LONGEST_WAVELENGTH_NM,
+    SHORTEST_WAVELENGTH_NM,
+    interpolate_spectrum,
+    primaries_xyz,
+    rgb_weights,
+)
 
 LAMPS = ("D65", "A", "FL11", "LED-B3", "E")
 """CIE illuminants: daylight, incandescent, three-band fluorescent, phosphor LED, and equal energy."""
 _TABULATED = {"D65": ("cie-1931-d65", "d65"), "FL11": ("illuminants", "fl11"), "LED-B3": ("illuminants", "led_b3")}
-_VISIBLE_NM = np.arange(380.0, LONGEST_VISIBLE_NM + 1.0, 1.0)
+_VISIBLE_NM = np.arange(SHORTEST_WAVELENGTH_NM, LONGEST_VISIBLE_NM + 1.0, 1.0)
+_TABLE_NM = _VISIBLE_NM[::5]  # wavelengths of the tables of CIE
+_BAND_NM = 10.0
 _D65_AT_560_NM = 100.0
 _INCANDESCENT_NM = 1.435e7 / 2848.0  # second radiation constant over the temperature, as CIE defines illuminant A
 _NEUTRAL_NM = 560.0
 _SPECTRUM_FILE = f"one of {', '.join(LAMPS)}, or a CSV file of wavelength [nm] and relative power"
+
+
+def band_power(lamp: str | Path, wavelength_nm: Floats) -> Floats:
+    """Return the mean power (n,) of a lamp in triangular bands of 10 nm, as in `lamp_power` [-].
+
+    The full width at half maximum of the bands is 10 nm.
+
+    lamp, wavelength_nm : as in `lamp_power`
+    """
+    offset = np.linspace(-_BAND_NM, _BAND_NM, 2 * int(_BAND_NM) + 1)
+    ends = _power_ends_nm(str(lamp))
+    lamp_power(lamp, wavelength_nm)  # refuses wavelengths beyond the table
+    power = lamp_power(lamp, np.clip(wavelength_nm[:, None] + offset, *ends))
+    return np.asarray(np.average(power, axis=1, weights=_BAND_NM - np.abs(offset)))
+
+
+def colour_weights(lamp: str | Path, wavelength_nm: Floats) -> Floats:
+    """Return weights (3, n) from reflectance spectra, lit by a lamp, to linear Rec. 709 [-].
+
+    Each colour has the L*a*b* coordinates under D65 that its spectrum has under the lamp; white is white.
+    Spectra are taken as linear between the wavelengths and as constant beyond them.
+
+    lamp : illuminant of `LAMPS`, or a CSV file of wavelength [nm] and relative power
+    wavelength_nm : (n,) wavelengths of the spectra, increasing [nm]
+
+    Source: [CIE2018] for the observer, and for the formulae of L*a*b*.
+    """
+    if lamp == "D65":
+        return rgb_weights(wavelength_nm)
+    low, high = _power_ends_nm(str(lamp))
+    grid = _TABLE_NM if lamp in LAMPS else _VISIBLE_NM
+    grid = grid[(grid >= low) & (grid <= high)]
+    observer = np.array([interpolate_spectrum("cie-1931-d65", f"{axis}_bar", grid) for axis in "xyz"])
+    xyz = sensor_weights(lamp, grid, observer, wavelength_nm)
+    weights = np.linalg.solve(primaries_xyz(), _d65_white()[:, None] * xyz)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+def sensor_weights(lamp: str | Path, grid_nm: Floats, sensitivity: Floats, wavelength_nm: Floats) -> Floats:
+    """Return weights (c, n) from reflectance spectra, lit by a lamp, to the signals of c sensors [-].
+
+    The signal of white is 1. Spectra are taken as linear between the wavelengths and as constant beyond them.
+
+    lamp : illuminant of `LAMPS`, or a CSV file of wavelength [nm] and relative power
+    grid_nm : (m,) wavelengths at which the sensitivities are given [nm]
+    sensitivity : (c, m) responses of the sensors to light of equal power [-]
+    wavelength_nm : (n,) wavelengths of the spectra, increasing [nm]
+    """
+    hats = np.array([np.interp(grid_nm, wavelength_nm, unit) for unit in np.eye(len(wavelength_nm))])
+    weights = (sensitivity * lamp_power(lamp, grid_nm) * np.gradient(grid_nm)) @ hats.T
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+def read_sensitivities(path: str | Path, lamp: str | Path) -> tuple[Floats, Floats]:
+    """Return wavelengths (m,) [nm] and the sensitivities (3, m) of a camera in a CSV file, every nanometre.
+
+    The wavelengths are those of the file for which the power of the lamp is known.
+
+    Raises DermisError for a file that cannot be read, and for sensitivities that are not.
+    """
+    expected = "a CSV file of wavelength [nm] and the sensitivities of red, green and blue"
+    table = read_number_table(path, expected, (4,), "wavelength [nm] and three sensitivities in each line")
+    check_spectra(path, table)
+    low, high = _power_ends_nm(str(lamp))
+    grid = np.arange(np.ceil(max(table[0, 0], low)), np.floor(min(table[-1, 0], high)) + 1.0)
+    return grid, np.array([np.interp(grid, table[:, 0], column) for column in table.T[1:]])
 
 
 def lamp_power(lamp: str | Path, wavelength_nm: Floats) -> Floats:
@@ -35,6 +110,22 @@ def lamp_power(lamp: str | Path, wavelength_nm: Floats) -> Floats:
     Source: [CIE2018].
     """
     return _raw_power(str(lamp), np.asarray(wavelength_nm, np.float64)) * _scale(str(lamp))
+
+
+def _power_ends_nm(lamp: str) -> tuple[float, float]:
+    """Return the shortest and the longest wavelength at which the power of a lamp is known [nm]."""
+    if lamp in _TABULATED:
+        return SHORTEST_WAVELENGTH_NM, LONGEST_VISIBLE_NM
+    if lamp in LAMPS:
+        return SHORTEST_WAVELENGTH_NM, LONGEST_WAVELENGTH_NM + _BAND_NM
+    table = _read_lamp(lamp)
+    return float(table[0, 0]), float(table[-1, 0])
+
+
+def _d65_white() -> Floats:
+    """Return X, Y and Z (3,) of D65."""
+    observer = np.array([interpolate_spectrum("cie-1931-d65", f"{axis}_bar", _TABLE_NM) for axis in "xyz"])
+    return np.asarray(observer @ interpolate_spectrum("cie-1931-d65", "d65", _TABLE_NM))
 
 
 @cache

@@ -180,10 +180,11 @@ def dj2006_layers(
     parameters : parameters of the skins; its fields `melanin` and `blood` are ignored
     pigment_fractions : (n,) fractions, used both as melanin fractions of the epidermis and as blood fractions
         of the dermis [-]
+    wavelength_nm : (c,) wavelengths from 380 to 1000 [nm]
     """
-    column, scattering = pigment_fractions[:, None], donner_jensen_scattering(WAVELENGTHS_NM)
-    epidermal = _epidermal_absorption(parameters, column, WAVELENGTHS_NM)
-    dermal = _dermal_absorption(parameters, column, WAVELENGTHS_NM)
+    column, scattering = pigment_fractions[:, None], donner_jensen_scattering(wavelength_nm)
+    epidermal = _epidermal_absorption(parameters, column, wavelength_nm)
+    dermal = _dermal_absorption(parameters, column, wavelength_nm)
     ratios = 1.0, DERMIS_SCATTERING_RATIO
     upper, lower = (np.broadcast_to(ratio * scattering, epidermal.shape) for ratio in ratios)
     epidermis = Layer(epidermal, upper, parameters.epidermis_mm, "epidermis")

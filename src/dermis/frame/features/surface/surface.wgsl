@@ -31,6 +31,8 @@ struct Skin {
 @group(0) @binding(9) var beckmann_table: texture_2d<f32>;
 @group(0) @binding(10) var albedo_table: texture_2d<f32>; // rho_dt and its mean over directions
 
+override BANDS: bool = false; // whether wavelengths take the place of red, green and blue
+
 //#if BANDS
 // Reflectance of an RGB colour at the three wavelengths of the channels.
 fn in_channels(rgb: vec3f) -> vec3f {

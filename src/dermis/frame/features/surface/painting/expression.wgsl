@@ -18,6 +18,8 @@ override LIVING: bool = false; // whether states and the pulse change the blood
 @group(0) @binding(2) var expression_deltas: texture_2d_array<f32>; // see expression_relief.wgsl; the last channel is the gain or loss of blood
 @group(0) @binding(5) var colour: texture_storage_2d<rgba16float, write>;
 
+override BANDS: bool = false; // whether wavelengths take the place of red, green and blue
+
 //#if BANDS
 // Reflectance of an RGB colour at the three wavelengths of the channels.
 fn in_channels(rgb: vec3f) -> vec3f {

@@ -48,6 +48,8 @@ const PORES: f32 = 0.4; // amount of pores outside zones
 const MIDLINE_MM: f32 = 4.0; // half of the width over which tension lines of both halves of the face meet
 const UNEVEN: f32 = 0.15; // relative variation of gloss by uneven oil
 
+override BANDS: bool = false; // whether wavelengths take the place of red, green and blue
+
 //#if BANDS
 // Reflectance of an RGB colour at the three wavelengths of the channels.
 fn in_channels(rgb: vec3f) -> vec3f {
