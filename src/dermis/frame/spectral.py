@@ -13,9 +13,16 @@ from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_array, checked_number
 from dermis.base.summary import ShortRepr
 from dermis.frame.renderer import Renderer
+from dermis.images.colour import XYZ_OF_REC709
+from dermis.images.colour_spaces import BRADFORD_MATRIX
 from dermis.optics.bands import Bands, rgb_spectra
-from dermis.optics.lamps import band_power, colour_weights, read_sensitivities, sensor_weights
-from dermis.optics.pigments.spectra import LONGEST_WAVELENGTH_NM, SHORTEST_WAVELENGTH_NM, WAVELENGTHS_NM
+from dermis.optics.lamps import band_power, read_sensitivities, sensor_weights, xyz_weights
+from dermis.optics.pigments.spectra import (
+    LONGEST_WAVELENGTH_NM,
+    SHORTEST_WAVELENGTH_NM,
+    WAVELENGTHS_NM,
+    rgb_weights,
+)
 from dermis.scene.conversions import as_model
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -128,17 +135,40 @@ class SpectralPicture(ShortRepr):
             picture += self.backdrop @ (weights @ rgb_spectra(self.wavelengths_nm)).T.astype(np.float32)
         return np.asarray(picture, np.float32)
 
-    def _check_covers(self, low_nm: float, high_nm: float) -> None:
-        wavelengths = self.wavelengths_nm
+    @property
+    def covers_visible_light(self) -> bool:
+        """Return whether colours can be computed: from 400 to 700 nm in steps of at most 20 nm."""
+        return self._covers(WAVELENGTHS_NM[0], WAVELENGTHS_NM[-1])
+
+    def _covers(self, low_nm: float, high_nm: float) -> bool:
+        wavelengths, margin = self.wavelengths_nm, 0.5 * _MAX_COLOUR_STEP_NM
         gap = np.diff(np.clip(wavelengths, low_nm, high_nm)).max(initial=0.0)
-        if (
-            wavelengths[0] > low_nm + _MAX_COLOUR_STEP_NM / 2
-            or wavelengths[-1] < high_nm - _MAX_COLOUR_STEP_NM / 2
-            or gap > _MAX_COLOUR_STEP_NM
-        ):
-            expected = f"spectra from {low_nm:g} to {high_nm:g} nm in steps of at most {_MAX_COLOUR_STEP_NM:g} nm"
-            actual = f"got {len(wavelengths)} wavelengths from {wavelengths[0]:g} to {wavelengths[-1]:g} nm"
-            refuse("colours", expected, actual, f"Render {len(WAVELENGTHS_NM)} bands, or {MAX_BANDS} to 1,000 nm")
+        reaches = wavelengths[0] <= low_nm + margin and wavelengths[-1] >= high_nm - margin
+        return bool(reaches and gap <= _MAX_COLOUR_STEP_NM)
+
+    def _check_covers(self, low_nm: float, high_nm: float) -> None:
+        if self._covers(low_nm, high_nm):
+            return
+        wavelengths = self.wavelengths_nm
+        expected = f"spectra from {low_nm:g} to {high_nm:g} nm in steps of at most {_MAX_COLOUR_STEP_NM:g} nm"
+        actual = f"got {len(wavelengths)} wavelengths from {wavelengths[0]:g} to {wavelengths[-1]:g} nm"
+        refuse("colours", expected, actual, f"Render {len(WAVELENGTHS_NM)} bands, or {MAX_BANDS} to 1,000 nm")
+
+
+def colour_weights(lamp: str | Path, wavelength_nm: Doubles) -> Doubles:
+    """Return weights (3, n) from reflectance spectra, lit by a lamp, to linear Rec. 709 [-].
+
+    White in the light of the lamp becomes white, by the adaptation of Bradford.
+
+    lamp : lamp as in `SpectralPicture.radiance`
+    wavelength_nm : (n,) wavelengths of the spectra, increasing [nm]
+    """
+    if lamp == "D65":
+        return rgb_weights(wavelength_nm)
+    xyz = xyz_weights(lamp, wavelength_nm)
+    cones, white = BRADFORD_MATRIX @ xyz, BRADFORD_MATRIX @ XYZ_OF_REC709.sum(axis=1)
+    adapted = cones * (white / cones.sum(axis=1))[:, None]
+    return np.asarray(np.linalg.solve(BRADFORD_MATRIX @ XYZ_OF_REC709, adapted))
 
 
 def band_wavelengths(bands: int | Sequence[float]) -> Doubles:

@@ -15,8 +15,6 @@ from dermis.optics.pigments.spectra import (
     LONGEST_WAVELENGTH_NM,
     SHORTEST_WAVELENGTH_NM,
     interpolate_spectrum,
-    primaries_xyz,
-    rgb_weights,
 )
 
 LAMPS = ("D65", "A", "FL11", "LED-B3", "E")
@@ -45,26 +43,22 @@ def band_power(lamp: str | Path, wavelength_nm: Floats) -> Floats:
     return np.asarray(np.average(power, axis=1, weights=_BAND_NM - np.abs(offset)))
 
 
-def colour_weights(lamp: str | Path, wavelength_nm: Floats) -> Floats:
-    """Return weights (3, n) from reflectance spectra, lit by a lamp, to linear Rec. 709 [-].
+def xyz_weights(lamp: str | Path, wavelength_nm: Floats) -> Floats:
+    """Return weights (3, n) from reflectance spectra, lit by a lamp, to CIE 1931 XYZ; Y of white is 1 [-].
 
-    Each colour has the L*a*b* coordinates under D65 that its spectrum has under the lamp; white is white.
     Spectra are taken as linear between the wavelengths and as constant beyond them.
 
     lamp : illuminant of `LAMPS`, or a CSV file of wavelength [nm] and relative power
     wavelength_nm : (n,) wavelengths of the spectra, increasing [nm]
 
-    Source: [CIE2018] for the observer, and for the formulae of L*a*b*.
+    Source: [CIE2018].
     """
-    if lamp == "D65":
-        return rgb_weights(wavelength_nm)
     low, high = _power_ends_nm(str(lamp))
     grid = _TABLE_NM if lamp in LAMPS else _VISIBLE_NM
     grid = grid[(grid >= low) & (grid <= high)]
     observer = np.array([interpolate_spectrum("cie-1931-d65", f"{axis}_bar", grid) for axis in "xyz"])
-    xyz = sensor_weights(lamp, grid, observer, wavelength_nm)
-    weights = np.linalg.solve(primaries_xyz(), _d65_white()[:, None] * xyz)
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+    white = observer @ (lamp_power(lamp, grid) * np.gradient(grid))
+    return sensor_weights(lamp, grid, observer, wavelength_nm) * (white / white[1])[:, None]
 
 
 def sensor_weights(lamp: str | Path, grid_nm: Floats, sensitivity: Floats, wavelength_nm: Floats) -> Floats:
@@ -120,12 +114,6 @@ def _power_ends_nm(lamp: str) -> tuple[float, float]:
         return SHORTEST_WAVELENGTH_NM, LONGEST_WAVELENGTH_NM + _BAND_NM
     table = _read_lamp(lamp)
     return float(table[0, 0]), float(table[-1, 0])
-
-
-def _d65_white() -> Floats:
-    """Return X, Y and Z (3,) of D65."""
-    observer = np.array([interpolate_spectrum("cie-1931-d65", f"{axis}_bar", _TABLE_NM) for axis in "xyz"])
-    return np.asarray(observer @ interpolate_spectrum("cie-1931-d65", "d65", _TABLE_NM))
 
 
 @cache

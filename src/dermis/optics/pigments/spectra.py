@@ -84,7 +84,7 @@ def rgb_weights(wavelength_nm: Floats = WAVELENGTHS_NM) -> Floats:
         refuse("wavelengths", "a list that increases", f"got {grid.tolist()}", "Sort it without repetitions")
     fine = _spectrum_columns("cie-1931-d65")["wavelength_nm"]
     hats = np.array([np.interp(fine, grid, unit) for unit in np.eye(len(grid))])
-    weights = np.linalg.solve(primaries_xyz(), _weighted_colour_matching() @ hats.T)
+    weights = np.linalg.solve(_primaries_xyz(), _weighted_colour_matching() @ hats.T)
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
@@ -94,7 +94,7 @@ def _weighted_colour_matching() -> Floats:
     return np.array([columns[name] for name in ("x_bar", "y_bar", "z_bar")]) * columns["d65"]
 
 
-def primaries_xyz() -> Floats:
+def _primaries_xyz() -> Floats:
     """Return a matrix (3, 3) with the XYZ colours of the Rec. 709 primaries as columns, each with Y = 1."""
     x, y = _PRIMARIES_XY.T
     return np.array([x / y, np.ones(3), (1.0 - x - y) / y])

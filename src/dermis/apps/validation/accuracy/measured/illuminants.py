@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from functools import cache
 
-from dermis.optics import lamps
+from dermis.images.colour import linear_of_xyz
+from dermis.optics.lamps import xyz_weights
 from dermis.optics.media import Floats
-from dermis.optics.pigments.spectra import WAVELENGTHS_NM
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 ILLUMINANTS = ("D65", "A", "FL11", "LED-B3")
 """Illuminants of the comparison, from `dermis.optics.lamps.LAMPS`."""
@@ -19,5 +20,10 @@ def colour_weights(illuminant: str) -> Floats:
     Each colour has the L*a*b* coordinates under D65 that its spectrum has under the illuminant.
 
     illuminant : one of `ILLUMINANTS`
+
+    Source: [CIE2004] for the formulae of L*a*b*.
     """
-    return lamps.colour_weights(illuminant, WAVELENGTHS_NM)
+    if illuminant == "D65":
+        return rgb_weights()
+    xyz = xyz_weights(illuminant, WAVELENGTHS_NM)
+    return linear_of_xyz((xyz / xyz.sum(axis=1, keepdims=True)).T).T
