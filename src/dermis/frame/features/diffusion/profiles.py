@@ -62,8 +62,8 @@ class SkinProfiles:
             if key not in self._band_fits:
                 if len(self._band_fits) >= _CACHED_BAND_FIT_COUNT:
                     self._band_fits.clear()
-                fit = fit_profile(tissue.in_bands(bands), skin.profile, rgb_profile)
-                self._band_fits[key] = fit
+                spectral = tissue.in_bands(bands)
+                self._band_fits[key] = fit_profile(spectral, skin.profile, rgb_profile, keep_energy=True)
             return self._band_fits[key]
         return replace(rgb_profile, weight=bands.reflectance(rgb_profile.weight))
 
