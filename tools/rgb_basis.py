@@ -2,8 +2,8 @@
 
 Usage: python tools/rgb_basis.py [OUTPUT.csv]
 
-The method is that of [MallettYuksel2019]: the smoothest reflectances that sum to 1 at each wavelength and have,
-under D65, the colours of the primaries of Rec. 709.
+The method is that of [MallettYuksel2019]: the smoothest reflectances that sum to 1 at each wavelength and
+have, under D65, the colours of the primaries of Rec. 709.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import minimize
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, LinearConstraint, minimize
 
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
@@ -26,26 +27,25 @@ wavelength_nm,red,green,blue
 """
 
 
-def smooth_basis() -> np.ndarray:
+def smooth_basis() -> NDArray[np.float64]:
     """Return the reflectances (31, 3) of red, green and blue at `WAVELENGTHS_NM` [-]."""
     n = len(WAVELENGTHS_NM)
     slope = np.kron(np.diff(np.eye(n), axis=0), np.eye(3))
     colours = np.kron(rgb_weights(WAVELENGTHS_NM), np.eye(3))
     sums = np.kron(np.eye(n), np.ones(3))
-    # The sums follow from eight of the nine equations of the colours and the rest of the wavelengths.
     matrix, target = np.vstack([sums, colours]), np.concatenate([np.ones(n), np.eye(3).ravel()])
     vectors, scales, rows = np.linalg.svd(matrix, full_matrices=False)
-    kept = scales > 1e-9 * scales[0]
-    matrix, target = rows[kept], (vectors[:, kept].T @ target) / scales[kept]
+    kept = scales > 1e-9 * scales[0]  # some equations follow from others
+    target = (vectors[:, kept].T @ target) / scales[kept]
     energy = slope.T @ slope
     solution = minimize(
-        lambda x: x @ energy @ x,
-        np.full(3 * n, 1.0 / 3.0),
-        jac=lambda x: 2.0 * energy @ x,
-        bounds=[(0.0, 1.0)] * (3 * n),
-        constraints={"type": "eq", "fun": lambda x: matrix @ x - target, "jac": lambda x: matrix},
+        lambda x: float(x @ energy @ x),
+        np.full(3 * n, 1.0 / 3.0, np.float64),
+        jac=lambda x: np.asarray(2.0 * energy @ x, np.float64),
+        bounds=Bounds(0.0, 1.0),
+        constraints=LinearConstraint(rows[kept], target, target),
         method="SLSQP",
-        options={"maxiter": 1000, "ftol": 1e-12},
+        options={"maxiter": 1000, "ftol": 1e-12},  # type: ignore[call-overload]
     )
     return np.asarray(solution.x.reshape(n, 3))
 

@@ -107,9 +107,7 @@ class Oximeter:
     """Two-wavelength oximeter, calibrated with skin of two known saturations and of skin without blood."""
 
     def __init__(self, renderer: Renderer) -> None:
-        self.settings = SMALL.model_copy(
-            update={"polarisation": "cross", "strands": False, "exposure": 1.0}
-        )
+        self.settings = SMALL.model_copy(update={"polarisation": "cross", "strands": False, "exposure": 1.0})
         self.bloodless = self._spectra(renderer, 0.8, blood=0.0)
         label = renderer.draw(self._scene(0.8), self.settings, outputs=("label",)).output("label")
         names = "skin", "nose", "neck"
@@ -157,9 +155,11 @@ def test_camera_sees_by_its_sensitivities(picture: SpectralPicture, tmp_path: Pa
     """A sensor of a single wavelength has the spectrum there as its signal, balanced for white."""
     file = tmp_path / "narrow.csv"
     rows = [(nm, nm == 650, nm == 550, nm == 450) for nm in range(400, 701)]
-    file.write_text("nm,red,green,blue\n" + "".join(f"{','.join(str(float(one)) for one in r)}\n" for r in rows))
+    file.write_text(
+        "nm,red,green,blue\n" + "".join(f"{','.join(str(float(one)) for one in r)}\n" for r in rows)
+    )
     bare = replace(picture, backdrop=None)
-    index = [int(np.flatnonzero(WAVELENGTHS_NM == nm)[0]) for nm in (650.0, 550.0, 450.0)]
+    index = [int(np.flatnonzero(nm == WAVELENGTHS_NM)[0]) for nm in (650.0, 550.0, 450.0)]
     assert np.allclose(bare.camera(file, "LED-B3"), picture.reflected[..., index], atol=1e-5)
 
 

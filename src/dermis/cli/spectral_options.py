@@ -32,31 +32,36 @@ class SpectralOptions:
         str | None,
         Parameter(
             metavar="COUNT|NM,NM,...",
-            help="Write the spectrum of each pixel to an .exr file: 31 bands of 10 nm from 400 to 700 nm, up to 61 "
-            "bands to 1,000 nm, or wavelengths in nm, such as 660,940.",
+            help="Write the spectrum of each pixel to an .exr file: 31 bands of 10 nm from 400 to 700 nm, up "
+            "to 61 bands to 1,000 nm, or wavelengths in nm, such as 660,940.",
         ),
     ] = None
     light_spectrum: Annotated[
         str | None,
         Parameter(
             metavar="LAMP",
-            help="Spectrum of all lights: D65, A, FL11, LED-B3, E (equal energy), or a CSV file of wavelength in "
-            "nm and relative power. Colours are computed from spectra, for an eye that is adapted to the light.",
+            help="Spectrum of all lights: D65, A, FL11, LED-B3, E (equal energy), or a CSV file of "
+            "wavelength in nm and relative power. Colours are computed from spectra, for an eye adapted to "
+            "the light.",
         ),
     ] = None
     camera_sensitivity: Annotated[
         Path | None,
         Parameter(
             metavar="FILE",
-            help="CSV file of wavelength in nm and the sensitivities of a camera's red, green and blue, whose "
-            "white-balanced signals are the colours of the picture.",
+            help="CSV file of wavelength in nm and the sensitivities of a camera's red, green and blue: the "
+            "colours of the picture are its white-balanced signals.",
         ),
     ] = None
 
     @property
     def are_given(self) -> bool:
         """Return whether any of the options is given."""
-        return self.spectral is not None or self.light_spectrum is not None or self.camera_sensitivity is not None
+        return (
+            self.spectral is not None
+            or self.light_spectrum is not None
+            or self.camera_sensitivity is not None
+        )
 
     def check(self, output: Path, settings: Mapping[str, Any], has_outputs: bool, as_json: bool) -> None:
         """Raise DermisError for options that do not go together, before anything is rendered.
@@ -70,7 +75,9 @@ class SpectralOptions:
         if self.spectral is not None and not is_exr:
             refuse(output, "an .exr file with --spectral", f"got {output.suffix}", "Name it .exr")
         if has_outputs:
-            refuse("--outputs", "a picture without spectra", "it is given", "Render the outputs by themselves")
+            refuse(
+                "--outputs", "a picture without spectra", "it is given", "Render the outputs by themselves"
+            )
         if as_json:
             refuse("--json", "a picture without spectra", "it is given", "Leave it out")
         if not is_exr and settings.get("tone", "none") != "none":
@@ -128,7 +135,9 @@ class SpectralOptions:
         else:
             colours = picture.linear(self.lamp)
             lines = [_colour_error(renderer, scene, settings, picture, self.lamp)]
-        write_image(output, colours if picture.backdrop is not None else _with_alpha(colours, picture, output))
+        write_image(
+            output, colours if picture.backdrop is not None else _with_alpha(colours, picture, output)
+        )
         return lines
 
     def _write_cube(self, picture: SpectralPicture, output: Path) -> list[str]:
@@ -152,12 +161,12 @@ NO_SPECTRA = SpectralOptions()
 
 
 def _with_alpha(colours: Floats, picture: SpectralPicture, output: Path) -> Floats:
-    """Return colours (h, w, 4) with alpha, by which colours in EXR files are multiplied, and in PNG files not."""
+    """Return colours (h, w, 4) with alpha, by which colours are multiplied in EXR files, but not in PNG."""
     import numpy as np
 
     alpha = picture.alpha[..., None]
     if output.suffix.lower() == ".png":
-        colours = colours / np.maximum(alpha, np.float32(1e-6))
+        colours = np.asarray(colours / np.maximum(alpha, 1e-6), np.float32)
     return np.concatenate([colours, alpha], axis=-1)
 
 
@@ -177,4 +186,5 @@ def _colour_error(
         return "no pixel shows skin alone"
     error = delta_e_2000(picture.linear(lamp)[skin], picture.rgb[skin])
     median, most = np.percentile(error, [50, 95])
-    return f"skin in red, green and blue light would differ by CIEDE2000 {median:.2f} (median), {most:.2f} (95 %)"
+    values = f"{median:.2f} (median), {most:.2f} (95 %)"
+    return f"error of red, green and blue light on skin: CIEDE2000 {values}"

@@ -29,7 +29,6 @@ from dermis.frame.features.occlusion.moving import (
     sky_views_record,
 )
 from dermis.frame.features.outputs.stage_inputs import PreviousScene
-from dermis.frame.features.surface.bands import head_in_bands, light_in_bands
 from dermis.frame.features.shading.shade import shade_program
 from dermis.frame.features.shading.view import (
     EyePoses,
@@ -39,6 +38,7 @@ from dermis.frame.features.shading.view import (
     world_space_pinhole,
 )
 from dermis.frame.features.shape.shape import PoseBytes, rest_pose_bytes
+from dermis.frame.features.surface.bands import head_in_bands, light_in_bands
 from dermis.frame.hair_motion import HairFrame, HairMotion
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.lights.environment import add_suns, load_environment_map, peak_irradiance
@@ -134,14 +134,12 @@ class Preparation:
     ) -> FrameInputs:
         cached, device = self.memo.get, self.device
         if bands is not None:
-            lights = tuple(light_in_bands(light, bands) for light in scene.lights)
-            scene = replace(scene, head=cached(head_in_bands, scene.head, bands), lights=lights)
+            lit = tuple(light_in_bands(light, bands) for light in scene.lights)
+            scene = replace(scene, head=cached(head_in_bands, scene.head, bands), lights=lit)
         head, environment = scene.head.without_maps, scene.environment
         (profile, *others), blend_weights = self._profiles(scene.skin, technique, bands)
         name = environment.name if environment else None
-        environment_map = cached(
-            load_environment_map, device, name, bands, min_cache_size=_KEPT_ENVIRONMENTS
-        )
+        environment_map = cached(load_environment_map, device, name, bands, min_cache_size=_KEPT_ENVIRONMENTS)
         scene = add_suns(self.memo, scene, environment_map)
         state = self._head_state(head, scene.pose_arrays)
         light_inputs = head, tuple(scene.lights), state.outline, settings.shadow_size

@@ -254,7 +254,16 @@ class Renderer:
         """
         settings = as_model(Settings, settings or {}, "settings", "size=(512, 512)")
         previous = previous and Scene.coerce(previous)
-        prepared = Scene.coerce(scene), settings, view, check_outputs(outputs), previous, (), hair_frame, bands
+        prepared = (
+            Scene.coerce(scene),
+            settings,
+            view,
+            check_outputs(outputs),
+            previous,
+            (),
+            hair_frame,
+            bands,
+        )
         return self.reopening_device.run(partial(self._draw, run_all_passes, timed, *prepared))
 
     def _draw(self, run_all_passes: bool, timed: Timing, *prepared: Any) -> RenderedFrame:

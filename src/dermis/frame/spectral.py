@@ -168,7 +168,7 @@ def colour_weights(lamp: str | Path, wavelength_nm: Doubles) -> Doubles:
     xyz = xyz_weights(lamp, wavelength_nm)
     cones, white = BRADFORD_MATRIX @ xyz, BRADFORD_MATRIX @ XYZ_OF_REC709.sum(axis=1)
     adapted = cones * (white / cones.sum(axis=1))[:, None]
-    return np.asarray(np.linalg.solve(BRADFORD_MATRIX @ XYZ_OF_REC709, adapted))
+    return np.asarray(np.linalg.solve(BRADFORD_MATRIX @ XYZ_OF_REC709, adapted), np.float64)
 
 
 def band_wavelengths(bands: int | Sequence[float]) -> Doubles:
@@ -178,9 +178,9 @@ def band_wavelengths(bands: int | Sequence[float]) -> Doubles:
     """
     if isinstance(bands, int):
         count = int(checked_number("spectral", bands, 1, MAX_BANDS, "bands of 10 nm from 400 nm"))
-        return FIRST_BAND_NM + BAND_NM * np.arange(count)
+        return np.asarray(FIRST_BAND_NM + BAND_NM * np.arange(count), np.float64)
     ends = SHORTEST_WAVELENGTH_NM, LONGEST_WAVELENGTH_NM
-    wavelengths = checked_array("spectral", bands, (0,), *ends, "wavelengths in nm")
+    wavelengths: Doubles = checked_array("spectral", bands, (0,), *ends, "wavelengths in nm")
     if len(wavelengths) == 0 or (np.diff(wavelengths) <= 0.0).any():
         refuse("spectral", "wavelengths that increase", f"got {format_value(bands)}", "Sort them")
     return wavelengths

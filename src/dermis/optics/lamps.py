@@ -19,12 +19,18 @@ from dermis.optics.pigments.spectra import (
 
 LAMPS = ("D65", "A", "FL11", "LED-B3", "E")
 """CIE illuminants: daylight, incandescent, three-band fluorescent, phosphor LED, and equal energy."""
-_TABULATED = {"D65": ("cie-1931-d65", "d65"), "FL11": ("illuminants", "fl11"), "LED-B3": ("illuminants", "led_b3")}
+_TABULATED = {
+    "D65": ("cie-1931-d65", "d65"),
+    "FL11": ("illuminants", "fl11"),
+    "LED-B3": ("illuminants", "led_b3"),
+}
 _VISIBLE_NM = np.arange(SHORTEST_WAVELENGTH_NM, LONGEST_VISIBLE_NM + 1.0, 1.0)
 _TABLE_NM = _VISIBLE_NM[::5]  # wavelengths of the tables of CIE
 _BAND_NM = 10.0
 _D65_AT_560_NM = 100.0
-_INCANDESCENT_NM = 1.435e7 / 2848.0  # second radiation constant over the temperature, as CIE defines illuminant A
+_INCANDESCENT_NM = (
+    1.435e7 / 2848.0
+)  # second radiation constant over the temperature, as CIE defines illuminant A
 _NEUTRAL_NM = 560.0
 _SPECTRUM_FILE = f"one of {', '.join(LAMPS)}, or a CSV file of wavelength [nm] and relative power"
 
@@ -58,7 +64,7 @@ def xyz_weights(lamp: str | Path, wavelength_nm: Floats) -> Floats:
     grid = grid[(grid >= low) & (grid <= high)]
     observer = np.array([interpolate_spectrum("cie-1931-d65", f"{axis}_bar", grid) for axis in "xyz"])
     white = observer @ (lamp_power(lamp, grid) * np.gradient(grid))
-    return sensor_weights(lamp, grid, observer, wavelength_nm) * (white / white[1])[:, None]
+    return np.asarray(sensor_weights(lamp, grid, observer, wavelength_nm) * (white / white[1])[:, None])
 
 
 def sensor_weights(lamp: str | Path, grid_nm: Floats, sensitivity: Floats, wavelength_nm: Floats) -> Floats:
@@ -124,7 +130,10 @@ def _scale(lamp: str) -> float:
     if lamp not in LAMPS:
         table = _read_lamp(lamp)
         inside = np.clip(_VISIBLE_NM, table[0, 0], table[-1, 0])  # the power of daylight is tiny at both ends
-    reference, own = _raw_power("D65", _VISIBLE_NM), np.where(inside == _VISIBLE_NM, _raw_power(lamp, inside), 0.0)
+    reference, own = (
+        _raw_power("D65", _VISIBLE_NM),
+        np.where(inside == _VISIBLE_NM, _raw_power(lamp, inside), 0.0),
+    )
     return float(observer @ reference / _D65_AT_560_NM / (observer @ own))
 
 

@@ -201,11 +201,15 @@ def infrared_absorption(wavelength_nm: ArrayLike) -> Floats:
     Source: [Jacques2013] for the water content of 65 %; the lipid content of 10 % is chosen.
     """
     added = _water_and_lipids(wavelength_nm) - _water_and_lipids(WAVELENGTHS_NM[-1])
-    return np.asarray(np.where(tissue_wavelengths(wavelength_nm) > WAVELENGTHS_NM[-1], np.maximum(added, 0.0), 0.0))
+    return np.asarray(
+        np.where(tissue_wavelengths(wavelength_nm) > WAVELENGTHS_NM[-1], np.maximum(added, 0.0), 0.0)
+    )
 
 
 def _water_and_lipids(wavelength_nm: ArrayLike) -> Floats:
-    return _WATER_FRACTION * water_absorption(wavelength_nm) + _LIPID_FRACTION * lipid_absorption(wavelength_nm)
+    return _WATER_FRACTION * water_absorption(wavelength_nm) + _LIPID_FRACTION * lipid_absorption(
+        wavelength_nm
+    )
 
 
 def donner_jensen_scattering(wavelength_nm: ArrayLike) -> Floats:

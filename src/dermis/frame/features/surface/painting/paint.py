@@ -357,9 +357,7 @@ def draw_expression(
     bands = expression_maps.bands
     constants = (LIVING_CONSTANTS if living else ()) + band_constants(bands)
     shader = program(graph.device, "surface/painting/expression.wgsl", constants)
-    record = shader.make_record(
-        "Expression", flush=flush, pressed=pressed, side=side, bands=band_rows(bands)
-    )
+    record = shader.make_record("Expression", flush=flush, pressed=pressed, side=side, bands=band_rows(bands))
     bindings: MutableBindings = {**expression_maps.bindings, "expression": record}
     if living is not None and skin_state is not None:
         draw_state(graph, living, skin_state)
