@@ -1,20 +1,18 @@
 """Compute the spectra of red, green and blue, from which `dermis.optics.bands` upsamples RGB colours.
 
-Usage: python tools/rgb_basis.py [OUTPUT.csv]
-
 The method is that of [MallettYuksel2019]: the smoothest reflectances that sum to 1 at each wavelength and
 have, under D65, the colours of the primaries of Rec. 709.
 """
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, minimize
 
+from dermis.base.command_line import run_script
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 _TABLE = Path(__file__).parents[1] / "src/dermis/optics/data/spectra/rgb-basis.csv"
@@ -50,14 +48,20 @@ def smooth_basis() -> NDArray[np.float64]:
     return np.asarray(solution.x.reshape(n, 3))
 
 
-def main() -> None:
-    """Write the table."""
+def main(output: Path = _TABLE) -> None:
+    """Compute the spectra of red, green and blue.
+
+    Parameters
+    ----------
+    output:
+        Table to write.
+    """
     rows = (
         f"{wavelength:.0f},{','.join(f'{value:.7f}' for value in values)}\n"
         for wavelength, values in zip(WAVELENGTHS_NM, np.clip(smooth_basis(), 0.0, 1.0), strict=True)
     )
-    Path(sys.argv[1] if len(sys.argv) > 1 else _TABLE).write_text(_HEADING + "".join(rows), "utf-8")
+    output.write_text(_HEADING + "".join(rows), "utf-8")
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

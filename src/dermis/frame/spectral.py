@@ -52,6 +52,16 @@ class SpectralPicture(ShortRepr):
         (h, w, 3) light of the background in linear Rec. 709; None for the background "none".
     exposure : float
         Factor from radiance to the values of the picture [-].
+
+    Examples
+    --------
+    >>> import dermis
+    >>> import numpy as np
+    >>> wavelengths = np.arange(400.0, 701.0, 10.0)
+    >>> white, alpha = np.ones((1, 1, 31), np.float32), np.ones((1, 1), np.float32)
+    >>> picture = dermis.SpectralPicture(wavelengths, white, alpha, white[..., :3], None, 1.0)
+    >>> picture.linear("FL11").round(3).tolist()
+    [[[1.0, 1.0, 1.0]]]
     """
 
     wavelengths_nm: Doubles
@@ -226,9 +236,9 @@ def render_spectrum(
     Examples
     --------
     >>> import dermis
-    >>> from dermis.frame.spectral import render_spectrum
     >>> scene = dermis.Scene(dermis.Human().head(subdivide=0))
-    >>> picture = render_spectrum(dermis.Renderer("cpu"), scene, dermis.Settings(size=64))  # doctest: +SKIP
+    >>> renderer, settings = dermis.Renderer("cpu"), dermis.Settings(size=64)
+    >>> picture = dermis.render_spectrum(renderer, scene, settings)  # doctest: +SKIP
     >>> picture.linear("FL11").shape  # doctest: +SKIP
     (64, 64, 3)
     """
