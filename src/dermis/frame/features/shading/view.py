@@ -38,7 +38,7 @@ _MAX_MATERIALS = 64
 _WET_MATERIAL_MARKER = -1.0  # roughness of plain materials, see parts.wgsl
 # Factors of light from below the surface and of reflected light, by `Settings.parts` and `.polarisation`.
 _LIGHT_FACTORS = {"all": (1.0, 1.0), "diffuse": (1.0, 0.0), "specular": (0.0, 1.0)}
-_POLARISER_FACTORS = {"none": (1.0, 1.0), "parallel": (0.5, 1.0), "cross": (0.5, 0.0)}
+_POLARISER_FACTORS = {None: (1.0, 1.0), "parallel": (0.5, 1.0), "cross": (0.5, 0.0)}
 _CAMERA_RAY_MEMBERS = ("eye", "forward", "right", "up", "shift")
 
 
