@@ -74,6 +74,9 @@ class SpectralOptions:
         is_exr = output.suffix.lower() == ".exr"
         if self.spectral is not None and not is_exr:
             refuse(output, "an .exr file with --spectral", f"got {output.suffix}", "Name it .exr")
+        if self.spectral is not None and self.camera_sensitivity is not None:
+            actual = "--camera-sensitivity is given too"
+            refuse("--spectral", "spectra, or the colours of a camera", actual, "Leave one of them out")
         if has_outputs:
             refuse(
                 "--outputs", "a picture without spectra", "it is given", "Render the outputs by themselves"
