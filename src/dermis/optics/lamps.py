@@ -27,6 +27,7 @@ _TABULATED = {
 _VISIBLE_NM = np.arange(SHORTEST_WAVELENGTH_NM, LONGEST_VISIBLE_NM + 1.0, 1.0)
 _TABLE_NM = _VISIBLE_NM[::5]  # wavelengths of the tables of CIE
 _BAND_NM = 10.0
+_MIN_SIGNAL = 1e-12  # smallest signal of white by which others are divided
 _D65_AT_560_NM = 100.0
 _INCANDESCENT_NM = (
     1.435e7 / 2848.0
@@ -79,7 +80,14 @@ def sensor_weights(lamp: str | Path, grid_nm: Floats, sensitivity: Floats, wavel
     """
     hats = np.array([np.interp(grid_nm, wavelength_nm, unit) for unit in np.eye(len(wavelength_nm))])
     weights = (sensitivity * lamp_power(lamp, grid_nm) * np.gradient(grid_nm)) @ hats.T
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+    return np.asarray(weights / _checked_sums(lamp, weights.sum(axis=1, keepdims=True)))
+
+
+def _checked_sums(lamp: str | Path, signals: Floats) -> Floats:
+    """Return the signals of sensors for white; raise DermisError if one of them is 0."""
+    if not (signals > _MIN_SIGNAL).all():
+        refuse(lamp, "light that each sensor sees", "the signal of white is 0", "Extend the tables")
+    return signals
 
 
 def read_sensitivities(path: str | Path, lamp: str | Path) -> tuple[Floats, Floats]:
@@ -93,8 +101,15 @@ def read_sensitivities(path: str | Path, lamp: str | Path) -> tuple[Floats, Floa
     table = read_number_table(path, expected, (4,), "wavelength [nm] and three sensitivities in each line")
     check_spectra(path, table)
     low, high = _power_ends_nm(str(lamp))
-    grid = np.arange(np.ceil(max(table[0, 0], low)), np.floor(min(table[-1, 0], high)) + 1.0)
-    return grid, np.array([np.interp(grid, table[:, 0], column) for column in table.T[1:]])
+    first, last = max(table[0, 0], low), min(table[-1, 0], high)
+    if last - first < _BAND_NM:
+        actual = f"got {first:g} to {last:g} nm"
+        refuse(path, f"at least {_BAND_NM:g} nm at which the lamp has a known power", actual, "Extend it")
+    grid = np.arange(np.ceil(first), np.floor(last) + 1.0)
+    relative = table.T[1:] / table[:, 1:].max()
+    response = np.array([np.interp(grid, table[:, 0], column) for column in relative])
+    _checked_sums(path, response.sum(axis=1))
+    return grid, response
 
 
 def lamp_power(lamp: str | Path, wavelength_nm: Floats) -> Floats:
@@ -105,7 +120,7 @@ def lamp_power(lamp: str | Path, wavelength_nm: Floats) -> Floats:
     lamp : illuminant of `LAMPS`, or a CSV file of wavelength [nm] and relative power
     wavelength_nm : (n,) wavelengths [nm]
 
-    Raises DermisError for unknown lamps, and for wavelengths outside the table of the lamp.
+    Raises DermisError for unknown and invisible lamps, and for wavelengths outside the table of the lamp.
 
     Source: [CIE2018].
     """
@@ -134,7 +149,7 @@ def _scale(lamp: str) -> float:
         _raw_power("D65", _VISIBLE_NM),
         np.where(inside == _VISIBLE_NM, _raw_power(lamp, inside), 0.0),
     )
-    return float(observer @ reference / _D65_AT_560_NM / (observer @ own))
+    return float(observer @ reference / _D65_AT_560_NM / _checked_sums(lamp, np.asarray(observer @ own)))
 
 
 def _raw_power(lamp: str, wavelength_nm: Floats) -> Floats:
@@ -164,7 +179,7 @@ def _read_lamp(lamp: str) -> Floats:
         refuse("--light-spectrum", _SPECTRUM_FILE, f"got {lamp!r}", "Choose one of them")
     table = read_number_table(lamp, _SPECTRUM_FILE, (2,), "wavelength [nm] and power in each line")
     check_spectra(lamp, table)
-    return table
+    return np.column_stack([table[:, 0], table[:, 1] / table[:, 1].max()])
 
 
 def check_spectra(file_name: str | Path, table: Floats) -> None:
