@@ -174,3 +174,16 @@ WRITTEN_CURVES_MM = 1e-3
 
 KNOTS_INSIDE_SKIN = 0.006
 """Share of knots of hair more than 0.5 mm inside the skin: strands are interpolated between guides."""
+
+SPECTRAL_COLOUR = 0.3
+"""Median CIEDE2000 of a picture from spectra under D65 against one in red, green and blue: products of
+colours differ from colours of products."""
+
+SPECTRUM = 0.005
+"""Spectrum of a flat patch against the layered model, relative: six Gaussians are fitted to its profile."""
+
+OXYGEN = 0.05
+"""Oxygen saturation by two wavelengths, relative: the paths of light depend a little on pigments."""
+
+POLARISED = 0.01
+"""Parallel minus cross-polarised light against the reflection, relative to its mean: float32."""

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from dermis.frame.hair_motion import HairMotion
     from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer, render
+    from dermis.frame.spectral import SpectralPicture, render_spectrum
     from dermis.human.hair.look import HairLook
     from dermis.human.makehuman import human_targets
     from dermis.human.person import Human
@@ -76,6 +77,8 @@ _MODULE_OF_NAME = {
     "Tissue": "optics.tissue",
     "load_tissue": "optics.tissue",
     "Renderer": "frame.renderer",
+    "SpectralPicture": "frame.spectral",
+    "render_spectrum": "frame.spectral",
     "Observation": "frame.observation",
     "render": "frame.renderer",
     "Camera": "scene.camera",
@@ -135,6 +138,7 @@ __all__ = [
     "Skin",
     "SkinLook",
     "SkinState",
+    "SpectralPicture",
     "SphereLight",
     "SpotLight",
     "StateEvent",
@@ -154,6 +158,7 @@ __all__ = [
     "portrait",
     "read_dataset",
     "render",
+    "render_spectrum",
     "side",
     "studio",
     "three_quarter",

@@ -19,6 +19,7 @@ _COSTLY = (
     "--photons",
     "--subdivide",
     "--fit",
+    "--spectral",
     "--motion-fps",
     "--fps",
 )
@@ -50,6 +51,9 @@ _USUAL: Mapping[str, tuple[str, ...]] = {
     "--lights": ("studio", "none", "lights.toml", "sky.hdr"),
     "--env": ("uniform", "sky.hdr", "head.obj"),
     "--camera": ("portrait", "ear", "camera.toml"),
+    "--spectral": ("31", "2", "730,805", "{},500", "400,{}"),
+    "--light-spectrum": ("A", "FL11", "skin.png", "take.csv"),
+    "--camera-sensitivity": ("take.csv", "skin.png"),
     "--profile": ("gpu-gems-3", "profile.csv", "scene.toml"),
     "--colour": ("skin.png", "grey.png"),
     "--normal": ("normal.png", "skin.png"),

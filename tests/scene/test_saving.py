@@ -111,6 +111,7 @@ SETTINGS = Settings(
     background=(0.1, 0.0, 0.0),
     background_blur=0.2,
     parts="diffuse",
+    polarisation="cross",
 )
 
 

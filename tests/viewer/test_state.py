@@ -9,6 +9,7 @@ import pytest
 
 from dermis.apps.viewer.state import UndoHistory, ViewerState, load_state, save_state, states_equal
 from dermis.base.errors import DermisError
+from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.scene import Environment, Scene, load_scene
 from dermis.scene.files import preset_lights
@@ -136,3 +137,18 @@ def test_unchanged_state_is_no_step_and_history_is_limited(state: ViewerState) -
         history.undo()
         steps += 1
     assert steps == 200
+
+
+def test_states_of_the_skin_are_kept_saved_and_undone(state: ViewerState, tmp_path: Path) -> None:
+    human = replace(state, scene=Scene(Human().head(subdivide=0)), head={"name": "human", "subdivide": 0})
+    history = UndoHistory(human)
+    history.change(human.with_skin_state("blush", 0.6))
+    red = history.state
+    assert red.scene.state is not None and red.scene.state.weights == {"blush": 0.6}
+    assert not states_equal(human, red)
+    save_state(tmp_path / "red.toml", red)
+    assert states_equal(replace(red, light_preset=""), load_state(tmp_path / "red.toml", red))
+    assert red.with_skin_state("blush", 0.0).scene.state is None
+    assert red.with_head(state.scene.head, state.head, 0.4).scene.state is None  # it has no pigments
+    history.undo()
+    assert history.state.scene.state is None

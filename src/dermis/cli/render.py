@@ -26,6 +26,7 @@ from dermis.cli.scene_options import (
     note_subdivision,
     shrink_atlas_on_cpu,
 )
+from dermis.cli.spectral_options import NO_SPECTRA, SpectralOptions
 from dermis.scene.techniques import TECHNIQUES
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def render(
     *,
     output: OutputPath = Path("dermis.png"),
     scene: SceneOptions = DEFAULT_SCENE_OPTIONS,
+    spectra: SpectralOptions = NO_SPECTRA,
     outputs: OutputsOption = None,
     outputs_format: OutputsFormatOption = None,
     landmarks: LandmarksOption = None,
@@ -75,6 +77,10 @@ def render(
 
         dermis render human:7 --outputs label --landmarks ibug-68 -o face.png
 
+        dermis render human --spectral 31 --light-spectrum FL11 -o cube.exr
+
+        dermis render human --polarisation cross -o cross.png
+
     Parameters
     ----------
     head:
@@ -92,6 +98,7 @@ def render(
     check_output(output)
     frame_outputs = FrameOutputs(outputs, outputs_format, output)
     landmark_output = FrameLandmarks(landmarks, output)
+    spectra.check(output, scene.settings, outputs is not None, as_json)
     from dermis.frame.renderer import Renderer
     from dermis.gpu.memory import check_driver_address_space
 
@@ -105,6 +112,12 @@ def render(
         with spinner("rendering"):
             renderer = future.result()
             settings = shrink_atlas_on_cpu(loaded_scene, settings, renderer.device.adapter.kind)
+            if spectra.are_given:
+                lines = spectra.render(renderer, loaded_scene, settings, output)
+                landmark_output.write(renderer, loaded_scene, settings)
+                summary = f"{output}  {time.perf_counter() - started:.1f} s on {renderer.device.adapter.name}"
+                print_report(False, {}, lambda: [summary, *lines])
+                return 0
             rendered = renderer.draw(loaded_scene, settings, timed=False, outputs=frame_outputs.names)
             values = {name: rendered.output(name) for name in frame_outputs.names}
             setup_ms = rendered.setup_ms

@@ -115,6 +115,7 @@ def _shade_constants(request: FrameRequest) -> Constants:
     used["PARTS"] = has_part_materials(request.head)
     used["WORN"] = not used["PARTS"] and request.head.undressed is not None
     used["METALS"] = used["PARTS"] or used["WORN"]
+    used["BANDS"] = request.bands is not None
     return tuple((name, 1) for name, value in used.items() if value)
 
 
@@ -130,7 +131,7 @@ def _shade_record(
     resources : tables and textures of the technique; None if the technique needs none
     """
     program = shade_program(device)
-    view = view_record(program, request.head, request.settings, request.profile_split)
+    view = view_record(program, request.head, request.settings, request.profile_split, request.bands)
     view["skin_albedo"] = memo.get(mean_skin_albedo, request.head)
     technique.write_view_record(view, program, resources)
     return view
@@ -160,9 +161,9 @@ def _shared_bindings(
     """Return the shader resources that all atlas layouts share, except the maps and the lights."""
     skin, program = request.skin, shade_program(device)
     environment, total = request.environment, request.profile_split.total
-    curvature, light_count = shape_resources.curvature, sum(request.light_part_counts)
+    curvature, counts = shape_resources.curvature, (sum(request.light_part_counts), request.bands)
     return {
-        "skin": memo.get(skin_record, program, skin, request.head.maps, request.profile, light_count),
+        "skin": memo.get(skin_record, program, skin, request.head.maps, request.profile, *counts),
         "environment": environment_record(
             program, environment, request.environment_map, skin, total, request.has_occlusion
         ),
@@ -278,7 +279,7 @@ def _make_layout(
             atlas,
             *light,
             layout_key=layout_key,
-            material_colour=material_colours(request.head),
+            material_colour=material_colours(request.head, request.bands),
         )
     bindings["from_skin"] = (
         interreflection.buffers.from_skin if interreflection else placeholder_interreflection(device)

@@ -38,6 +38,7 @@ from dermis.frame.features.shading.view import (
     world_space_pinhole,
 )
 from dermis.frame.features.shape.shape import PoseBytes, rest_pose_bytes
+from dermis.frame.features.surface.bands import head_in_bands, light_in_bands
 from dermis.frame.hair_motion import HairFrame, HairMotion
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.lights.environment import add_suns, load_environment_map, peak_irradiance
@@ -54,6 +55,7 @@ from dermis.human.skin.face import movement_weights
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import PoseArrays
+from dermis.optics.bands import Bands
 from dermis.scene.lights import Light
 from dermis.scene.model import Scene
 from dermis.scene.outputs import OUTPUTS
@@ -95,6 +97,7 @@ class Preparation:
         previous: Scene | None = None,
         landmarks: tuple[str, ...] = (),
         hair_frame: HairFrame | None = None,
+        bands: Bands | None = None,
     ) -> FrameInputs:
         """Return the inputs of a frame.
 
@@ -107,11 +110,12 @@ class Preparation:
         previous : scene of the same head for motion vectors; without it, motion is 0
         landmarks : names of landmark sets
         hair_frame : frame of an animation in which hair swings; None for hair that follows the head stiffly
+        bands : wavelengths in the place of red, green and blue
 
         Raises DermisError for sizes that exceed the limits of the device.
         """
         inputs = self._prepare_inputs(
-            scene, settings, TECHNIQUES[settings.technique], view, (outputs, landmarks)
+            scene, settings, TECHNIQUES[settings.technique], view, (outputs, landmarks), bands
         )
         if any(OUTPUTS[name].stage == "motion" for name in outputs):
             inputs = replace(inputs, previous=self._previous_scene(scene, previous or scene, inputs))
@@ -127,12 +131,16 @@ class Preparation:
         technique: Technique,
         view: str,
         requested_names: tuple[RequestedNames, RequestedNames],
+        bands: Bands | None,
     ) -> FrameInputs:
         cached, device = self.memo.get, self.device
+        if bands is not None:
+            lit = tuple(light_in_bands(light, bands) for light in scene.lights)
+            scene = replace(scene, head=cached(head_in_bands, scene.head, bands), lights=lit)
         head, environment = scene.head.without_maps, scene.environment
-        (profile, *others), blend_weights = self._profiles(scene.skin, technique)
+        (profile, *others), blend_weights = self._profiles(scene.skin, technique, bands)
         name = environment.name if environment else None
-        environment_map = cached(load_environment_map, device, name, min_cache_size=_KEPT_ENVIRONMENTS)
+        environment_map = cached(load_environment_map, device, name, bands, min_cache_size=_KEPT_ENVIRONMENTS)
         scene = add_suns(self.memo, scene, environment_map)
         state = self._head_state(head, scene.pose_arrays)
         light_inputs = head, tuple(scene.lights), state.outline, settings.shadow_size
@@ -157,6 +165,7 @@ class Preparation:
             blend_weights=blend_weights,
             outputs=requested_names[0],
             landmarks=requested_names[1],
+            bands=bands,
         )
         try:
             resources = cached(make_resources, self.memo, device, request, technique)
@@ -187,15 +196,17 @@ class Preparation:
             centre_mm=head.centre_mm,
         )
 
-    def _profiles(self, skin: Skin, technique: Technique) -> ProfileMix:
+    def _profiles(self, skin: Skin, technique: Technique, bands: Bands | None) -> ProfileMix:
         """Return the diffusion profiles of the skin and their blend weights.
 
         For techniques that cannot blend profiles, the result is the first profile alone, and None for the
         weights.
+
+        bands : wavelengths in the place of red, green and blue
         """
         if technique.mixes_profiles:
-            return self.profiles.mixture(skin)
-        return (self.profiles.profile(skin),), None
+            return self.profiles.mixture(skin, bands)
+        return (self.profiles.profile(skin, bands),), None
 
     def _sky_view(
         self, head: Head, pose_arrays: PoseArrays | None, outline: Outline

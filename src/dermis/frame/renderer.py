@@ -30,6 +30,7 @@ from dermis.gpu import CommandList, Device, Graph, open_device
 from dermis.gpu.command_list import Timing
 from dermis.gpu.failures import ReopeningDevice
 from dermis.mesh.head import Head
+from dermis.optics.bands import Bands
 from dermis.scene.conversions import as_model
 from dermis.scene.model import Scene
 from dermis.scene.outputs import check_outputs
@@ -204,6 +205,7 @@ class Renderer:
         outputs: Iterable[str] = (),
         previous: Scene | None = None,
         hair_frame: HairFrame | None = None,
+        bands: Bands | None = None,
     ) -> RenderedFrame:
         """Render one frame and leave the picture on the device.
 
@@ -229,6 +231,8 @@ class Renderer:
         hair_frame : HairFrame, optional
             Frame of an animation in which hair swings, from `HairMotion.advance` for the same scene. Without
             it, hair follows the head stiffly.
+        bands : Bands, optional
+            Three wavelengths in the place of red, green and blue, see `render_spectrum`.
 
         Returns
         -------
@@ -250,7 +254,16 @@ class Renderer:
         """
         settings = as_model(Settings, settings or {}, "settings", "size=(512, 512)")
         previous = previous and Scene.coerce(previous)
-        prepared = Scene.coerce(scene), settings, view, check_outputs(outputs), previous, (), hair_frame
+        prepared = (
+            Scene.coerce(scene),
+            settings,
+            view,
+            check_outputs(outputs),
+            previous,
+            (),
+            hair_frame,
+            bands,
+        )
         return self.reopening_device.run(partial(self._draw, run_all_passes, timed, *prepared))
 
     def _draw(self, run_all_passes: bool, timed: Timing, *prepared: Any) -> RenderedFrame:
@@ -262,7 +275,7 @@ class Renderer:
         started = time.perf_counter()
         inputs = self.prepare(*prepared)
         ready = time.perf_counter()
-        frame, _ = self._submit(inputs, timed, run_all_passes, hair_frame=prepared[-1])
+        frame, _ = self._submit(inputs, timed, run_all_passes, hair_frame=prepared[-2])
         if timed:
             frame.wait()
         else:

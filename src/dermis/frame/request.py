@@ -13,6 +13,7 @@ from dermis.frame.seams import AtlasPlan, SeamMethod, plan_atlases, seam_method
 from dermis.frame.technique import ProfileSplit, TechniqueTraits
 from dermis.human.skin.painted import MAX_SIDE, MIN_SIDE, PaintedMaps
 from dermis.mesh.head import Head
+from dermis.optics.bands import Bands
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.environment import Environment
 from dermis.scene.outputs import OUTPUTS
@@ -41,6 +42,7 @@ class FrameRequest:
         profile
     outputs : names of the requested outputs besides the picture
     landmarks : names of the requested landmark sets
+    bands : wavelengths in the place of red, green and blue
     """
 
     head: Head
@@ -60,6 +62,7 @@ class FrameRequest:
     blend_weights: NDArray[np.float32] | None = None
     outputs: tuple[str, ...] = ()
     landmarks: tuple[str, ...] = ()
+    bands: Bands | None = None
 
     @property
     def topology_head(self) -> Head:

@@ -167,7 +167,11 @@ def _fit_preset(preset_name: str) -> GaussianSum:
 
 
 def fit_profile(
-    tissue: Tissue, profile_name: str | Path, similar_fit: GaussianSum | None = None
+    tissue: Tissue,
+    profile_name: str | Path,
+    similar_fit: GaussianSum | None = None,
+    *,
+    keep_energy: bool = False,
 ) -> GaussianSum:
     """Fit six Gaussians to the diffusion profile of a tissue, computed by the tissue's default model.
 
@@ -177,11 +181,16 @@ def fit_profile(
 
     profile_name : preset or file after which the fitted profile is named
     similar_fit : fit of a similar tissue, as start of the new fit, which is then several times faster
+    keep_energy : whether to constrain fits to all other profiles to their total reflectance too
 
     Raises DermisError when the fit is not a valid profile.
     """
     return _fit_rings(
-        tissue.ring_target(), tissue.default_profile_model, f"profile {profile_name}", similar_fit
+        tissue.ring_target(),
+        tissue.default_profile_model,
+        f"profile {profile_name}",
+        similar_fit,
+        keep_energy=keep_energy,
     )
 
 
@@ -200,11 +209,20 @@ def fit_radial(
 
 
 def _fit_rings(
-    rings: RingTarget, model: str, profile_name: str, similar_fit: GaussianSum | None
+    rings: RingTarget,
+    model: str,
+    profile_name: str,
+    similar_fit: GaussianSum | None,
+    *,
+    keep_energy: bool = False,
 ) -> GaussianSum:
     from_photons = model in PHOTON_MODELS
     fit = fit_gaussians(
-        rings, GAUSSIAN_TERMS, keep_energy=from_photons, similar_fit=similar_fit, profile_name=profile_name
+        rings,
+        GAUSSIAN_TERMS,
+        keep_energy=keep_energy or from_photons,
+        similar_fit=similar_fit,
+        profile_name=profile_name,
     )
     return replace(fit.profile, from_photons=from_photons)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.optics.bands import Bands
 from dermis.optics.diffusion.boundary import boundary_mismatch, normal_reflectance
 from dermis.optics.diffusion.layered_diffusion import two_layer_table
 from dermis.optics.media import SKIN_ETA, Floats
@@ -60,23 +61,35 @@ def _cell_and_offset(pigment_fraction: Floats, node_count: int) -> tuple[NDArray
     return cell, (position - cell)[:, None]
 
 
-def colour_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_NODES) -> ColourTable:
+def colour_table(
+    parameters: SkinParameters, node_count: int = _COLOUR_TABLE_NODES, bands: Bands | None = None
+) -> ColourTable:
     """Return the diffuse reflectance of skins for a grid of melanin and blood, by layered diffusion.
 
     parameters : parameters of the skins; melanin and blood are ignored
     node_count : number n of fractions along each axis of the table
+    bands : wavelengths in the place of red, green and blue
     """
+    if bands is not None:
+        return ColourTable(spectral_table(parameters, node_count, np.array(bands.wavelengths_nm)))
     spectra = spectral_table(parameters, node_count)
     colours = spectra.reshape(-1, len(WAVELENGTHS_NM)) @ rgb_weights(WAVELENGTHS_NM).T
     return ColourTable(np.maximum(colours, 0.0).reshape(node_count, node_count, 3))
 
 
-def spectral_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_NODES) -> Floats:
-    """Return the diffuse reflectance spectra (n, n, 31) of skins for a grid of melanin and blood [-].
+def spectral_table(
+    parameters: SkinParameters,
+    node_count: int = _COLOUR_TABLE_NODES,
+    wavelength_nm: Floats = WAVELENGTHS_NM,
+) -> Floats:
+    """Return the diffuse reflectance spectra (n, n, c) of skins for a grid of melanin and blood [-].
 
-    The wavelengths are `WAVELENGTHS_NM`. The parameters and the grid are those of `colour_table`.
+    The parameters and the grid are those of `colour_table`.
+
+    wavelength_nm : (c,) wavelengths from 380 to 1000 [nm]
     """
-    epidermis, dermis = dj2006_layers(parameters, np.linspace(0.0, 1.0, node_count) ** 2)
+    fractions = np.linspace(0.0, 1.0, node_count) ** 2
+    epidermis, dermis = dj2006_layers(parameters, fractions, wavelength_nm)
     mismatch = boundary_mismatch(SKIN_ETA, "exact")
     spectra = two_layer_table(epidermis, parameters.epidermis_mm, dermis, mismatch)
     return (1.0 - normal_reflectance(SKIN_ETA)) * spectra

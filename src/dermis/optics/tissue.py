@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from dermis.base.errors import DermisError, format_value, refuse
 from dermis.base.reading import checked_path, read_toml
 from dermis.base.renamed import renamed_attribute
+from dermis.optics.bands import Bands
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import (
     DiffusionModel,
@@ -51,6 +52,8 @@ class Tissue:
         (3, c) weights that convert wavelengths to red, green and blue [-]; None if the channels are colours.
     parameters : SkinParameters, optional
         Parameters of a skin that is defined by its pigments; None for other media.
+    structure : {"dj2006", "donner2008", "biospec"}, optional
+        Layer structure of a skin that is defined by its pigments.
 
     Examples
     --------
@@ -63,6 +66,7 @@ class Tissue:
     medium: Medium
     rgb: Floats | None = None
     parameters: SkinParameters | None = None
+    structure: Structure = DEFAULT_STRUCTURE
     default_model = renamed_attribute("default_model", "default_profile_model")
     rings = renamed_attribute("rings", "ring_target")
 
@@ -95,6 +99,12 @@ class Tissue:
             return None
         entering = 1.0 - normal_reflectance(self.medium.eta)
         return np.asarray(entering * diffusion_profile(self.medium, model, clamp).total)
+
+    def in_bands(self, bands: Bands) -> Tissue:
+        """Return a skin that is defined by its pigments, with three wavelengths as red, green and blue."""
+        assert self.parameters is not None
+        medium = spectral_medium(self.structure, self.parameters, np.array(bands.wavelengths_nm))
+        return replace(self, medium=replace(medium, name=self.medium.name), rgb=np.eye(3))
 
     def with_layers(self, layers: Sequence[Layer]) -> Tissue:
         """Return a tissue with other layers but the same name and index of refraction.
@@ -239,7 +249,7 @@ def _spectral_tissue(
 ) -> Tissue:
     parameters = replace(default_parameters, **pigment_overrides)
     medium = replace(spectral_medium(structure, parameters), name=name)
-    return Tissue(medium, rgb_weights(WAVELENGTHS_NM), parameters)
+    return Tissue(medium, rgb_weights(WAVELENGTHS_NM), parameters, structure)
 
 
 def _tissue_from_skin_table(

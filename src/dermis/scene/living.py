@@ -65,6 +65,14 @@ class SkinState(ShortRepr):
         return cls(value)  # type: ignore[arg-type]
 
 
+def is_living_head(head: Head, albedo: str) -> bool:
+    """Return whether states can change the skin of a head: it is painted from pigments, and shows its colour.
+
+    albedo : field of `Skin`
+    """
+    return head.maps.is_painted and head.maps.colour is None and albedo == "map"
+
+
 def check_living_head(head: Head, albedo: str) -> None:
     """Raise DermisError for a head whose skin is not painted from pigments, or not rendered in that colour.
 

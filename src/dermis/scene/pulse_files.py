@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from dermis.base.arrays import Doubles
-from dermis.base.errors import format_value, refuse
-from dermis.base.reading import checked_path, read_text
-from dermis.base.tables import column_separator
+from dermis.base.errors import refuse
+from dermis.base.number_table import read_number_table
 from dermis.human.living import TYPICAL_BEAT
 from dermis.human.living.heartbeat import (
     SPREAD_PERCENTILES,
@@ -24,7 +23,7 @@ from dermis.mesh.pose import Pose, merge_poses
 from dermis.mesh.rotations import angles_matrix
 
 _HEAD_BONE = "head"
-_MAX_FILE_BYTES, _MIN_BEAT_SAMPLES = 64 << 20, 8
+_MIN_BEAT_SAMPLES = 8
 _MIN_RECORDING_S, _MAX_RECORDING_S = 2.0, 1e6
 
 
@@ -50,33 +49,7 @@ def load_signal(
 def _read_columns(file_name: str) -> Doubles:
     """Return the numbers (n, 1 or 2) of a CSV file; comments and a header line are skipped."""
     expected = f"{TYPICAL_BEAT}, or a CSV file with one column (a beat) or two (time, value)"
-    path = checked_path(file_name, expected)
-    lines = [
-        line
-        for line in read_text(path, expected, _MAX_FILE_BYTES).splitlines()
-        if line.strip() and line[0] != "#"
-    ]
-    rows = [_numbers(line) for line in lines]
-    if rows and rows[0] is None:
-        lines, rows = lines[1:], rows[1:]
-    for line, row in zip(lines, rows, strict=True):
-        if row is None or len(row) != len(rows[0] or ()) or len(row) not in (1, 2):
-            expected = "one or two numbers in each line, as in the first"
-            refuse(path, expected, f"got {format_value(line)}", "Correct it")
-    if not rows:
-        refuse(path, expected, "it is empty", "Correct it")
-    return np.array(rows, np.float64)
-
-
-def _numbers(line: str) -> list[float] | None:
-    """Return the numbers in a line of a table; None if it contains anything but finite numbers."""
-    mark = column_separator(line)
-    texts = line.split(mark) if mark == "," else line.replace(",", ".").split(mark)
-    try:
-        numbers = [float(text) for text in texts]
-    except ValueError:
-        return None
-    return numbers if np.isfinite(numbers).all() else None
+    return read_number_table(file_name, expected, (1, 2), "one or two numbers in each line, as in the first")
 
 
 def _checked_recording(file_name: str | Path, table: Doubles) -> tuple[Doubles, Doubles]:

@@ -115,6 +115,10 @@ class Settings(FrozenModel):
     parts: Literal["all", "diffuse", "specular"] = "all"
     """Components of the light to show: "all", only the "diffuse" subsurface light, or only the "specular"
     reflection."""
+    polarisation: Literal["parallel", "cross"] | None = None
+    """Polarisers before the lights and the camera: reflection at the surface keeps its polarisation, light
+    from below the surface loses it. "parallel" shows all of the reflection and half of the light from below,
+    "cross" only half of the light from below."""
 
     @model_validator(mode="after")
     def _check_fits_in_memory(self) -> Settings:

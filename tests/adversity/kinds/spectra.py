@@ -1,4 +1,4 @@
-"""Tables of measured reflectance spectra."""
+"""Tables of measured reflectance spectra, and spectra of lamps and cameras."""
 
 from __future__ import annotations
 
@@ -37,4 +37,29 @@ def _take(plan: Plan) -> None:
             raise FoundError(WRONG, "a result is not finite")
 
 
-KINDS = (Kind("spectra", _table, _take),)
+def _lamp(rng: Random) -> Input:
+    """Return the power of a lamp, and the sensitivities of a camera."""
+    random = np.random.default_rng(rng.getrandbits(32)).uniform(0.1, 1.0, (33, 4))
+    rows = [(nm, *row) for nm, row in zip(range(390, 720, 10), random.tolist(), strict=True)]
+    lamp, camera = (
+        "nm,value\n" + "".join(",".join(f"{one:g}" for one in row[:count]) + "\n" for row in rows)
+        for count in (2, 5)
+    )
+    camera = "\n".join(",".join(line.split(",")[:4]) for line in camera.splitlines()[1:])
+    files = {"lamp.csv": lamp.encode(), "camera.csv": camera.encode()}
+    return Input(files, {"file": "lamp.csv", "camera": "camera.csv"})
+
+
+def _light(plan: Plan) -> None:
+    """Compute the colours of a spectrum under the lamp, for an eye and for the camera."""
+    from dermis.optics.lamps import band_power, read_sensitivities, sensor_weights, xyz_weights
+
+    power = band_power(plan["file"], WAVELENGTHS_NM)
+    grid, response = read_sensitivities(plan["camera"], plan["file"])
+    signals = sensor_weights(plan["file"], grid, response, WAVELENGTHS_NM)
+    for values in (power, signals, xyz_weights(plan["file"], WAVELENGTHS_NM)):
+        if not np.isfinite(values).all():
+            raise FoundError(WRONG, "a result is not finite")
+
+
+KINDS = (Kind("spectra", _table, _take), Kind("lamps", _lamp, _light))

@@ -30,8 +30,8 @@ def crossings(values: Floats) -> Floats:
 
 def test_haemoglobin_is_the_published_table(sample_folder: Path) -> None:
     table = np.loadtxt(sample_folder / "reference" / "data" / "prahl_hemoglobin.csv", skiprows=2)
-    wavelength, oxy, deoxy = table[(table[:, 0] >= 380) & (table[:, 0] <= 780)].T
-    assert len(wavelength) == 201
+    wavelength, oxy, deoxy = table[(table[:, 0] >= 380) & (table[:, 0] <= 1000)].T
+    assert len(wavelength) == 311
     assert np.array_equal(chromophores.oxyhaemoglobin_extinction(wavelength), oxy)
     assert np.array_equal(chromophores.deoxyhaemoglobin_extinction(wavelength), deoxy)
 
@@ -117,7 +117,7 @@ def test_skin_scatters_blue_more(law: chromophores.ScatteringLaw) -> None:
     assert (np.diff(law(VISIBLE_NM)) < 0.0).all()
 
 
-@pytest.mark.parametrize("wavelength", [379.9, 780.1, np.nan, [500.0, 900.0]])
+@pytest.mark.parametrize("wavelength", [379.9, 1000.1, np.nan, [500.0, 1100.0]])
 @pytest.mark.parametrize(
     "spectrum",
     [
@@ -127,12 +127,14 @@ def test_skin_scatters_blue_more(law: chromophores.ScatteringLaw) -> None:
         chromophores.oxyhaemoglobin_extinction,
         chromophores.deoxyhaemoglobin_extinction,
         chromophores.water_absorption,
+        chromophores.lipid_absorption,
+        chromophores.infrared_absorption,
         chromophores.donner_jensen_scattering,
         chromophores.jacques_scattering,
     ],
 )
 def test_invisible_light_is_refused(spectrum: Callable[[ArrayLike], Floats], wavelength: ArrayLike) -> None:
-    with pytest.raises(DermisError, match="380 to 780 nm"):
+    with pytest.raises(DermisError, match="380 to 1000 nm"):
         spectrum(wavelength)
 
 

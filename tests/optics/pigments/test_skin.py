@@ -188,5 +188,5 @@ def test_more_than_a_whole_epidermis_is_refused() -> None:
 def test_unknown_structure_names_those_there_are() -> None:
     with pytest.raises(DermisError, match="dj2006, donner2008, biospec"):
         spectral_medium("dj2007", SKIN)  # type: ignore[arg-type]
-    with pytest.raises(DermisError, match="380 to 780"):
-        spectral_medium("dj2006", SKIN, np.array([850.0]))
+    with pytest.raises(DermisError, match="380 to 1000"):
+        spectral_medium("dj2006", SKIN, np.array([1050.0]))

@@ -21,6 +21,7 @@ from dermis.scene.frozen_model import FrozenModel
 from dermis.scene.head_table import has_region_table
 from dermis.scene.heads import load_head
 from dermis.scene.lights import NO_LIGHTS, Light
+from dermis.scene.living import SkinState, is_living_head
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 from dermis.scene.saving import save_scene
@@ -166,14 +167,25 @@ class ViewerState:
         pose = merge_poses(clip.pose_at(time_in_motion_s), self.scene.pose)
         return replace(self.with_pose(pose), seconds=time_in_motion_s)
 
+    def with_skin_state(self, state_name: str, weight: float) -> ViewerState:
+        """Return a copy with another weight of a state of the skin, such as "blush"."""
+        state = self.scene.state
+        weights = {**(state.weights if state else {}), state_name: weight}
+        present = {name: value for name, value in weights.items() if value > 0.0}
+        blood = state.blood if state else None
+        return self._with_scene(state=SkinState(present, blood) if present or blood is not None else None)
+
     def with_head(self, head: Head, head_table: Table, rho_s: float) -> ViewerState:
         """Return a copy with another head, or with other maps for the same head.
+
+        States of the skin end if the skin of the new head is not painted from pigments.
 
         head_table : table from which the head was loaded, with the keys of the [head] table of a scene file
         rho_s : mean specular strength [-]
         """
         skin = validated_copy(self.scene.skin, rho_s=rho_s)
-        return replace(self._with_scene(head=head, skin=skin), head=head_table)
+        state = self.scene.state if is_living_head(head, skin.albedo) else None
+        return replace(self._with_scene(head=head, skin=skin, state=state), head=head_table)
 
     def _with_scene(self, **fields: Any) -> ViewerState:
         return replace(self, scene=replace(self.scene, **fields))
@@ -184,7 +196,8 @@ def states_equal(first_state: ViewerState, second_state: ViewerState) -> bool:
 
     def compared_values(state: ViewerState) -> tuple[object, ...]:
         scene = state.scene
-        scene_values = tuple(scene.lights), scene.camera, scene.skin, scene.environment
+        skin_state = scene.state and (dict(scene.state.weights), str(scene.state.blood))
+        scene_values = tuple(scene.lights), scene.camera, scene.skin, skin_state, scene.environment
         view_values = state.view, state.light_preset, state.atlas_view, state.seconds
         return *scene_values, state.settings, state.head_table, *view_values
 

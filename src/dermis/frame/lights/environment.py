@@ -14,6 +14,7 @@ from dermis.environment.prefilter import LAYER_ROUGHNESSES, prefilter
 from dermis.frame.lights.records import sun_lights
 from dermis.gpu import ComputeProgram, Device, Memo, Texture, UniformRecord, make_texture, upload
 from dermis.images.colour import luminance
+from dermis.optics.bands import Bands
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.skin import Skin, lobe_name
@@ -43,8 +44,12 @@ class EnvironmentMap:
     broad_luminance: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0), np.float32))
 
 
-def load_environment_map(device: Device, environment_name: str | None) -> EnvironmentMap:
+def load_environment_map(
+    device: Device, environment_name: str | None, bands: Bands | None = None
+) -> EnvironmentMap:
     """Return the prefiltered panorama of an environment, or a black panorama if the name is None.
+
+    bands : wavelengths in the place of red, green and blue
 
     Raises DermisError when there is no such environment.
     """
@@ -53,10 +58,14 @@ def load_environment_map(device: Device, environment_name: str | None) -> Enviro
             make_texture(device, (1, 1), "rgba16float", layer_count=2, content_source="map"), ()
         )
     prefiltered = prefilter(environment_name)
+    layers, suns = prefiltered.layers, prefiltered.suns
+    if bands is not None:
+        layers = np.asarray(layers @ bands.of_rgb.T.astype(np.float32), np.float32)
+        suns = tuple(replace(sun, irradiance=bands.reflectance(sun.irradiance)) for sun in suns)
     return EnvironmentMap(
-        _upload_panorama_layers(device, prefiltered.layers),
-        prefiltered.suns,
-        float(prefiltered.layers[0].max()),
+        _upload_panorama_layers(device, layers),
+        suns,
+        float(layers[0].max()),
         np.asarray(luminance(prefiltered.layers[1 + _BROAD_LAYER]), np.float32),
     )
 

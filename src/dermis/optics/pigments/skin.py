@@ -18,8 +18,9 @@ from dermis.optics.pigments.spectra import (
     baseline_absorption,
     blood_absorption,
     donner_jensen_scattering,
+    infrared_absorption,
     melanosome_absorption,
-    visible_wavelengths,
+    tissue_wavelengths,
 )
 
 MELANIN_SHEET_ABSORPTION_RATIO: Final = 0.175
@@ -46,7 +47,7 @@ def spectral_medium(
         and dermis, and a thin melanin sheet between them; "biospec" has a stratum corneum, an epidermis and
         two dermal layers
     parameters : pigment fractions and epidermal thickness
-    wavelength_nm : (n,) wavelengths from 380 to 780 [nm]
+    wavelength_nm : (n,) wavelengths from 380 to 1000 [nm]
     scattering : function from wavelengths to the reduced scattering coefficient of the epidermis
 
     All layers have the same index of refraction. The thin layers of "donner2008" and "biospec" require the
@@ -60,7 +61,7 @@ def spectral_medium(
     if structure not in _STRUCTURES:
         known = ", ".join(get_args(Structure))
         refuse("structure", known, f"got {format_value(structure)}", "Choose one of them")
-    wavelengths = visible_wavelengths(wavelength_nm)
+    wavelengths = tissue_wavelengths(wavelength_nm)
     layers, note, sources = _STRUCTURES[structure]
     stack = layers(parameters, wavelengths, scattering(wavelengths))
     notes: tuple[str, ...] = (note, _UNIFORM_INDEX_NOTE)
@@ -165,21 +166,25 @@ def _dermal_absorption(
 
 def _bloodless_absorption(parameters: SkinParameters, wavelength_nm: Floats) -> Floats:
     """Return the absorption of tissue without blood and melanin [1/mm]."""
-    return parameters.baseline * baseline_absorption(wavelength_nm)
+    baseline = parameters.baseline * baseline_absorption(wavelength_nm)
+    return np.asarray(baseline + infrared_absorption(wavelength_nm))
 
 
-def dj2006_layers(parameters: SkinParameters, pigment_fractions: Floats) -> tuple[Layer, Layer]:
+def dj2006_layers(
+    parameters: SkinParameters, pigment_fractions: Floats, wavelength_nm: Floats = WAVELENGTHS_NM
+) -> tuple[Layer, Layer]:
     """Return epidermis and dermis of the structure "dj2006" for each of n pigment fractions.
 
-    The coefficients of both layers have the shape (n, 31).
+    The coefficients of both layers have the shape (n, c) for c wavelengths.
 
     parameters : parameters of the skins; its fields `melanin` and `blood` are ignored
     pigment_fractions : (n,) fractions, used both as melanin fractions of the epidermis and as blood fractions
         of the dermis [-]
+    wavelength_nm : (c,) wavelengths from 380 to 1000 [nm]
     """
-    column, scattering = pigment_fractions[:, None], donner_jensen_scattering(WAVELENGTHS_NM)
-    epidermal = _epidermal_absorption(parameters, column, WAVELENGTHS_NM)
-    dermal = _dermal_absorption(parameters, column, WAVELENGTHS_NM)
+    column, scattering = pigment_fractions[:, None], donner_jensen_scattering(wavelength_nm)
+    epidermal = _epidermal_absorption(parameters, column, wavelength_nm)
+    dermal = _dermal_absorption(parameters, column, wavelength_nm)
     ratios = 1.0, DERMIS_SCATTERING_RATIO
     upper, lower = (np.broadcast_to(ratio * scattering, epidermal.shape) for ratio in ratios)
     epidermis = Layer(epidermal, upper, parameters.epidermis_mm, "epidermis")

@@ -13,7 +13,8 @@ from dermis.base.errors import refuse
 from dermis.base.tables import float_columns, read_rows
 from dermis.optics.media import Floats
 
-SHORTEST_WAVELENGTH_NM, LONGEST_WAVELENGTH_NM = 380.0, 780.0
+SHORTEST_WAVELENGTH_NM, LONGEST_WAVELENGTH_NM, LONGEST_VISIBLE_NM = 380.0, 1000.0, 780.0
+"""Ends of the spectra of tissue, and of visible light [nm]."""
 
 WAVELENGTHS_NM: Floats = np.arange(400.0, 701.0, 10.0)
 """Wavelengths (31,) of the spectra that are converted to colours [nm]."""
@@ -25,6 +26,7 @@ _MM_PER_CM = 10.0
 _HAEMOGLOBIN_MOL_PER_LITRE = 150.0 / 64500.0  # in whole blood: 150 g/l of 64500 g/mol [mol/l]
 ScatteringLaw = Callable[[ArrayLike], Floats]
 """Function from wavelengths [nm] to the reduced scattering of the epidermis [1/mm]."""
+_WATER_FRACTION, _LIPID_FRACTION = 0.65, 0.1
 DERMIS_SCATTERING_RATIO: Final = 0.5
 """Scattering coefficient of the dermis relative to the epidermis, after [DonnerJensen2006] [-]."""
 
@@ -34,14 +36,23 @@ def visible_wavelengths(wavelength_nm: ArrayLike) -> Floats:
 
     Raises DermisError unless all wavelengths are from 380 to 780 nm.
     """
+    return _checked_wavelengths(wavelength_nm, LONGEST_VISIBLE_NM, "Use wavelengths of visible light")
+
+
+def tissue_wavelengths(wavelength_nm: ArrayLike) -> Floats:
+    """Check that wavelengths are in the range of the spectra of tissue, and return them as an array [nm].
+
+    Raises DermisError unless all wavelengths are from 380 to 1000 nm.
+    """
+    return _checked_wavelengths(wavelength_nm, LONGEST_WAVELENGTH_NM, "Use visible or near-infrared light")
+
+
+def _checked_wavelengths(wavelength_nm: ArrayLike, longest_nm: float, advice: str) -> Floats:
     wavelength = np.asarray(wavelength_nm, dtype=np.float64)
-    inside = (wavelength >= SHORTEST_WAVELENGTH_NM) & (wavelength <= LONGEST_WAVELENGTH_NM)
+    inside = (wavelength >= SHORTEST_WAVELENGTH_NM) & (wavelength <= longest_nm)
     if not inside.all():
-        expected, actual = (
-            f"{SHORTEST_WAVELENGTH_NM:g} to {LONGEST_WAVELENGTH_NM:g} nm",
-            f"got {wavelength[~inside].flat[0]:g} nm",
-        )
-        refuse("wavelength", expected, actual, "Use wavelengths of visible light")
+        expected = f"{SHORTEST_WAVELENGTH_NM:g} to {longest_nm:g} nm"
+        refuse("wavelength", expected, f"got {wavelength[~inside].flat[0]:g} nm", advice)
     return wavelength
 
 
@@ -50,10 +61,11 @@ def interpolate_spectrum(table_name: str, column_name: str, wavelength_nm: Array
 
     table_name : name of the file, without folder and suffix
     column_name : heading of the column with the spectrum
-    wavelength_nm : wavelengths from 380 to 780, an array of any shape [nm]
+    wavelength_nm : wavelengths from 380 to the end of the table, at most 1000, an array of any shape [nm]
     """
     columns = _spectrum_columns(table_name)
-    wavelength = visible_wavelengths(wavelength_nm)
+    ends_visible = columns["wavelength_nm"][-1] < LONGEST_WAVELENGTH_NM
+    wavelength = visible_wavelengths(wavelength_nm) if ends_visible else tissue_wavelengths(wavelength_nm)
     return np.asarray(np.interp(wavelength, columns["wavelength_nm"], columns[column_name]))
 
 
@@ -99,7 +111,7 @@ def eumelanin_absorption(wavelength_nm: ArrayLike) -> Floats:
 
     Source: [Jacques1998], as in [DonnerJensen2006].
     """
-    return np.asarray(6.6e10 * visible_wavelengths(wavelength_nm) ** -3.33)
+    return np.asarray(6.6e10 * tissue_wavelengths(wavelength_nm) ** -3.33)
 
 
 def pheomelanin_absorption(wavelength_nm: ArrayLike) -> Floats:
@@ -107,13 +119,13 @@ def pheomelanin_absorption(wavelength_nm: ArrayLike) -> Floats:
 
     Source: [DonnerJensen2006], as quoted by public code.
     """
-    return np.asarray(2.9e14 * visible_wavelengths(wavelength_nm) ** -4.75)
+    return np.asarray(2.9e14 * tissue_wavelengths(wavelength_nm) ** -4.75)
 
 
 def melanosome_absorption(wavelength_nm: ArrayLike, eumelanin_fraction: float) -> Floats:
     """Return the absorption coefficient of melanosomes with a mixture of eumelanin and pheomelanin [1/mm].
 
-    wavelength_nm : wavelengths from 380 to 780 [nm]
+    wavelength_nm : wavelengths from 380 to 1000 [nm]
     eumelanin_fraction : fraction of the melanosomes that contain eumelanin, 0 to 1 [-]
 
     Source: [DonnerJensen2006].
@@ -127,7 +139,7 @@ def baseline_absorption(wavelength_nm: ArrayLike) -> Floats:
 
     Source: [Jacques1998] section 1.1.
     """
-    return np.asarray(0.0244 + 8.53 * np.exp(-(visible_wavelengths(wavelength_nm) - 154.0) / 66.2))
+    return np.asarray(0.0244 + 8.53 * np.exp(-(tissue_wavelengths(wavelength_nm) - 154.0) / 66.2))
 
 
 def oxyhaemoglobin_extinction(wavelength_nm: ArrayLike) -> Floats:
@@ -149,7 +161,7 @@ def deoxyhaemoglobin_extinction(wavelength_nm: ArrayLike) -> Floats:
 def blood_absorption(wavelength_nm: ArrayLike, oxygen: float) -> Floats:
     """Return the absorption coefficient of whole blood [1/mm].
 
-    wavelength_nm : wavelengths from 380 to 780 [nm]
+    wavelength_nm : wavelengths from 380 to 1000 [nm]
     oxygen : fraction of oxygenated haemoglobin, 0 to 1 [-]
 
     Source: [Prahl1999].
@@ -163,13 +175,41 @@ def blood_absorption(wavelength_nm: ArrayLike, oxygen: float) -> Floats:
 def water_absorption(wavelength_nm: ArrayLike) -> Floats:
     """Return the absorption coefficient of water, 4 pi k / lambda [1/mm].
 
-    Here, k is the imaginary part of the index of refraction. The skin models do not need this spectrum,
-    because `baseline_absorption` was measured on moist tissue and so includes water.
+    Here, k is the imaginary part of the index of refraction.
 
     Source: [HaleQuerry1973].
     """
     k = interpolate_spectrum("water", "k", wavelength_nm)
-    return np.asarray(4.0 * np.pi * k * _NM_PER_MM / visible_wavelengths(wavelength_nm))
+    return np.asarray(4.0 * np.pi * k * _NM_PER_MM / tissue_wavelengths(wavelength_nm))
+
+
+def lipid_absorption(wavelength_nm: ArrayLike) -> Floats:
+    """Return the absorption coefficient of mammalian fat [1/mm].
+
+    Below 430 nm, it is that at 430 nm.
+
+    Source: [VanVeen2004].
+    """
+    return interpolate_spectrum("lipid", "absorption_per_mm", wavelength_nm)
+
+
+def infrared_absorption(wavelength_nm: ArrayLike) -> Floats:
+    """Return the absorption coefficient by water and lipids that exceeds that at 700 nm [1/mm].
+
+    It is 0 up to 700 nm, as `baseline_absorption` was measured on moist tissue and so includes water.
+
+    Source: [Jacques2013] for the water content of 65 %; the lipid content of 10 % is chosen.
+    """
+    added = _water_and_lipids(wavelength_nm) - _water_and_lipids(WAVELENGTHS_NM[-1])
+    return np.asarray(
+        np.where(tissue_wavelengths(wavelength_nm) > WAVELENGTHS_NM[-1], np.maximum(added, 0.0), 0.0)
+    )
+
+
+def _water_and_lipids(wavelength_nm: ArrayLike) -> Floats:
+    return _WATER_FRACTION * water_absorption(wavelength_nm) + _LIPID_FRACTION * lipid_absorption(
+        wavelength_nm
+    )
 
 
 def donner_jensen_scattering(wavelength_nm: ArrayLike) -> Floats:
@@ -180,7 +220,7 @@ def donner_jensen_scattering(wavelength_nm: ArrayLike) -> Floats:
 
     Source: [DonnerJensen2006], as quoted by public code.
     """
-    wavelength = visible_wavelengths(wavelength_nm)
+    wavelength = tissue_wavelengths(wavelength_nm)
     return np.asarray(14.74 * wavelength**-0.22 + 2.2e11 * wavelength**-4.0)
 
 
@@ -190,5 +230,5 @@ def jacques_scattering(wavelength_nm: ArrayLike) -> Floats:
     The law is the sum of Mie scattering by large fibres and Rayleigh scattering by small fibres. It is the
     same for epidermis and dermis.
     """
-    wavelength = visible_wavelengths(wavelength_nm)
+    wavelength = tissue_wavelengths(wavelength_nm)
     return np.asarray(2e4 * wavelength**-1.5 + 2e11 * wavelength**-4.0)

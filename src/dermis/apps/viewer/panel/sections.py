@@ -35,6 +35,7 @@ from dermis.apps.viewer.panel.fields import (
     record_position,
     run_action,
 )
+from dermis.apps.viewer.panel.living import draw_skin_states, has_living_skin
 from dermis.apps.viewer.panel.skin import draw_profile, draw_surface
 from dermis.apps.viewer.session import Session, built_in_heads
 from dermis.apps.viewer.state import ATLAS_VIEW_NAME, ViewerState, validated_copy
@@ -493,6 +494,7 @@ SECTIONS = (
     Section("Motion", draw_motion_controls, is_open=True, applies=has_motion_controls),
     Section("Profile", draw_profile, is_open=True),
     Section("Surface", draw_surface, is_open=True),
+    Section("Skin state", draw_skin_states, applies=has_living_skin),
     Section("Light", draw_lights),
     Section("Technique", draw_technique_settings),
     Section("Picture", draw_picture_settings),

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
 from dermis.frame.features.diffusion.mixture import load_blend_weights
+from dermis.optics.bands import Bands
 from dermis.optics.fits.gaussian import shared_gaussians
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.profiles import fit_profile, load_profile, preset_names
+from dermis.optics.profiles import find_gaussians, fit_profile, load_profile, preset_names
 from dermis.scene.skin import Pigments, Skin
 from dermis.scene.tissue import skin_tissue
 
 ProfileMix = tuple[tuple[GaussianSum, ...], NDArray[np.float32] | None]
 """Profiles as sums of the same Gaussians, and (h, w, 2) blend weights of all but the first."""
+_CACHED_BAND_FIT_COUNT = 64  # three times the bands of a spectrum up to 1,000 nm
 _CACHED_FIT_COUNT = 4  # the current skin, one to compare with, and two previous ones
 
 
@@ -32,35 +35,60 @@ class SkinProfiles:
     def __init__(self) -> None:
         self._fits: list[tuple[Skin, GaussianSum]] = []
         self._current: tuple[Skin, GaussianSum] | None = None
+        self._band_fits: dict[tuple[object, ...], GaussianSum] = {}
 
-    def profile(self, skin: Skin) -> GaussianSum:
+    def profile(self, skin: Skin, bands: Bands | None = None) -> GaussianSum:
         """Return the diffusion profile of a skin; if a map blends several profiles, return the first of them.
 
         A file that holds the profile is read when the skin changes, not in every frame.
+
+        bands : wavelengths in the place of red, green and blue
 
         Raises DermisError if the skin has pigments or layers, but names a profile that cannot be computed
         from them.
         """
         if self._current is None or self._current[0] is not skin:
             self._current = skin, self._load_or_fit(skin)
-        return self._current[1]
+        return self._current[1] if bands is None else self._in_bands(skin, self._current[1], bands)
 
-    def mixture(self, skin: Skin) -> ProfileMix:
+    def _in_bands(self, skin: Skin, rgb_profile: GaussianSum, bands: Bands) -> GaussianSum:
+        """Return the profile of a skin at three wavelengths.
+
+        It is computed from pigments; for profiles that are given in red, green and blue, the weights of their
+        Gaussians are upsampled like colours.
+        """
+        if find_gaussians(skin.profile) is None and (tissue := skin_tissue(skin)).rgb is not None:
+            key = (*_tissue_key(skin), bands)
+            if key not in self._band_fits:
+                if len(self._band_fits) >= _CACHED_BAND_FIT_COUNT:
+                    self._band_fits.clear()
+                spectral = tissue.in_bands(bands)
+                self._band_fits[key] = fit_profile(spectral, skin.profile, rgb_profile, keep_energy=True)
+            return self._band_fits[key]
+        return replace(rgb_profile, weight=bands.reflectance(rgb_profile.weight))
+
+    def mixture(self, skin: Skin, bands: Bands | None = None) -> ProfileMix:
         """Return all profiles of a skin, and the blend weights of all but the first.
 
         For a single profile the weights are None.
 
+        bands : wavelengths in the place of red, green and blue
+
         Raises DermisError for a blend map without other profiles, and for other profiles without a blend map.
         """
-        first = self.profile(skin)
+        first = self.profile(skin, bands)
         if not skin.other_profiles and skin.profile_map is None:
             return (first,), None
         if not skin.other_profiles or skin.profile_map is None:
             actual = "there is only a map" if skin.profile_map else "there is no map"
             advice = "Give profile_map and other_profiles both"
             refuse("profile_map", "a map of blend weights, and the profiles that it blends", actual, advice)
-        others = (load_profile(name) for name in skin.other_profiles)
+        others = (self._other_profile(name, bands) for name in skin.other_profiles)
         return shared_gaussians((first, *others)), load_blend_weights(skin.profile_map)
+
+    def _other_profile(self, name: str, bands: Bands | None) -> GaussianSum:
+        profile = load_profile(name)
+        return profile if bands is None else self._in_bands(Skin(profile=name), profile, bands)
 
     def _load_or_fit(self, skin: Skin) -> GaussianSum:
         cached = self._latest_fit(_tissue_key, skin)

@@ -57,8 +57,16 @@ fn eye_at(eye: Eye, p: vec3f, lids: Lids, v: vec3f, lid_albedo: vec3f) -> EyeLit
     let on_iris = clamped_to_iris(refracted_to_iris(p, d));
     let film = tears_at(normalize(mix(ball, cornea, clear)), lids);
     let below = normalize(mix(ball, iris_normal(on_iris), clear));
+    //#if BANDS
+    let colour = in_channels(mix(white_colour(eye, p), IRIS_FACTOR * iris_colour(eye, on_iris), clear));
+    //#else
     let colour = mix(white_colour(eye, p), IRIS_FACTOR * iris_colour(eye, on_iris), clear);
+    //#end
+    //#if BANDS
+    let open = in_channels(lid_transmittance(lids));
+    //#else
     let open = lid_transmittance(lids);
+    //#end
     let back = transpose(rotation); // rotation and uniform scale, so that it transforms normals
     let film_roughness = mix(TEARS, MENISCUS_ROUGHNESS, meniscus_weight(lids));
     return EyeLit(Surface(normalize(back * below), colour, film_roughness, 1.0), Film(normalize(back * film), LIT_LIDS * (1.0 - open) * lid_albedo, open, 1.0 - meniscus_weight(lids)));

@@ -72,7 +72,11 @@ fn cloth_at(point: Point, colour: vec3f, material: PartMaterial, footprint: f32)
     let fibres = 1.0 - smoothstep(0.12, 0.4, footprint * MM_PER_UV / FIBRE_MM);
     var albedo = colour * (1.0 - 0.5 * mixture);
     if (material.weave == TWILL) {
+        //#if BANDS
+        albedo = mix(colour, in_channels(WEFT), 0.55 * mixture);
+        //#else
         albedo = mix(colour, WEFT, 0.55 * mixture);
+        //#end
     }
     albedo *= 1.0 + 0.06 * fibres * (cloth_noise(mm / FIBRE_MM) - 0.5) + 0.04 * (cloth_noise(mm / 42.0) - 0.5);
     let hidden = (1.0 - seen) * material.relief * material.relief;

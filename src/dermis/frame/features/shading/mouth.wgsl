@@ -57,7 +57,11 @@ fn teeth_at(point: Point, kind: f32) -> Surface {
     let down = clamp(2.0 * height / crown - 1.0, -1.0, 1.0); // -1 at the biting edge, 1 at the gum
     let rise = -4.0 * HEIGHT_BULGE_MM * down / crown * (1.0 - gum);
     let face = smoothstep(0.5, 2.5, height); // the edge is round in the mesh, and v hardly changes along it
+    //#if BANDS
+    return Surface(bend(point, face * vec2f(slope * ARCH_MM, rise * CROWN_MM)), in_channels(colour), SALIVA_ROUGHNESS, 1.0);
+    //#else
     return Surface(bend(point, face * vec2f(slope * ARCH_MM, rise * CROWN_MM)), colour, SALIVA_ROUGHNESS, 1.0);
+    //#end
 }
 
 fn tongue_at(point: Point, colour: vec3f) -> Surface {
@@ -68,7 +72,11 @@ fn tongue_at(point: Point, colour: vec3f) -> Surface {
 // Fraction of a light that reaches shadowed parts of the mouth.
 fn mouth_shadow_scatter(point: Point, part: f32) -> vec3f {
     let behind_canines = max(abs(point.uv.x - MIDDLE) * ARCH_MM - CANINE_MM, 0.0);
+    //#if BANDS
+    return in_channels(select(TOOTH_SHADOW_SCATTER * exp(-behind_canines / SHADE_MM), MOUTH_SHADOW_SCATTER, part == TONGUE));
+    //#else
     return select(TOOTH_SHADOW_SCATTER * exp(-behind_canines / SHADE_MM), MOUTH_SHADOW_SCATTER, part == TONGUE);
+    //#end
 }
 
 // material: colour and part of the mouth

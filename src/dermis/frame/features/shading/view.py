@@ -28,6 +28,7 @@ from dermis.mesh.fabric import WEAVES
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import MOUTH_PARTS
 from dermis.mesh.outline import Outline
+from dermis.optics.bands import Bands
 from dermis.scene.camera import Camera, ImageRectangle
 from dermis.scene.living import SkinState
 from dermis.scene.settings import Settings
@@ -35,8 +36,9 @@ from dermis.scene.skin import MAX_OTHER_PROFILES
 
 _MAX_MATERIALS = 64
 _WET_MATERIAL_MARKER = -1.0  # roughness of plain materials, see parts.wgsl
-# Factors of light from below the surface and of reflected light, by `Settings.parts`.
+# Factors of light from below the surface and of reflected light, by `Settings.parts` and `.polarisation`.
 _LIGHT_FACTORS = {"all": (1.0, 1.0), "diffuse": (1.0, 0.0), "specular": (0.0, 1.0)}
+_POLARISER_FACTORS = {None: (1.0, 1.0), "parallel": (0.5, 1.0), "cross": (0.5, 0.0)}
 _CAMERA_RAY_MEMBERS = ("eye", "forward", "right", "up", "shift")
 
 
@@ -84,12 +86,17 @@ def camera_views(pinhole: Pinhole, outline: Outline, sample_count: int) -> Views
 
 
 def view_record(
-    shading_program: ComputeProgram, head: Head, settings: Settings, profile_split: ProfileSplit
+    shading_program: ComputeProgram,
+    head: Head,
+    settings: Settings,
+    profile_split: ProfileSplit,
+    bands: Bands | None = None,
 ) -> UniformRecord:
     """Return the uniform record of the struct Shade; `with_camera` adds the camera and the eye poses.
 
     profile_split : division of the diffusion profile into Gaussians that blur light over the atlas, and a
         narrower Gaussian that is evaluated at each pixel
+    bands : wavelengths in the place of red, green and blue
 
     Raises DermisError for a head with too many materials.
     """
@@ -104,13 +111,14 @@ def view_record(
             profile_split.unblurred_differences, ((0, MAX_OTHER_PROFILES - len(profile_split.others)), (0, 1))
         ),
         total=profile_split.total,
-        light_factors=_LIGHT_FACTORS[settings.parts],
-        material_colour=material_colours(head),
+        light_factors=np.multiply(_LIGHT_FACTORS[settings.parts], _POLARISER_FACTORS[settings.polarisation]),
+        material_colour=material_colours(head, bands),
         jitter=jitter,
     )
     for index, material in enumerate(materials):
         part = record["part_materials"][index]
-        part["emission"], part["metalness"] = material.emission, material.metalness
+        emission = material.emission if bands is None else bands.reflectance(material.emission)
+        part["emission"], part["metalness"] = emission, material.metalness
         part["roughness"] = _WET_MATERIAL_MARKER if material.roughness is None else material.roughness
         part["has_maps"] = material.has_maps
         if (fabric := material.fabric) is not None:
@@ -126,8 +134,10 @@ def view_record(
     return record
 
 
-def material_colours(head: Head) -> NDArray[np.float32]:
+def material_colours(head: Head, bands: Bands | None = None) -> NDArray[np.float32]:
     """Return the albedos of a head's materials as rows (64, 4); the last column is the part of the mouth.
+
+    bands : wavelengths in the place of red, green and blue
 
     Raises DermisError for a head with too many materials.
     """
@@ -139,6 +149,8 @@ def material_colours(head: Head) -> NDArray[np.float32]:
     for index, material in enumerate(materials):
         colours[index, :3] = material.colour
         colours[index, 3] = 1 + MOUTH_PARTS.index(material.part) if material.part else 0
+    if bands is not None:
+        colours[:, :3] = bands.reflectance(colours[:, :3])
     return colours
 
 

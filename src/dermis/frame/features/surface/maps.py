@@ -99,7 +99,8 @@ def _paint_maps(
         side = min(side, _MAX_SOFTWARE_MAP_SIDE)
     from_file = {"relief": maps.height if maps.normal is None else maps.normal, "colour": maps.colour}
     animated = animated and (from_file["relief"] is None or (use_colour and maps.colour is None))
-    painted = paint.paint_textures(device, surface, maps.look, side, animated, is_living and animated)
+    changes = animated, is_living and animated
+    painted = paint.paint_textures(device, surface, maps.look, side, *changes, maps.bands)
     textures = {role: getattr(painted, role) for role in ("colour", "specular", "roughness", "relief")}
     from_file |= {"specular": maps.specular, "roughness": maps.roughness}
     used = [role for role in textures if from_file[role] is None and (use_colour or role != "colour")]

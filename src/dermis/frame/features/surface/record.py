@@ -12,6 +12,7 @@ from dermis.human import teeth
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_plane_mm
 from dermis.mesh.maps import Maps
+from dermis.optics.bands import Bands, band_rows
 from dermis.optics.equivalent_medium import equivalent_medium, oblique_offset_mm
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.slabs import anisotropic_response
@@ -76,7 +77,12 @@ def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
 
 
 def skin_record(
-    shading_program: ComputeProgram, skin: Skin, maps: Maps, profile: GaussianSum, light_count: int
+    shading_program: ComputeProgram,
+    skin: Skin,
+    maps: Maps,
+    profile: GaussianSum,
+    light_count: int,
+    bands: Bands | None = None,
 ) -> UniformRecord:
     """Return the uniform record of the shader struct `Skin`.
 
@@ -85,12 +91,12 @@ def skin_record(
     maps : maps of the head
     profile : diffusion profile of the skin
     light_count : number of lights; each part of a divided light counts as one
+    bands : wavelengths in the place of red, green and blue
     """
     members = struct_dtype(shading_program.source.text, "Skin").names or ()
     values = {name: getattr(skin, name) for name in members if hasattr(skin, name)}
-    return shading_program.make_record(
-        "Skin", **values, **_derived_skin_members(skin, maps, profile), light_count=light_count
-    )
+    values |= {"light_count": light_count, "bands": band_rows(bands)}
+    return shading_program.make_record("Skin", **values, **_derived_skin_members(skin, maps, profile))
 
 
 def _derived_skin_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:

@@ -71,7 +71,11 @@ fn surface_at(point: Point, footprint: f32) -> Surface {
     out.roughness = clamp(widened(max(m, 1e-3), spread.x + spread.y + finest.spread), 0.05, 1.0);
     out.rho_s = skin.specular_strength * gloss.x;
     if (DETAIL) {
+        //#if BANDS
+        out.colour *= 1.0 - in_channels(CAVITY_COLOUR) * finest.cavity;
+        //#else
         out.colour *= 1.0 - CAVITY_COLOUR * finest.cavity;
+        //#end
         out.rho_s *= max(1.0 - CAVITY_GLOSS * finest.cavity, 0.2);
     }
     return out;

@@ -22,6 +22,7 @@ struct Skin {
     single_scattering: vec3f, // strength of single scattering
     uniform_reflectance: vec3f, // reflectance of uniform light relative to that at normal incidence
     reflectance: array<vec4f, 32>, // reflectance of light from one direction relative to that at normal incidence, at evenly spaced roots of the cosine
+    bands: array<vec4f, 3>, // matrix from RGB colours to the channels of the picture, by rows
     transmittance: array<vec4f, 32>, // light from one direction that passes deep slabs, relative to that of uniform light with equal reflectance
 }
 
@@ -29,6 +30,15 @@ struct Skin {
 @group(0) @binding(13) var nearest_sampler: sampler; // non-filtering
 @group(0) @binding(9) var beckmann_table: texture_2d<f32>;
 @group(0) @binding(10) var albedo_table: texture_2d<f32>; // rho_dt and its mean over directions
+
+override BANDS: bool = false; // whether wavelengths take the place of red, green and blue
+
+//#if BANDS
+// Reflectance of an RGB colour at the three wavelengths of the channels.
+fn in_channels(rgb: vec3f) -> vec3f {
+    return vec3f(dot(skin.bands[0].xyz, rgb), dot(skin.bands[1].xyz, rgb), dot(skin.bands[2].xyz, rgb));
+}
+//#end
 
 // Roughness m of a surface whose slopes have an additional variance [OlanoBaker2010]. Both lobes of a model with two widen by
 // the same variance; the roughness is that with the same peak of their mixed slope distributions.

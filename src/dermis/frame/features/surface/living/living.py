@@ -31,6 +31,7 @@ from dermis.human.living.zones import (
 )
 from dermis.human.skin.colours import skin_colour_table
 from dermis.human.skin.look import SkinLook
+from dermis.optics.bands import Bands
 from dermis.scene.living import PULSE_SAMPLE_COUNT, SkinState
 
 LIVING_CONSTANTS: Constants = (("LIVING", 1),)
@@ -59,12 +60,18 @@ class LivingMaps:
 
 
 def make_living_maps(
-    device: Device, look: SkinLook, zone_bindings: MutableBindings, specular: Texture, roughness: Texture
+    device: Device,
+    look: SkinLook,
+    zone_bindings: MutableBindings,
+    specular: Texture,
+    roughness: Texture,
+    bands: Bands | None = None,
 ) -> LivingMaps:
     """Allocate the maps of skin in a state, and compute the map of amplitudes and delays of the pulse.
 
     zone_bindings : painted surface and its tables, by their names in the shaders that paint skin
     specular, roughness : painted maps at rest
+    bands : wavelengths in the place of red, green and blue
     """
     side = specular.size[0]
     states, pulse = (make_texture(device, (side, side), HALF_TEXEL_FORMAT) for _ in range(2))
@@ -72,7 +79,7 @@ def make_living_maps(
     zones, map_shape = zone_bindings, (side, side)
     _draw_zone_sums(frame, zones | {"change_map": pulse}, map_shape, pulse_changes(), has_blotches=False)
     frame.submit()
-    tables, oxygen_per_layer = blood_tables(look)
+    tables, oxygen_per_layer = blood_tables(look, bands)
     changed = map_mips.empty_map(device, map_shape), map_mips.empty_map(device, map_shape)
     gloss: MutableBindings = {
         "specular_at_rest": specular,
@@ -85,7 +92,7 @@ def make_living_maps(
     return LivingMaps(zones | {"change_map": states}, gloss, bindings, *changed, oxygen_per_layer)
 
 
-def blood_tables(look: SkinLook) -> tuple[NDArray[np.float32], float]:
+def blood_tables(look: SkinLook, bands: Bands | None = None) -> tuple[NDArray[np.float32], float]:
     """Return tables (3, n, n, 3) of the colour, and the difference of oxygen between the first two [-].
 
     The first table is the natural logarithm of the colour at the oxygen saturation of `look`, the second at a
@@ -93,14 +100,14 @@ def blood_tables(look: SkinLook) -> tuple[NDArray[np.float32], float]:
     fraction. The axes are the square roots of the fractions of melanin and of blood, as in `ColourTable`.
     """
     low = max(look.oxygen - LARGEST_OXYGEN_DROP, min(_LEAST_OXYGEN, 0.5 * look.oxygen))
-    first, second = _log_colours(look, look.oxygen), _log_colours(look, low)
+    first, second = (_log_colours(look, oxygen, bands) for oxygen in (look.oxygen, low))
     root = np.linspace(0.0, 1.0, first.shape[1])
     derivative = np.gradient(first, root, axis=1) * (0.5 * root)[None, :, None]
     return np.stack([first, second, derivative]).astype(np.float32), max(look.oxygen - low, 1e-3)
 
 
-def _log_colours(look: SkinLook, oxygen: float) -> NDArray[np.float64]:
-    colours = skin_colour_table(look.eumelanin, oxygen, look.epidermis_mm).colours
+def _log_colours(look: SkinLook, oxygen: float, bands: Bands | None) -> NDArray[np.float64]:
+    colours = skin_colour_table(look.eumelanin, oxygen, look.epidermis_mm, bands).colours
     return np.log(np.maximum(colours, _LEAST_COLOUR))
 
 

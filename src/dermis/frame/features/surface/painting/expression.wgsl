@@ -4,6 +4,7 @@ struct Expression {
     flush: f32, // amount by which the face reddens
     pressed: f32, // amount by which blood is pressed out of the lips
     side: u32, // of the maps [texels]
+    bands: array<vec4f, 3>, // matrix from RGB colours to the channels of the maps, by rows
 }
 
 // Factors by which a full flush, and a full loss of blood, multiply the skin colour: artistic values.
@@ -16,6 +17,15 @@ override LIVING: bool = false; // whether states and the pulse change the blood
 @group(0) @binding(1) var colour_at_rest: texture_2d<f32>;
 @group(0) @binding(2) var expression_deltas: texture_2d_array<f32>; // see expression_relief.wgsl; the last channel is the gain or loss of blood
 @group(0) @binding(5) var colour: texture_storage_2d<rgba16float, write>;
+
+override BANDS: bool = false; // whether wavelengths take the place of red, green and blue
+
+//#if BANDS
+// Reflectance of an RGB colour at the three wavelengths of the channels.
+fn in_channels(rgb: vec3f) -> vec3f {
+    return vec3f(dot(expression.bands[0].xyz, rgb), dot(expression.bands[1].xyz, rgb), dot(expression.bands[2].xyz, rgb));
+}
+//#end
 
 //#if LIVING
 //#fill const PULSE_SAMPLES: u32 = 4u * {pulse_rows}u;
@@ -99,8 +109,16 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let blood = textureLoad(expression_deltas, id.xy, 1, 0).w;
+    //#if BANDS
+    let flushed = pow(in_channels(FLUSH), vec3f(expression.flush * max(blood, 0.0)));
+    //#else
     let flushed = pow(FLUSH, vec3f(expression.flush * max(blood, 0.0)));
+    //#end
+    //#if BANDS
+    let pale = pow(in_channels(PALE), vec3f(expression.pressed * max(-blood, 0.0)));
+    //#else
     let pale = pow(PALE, vec3f(expression.pressed * max(-blood, 0.0)));
+    //#end
     let rest = textureLoad(colour_at_rest, id.xy, 0);
     textureStore(colour, id.xy, vec4f(living_colour(rest.rgb * flushed * pale, id.xy), rest.a));
 }

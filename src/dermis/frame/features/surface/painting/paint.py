@@ -16,6 +16,7 @@ from dermis.base.disk import Arrays, array_key, load_arrays, load_or_make
 from dermis.base.errors import refuse
 from dermis.base.progress import logged_step
 from dermis.frame.features.surface import mips as map_mips
+from dermis.frame.features.surface.bands import band_constants
 from dermis.frame.features.surface.living.living import (
     LIVING_CONSTANTS,
     LivingMaps,
@@ -57,6 +58,7 @@ from dermis.human.skin.textures import (
     noise_table,
 )
 from dermis.mesh.maps import Maps
+from dermis.optics.bands import Bands, band_rows
 from dermis.scene.living import PULSE_SAMPLE_COUNT, SkinState
 from dermis.scene.skin import DEFAULT_RHO_S
 from dermis.specular.hair import absorption_per_mm, dense_hair_reflectance
@@ -111,18 +113,23 @@ class PaintInputs(NamedTuple):
         the melanin fraction increases evenly from row to row, and the square root of the blood fraction from
         column to column
     surface : mesh that is painted
+    bands : wavelengths in the place of red, green and blue
     """
 
     paint: UniformRecord
     tables: NDArray[np.float32]
     colours: NDArray[np.float32]
     surface: PaintedSurface
+    bands: Bands | None = None
 
 
-def paint_inputs(surface: PaintedSurface, look: SkinLook, map_side: int) -> PaintInputs:
+def paint_inputs(
+    surface: PaintedSurface, look: SkinLook, map_side: int, bands: Bands | None = None
+) -> PaintInputs:
     """Return the inputs of the shader that paints a skin that has the given look.
 
     map_side : side of the maps [texels]
+    bands : wavelengths in the place of red, green and blue
 
     Raises DermisError for a mesh with too many triangles.
     """
@@ -133,18 +140,20 @@ def paint_inputs(surface: PaintedSurface, look: SkinLook, map_side: int) -> Pain
     names = set(struct_dtype(text, "Paint").names or ()) & set(vars(look))
     values = {name: getattr(look, name) for name in names}
     low, high = oxygen_range(look)
-    stubble = dense_hair_reflectance(absorption_per_mm(look.stubble_eumelanin, look.stubble_pheomelanin))
+    hair = dense_hair_reflectance(absorption_per_mm(look.stubble_eumelanin, look.stubble_pheomelanin))
+    stubble = _SCALP_FACTOR * hair + _SCALP_REFLECTANCE
     paint = make_record(
         text,
         "Paint",
         side=map_side,
         low_oxygen=low,
         high_oxygen=high,
-        stubble_colour=_SCALP_FACTOR * stubble + _SCALP_REFLECTANCE,
+        stubble_colour=stubble if bands is None else bands.reflectance(stubble),
+        bands=band_rows(bands),
         **values,
     )
     tables = np.ndarray((), struct_dtype(text, "Tables"), _face_tables(look.recession, look.sites))
-    return PaintInputs(paint, tables, painted_colour_tables(look), surface)
+    return PaintInputs(paint, tables, painted_colour_tables(look, bands), surface, bands)
 
 
 def painted_maps_cache_key(inputs: PaintInputs, driver_name: str) -> str:
@@ -244,7 +253,10 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, map_side: int) -> RestM
     }
     frame = CommandList(device, timed=False)
     frame.compute(
-        "maps", program(device, _SKIN_SHADER), {**surface, **tables, **outputs}, (map_side, map_side)
+        "maps",
+        program(device, _SKIN_SHADER, band_constants(inputs.bands)),
+        {**surface, **tables, **outputs},
+        (map_side, map_side),
     )
     frame.submit()
     return RestMaps(**maps, heights=heights, deltas=deltas)
@@ -313,6 +325,7 @@ class ExpressionMaps:
     heights : buffer of heights from which the relief is computed [mm]
     colour, relief : textures with all mip levels
     living : maps of skin in a state or with a pulse; None for skin without both
+    bands : wavelengths in the place of red, green and blue
     """
 
     bindings: MutableBindings
@@ -320,6 +333,7 @@ class ExpressionMaps:
     colour: map_mips.MippedTexture
     relief: map_mips.MippedTexture
     living: LivingMaps | None = None
+    bands: Bands | None = None
 
 
 def draw_expression(
@@ -340,8 +354,10 @@ def draw_expression(
     graph.compute("maps", shader, expression_maps.bindings | {"relief": record}, (side, side))
     graph.add_replayable(map_mips.fill_relief, expression_maps.relief, expression_maps.heights)
     living = expression_maps.living if skin_state is not None else None
-    shader = program(graph.device, "surface/painting/expression.wgsl", LIVING_CONSTANTS if living else ())
-    record = shader.make_record("Expression", flush=flush, pressed=pressed, side=side)
+    bands = expression_maps.bands
+    constants = (LIVING_CONSTANTS if living else ()) + band_constants(bands)
+    shader = program(graph.device, "surface/painting/expression.wgsl", constants)
+    record = shader.make_record("Expression", flush=flush, pressed=pressed, side=side, bands=band_rows(bands))
     bindings: MutableBindings = {**expression_maps.bindings, "expression": record}
     if living is not None and skin_state is not None:
         draw_state(graph, living, skin_state)
@@ -383,14 +399,16 @@ def paint_textures(
     map_side: int,
     with_expressions: bool = False,
     is_living: bool = False,
+    bands: Bands | None = None,
 ) -> PaintedTextures:
     """Paint the maps of a skin that has the given look, and return them as textures.
 
     map_side : side of the maps [texels]
     with_expressions : whether expressions change colour and relief; if so, `draw_expression` fills these maps
     is_living : whether states and the pulse change colour and gloss too; it requires `with_expressions`
+    bands : wavelengths in the place of red, green and blue
     """
-    inputs = paint_inputs(surface, look, map_side)
+    inputs = paint_inputs(surface, look, map_side, bands)
     maps = cached_rest_maps(device, inputs, map_side, with_expressions)
     colour = map_mips.empty_map(device, (map_side, map_side)) if with_expressions else maps.colour
     living = _living_maps(device, inputs, look, maps) if is_living else None
@@ -410,7 +428,7 @@ def paint_textures(
     )
     bindings: MutableBindings = {"colour_at_rest": maps.colour.texture, "heights_at_rest": maps.heights}
     bindings |= {"expression_deltas": maps.deltas, "heights": heights, "colour": colour.levels[0]}
-    expression_maps = ExpressionMaps(bindings, heights, colour, relief, living)
+    expression_maps = ExpressionMaps(bindings, heights, colour, relief, living, bands)
     return PaintedTextures(colour.texture, *gloss, relief.texture, expression_maps)
 
 
@@ -419,7 +437,8 @@ def _living_maps(device: Device, inputs: PaintInputs, look: SkinLook, maps: Rest
     map_side = maps.colour.size[0]
     zone_bindings: MutableBindings = {"paint": inputs.paint, "tables": inputs.tables}
     zone_bindings |= _surface_buffers(device, inputs, map_side)
-    return make_living_maps(device, look, zone_bindings, maps.specular.texture, maps.roughness.texture)
+    gloss = maps.specular.texture, maps.roughness.texture
+    return make_living_maps(device, look, zone_bindings, *gloss, inputs.bands)
 
 
 def paint_arrays(

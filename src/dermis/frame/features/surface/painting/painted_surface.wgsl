@@ -26,6 +26,7 @@ struct Paint {
     low_oxygen: f32, // oxygen saturations of the two colour tables of skin
     high_oxygen: f32,
     stubble_colour: vec3f, // reflectance of a scalp covered by short hair
+    bands: array<vec4f, 3>, // matrix from RGB colours to the channels of the maps, by rows
 }
 
 struct Vertex {

@@ -48,6 +48,15 @@ const PORES: f32 = 0.4; // amount of pores outside zones
 const MIDLINE_MM: f32 = 4.0; // half of the width over which tension lines of both halves of the face meet
 const UNEVEN: f32 = 0.15; // relative variation of gloss by uneven oil
 
+override BANDS: bool = false; // whether wavelengths take the place of red, green and blue
+
+//#if BANDS
+// Reflectance of an RGB colour at the three wavelengths of the channels.
+fn in_channels(rgb: vec3f) -> vec3f {
+    return vec3f(dot(paint.bands[0].xyz, rgb), dot(paint.bands[1].xyz, rgb), dot(paint.bands[2].xyz, rgb));
+}
+//#end
+
 // Colour for fractions of melanin and blood, interpolated bilinearly in their square roots.
 fn colour_of(table: u32, melanin: f32, blood: f32) -> vec3f {
     let nodes = f32(textureDimensions(colour_tables).x);
@@ -159,13 +168,25 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let inner = inner_lid(spot);
     let p = pigments(spot, lip, mucosa);
     var rgb = mix(skin_colour(p.x, p.y), colour_of(LIPS, p.x, p.y), lip);
+    //#if BANDS
+    rgb *= mix(vec3f(1.0), in_channels(VEIN_COLOUR), veins());
+    //#else
     rgb *= mix(vec3f(1.0), VEIN_COLOUR, veins());
+    //#end
     let bristles = 0.85 + 0.15 * dotted[DOT_STUBBLE];
     let beard = 0.55 * paint.beard * saturate(zone_of(ZONE_BEARD)) * (1.0 - lip) * (0.45 + 0.9 * dotted[DOT_STUBBLE]);
     rgb = mix(rgb, paint.stubble_colour, paint.stubble * scalp * bristles);
+    //#if BANDS
+    rgb = over(rgb, in_channels(BEARD_COLOUR), beard);
+    //#else
     rgb = over(rgb, BEARD_COLOUR, beard);
+    //#end
     let wet = max(mucosa, 1.0 - smoothstep(0.2, 1.2, spot.fields.z));
+    //#if BANDS
+    rgb = mix(rgb, in_channels(INNER_LID) * (1.0 + 0.15 * noise[NOISE_BLOTCHES]), 0.85 * inner);
+    //#else
     rgb = mix(rgb, INNER_LID * (1.0 + 0.15 * noise[NOISE_BLOTCHES]), 0.85 * inner);
+    //#end
     let away = f32(NEAREST - (owner >> ID_BITS)) / STEPS;
     let fade = 1.0 - smoothstep(0.5 * MARGIN, MARGIN, away); // to 0 outside the charts
     let height = relief(spot, lip) * fade * (1.0 - inner);
