@@ -149,7 +149,8 @@ def sky_luminance(broad_luminance: NDArray[np.float32], environment: Environment
     column = np.floor((0.5 + np.arctan2(x, -z) / (2.0 * np.pi)) * width).astype(int) % width
     row = np.minimum(np.floor(np.arccos(directions[:, 1]) / np.pi * height).astype(int), height - 1)
     found = broad_luminance[row, column].astype(np.float64)
-    return np.maximum(found / max(float(found.mean()), np.finfo(np.float32).tiny), _MIN_SKY_LUMINANCE)
+    relative = found / max(float(found.mean()), np.finfo(np.float32).tiny)
+    return np.asarray(np.maximum(relative, _MIN_SKY_LUMINANCE))
 
 
 def sky_moments(sky_light: NDArray[np.float64]) -> NDArray[np.float64]:
