@@ -57,8 +57,8 @@ def test_the_picture_is_small_and_shows_all_views() -> None:
     data = page.picture_sheet(list(page.ALL_VIEWS))
     assert len(data) <= page.MAX_SHEET_BYTES
     width, height = Image.open(io.BytesIO(data)).size
-    rows = -(-3 * len(page.ALL_VIEWS) // page.SHEET_COLUMNS)
-    assert width >= page.SHEET_COLUMNS * 96 and height >= rows * 96
+    rows = -(-len(page.ALL_VIEWS) // page.SHEET_COLUMNS)
+    assert width >= page.SHEET_COLUMNS * 3 * 96 and height >= rows * 96
 
 
 def test_page_lists_its_placeholders() -> None:

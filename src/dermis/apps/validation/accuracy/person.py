@@ -64,7 +64,7 @@ PAGE = DOCS / "path_traced.md"
 PICTURE_FILE = DOCS / "images" / "path_traced.webp"
 RESULTS_FILE = RESULTS / "path_traced.json"
 PICTURE_SIDE, PATHS_PER_PIXEL = 160, 48
-SHEET_COLUMNS = 6
+SHEET_COLUMNS = 2
 MAX_SHEET_BYTES = 300_000
 NOT_MEASURED = "not measured"
 _PANEL_FOLDER, _PANEL_NAMES = "path-traced-panels", ("frame", "traced", "difference")
@@ -258,17 +258,18 @@ def save_panels(view_name: str, comparison: PersonComparison) -> None:
 
 
 def picture_sheet(view_names: Sequence[str]) -> bytes:
-    """Return a WebP file that shows each view three times: by dermis, path-traced, and their difference.
+    """Return a WebP file that shows three pictures of each view side by side.
 
-    Views whose pictures are not in the cache are left out.
+    The pictures are by dermis, path-traced, and their difference. Views whose pictures are not in the cache
+    are left out.
     """
     panels: dict[str, NDArray[np.uint8]] = {}
     for view in view_names:
         found = load_arrays(_PANEL_FOLDER, _panel_key(view), _PANEL_NAMES)
         if found is not None:
-            panels[view] = found["frame"]
-            panels[f"{view}, traced"] = found["traced"]
-            panels[f"{view}, difference"] = found["difference"]
+            panels[f"{view}: frame, path-traced, difference"] = np.hstack(
+                [found[name] for name in _PANEL_NAMES]
+            )
     return sheet_bytes(panels, SHEET_COLUMNS)
 
 
