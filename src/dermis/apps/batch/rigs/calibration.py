@@ -1,4 +1,4 @@
-"""Reader of camera calibrations of OpenCV: JSON, and the YAML that OpenCV and ROS write."""
+"""Reader of camera calibrations in OpenCV's conventions: JSON, and YAML as OpenCV and ROS write it."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def parse_opencv_yaml(text: str) -> dict[str, Any]:
     for number, line in _logical_lines(text):
         match = _LINE.match(line)
         if match is None:
-            refuse(f"line {number}", "key: value", f"got {shorten(line.strip(), 60)!r}", "Write it as JSON")
+            refuse(f"line {number}", "key: value", f"got {shorten(line.strip(), 60)!r}", "Convert it to JSON")
         indent, dash = len(match["indent"]), match["dash"]
         while parents[-1][0] >= indent + (_ITEM_INDENT if dash else 0.0):
             parents.pop()
@@ -165,7 +165,7 @@ def _camera_tables(data: object) -> list[tuple[str, Mapping[str, Any]]]:
 
 
 def _stereo_tables(data: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
-    """Return the tables of the two cameras of cv2.stereoCalibrate, of which the first is the world."""
+    """Return the tables of the two cameras of cv2.stereoCalibrate, in the coordinates of the first one."""
     tables: list[tuple[str, Mapping[str, Any]]] = []
     for k, (R, t) in enumerate([(np.eye(3).tolist(), [0.0, 0.0, 0.0]), (data["R"], data["T"])], 1):
         own = {
@@ -197,7 +197,7 @@ def _calibration(name: str, table: Mapping[str, Any]) -> Calibration:
     name = str(stated) if stated is not None else name
     with error_context(f"camera {name}"):
         if _value(table, "size") is None:
-            refuse("size", "width and height of the pictures", "there are none", "Add size = [width, height]")
+            refuse("size", "width and height of the pictures", "there is none", "Add size = [width, height]")
         width, height = np.ravel(checked_array("size", np.ravel(_value(table, "size")), (2,), 1, 1e6)).astype(
             int
         )
@@ -210,7 +210,7 @@ def _calibration(name: str, table: Mapping[str, Any]) -> Calibration:
 
 
 def _matrix(table: Mapping[str, Any], name: str) -> Doubles:
-    """Return a matrix (3, 3) of a camera; the rotation is 1 if it is missing."""
+    """Return a matrix (3, 3) of a camera; the identity if the rotation is missing."""
     value = _value(table, name)
     if value is None and name == "K":
         refuse(name, "the intrinsic matrix of the camera", "there is none", "Add it")
