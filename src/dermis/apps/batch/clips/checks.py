@@ -24,7 +24,7 @@ def check_clip(clip: ClipTable, distributions: Mapping[str, Distribution], folde
         if name == GENERATED_MOTION or (name.lower().endswith(_CAPTURE_SUFFIXES) and is_file(folder / name)):
             continue
         expected = f'"{GENERATED_MOTION}", or captures ({", ".join(_CAPTURE_SUFFIXES)}) in the spec\'s folder'
-        refuse("clip: motion", expected, f"got {name!r}", "Correct it")
+        refuse("clip: motion", expected, f"{name!r} is neither", "Correct it")
     if any(0.0 < float(rate) < _MIN_PULSE_PER_MIN for rate in clip.pulse_per_min.support):
-        expected = f"0, or at least {_MIN_PULSE_PER_MIN:g}"
+        expected = f"0 or {_MIN_PULSE_PER_MIN:g} and more"
         refuse("clip: pulse_per_min", expected, f"got {clip.pulse_per_min.spec_value()}", "Correct it")
