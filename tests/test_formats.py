@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 import dermis
+from dermis.apps.batch.rigs.calibration import CALIBRATION_KEYS
 from dermis.human.person_file import read_person
 from dermis.human.regions.average import average_head
 from dermis.human.regions.labels import average_landmarks, load_landmarks, warp_to_average
 from dermis.human.regions.region_table import load_region_table
+from dermis.optics.lamps import lamp_power, read_sensitivities
 from dermis.optics.profiles import find_gaussians
 from dermis.optics.tissue import load_tissue
 from dermis.scene.lights import LIGHTS
@@ -28,7 +30,7 @@ def folder(tmp_path: Path) -> Path:
     for kind, text in FENCE.findall(PAGE):
         name = "person.json" if kind == "json" else text.splitlines()[0].removeprefix("# ")
         (tmp_path / name).write_text(text, encoding="utf-8")
-    assert len(list(tmp_path.iterdir())) == len(FENCE.findall(PAGE)) == 7
+    assert len(list(tmp_path.iterdir())) == len(FENCE.findall(PAGE)) == 9
     return tmp_path
 
 
@@ -71,6 +73,21 @@ def test_tissue_and_profile_examples_load(folder: Path) -> None:
     published = find_gaussians("gpu-gems-3")
     assert table is not None and published is not None
     np.testing.assert_allclose(table.weight, published.weight)
+
+
+def test_lamp_and_sensitivities_examples_load(folder: Path) -> None:
+    lamp = folder / "lamp.csv"
+    assert lamp_power(lamp, np.array([450.0, 560.0])) @ [10.0, -9.0] == pytest.approx(0.0)  # 0.9 to 1
+    grid, response = read_sensitivities(folder / "sensitivities.csv", lamp)
+    assert (grid[0], grid[-1]) == (400.0, 700.0)
+    assert grid[response.argmax(axis=1)].tolist() == [600.0, 530.0, 460.0]
+
+
+def test_names_of_keys_of_calibrations_are_explained() -> None:
+    section = PAGE.partition("## Calibrations of cameras")[2].partition("## ")[0]
+    assert {name for names in CALIBRATION_KEYS.values() for name in names} <= set(
+        re.findall(r"`(\w+)`", section)
+    )
 
 
 def test_person_example_loads(folder: Path) -> None:
