@@ -68,7 +68,7 @@ def licence_text(subject: Subject, target: Target) -> str:
     """Return sentences on the licences of the exported head and of scripts in the files."""
     texts = []
     if subject.head is not None:
-        credit = subject.head.attribution or "its file names no licence; the owner of the head decides"
+        credit = subject.head.attribution or "as its owner states; the file of the head names none"
         texts.append(f"Head: {credit}.")
     if target.licence:
         texts.append(f"The page contains or loads {target.title}, {target.licence}.")
