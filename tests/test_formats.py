@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import dermis
-from dermis.apps.batch.rigs.calibration import CALIBRATION_KEYS
+from dermis.apps.batch.rigs.calibration import load_calibrations
 from dermis.human.person_file import read_person
 from dermis.human.regions.average import average_head
 from dermis.human.regions.labels import average_landmarks, load_landmarks, warp_to_average
@@ -83,11 +83,21 @@ def test_lamp_and_sensitivities_examples_load(folder: Path) -> None:
     assert grid[response.argmax(axis=1)].tolist() == [600.0, 530.0, 460.0]
 
 
-def test_names_of_keys_of_calibrations_are_explained() -> None:
+def test_other_names_of_keys_of_calibrations_are_read(tmp_path: Path) -> None:
     section = PAGE.partition("## Calibrations of cameras")[2].partition("## ")[0]
-    assert {name for names in CALIBRATION_KEYS.values() for name in names} <= set(
-        re.findall(r"`(\w+)`", section)
-    )
+    rows = [[re.findall(r"`(\w+)`", cell) for cell in row.split("|")] for row in section.splitlines()]
+    others = {row[1][0]: row[3] for row in rows if len(row) == 5 and row[1]}
+    assert others.keys() == {"K", "size", "dist", "R", "t", "name"}
+    camera = {"K": [[90, 0, 31], [0, 90, 31], [0, 0, 1]], "size": [64, 60], "dist": [0.1]}
+    camera |= {"R": [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], "t": [1, 2, 900], "name": "a"}
+    second, file = camera | {"name": "b"}, tmp_path / "rig.json"
+    for key, names in others.items():
+        for name in names:
+            renamed = {name if one == key else one: value for one, value in camera.items()}
+            file.write_text(json.dumps({"cameras": [renamed, second]}))
+            one, two = load_calibrations(file)
+            assert one.name == "a" and one.lens == two.lens and one.size == two.size, name
+            assert (one.K == two.K).all() and (one.R == two.R).all() and (one.t == two.t).all(), name
 
 
 def test_person_example_loads(folder: Path) -> None:

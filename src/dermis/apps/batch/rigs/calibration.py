@@ -19,7 +19,7 @@ from dermis.scene.camera import Camera
 MAX_CAMERAS = 256
 _BOUNDS = -1e9, 1e9
 _FORMS = 'a list "cameras" with K, R, t and size, or the K1, D1, K2, D2, R, T of a stereo calibration'
-CALIBRATION_KEYS: Mapping[str, tuple[str, ...]] = {
+_KEYS: Mapping[str, tuple[str, ...]] = {
     "K": ("K", "camera_matrix", "cameraMatrix", "intrinsic_matrix"),
     "dist": ("dist", "D", "distortion_coefficients", "distCoeffs", "dist_coeffs", "distortion"),
     "R": ("R", "rotation", "rotation_matrix"),
@@ -27,7 +27,6 @@ CALIBRATION_KEYS: Mapping[str, tuple[str, ...]] = {
     "size": ("size", "image_size", "imageSize", "resolution"),
     "name": ("name", "camera_name"),
 }
-"""Names of the keys of a camera in files, by the name on the page docs/formats.md."""
 _LENS_FIELDS = tuple(Lens.model_fields)  # k1, k2, p1, p2, k3: the order of OpenCV
 _ITEMS, _ITEM_INDENT = "", 0.5  # key of the items of a list; indent of an item after its dash
 _LINE = re.compile(
@@ -148,7 +147,7 @@ def _camera_tables(data: object) -> list[tuple[str, Mapping[str, Any]]]:
     """Return the name and the table of each camera in a parsed file."""
     if not isinstance(data, Mapping):
         refuse("file", _FORMS, f"got {type(data).__name__}", "Correct it")
-    if {"R", "T"} <= data.keys() and any(f"{name}1" in data for name in ("K", "M", *CALIBRATION_KEYS["K"])):
+    if {"R", "T"} <= data.keys() and any(f"{name}1" in data for name in ("K", "M", *_KEYS["K"])):
         return _stereo_tables(data)
     cameras = data.get("cameras", data)
     cameras = cameras.get(_ITEMS, cameras) if isinstance(cameras, Mapping) else cameras
@@ -171,7 +170,7 @@ def _stereo_tables(data: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]
     for k, (R, t) in enumerate([(np.eye(3).tolist(), [0.0, 0.0, 0.0]), (data["R"], data["T"])], 1):
         own = {
             name: next((data[f"{key}{k}"] for key in keys if f"{key}{k}" in data), None)
-            for name, keys in CALIBRATION_KEYS.items()
+            for name, keys in _KEYS.items()
         }
         own["K"] = own["K"] if own["K"] is not None else data.get(f"M{k}")
         size = own["size"] if own["size"] is not None else _value(data, "size")
@@ -180,7 +179,7 @@ def _stereo_tables(data: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]
 
 
 def _value(table: Mapping[str, Any], name: str) -> Any:
-    found = next((table[key] for key in CALIBRATION_KEYS[name] if table.get(key) is not None), None)
+    found = next((table[key] for key in _KEYS[name] if table.get(key) is not None), None)
     if found is None and name == "size" and {"image_width", "image_height"} <= table.keys():
         return [table["image_width"], table["image_height"]]
     if isinstance(found, Mapping) and {"rows", "cols", "data"} <= found.keys():
@@ -198,7 +197,7 @@ def _calibration(name: str, table: Mapping[str, Any]) -> Calibration:
     name = str(stated) if stated is not None else name
     with error_context(f"camera {name}"):
         if _value(table, "size") is None:
-            refuse("size", "width and height of the pictures", "there is none", "Add size = [width, height]")
+            refuse("size", "width and height of the pictures", "there are none", "Add size = [width, height]")
         width, height = np.ravel(checked_array("size", np.ravel(_value(table, "size")), (2,), 1, 1e6)).astype(
             int
         )
@@ -211,7 +210,7 @@ def _calibration(name: str, table: Mapping[str, Any]) -> Calibration:
 
 
 def _matrix(table: Mapping[str, Any], name: str) -> Doubles:
-    """Return a matrix (3, 3) of a camera; the identity if the rotation is missing."""
+    """Return a matrix (3, 3) of a camera; the rotation is 1 if it is missing."""
     value = _value(table, name)
     if value is None and name == "K":
         refuse(name, "the intrinsic matrix of the camera", "there is none", "Add it")
