@@ -1,7 +1,7 @@
-"""One face in the light of five lamps, and in red, green and blue light.
+"""One face rendered in red, green and blue, and in the light of five lamps.
 
-White is white in each picture. Colours are computed from spectra in bands of 10 nm; the first picture has
-only three channels.
+White is white in each picture. The first picture is rendered in three channels; the colours of the others are
+computed from spectra in bands of 10 nm.
 
 Deck: S24
 Columns: 3

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 import dermis
+from dermis.apps.batch.rigs.calibration import load_calibrations
 from dermis.human.person_file import read_person
 from dermis.human.regions.average import average_head
 from dermis.human.regions.labels import average_landmarks, load_landmarks, warp_to_average
 from dermis.human.regions.region_table import load_region_table
+from dermis.optics.lamps import lamp_power, read_sensitivities
 from dermis.optics.profiles import find_gaussians
 from dermis.optics.tissue import load_tissue
 from dermis.scene.lights import LIGHTS
@@ -28,7 +30,7 @@ def folder(tmp_path: Path) -> Path:
     for kind, text in FENCE.findall(PAGE):
         name = "person.json" if kind == "json" else text.splitlines()[0].removeprefix("# ")
         (tmp_path / name).write_text(text, encoding="utf-8")
-    assert len(list(tmp_path.iterdir())) == len(FENCE.findall(PAGE)) == 7
+    assert len(list(tmp_path.iterdir())) == len(FENCE.findall(PAGE)) == 9
     return tmp_path
 
 
@@ -71,6 +73,31 @@ def test_tissue_and_profile_examples_load(folder: Path) -> None:
     published = find_gaussians("gpu-gems-3")
     assert table is not None and published is not None
     np.testing.assert_allclose(table.weight, published.weight)
+
+
+def test_lamp_and_sensitivities_examples_load(folder: Path) -> None:
+    lamp = folder / "lamp.csv"
+    assert lamp_power(lamp, np.array([450.0, 560.0])) @ [10.0, -9.0] == pytest.approx(0.0)  # 0.9 to 1
+    grid, response = read_sensitivities(folder / "sensitivities.csv", lamp)
+    assert (grid[0], grid[-1]) == (400.0, 700.0)
+    assert grid[response.argmax(axis=1)].tolist() == [600.0, 530.0, 460.0]
+
+
+def test_other_names_of_keys_of_calibrations_are_read(tmp_path: Path) -> None:
+    section = PAGE.partition("## Calibrations of cameras")[2].partition("## ")[0]
+    rows = [[re.findall(r"`(\w+)`", cell) for cell in row.split("|")] for row in section.splitlines()]
+    others = {row[1][0]: row[3] for row in rows if len(row) == 5 and row[1]}
+    assert others.keys() == {"K", "size", "dist", "R", "t", "name"}
+    camera = {"K": [[90, 0, 31], [0, 90, 31], [0, 0, 1]], "size": [64, 60], "dist": [0.1]}
+    camera |= {"R": [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], "t": [1, 2, 900], "name": "a"}
+    second, file = camera | {"name": "b"}, tmp_path / "rig.json"
+    for key, names in others.items():
+        for name in names:
+            renamed = {name if one == key else one: value for one, value in camera.items()}
+            file.write_text(json.dumps({"cameras": [renamed, second]}))
+            one, two = load_calibrations(file)
+            assert one.name == "a" and one.lens == two.lens and one.size == two.size, name
+            assert (one.K == two.K).all() and (one.R == two.R).all() and (one.t == two.t).all(), name
 
 
 def test_person_example_loads(folder: Path) -> None:

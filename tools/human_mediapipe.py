@@ -3,8 +3,8 @@
     python tools/human_mediapipe.py canonical_face_model.obj
 
 The file is in mediapipe/modules/face_geometry/data of MediaPipe's repository. The points of the set
-"mediapipe" stay where they are. A thin-plate spline through them places the other points of the model, which
-are then moved to the nearest position on the skin.
+"mediapipe" are kept. A thin-plate spline through them places the other points of the model, which are then
+moved to the nearest position on the skin.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ def test_backgrounds_are_parts_of_the_pictures(tmp_path: Path) -> None:
         assert "a file of the spec" in image["licence"]
 
 
-def test_persons_are_over_the_background_in_linear_light(tmp_path: Path) -> None:
+def test_people_are_composited_over_the_background_in_linear_light(tmp_path: Path) -> None:
     Image.fromarray(np.full((32, 32, 3), 188, np.uint8)).save(tmp_path / "grey.png")
     grey = {"kind": "picture", "picture": "grey.png"}
     clear = spec_of(

@@ -211,7 +211,7 @@ def test_scalp_hair_is_written_as_curves_of_a_bone(tmp_path: Path) -> None:
     assert darker.mean() > 0.9 and (colour[darker, 2] <= colour[darker, 0]).all()  # melanin absorbs blue
 
 
-def test_switches_of_lamps_stay_switches() -> None:
+def test_boolean_properties_of_lamps_stay_boolean() -> None:
     scene = Scene(Head("ball", uv_sphere(90.0, 8, 4), Maps()), lights=[PointLight(position=(0, 0, 500))])
     (lamp,) = describe_scene(scene, np.zeros(3))[0]["lights"]
     assert lamp["set"]["use_soft_falloff"] is False  # Blender refuses 0.0

@@ -85,7 +85,7 @@ def test_unity_folder_is_a_project_with_all_references(unity: Path) -> None:
     assert read_yaml(assets / f"{NAME}_DiffusionProfile.asset")["profile"]["worldScale"] == 1
 
 
-def test_guids_are_numbers_that_text_keeps() -> None:
+def test_guids_of_profiles_survive_as_decimal_numbers() -> None:
     for number in range(2000):
         guid = asset_guid(f"name {number}")
         vector = guid_vector(guid)

@@ -64,7 +64,7 @@ def test_spectra_under_daylight_have_the_colours_of_the_picture(picture: Spectra
 
 
 def test_lamps_shift_colours_of_skin(picture: SpectralPicture) -> None:
-    """Lights of three channels cannot show it: white remains white under each lamp."""
+    """Frames in three channels do not have this shift, because white remains white under each lamp."""
     head = picture.alpha == 1.0
     error = {
         lamp: np.median(delta_e_2000(picture.linear(lamp)[head], picture.rgb[head]))
@@ -140,7 +140,7 @@ def oximeter(renderer: Renderer) -> Oximeter:
     return Oximeter(renderer)
 
 
-def test_polarisers_separate_the_surface(renderer: Renderer, scene: Scene) -> None:
+def test_polarisers_separate_reflection_from_scattered_light(renderer: Renderer, scene: Scene) -> None:
     def light(**settings: str) -> NDArray[np.float32]:
         return renderer.render(scene, **(SMALL.model_dump() | settings))
 
@@ -151,7 +151,9 @@ def test_polarisers_separate_the_surface(renderer: Renderer, scene: Scene) -> No
     assert np.abs(2.0 * cross - below).max() < POLARISED * below.mean()
 
 
-def test_camera_sees_by_its_sensitivities(picture: SpectralPicture, tmp_path: Path) -> None:
+def test_camera_signals_are_spectra_weighted_by_sensitivities(
+    picture: SpectralPicture, tmp_path: Path
+) -> None:
     """A sensor of a single wavelength has the spectrum there as its signal, balanced for white."""
     file = tmp_path / "narrow.csv"
     rows = [(nm, nm == 650, nm == 550, nm == 450) for nm in range(400, 701)]

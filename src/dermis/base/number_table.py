@@ -1,4 +1,4 @@
-"""Reading of CSV files of numbers that users supply, such as recordings and spectra."""
+"""Reading of CSV files of numbers, such as recordings and spectra."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def read_number_table(
     column_counts : numbers of columns that are accepted
     rows : description of a line for errors, such as "two numbers in each line"
 
-    Raises DermisError for a file that cannot be read, and for lines of other numbers of columns.
+    Raises DermisError for a file that cannot be read, and for lines with another number of columns.
     """
     path = checked_path(file_name, expected)
     text = read_text(path, expected, _MAX_FILE_BYTES)

@@ -12,7 +12,7 @@ COMMANDS = {
     "profile": "Compute the diffusion profile of a skin and fit Gaussians to it.",
     "head": "Create a person of the parametric human and write it as glTF.",
     "export": "Export a skin or a head to another program and report the error.",
-    "correspondences": "Write which vertices of a person other face models' landmarks are.",
+    "correspondences": "Write a person's vertices that are landmarks of other face models.",
     "unmix": "Estimate melanin and blood from a skin colour map, and recolour it.",
     "fit": "Estimate the light and the skin in a photograph of a head.",
     "lights": "Print a lighting rig as a TOML file to start from.",

@@ -111,7 +111,7 @@ def batch(
         Skip images that cannot be rendered, and list these images.
     dry_run:
         Do not write the data set: print its parameters, estimate its size and the rendering time, and render
-        its first 16 images as a contact sheet.
+        16 of its images as a contact sheet: the first ones, or four frames of each of the first clips.
     example:
         Print a complete example spec with comments.
     as_json:

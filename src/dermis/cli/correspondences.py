@@ -1,4 +1,4 @@
-"""The command `dermis correspondences`: landmarks and blend shapes of a person in other face models."""
+"""Command `dermis correspondences`: landmarks and blend shapes of other face models on a person."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ def correspondences(
     head: HeadOptions = NO_OPTIONS,
     as_json: JsonOption = False,
 ) -> int:
-    """Write which vertices of a person correspond to landmarks and blend shapes of other face models.
+    """Write a person's vertices that are landmarks of other face models, and names of blend shapes.
 
-    The JSON file lists the landmarks of MediaPipe's face mesh, iBUG's 300-W and FaceSynthetics as weighted
-    means of vertices of exports to gltf and usd, and the names of the blend shapes in ARKit, MediaPipe and
-    Live Link Face. Other face models can be fitted to the person with them.
+    The JSON file lists the landmarks of MediaPipe's face mesh, of 300-W (iBUG) and of FaceSynthetics as
+    weighted means of vertices of exports to gltf and usd, and the names of the blend shapes in ARKit,
+    MediaPipe and Live Link Face. With it, another face model can be fitted to the person.
 
     Examples:
 
@@ -34,7 +34,7 @@ def correspondences(
     output:
         JSON file to write.
     as_json:
-        Print one JSON object with the file and the number of landmarks of each set.
+        Print one JSON object with the file, the number of landmarks in each set and that of blend shapes.
     """
     from dermis.apps.export.correspondences import correspondence_table
     from dermis.base.atomic_write import atomic_file, check_output

@@ -74,9 +74,9 @@ def export(
         A skin (skin1, dj3, medium, gpu-gems-3 ..., a .toml or .csv file) or a head (human, human:SEED, a
         person (.json), a sample or a mesh file).
     output:
-        File to write; a name without suffix is a folder, created if necessary. A README is written beside the
-        file or into the folder: files, steps of the import, a picture, the licence, and the parameters with
-        their meaning and errors, which are also written as JSON.
+        File to write; a name without suffix is a folder, created if necessary. A README beside the file or in
+        the folder lists the files, the steps of the import, the licence, and the parameters with their
+        meaning and errors, and shows a picture. Parameters and errors are also written as JSON.
     version:
         Version of the program. [default: newest supported]
     variant:
@@ -94,7 +94,7 @@ def export(
     map_side:
         Side of the painted maps, a power of two from 256 to 4096 [texel].
     picture_width:
-        Width of the picture of the head in the README [pixel]; 0 for no picture.
+        Width and height of the picture of the head in the README [pixel]; 0 for no picture.
     naive:
         Also print the parameters that a user might choose without knowing their meaning in the program.
     as_json:

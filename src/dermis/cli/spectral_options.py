@@ -176,7 +176,7 @@ def _with_alpha(colours: Floats, picture: SpectralPicture, output: Path) -> Floa
 def _colour_error(
     renderer: Renderer, scene: Scene, settings: Settings, picture: SpectralPicture, lamp: str
 ) -> str:
-    """Return a line with the error of red, green and blue light on skin, in CIEDE2000."""
+    """Return a line with the difference between skin from spectra and skin in red, green and blue."""
     import numpy as np
 
     from dermis.human.labels.classes import class_number
@@ -190,4 +190,4 @@ def _colour_error(
     error = delta_e_2000(picture.linear(lamp)[skin], picture.rgb[skin])
     median, most = np.percentile(error, [50, 95])
     values = f"{median:.2f} (median), {most:.2f} (95 %)"
-    return f"error of red, green and blue light on skin: CIEDE2000 {values}"
+    return f"skin here and in a picture in red, green and blue differ by CIEDE2000 {values}"

@@ -83,7 +83,8 @@ class SpectralPicture(ShortRepr):
         Returns
         -------
         ndarray
-            (h, w, n) means over triangular bands of 10 nm, without the background.
+            (h, w, n) radiance at the wavelengths, without the background. The power of the lamp is the mean
+            over a triangular band of 10 nm.
 
         Raises
         ------
@@ -204,14 +205,14 @@ def render_spectrum(
 ) -> SpectralPicture:
     """Render a picture with a spectrum in each pixel.
 
-    Skin whose profile or colour is made of pigments has its spectrum; all colours that are given in red,
-    green and blue, such as those of eyes, hair, clothing, colour maps and lights, are upsampled to smooth
-    spectra.
+    Skin whose profile or colour is computed from pigments has the spectrum of the pigments. Colours given in
+    red, green and blue, such as those of eyes, hair, clothing, colour maps and lights, are upsampled to
+    smooth spectra.
 
     Parameters
     ----------
     renderer : Renderer
-        Renderer, which draws a frame for each three wavelengths.
+        Renderer, which draws a frame for every three wavelengths.
     scene : Scene
         Scene to render.
     settings : Settings, optional

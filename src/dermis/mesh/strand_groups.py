@@ -1,4 +1,4 @@
-"""Strands of a head for exports: named groups, fewer knots, and displacements by morph targets."""
+"""Strands of a head for exports: named groups, reduction of knots, and displacements by morph targets."""
 
 from __future__ import annotations
 
@@ -72,14 +72,14 @@ def root_vertices(mesh: Mesh, roots: Roots) -> Intp:
 def moved_strands(
     mesh: Mesh, roots: Roots, offsets_mm: Doubles, points_mm: Doubles, delta_mm: Doubles, threshold_mm: float
 ) -> tuple[Index, Doubles]:
-    """Return the k of n strands that move when the skin is displaced, and how their m points move.
+    """Return which of n strands move when the skin is displaced, and the displacements of their points.
 
-    Returns the indices of the strands (k,), and the displacements (k, m, 3) [mm].
+    These are the indices (k,) of k strands, and the displacements (k, m, 3) of m points of each [mm].
 
     mesh, roots : skin, and the roots of the strands on it
     offsets_mm : (n, m, 3) points of each strand in the frame of its root, see `root_frames`
     points_mm, delta_mm : (p, 3) points of the skin at rest, and their displacements
-    threshold_mm : strands that move less are left out
+    threshold_mm : displacement below which a strand is left out [mm]
     """
     first, second = mesh.quads[roots.quad].T
     corners = mesh.point[np.column_stack([mesh.triangles[first], mesh.triangles[second]])]

@@ -15,7 +15,7 @@ from dermis.optics.pigments.spectra import WAVELENGTHS_NM, interpolate_spectrum,
 def rgb_spectra(wavelength_nm: ArrayLike) -> Floats:
     """Return smooth reflectances (..., 3) of red, green and blue of Rec. 709, which sum to 1 [-].
 
-    The spectrum of a colour is their sum, weighted by the colour. Under D65 it has that colour. Below 400
+    The spectrum of a colour is their sum weighted by its channels; under D65 it has this colour. Below 400
     and above 700 nm the spectra are constant.
 
     wavelength_nm : (...) wavelengths from 380 to 1000 [nm]

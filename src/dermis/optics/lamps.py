@@ -95,7 +95,7 @@ def read_sensitivities(path: str | Path, lamp: str | Path) -> tuple[Floats, Floa
 
     The wavelengths are those of the file for which the power of the lamp is known.
 
-    Raises DermisError for a file that cannot be read, and for sensitivities that are not.
+    Raises DermisError for a file that cannot be read, and for values that are not sensitivities.
     """
     expected = "a CSV file of wavelength [nm] and the sensitivities of red, green and blue"
     table = read_number_table(path, expected, (4,), "wavelength [nm] and three sensitivities in each line")

@@ -181,7 +181,8 @@ def fit_profile(
 
     profile_name : preset or file after which the fitted profile is named
     similar_fit : fit of a similar tissue, as start of the new fit, which is then several times faster
-    keep_energy : whether to constrain fits to all other profiles to their total reflectance too
+    keep_energy : whether to constrain the fit to the total reflectance also for profiles that are not
+        tabulated from photons
 
     Raises DermisError when the fit is not a valid profile.
     """

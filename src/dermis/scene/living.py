@@ -66,9 +66,9 @@ class SkinState(ShortRepr):
 
 
 def is_living_head(head: Head, albedo: str) -> bool:
-    """Return whether states can change the skin of a head: it is painted from pigments, and shows its colour.
+    """Return whether states can change the skin of a head: it must be painted from pigments and use its map.
 
-    albedo : field of `Skin`
+    albedo : value of `Skin.albedo`
     """
     return head.maps.is_painted and head.maps.colour is None and albedo == "map"
 

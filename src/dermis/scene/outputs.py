@@ -170,7 +170,7 @@ _BUILT_IN_OUTPUTS = (
         "Z",
         _FLOAT_CHANNEL,
         "mm",
-        "depth of the visible point in the previous scene",
+        "depth that the visible point had in the previous scene",
         0.0,
         _LENGTH_QUANTISATION,
     ),

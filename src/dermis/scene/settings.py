@@ -116,9 +116,9 @@ class Settings(FrozenModel):
     """Components of the light to show: "all", only the "diffuse" subsurface light, or only the "specular"
     reflection."""
     polarisation: Literal["parallel", "cross"] | None = None
-    """Polarisers before the lights and the camera: reflection at the surface keeps its polarisation, light
-    from below the surface loses it. "parallel" shows all of the reflection and half of the light from below,
-    "cross" only half of the light from below."""
+    """Polarisers before the lights and the camera. Light that the surface reflects keeps its polarisation,
+    and light that was scattered below it has lost it: "parallel" shows all of the reflection and half of the
+    scattered light, "cross" only half of the scattered light. Without polarisers if left out."""
 
     @model_validator(mode="after")
     def _check_fits_in_memory(self) -> Settings:

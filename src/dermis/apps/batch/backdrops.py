@@ -1,4 +1,4 @@
-"""Pictures of the user's own as backgrounds: cropped, blurred, and composed in linear light."""
+"""Pictures of users as backgrounds: cropped, blurred, and composited in linear light."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _MIN_SOURCE_SIDE = 2
 
 
 class Crop(NamedTuple):
-    """Part of a picture: size relative to the largest part of the same shape, and position from 0 to 1.
+    """Part of a picture: its size relative to the largest part with this aspect ratio, and its position.
 
     zoom : factor by which the part is smaller than the largest one, at least 1 [-]
-    x, y : position between the left and the right, and the upper and the lower end [-]
+    x, y : position, from 0 at the left and the upper end to 1 at the right and the lower end [-]
     """
 
     zoom: float
@@ -36,7 +36,7 @@ class Crop(NamedTuple):
 
 
 def with_backdrop(observation: Observation, parameters: Parameters, spec: Spec) -> Observation:
-    """Return an observation whose picture has the background of a picture file, if its image has one.
+    """Return an observation with its picture over a background picture, if the image has one.
 
     observation : observation whose picture has an alpha channel
     parameters : sampled parameters of the image

@@ -1,4 +1,4 @@
-"""Finishing of rendered observations: background pictures, encoding of blurred pictures, and the camera."""
+"""Last steps of rendered observations: background pictures, sRGB of blurred pictures, and the sensor."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def finished_image(
 
 
 def _srgb_bytes(picture: Floats) -> Bytes:
-    """Return a linear picture as sRGB bytes, of which those with alpha are not multiplied by it."""
+    """Return a linear picture as sRGB bytes; colours that are premultiplied by alpha are divided by it."""
     if picture.shape[2] == 3:
         return encode_srgb8(picture)
     alpha = picture[..., 3:]

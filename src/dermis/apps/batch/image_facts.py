@@ -48,8 +48,8 @@ class ImageFacts:
     sensor : facts about the exposure, by the names of `SENSOR_FACT_NAMES`; empty for a spec without [sensor]
     captured : weights of morph targets by captured motion, which replace those of the expression, by
         parameter name such as "pose.jawOpen"
-    rig : all cameras of the rig by name, without distortion; empty for a spec with one camera
-    blur : facts about the lens, by the names of `FOCUS_FACT_NAMES`; empty without depth of field
+    rig : all cameras of the rig by name, without distortion; empty for a spec without [rig]
+    blur : facts about the aperture, by the names of `FOCUS_FACT_NAMES`; empty without depth of field
     """
 
     person: Mapping[str, float | str | None] = field(default_factory=lambda: _NO_FACTS)

@@ -1,4 +1,4 @@
-"""Rendering of planned images, some of which need several frames: flow of clips, and blurred pictures."""
+"""Rendering of planned images, some of which need several frames, for the flow of clips or for blur."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class PlannedImage(NamedTuple):
 class _Role(Enum):
     """Purpose of a frame."""
 
-    BEFORE = "frame before an image, whose depth hides points"
+    BEFORE = "frame before an image, whose depth shows which points it hides"
     IMAGE = "image itself"
     FORWARD = "image again, with its motion relative to the next frame"
     SAMPLE = "frame whose picture is a part of a blurred one"

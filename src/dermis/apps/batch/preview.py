@@ -85,7 +85,7 @@ def estimate_size_and_duration(spec: Spec, adapter: str = "auto") -> Estimate:
     These images are rendered by a `Worker`. The first two of them, which fill caches, are not timed.
     """
     count = min(spec.count, spec.shard_size, _MEASURED_IMAGE_COUNT)
-    times, measured = [time.monotonic()], spec.replace(count=count)  # a whole shard
+    times, measured = [time.monotonic()], spec.replace(count=count)  # a complete shard of few images
     with TemporaryDirectory() as name, closing(Worker(adapter, RunOptions(measured, Path(name)))) as worker:
         send = lambda event: times.extend([time.monotonic()] * event.images)  # noqa: E731
         worker.run_tasks([Part(0, 0, count)], send)

@@ -104,8 +104,9 @@ def read_dataset(
         directions to the target of the spec, or None; "boxes", left, upper, right and lower edge of each box
         by name, or None; "landmarks", `LandmarkPoints` by the name of the set; "skin_tone", a dictionary that
         describes the colour of the skin, or None; "split", "train", "val" or "test" by person; and "licence".
-        Data sets of rigs also have "rig", all cameras of the moment by name. Split and licence are "" in data
-        sets of earlier versions. `dermis.dataset.arrays` converts an image into arrays for batches.
+        With [rig] in the spec there is also "rig", the cameras of all images of the same moment by name.
+        "split" and "licence" are "" in data sets of earlier versions. `dermis.dataset.arrays` converts an
+        image into arrays for batches.
 
     Raises
     ------

@@ -56,8 +56,7 @@ class Record(TypedDict):
     """Description of one image as stored in its JSON file, with the same keys for all images of a data set.
 
     For `head_pose` and `gaze`, see `Observation`; for `gaze_error_deg` and `boxes`, see `ImageFacts`. `split`
-    is "train", "val" or "test", by person. For a spec with [rig],
-    `rig` has all cameras of the moment by name.
+    is "train", "val" or "test", by person. `rig` has all cameras of a spec with [rig] by name.
     """
 
     number: int

@@ -118,7 +118,7 @@ class SceneBuilder:
         return scene, self.spec.render.replace(**_background_settings(parameters))
 
     def blur_scenes(self, image_number: int, parameters: Parameters, scene: Scene) -> tuple[Scene, ...]:
-        """Return the scenes whose average is the picture of an image; none for sharp pictures.
+        """Return the scenes whose average is the picture of an image; empty for sharp pictures.
 
         scene : scene of the image at the middle of the exposure and of the aperture
         """

@@ -112,12 +112,12 @@ def check_lens(distributions: Mapping[str, Distribution], outputs: Sequence[str]
     """
     _check_table("lens", distributions, list(Lens.model_fields), Lens)
     if {"motion", "motion_depth", *FLOW_OUTPUTS} & {*outputs}:
-        expected = "outputs without motion and flow, which are those of a pinhole camera"
-        refuse("outputs", expected, "the spec has a table [lens]", "Remove motion or [lens]")
+        expected = "outputs without motion and flow, which are computed for pinhole cameras"
+        refuse("outputs", expected, "the spec has a table [lens]", "Remove these outputs, or [lens]")
 
 
 def check_blur(distributions: Mapping[str, Distribution], render: Settings, *, has_clip: bool) -> None:
-    """Raise DermisError for a table [blur] that has no effect, or contradicts other tables.
+    """Raise DermisError for a table [blur] that has no effect or contradicts other tables.
 
     distributions : distribution of each parameter by its dotted name
     render : settings of the table [render]
@@ -126,7 +126,7 @@ def check_blur(distributions: Mapping[str, Distribution], render: Settings, *, h
     exposure = distributions["blur.shutter_ms"].support
     if not has_clip and exposure != (0.0,):
         advice = "Add [clip], or remove the key"
-        refuse("blur: shutter_ms", "a table [clip], whose people move", "there is none", advice)
+        refuse("blur: shutter_ms", "a table [clip], in which people move", "there is none", advice)
     if exposure == (0.0,) == distributions["blur.f_number"].support:
         actual = "both are 0"
         refuse("blur", "f_number or shutter_ms above 0", actual, "Set one of them, or remove [blur]")
@@ -153,10 +153,11 @@ def check_backgrounds(distributions: Mapping[str, Distribution], folder: Path, *
         return
     for name in map(str, pictures.support):
         if not is_file(folder / name):
-            refuse("background: picture", "files in the spec's folder", f"{name!r} is none", "Correct it")
+            refuse("background: picture", "files in the spec's folder", f"there is no {name!r}", "Correct it")
     if has_rig:
         expected, actual = "one camera", "the cameras of [rig] would show the same picture"
-        refuse("background: picture", expected, actual, 'Use kind = "environment", which has the right view')
+        advice = 'Use kind = "environment", which each camera sees in its direction'
+        refuse("background: picture", expected, actual, advice)
 
 
 def note_lamps_without_blue(distributions: Mapping[str, Distribution]) -> None:

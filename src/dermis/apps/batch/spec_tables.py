@@ -336,16 +336,16 @@ class BackgroundTable(FrozenModel):
     blue: Annotated[Distribution, _FRACTION_FIELD] = Uniform(0, 0.6)
     """Blue of the colour, linear Rec. 709."""
     blur: Annotated[Distribution, _FRACTION_FIELD] = Constant(0.0)
-    """Blur of the environment behind the head: the roughness of a mirror that blurs it as much; or of a
-    picture, from 0 to a standard deviation of a tenth of the height [-]."""
+    """Blur of the background: of an environment, the roughness of a mirror that blurs it as much; of a
+    picture, ten times the standard deviation relative to the height [-]."""
     picture: Annotated[Distribution | None, NameField()] = None
-    """Files of pictures for the kind "picture", which cover the background and keep their shape."""
+    """Picture files for the kind "picture", which cover the background and keep their aspect ratio."""
     zoom: Annotated[Distribution | None, NumberField(1, 20, "1 shows as much as possible")] = None
-    """Factor by which the shown part of a picture is smaller than the largest possible, by default 1."""
+    """Factor by which the visible part of a picture is smaller than the largest possible, by default 1."""
     crop_x: Annotated[Distribution | None, _FRACTION_FIELD] = None
-    """Position of the shown part between the left (0) and the right end, by default uniform [-]."""
+    """Position of the visible part between the left (0) and the right end (1), by default uniform [-]."""
     crop_y: Annotated[Distribution | None, _FRACTION_FIELD] = None
-    """Position of the shown part between the upper (0) and the lower end, by default uniform [-]."""
+    """Position of the visible part between the upper (0) and the lower end (1), by default uniform [-]."""
 
     @model_validator(mode="after")
     def _check_pictures(self) -> BackgroundTable:

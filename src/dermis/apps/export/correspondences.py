@@ -63,7 +63,7 @@ def _landmark_rows(head: Head, landmarks: LandmarkPoints) -> list[dict[str, Any]
 
 
 def _material_of_points(mesh: Mesh, points: Index) -> int:
-    """Return the material of which all of the points are corners."""
+    """Return the index of a material whose triangles have all of the points as corners."""
     corners = mesh.point[mesh.triangles]
     used = [set(mesh.material[(corners == point).any(axis=1)].tolist()) for point in np.unique(points)]
     return int(min(set.intersection(*used)))
@@ -77,7 +77,7 @@ def _gltf_vertices(mesh: Mesh, material: int, points: Index) -> Index:
 
 
 def blend_shape_rows(target_names: tuple[str, ...]) -> list[dict[str, str | None]]:
-    """Return the names of each morph target in ARKit, MediaPipe and Live Link Face, or None."""
+    """Return the name of each morph target in ARKit, MediaPipe and Live Link Face; None where it has none."""
     return [
         {
             "name": name,

@@ -202,7 +202,7 @@ def export_skin(
     state : SkinState or mapping, optional
         State of the skin of a person, such as {"blush": 0.6}, which the painted maps show.
     picture_width : int, default 0
-        Width of a picture of the head for the README [pixel]; 0 writes no picture.
+        Width and height of a picture of the head for the README [pixel]; 0 writes no picture.
     **head
         Options of `load_head`.
 

@@ -178,7 +178,7 @@ class ViewerState:
     def with_head(self, head: Head, head_table: Table, rho_s: float) -> ViewerState:
         """Return a copy with another head, or with other maps for the same head.
 
-        States of the skin end if the skin of the new head is not painted from pigments.
+        States of the skin are removed if the skin of the new head is not painted from pigments.
 
         head_table : table from which the head was loaded, with the keys of the [head] table of a scene file
         rho_s : mean specular strength [-]

@@ -26,7 +26,7 @@ def grouped_colours(strands: Strands, count: int = HAIR_COLOUR_COUNT) -> tuple[D
 
 
 def hair_albedo(strands: Strands) -> Doubles:
-    """Return the linear colours (n, 3) of many parallel hairs like each of n strands [-].
+    """Return the linear colour (n, 3) that a bundle of parallel hairs like each of n strands has [-].
 
     Source: [Chiang2016] equation 9, at a roughness of 0.3.
     """

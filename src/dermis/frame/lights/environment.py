@@ -22,7 +22,7 @@ from dermis.scene.skin import Skin, lobe_name
 _MAX_HALF_FLOAT = 65504.0  # largest 16-bit float
 _MAX_BACKGROUND_ROWS = 2048  # limit of a panorama in the background
 SKY_DIRECTIONS = 32
-"""Number of directions in which the transmittance of hair is computed, see sky_transmittance.wgsl."""
+"""Number of directions for which the transmittance of hair is computed, see sky_transmittance.wgsl."""
 _BROAD_LAYER = int(np.searchsorted(LAYER_ROUGHNESSES, 0.3))
 _MIN_SKY_LUMINANCE = 0.2  # of a direction, relative to the mean of all directions
 
@@ -35,7 +35,7 @@ class EnvironmentMap:
         increasing roughness; black without an environment
     suns : bright peaks of the panorama, which are rendered as lights
     peak_irradiance : largest irradiance in the panorama without its suns [-]
-    broad_luminance : (h, 2 h) luminance of the panorama under a broad lobe; empty without an environment
+    broad_luminance : (h, 2 h) luminance of the panorama blurred by a broad lobe; empty without an environment
     """
 
     panorama: Texture

@@ -4,7 +4,7 @@ LANDMARK_SETS = {
     "ibug-68": "the 68 of iBUG's 300-W",
     "face-synthetics-70": "those of ibug-68 and both pupils, as in FaceSynthetics",
     "mediapipe": "142 of MediaPipe's 478: outlines, the middle of the nose, both irises",
-    "mediapipe-468": "all 468 of MediaPipe's face mesh, most of them interpolated",
+    "mediapipe-468": "all 468 points of MediaPipe's face mesh, most of them interpolated",
     "ibug-68-silhouette": "those of ibug-68, with the outline on the visible contour of the face",
 }
 """Sets of landmarks of the parametric human, with descriptions."""

@@ -14,7 +14,7 @@ from dermis.base.tables import float_columns, read_rows
 from dermis.optics.media import Floats
 
 SHORTEST_WAVELENGTH_NM, LONGEST_WAVELENGTH_NM, LONGEST_VISIBLE_NM = 380.0, 1000.0, 780.0
-"""Ends of the spectra of tissue, and of visible light [nm]."""
+"""Limits of the spectra of tissue, and upper limit of visible light [nm]."""
 
 WAVELENGTHS_NM: Floats = np.arange(400.0, 701.0, 10.0)
 """Wavelengths (31,) of the spectra that are converted to colours [nm]."""
@@ -194,9 +194,9 @@ def lipid_absorption(wavelength_nm: ArrayLike) -> Floats:
 
 
 def infrared_absorption(wavelength_nm: ArrayLike) -> Floats:
-    """Return the absorption coefficient by water and lipids that exceeds that at 700 nm [1/mm].
+    """Return the absorption coefficient of water and lipids in tissue minus that at 700 nm [1/mm].
 
-    It is 0 up to 700 nm, as `baseline_absorption` was measured on moist tissue and so includes water.
+    It is 0 up to 700 nm, because `baseline_absorption` was measured on moist tissue and includes water.
 
     Source: [Jacques2013] for the water content of 65 %; the lipid content of 10 % is chosen.
     """

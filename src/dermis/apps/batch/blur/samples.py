@@ -34,9 +34,9 @@ def thin_lens(points_mm: Doubles, camera: Camera, f_number: float, focus_mm: flo
     points_mm : (n, 3) points, such as the corneas, relative to the head's centre [mm]
     camera : camera of the picture, whose angle of view determines the focal length
     f_number : focal length divided by the diameter of the aperture; 0 for a pinhole
-    focus_mm : distance of the plane in focus behind the point [mm]
+    focus_mm : distance of the plane in focus behind the nearest point [mm]
 
-    Raises DermisError if the plane in focus is behind the camera.
+    Raises DermisError if the plane in focus is not farther from the lens than the focal length.
     """
     axis = np.subtract(camera.target, camera.position) / math.dist(camera.target, camera.position)
     depth_mm = float(((points_mm - np.array(camera.position)) @ axis).min()) + focus_mm
@@ -50,8 +50,8 @@ def thin_lens(points_mm: Doubles, camera: Camera, f_number: float, focus_mm: flo
 def aperture_points(count: int) -> Doubles:
     """Return points (n, 2) in the unit disc with uniform density, on a golden-angle spiral.
 
-    Consecutive points have distant radii, so that times of the exposure are not related to places in the
-    aperture.
+    Consecutive points have different radii, so that times of the exposure and positions in the aperture are
+    not correlated.
     """
     step = next(k for k in range(max(int(0.618 * count), 1), 2 * count) if math.gcd(k, count) == 1)
     order = (np.arange(count) * step) % count

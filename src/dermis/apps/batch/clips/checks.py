@@ -15,7 +15,7 @@ _CAPTURE_SUFFIXES = ".csv", ".tsv", ".json", ".jsonl", ".ndjson"
 
 
 def check_clip(clip: ClipTable, distributions: Mapping[str, Distribution], folder: Path) -> None:
-    """Raise DermisError for values of [clip] that contradict each other, and for missing captures.
+    """Raise DermisError for captures that do not exist, and for heart rates too low for a pulse.
 
     distributions : distribution of each parameter by its dotted name
     folder : folder to which file names in the spec are relative

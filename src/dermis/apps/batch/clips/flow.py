@@ -1,4 +1,4 @@
-"""Flow of clips: where the point at each pixel is in the previous and next frame, and if it is hidden."""
+"""Optical flow of clips: displacement of each pixel's point to the frames before and after, and masks."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FLOW_OUTPUTS: Mapping[str, Output] = MappingProxyType(
             ),
             (
                 "hidden",
-                ("I", "uint8", "", f"1 where the point is hidden or outside in the {frame} frame", 0.0),
+                ("I", "uint8", "", f"1 where the {frame} frame does not show the point", 0.0),
             ),
         )
     }
@@ -55,7 +55,7 @@ def hidden_points(
 ) -> Bytes:
     """Return a mask (h, w) with 1 for points that another frame does not show.
 
-    A point is hidden where all four pixels around it are nearer to the camera than the point, and where it is
+    A point is hidden if the surfaces in all four pixels around it are nearer to the camera, or if it is
     outside the other picture. The background is hidden where the other frame has a surface.
 
     flow : (h, w, 2) displacement to the other frame [pixel]

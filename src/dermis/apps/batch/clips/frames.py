@@ -1,4 +1,4 @@
-"""Numbering of the images of clips and of several cameras, and the parameters of each frame."""
+"""Order of the images of clips and of several cameras, and the parameters of each frame."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Values = dict[str, float | int | str]
 class ImagePlace(NamedTuple):
     """Place of an image in a data set: number of its moment or clip, of its camera, and of its frame.
 
-    Between frames, the frame is not a whole number.
+    The frame is a fraction for times between frames, such as those of motion blur.
     """
 
     moment: int
@@ -39,7 +39,7 @@ class ImagePlace(NamedTuple):
 
 @dataclass(frozen=True)
 class ImageSequence:
-    """Division of the numbers of images into moments or clips, cameras, and frames, in this order.
+    """Division of the images of a data set into moments or clips, these into cameras, and these into frames.
 
     frames : number of frames of a clip; 1 for single pictures
     rate_hz : frames per second; 0 for single pictures
@@ -52,7 +52,7 @@ class ImageSequence:
 
     @property
     def images(self) -> int:
-        """Return the number of images of a moment or clip."""
+        """Return the number of images of a moment or clip with all its cameras."""
         return self.frames * self.views
 
     def place(self, image_number: int) -> ImagePlace:

@@ -1,6 +1,6 @@
-"""Generated motion of a person: blinks, saccades, speech-like movements, turning of the head, and the pulse.
+"""Generated motion of a person: blinks, saccades, speech-like movements, rotation of the head, and the pulse.
 
-All motions are functions of time, also before the first frame, so that the first frame has a motion as well.
+Motion is defined before the first and after the last frame too, so that these frames have flow.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dermis.base.arrays import Doubles
 from dermis.scene.pulse import Pulse
 
 _LEAD_S = 3.0  # time before the first frame from which events are generated
-_PULSE_LEAD_S = 1.0  # least time of the pulse at the first frame
+_PULSE_LEAD_S = 1.0  # smallest time of the pulse at the first frame
 _CLOSING_S, _CLOSED_S, _OPENING_S, _MIN_BLINK_INTERVAL_S = 0.09, 0.03, 0.19, 0.4
 _SACCADE_S, _SACCADE_S_PER_DEG = 0.021, 0.0022
 _MIN_FIXATION_S, _PITCH_OF_YAW = 0.15, 0.6
@@ -92,7 +92,7 @@ def clip_pulse(seed: int, clip_values: Mapping[str, float]) -> Pulse:
 
 
 def pulse_time_s(seed: int, clip_values: Mapping[str, float], time_s: float) -> float:
-    """Return the time of a clip's pulse at a time of the clip [s]: each clip starts at another phase."""
+    """Return the time of the pulse at a time of the clip [s]; the seed determines the phase at the start."""
     return _PULSE_LEAD_S + 60.0 / clip_values["pulse_per_min"] * (seed % 1000) / 1000.0 + time_s
 
 
@@ -100,9 +100,9 @@ def pulse_time_s(seed: int, clip_values: Mapping[str, float], time_s: float) -> 
 class _Events:
     """Events of a clip, from which the motion at any time follows.
 
-    blinks : (b,) begin of each blink [s]
-    fixations : (f, 3) begin [s], yaw and pitch [degrees] of each fixation
-    syllables : (s, 4) begin, duration [s], weight of the jaw and number of the lip shape of each syllable
+    blinks : (b,) start of each blink [s]
+    fixations : (f, 3) start [s], yaw and pitch [degrees] of each fixation
+    syllables : (s, 4) start [s], duration [s], weight of the jaw and number of the lip shape of each syllable
     waves : (3, n, 3) amplitude [degrees], frequency [1/s] and phase of the waves of the head's rotation
     """
 
@@ -159,7 +159,7 @@ def _events(seed: int, duration_s: float, clip_items: tuple[tuple[str, float], .
 def _random_times(
     rng: np.random.Generator, rate_per_min: float, min_interval_s: float, end_s: float
 ) -> list[float]:
-    """Return times of random events: intervals are a shortest interval and an exponential random number."""
+    """Return random times, whose intervals are the shortest interval plus an exponential random number."""
     times, time_s = [], -_LEAD_S
     mean_s = max(60.0 / rate_per_min - min_interval_s, 0.1) if rate_per_min else np.inf
     while mean_s < np.inf and (time_s := time_s - mean_s * float(np.log1p(-rng.random()))) < end_s:
@@ -203,6 +203,6 @@ def _waves(rng: np.random.Generator, values: Mapping[str, float]) -> Doubles:
 
 
 def _smooth_step(progress: Doubles | float) -> Doubles:
-    """Return the path of least jerk from 0 to 1."""
+    """Return the minimum-jerk path from 0 to 1."""
     x = np.clip(progress, 0.0, 1.0)
     return np.asarray(x**3 * (10.0 + x * (6.0 * x - 15.0)))

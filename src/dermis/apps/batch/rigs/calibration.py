@@ -1,4 +1,4 @@
-"""Reader of camera calibrations of OpenCV: JSON, and the YAML that OpenCV and ROS write."""
+"""Reader of camera calibrations in OpenCV's conventions: JSON, and YAML as OpenCV and ROS write it."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def parse_opencv_yaml(text: str) -> dict[str, Any]:
     for number, line in _logical_lines(text):
         match = _LINE.match(line)
         if match is None:
-            refuse(f"line {number}", "key: value", f"got {shorten(line.strip(), 60)!r}", "Write it as JSON")
+            refuse(f"line {number}", "key: value", f"got {shorten(line.strip(), 60)!r}", "Convert it to JSON")
         indent, dash = len(match["indent"]), match["dash"]
         while parents[-1][0] >= indent + (_ITEM_INDENT if dash else 0.0):
             parents.pop()
@@ -165,7 +165,7 @@ def _camera_tables(data: object) -> list[tuple[str, Mapping[str, Any]]]:
 
 
 def _stereo_tables(data: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
-    """Return the tables of the two cameras of cv2.stereoCalibrate, of which the first is the world."""
+    """Return the tables of the two cameras of cv2.stereoCalibrate, in the coordinates of the first one."""
     tables: list[tuple[str, Mapping[str, Any]]] = []
     for k, (R, t) in enumerate([(np.eye(3).tolist(), [0.0, 0.0, 0.0]), (data["R"], data["T"])], 1):
         own = {

@@ -20,16 +20,16 @@ class RigTable(FrozenModel):
     baseline_mm: Annotated[Distribution | None, NumberField(1, 5000, "mm")] = None
     """Distance of the two cameras of "stereo", by default 120 [mm]."""
     parallel: bool | None = None
-    """Whether the cameras of "stereo" have parallel axes; by default, both look at the same point."""
+    """Whether the cameras of "stereo" have parallel axes; by default they look at the same point."""
     count: Annotated[int | None, Field(ge=2, le=64), BoundsReason("cameras of a light stage")] = None
     """Number of cameras of "orbit", by default 8."""
     arc_deg: Annotated[Distribution | None, NumberField(1, 360, "degrees")] = None
-    """Angle between the first and the last camera of "orbit", by default 180; 360 for a closed circle
-    [degrees]."""
+    """Angle between the first and the last camera of "orbit", by default 180; with 360, they are
+    evenly spaced on a full circle [degrees]."""
     file: str | None = None
-    """Calibrations for "file": JSON or OpenCV's YAML with K, dist, R and t of each camera."""
+    """File of calibrations for "file": JSON or OpenCV's YAML with K, dist, R, t and size of each camera."""
     unit_mm: Annotated[float | None, Field(gt=0, le=1e6), BoundsReason("mm")] = None
     """Length of one unit of the translations in the file, by default 1 [mm]."""
     anchor: Literal["head", "first"] | None = None
-    """Place of the cameras of "file": "head" if R and t are relative to the head's centre (default), or
-    "first" if the first camera is placed by the table [camera]."""
+    """Position of the cameras of "file": "head" (default) if R and t are relative to the head's centre, or
+    "first" if the table [camera] places the first camera, and the others relative to it."""

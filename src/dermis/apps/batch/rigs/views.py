@@ -34,7 +34,7 @@ _STEREO_NAMES = "left", "right"
 
 
 def with_defaults(rig: RigTable | None) -> RigTable | None:
-    """Return a rig with the defaults of its kind, so that a canonical spec states them.
+    """Return a rig with the defaults of its kind, so that they are in the canonical text of the spec.
 
     Raises DermisError for keys of other kinds, and for a missing file.
     """
@@ -43,7 +43,7 @@ def with_defaults(rig: RigTable | None) -> RigTable | None:
     for kind, keys in _KEYS_OF_KIND.items():
         for key in keys:
             if kind != rig.kind and getattr(rig, key) is not None:
-                refuse(f"rig: {key}", f'kind = "{kind}"', f"got {rig.kind!r}", "Remove one of them")
+                refuse(f"rig: {key}", f'kind = "{kind}"', f"got {rig.kind!r}", "Remove it, or change kind")
     if rig.kind == "file" and not rig.file:
         refuse("rig: file", "the name of a file with calibrations", "there is none", "Add it")
     missing = [key for key in _KEYS_OF_KIND[rig.kind] if getattr(rig, key) is None]
@@ -119,7 +119,7 @@ def lens_values(rig: Rig, view: int) -> dict[str, float]:
 def check_rig(
     rig: Rig, distributions: Mapping[str, Distribution], picture_size: tuple[int, int], *, has_lens: bool
 ) -> None:
-    """Raise DermisError for a rig whose cameras the other tables of the spec contradict.
+    """Raise DermisError if other tables of the spec contradict the cameras of a rig.
 
     distributions : distribution of each parameter by its dotted name
     has_lens : whether the spec has a table [lens]
@@ -152,14 +152,14 @@ def _beside(base: Camera, offset_mm: float, picture_size: tuple[int, int], *, is
 
 
 def _orbit_yaw_deg(view: int, count: int, arc_deg: float) -> float:
-    """Return the angle of a camera of an orbit to that of [camera], to the head's left [degrees]."""
+    """Return the angle from the camera of [camera] to a camera of an orbit, to the head's left [degrees]."""
     if arc_deg >= 360.0:
         return 360.0 * view / count
     return arc_deg * (view / (count - 1) - 0.5)
 
 
 def _around(base: Camera, yaw_deg: float) -> Camera:
-    """Return a camera turned about the upward axis through the head's centre."""
+    """Return a camera rotated about the vertical axis through the head's centre."""
     rotation = np.array(angles_matrix((0.0, yaw_deg, 0.0)))
     position, target, up = (_point(rotation @ np.array(one)) for one in (base.position, base.target, base.up))
     return base.replace(position=position, target=target, up=up)

@@ -157,9 +157,9 @@ def view_scale(lens: Lens, K: Doubles, picture_size: tuple[int, int]) -> float:
 
 
 def view_scales(lens: Lens, K: Doubles, picture_size: tuple[int, int]) -> tuple[float, float]:
-    """Return width and height of the pinhole picture that a picture with distortion shows, relative to it.
+    """Return the relative width and height of the pinhole picture that contains a picture with distortion.
 
-    The pinhole picture has its principal point in the middle.
+    Its principal point is in its middle.
 
     K : intrinsic matrix of the picture with distortion [pixel]
     picture_size : width and height [pixel]

@@ -353,8 +353,8 @@ def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating])
 def curves_text(knots_mm: Doubles, radius_mm: NDArray[np.floating]) -> str:
     """Return B-spline curves for Mitsuba as text: a line per control point, an empty line after each curve.
 
-    The text ends with a curve that is too small to be hit: for hits near the end of the last curve,
-    Mitsuba 3.9.1 reads the control points of the next one, and without one it reads invalid memory.
+    The text ends with a curve too small to be hit. For hits near the end of a curve, Mitsuba 3.9.1 reads the
+    control points of the next curve; after the last one it would read invalid memory.
 
     knots_mm : (n, k, 3) points through which the curves pass [mm]
     radius_mm : (n, k) radius at these points [mm]

@@ -1,4 +1,4 @@
-"""Section of the panel for states of the skin, such as a blush."""
+"""Section of the panel with sliders for states of the skin, such as a blush."""
 
 from __future__ import annotations
 

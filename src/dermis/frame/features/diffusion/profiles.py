@@ -54,8 +54,8 @@ class SkinProfiles:
     def _in_bands(self, skin: Skin, rgb_profile: GaussianSum, bands: Bands) -> GaussianSum:
         """Return the profile of a skin at three wavelengths.
 
-        It is computed from pigments; for profiles that are given in red, green and blue, the weights of their
-        Gaussians are upsampled like colours.
+        It is computed from pigments. For profiles given in red, green and blue, the weights of the Gaussians
+        are upsampled like colours.
         """
         if find_gaussians(skin.profile) is None and (tissue := skin_tissue(skin)).rgb is not None:
             key = (*_tissue_key(skin), bands)

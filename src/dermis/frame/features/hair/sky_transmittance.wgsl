@@ -1,5 +1,5 @@
 // Marches from each cell of the grid of strand_sky.wgsl in directions all around, and fits linear functions of direction to the
-// transmittances: T(d) = c0 + c . d. Also sums the moments of the light of the sky past hair.
+// transmittances: T(d) = c0 + c . d. Also sums the moments of the light of the environment that passes hair.
 //#include "sky_grid.wgsl"
 //#include "environment_record.wgsl"
 

@@ -79,8 +79,8 @@ fn sky_grid() -> SkyGrid {
     return make_sky_grid(low, high);
 }
 
-// Position in the grid: the cell with the lowest indices of the eight around a point, the weights of the upper ones, and how far the
-// point is outside, where transmittance increases to 1.
+// Position in the grid: of the eight cells around a point the one with the lowest indices, the weights of the upper cells along each
+// axis, and how far the point is outside the grid, where transmittance increases to 1.
 struct SkyPosition {
     low: vec3u,
     upper: vec3f,
@@ -120,8 +120,8 @@ fn sky_transmittance_at(grid: SkyGrid, p: vec3f) -> SkyTransmittance {
     return SkyTransmittance(mix(sum.hair, clear, position.outside), mix(sum.all, clear, position.outside));
 }
 
-// Light of the sky that a surface receives past hair, in units of `received`.
-// open: light without hair
+// Light of the environment that passes hair and reaches a surface, in units of `received`.
+// open: the same without hair
 fn received_past_hair(grid: SkyGrid, p: vec3f, normal: vec3f, open: f32) -> f32 {
     if (any(grid.cell <= vec3f(0.0))) {
         return open;

@@ -148,7 +148,7 @@ fn radiance_of(knot: Knot) -> vec3f {
     let absorbed = 1.0 - forth - back;
     var sky = SkyTransmittance(vec4f(0.0), vec4f(0.0));
     if (ENVIRONMENT) {
-        // strands that are seen lie on top of the hair of their cell
+        // visible strands are on top of the hair in their cell
         let grid = sky_grid();
         sky = sky_transmittance_at(grid, knot.position + 0.5 * grid.cell * knot.normal);
         let past_hair = irradiance_past_hair(knot.position, knot.normal);

@@ -79,7 +79,7 @@ fn total_visibility(light: Light, point: Point, l: vec3f) -> f32 {
     return visibility(light, point, l) * strand_transmittance(light, point.position);
 }
 
-// Fraction of the irradiance by the sky that passes hair.
+// Fraction of the irradiance by the environment that passes hair.
 fn irradiance_past_hair(p: vec3f, normal: vec3f) -> f32 {
     let moments = SkyMoments(environment.sky_moments[0], environment.sky_moments[1].xyz, environment.sky_moments[2].xyz);
     let open = max(received(moments, normal), 1e-4);
@@ -92,7 +92,7 @@ fn below_hair(point: Point) -> vec3f {
     return point.position - sky_grid().cell * point.normal;
 }
 
-// Fraction of the light of the sky from a direction that hair transmits to a point; 1 without occlusion.
+// Fraction of the light of the environment from a direction that hair transmits to a point; 1 without occlusion.
 fn sky_past_hair(point: Point, direction: vec3f) -> f32 {
     if (!STRANDS || environment.occluded == 0u) {
         return 1.0;

@@ -1,4 +1,4 @@
-"""Heads and lights in bands: wavelengths take the place of red, green and blue."""
+"""Heads and lights for spectral frames, in which wavelengths take the place of red, green and blue."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _HAIR_COLOURS = ("dark", "white", "dye")
 
 
 def band_constants(bands: Bands | None) -> Constants:
-    """Return the pipeline constant of shaders with colours of their own; empty for red, green and blue."""
+    """Return the constant of shaders that convert RGB colours to bands; empty for red, green and blue."""
     return () if bands is None else (("BANDS", 1),)
 
 

@@ -1,4 +1,4 @@
-"""Hairs of a head in a USD stage: curves that move with bones and, except scalp hair, with blend shapes."""
+"""Hairs of a head in a USD stage: curves that follow bones and, except for scalp hair, blend shapes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _MIN_DISPLACEMENT_MM = 0.05  # smaller displacements of hairs count as 0
 
 @dataclass(frozen=True, eq=False)
 class HairCurves:
-    """Hairs of one group as linear curves through the knots that their shape needs.
+    """Hairs of one group as linear curves through as few knots as their shape needs.
 
     name : name of the group, such as "brows"
     strands : strands of the group
@@ -68,7 +68,7 @@ class HairCurves:
         return prim
 
     def bind(self, skeleton_path: Sdf.Path, curves_prim: Usd.Prim) -> UsdSkel.BindingAPI:
-        """Bind the curves to the skeleton: scalp hair to the bone of its roots, other hair as the skin is."""
+        """Bind the curves to the skeleton: scalp hair to one bone, other hair like the skin at its roots."""
         bone: Numbers = np.zeros((1, 1))
         weight: Numbers = np.ones((1, 1))
         if self.deformable.rig.skeleton is not None and self.name == SCALP_HAIR:
