@@ -19,7 +19,7 @@ from dermis.mesh.maps import Maps
 from dermis.optics.media import SKIN_ETA
 
 LOD_FILE_MEANINGS = {
-    "*_LOD0.glb": "head, eyes, hair and rig in full detail, with a plain skin material; metres, Y up",
+    "*_LOD0.glb": "all parts of the head in full detail, with a plain skin material; metres, Y up",
     "*_LOD1.glb": "the same with the coarsest mesh and a quarter of the hairs, for small or distant heads",
 }
 _HAIR_DETAIL = 1.0, 0.25  # fraction of the tubes and ribbons in each level of detail
