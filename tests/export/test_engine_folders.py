@@ -26,8 +26,10 @@ from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.targets.unity.project import asset_guid, guid_vector
 from dermis.apps.export.targets.unreal.target import Unreal
+from dermis.gpu import failures
 from dermis.human.person_file import write_person_json
 from dermis.images.colour import decode_srgb
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.maps import Maps
 
 NAME = "person"
@@ -131,6 +133,21 @@ def test_levels_of_detail_have_slots_and_morphs(target: str, start: str, unity: 
         attributes = [one["primitives"][0]["attributes"]["POSITION"] for one in meshes.values()]
         counts.append(sum(tree["accessors"][index]["count"] for index in attributes))
     assert counts[1] < 0.5 * counts[0]
+
+
+def test_eyes_of_all_levels_are_painted_once_on_the_chosen_adapter(
+    person: Subject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    adapters, paint = list[str](), failures.run_on_device
+    monkeypatch.setattr(
+        failures, "run_on_device", lambda adapter, job: (adapters.append(adapter), paint(adapter, job))[1]
+    )
+    assert person.scene is not None and person.head is not None and person.head.eyes is not None
+    eyes = person.head.eyes.with_look(EyeLook(seed=5))  # not painted before
+    head = replace(person.head, eyes=eyes)
+    fresh = replace(person, scene=person.scene.replace(head=head))
+    export_skin(fresh, "unity", tmp_path / "project", adapter="cpu")
+    assert adapters == ["cpu"]
 
 
 def test_unreal_script_refers_to_the_written_files(unreal: Path, person: Subject) -> None:

@@ -36,7 +36,9 @@ def lod_files(subject: Subject, stem: str) -> Iterator[tuple[str, bytes]]:
         return
     heads = [subject.scene.head]
     if subject.person is not None and heads[0].levels > 0:
-        heads.append(subject.person.head(subdivide=0))
+        coarse = subject.person.head(subdivide=0)
+        look = heads[0].eyes and heads[0].eyes.look  # red from crying, for example
+        heads.append(replace(coarse, eyes=coarse.eyes.with_look(look)) if coarse.eyes and look else coarse)
     for level, (head, detail) in enumerate(zip(heads, _HAIR_DETAIL, strict=False)):
         yield f"{stem}_LOD{level}.glb", _encode_mesh(subject, replace(head, name=heads[0].name), detail)
 
