@@ -24,7 +24,9 @@ from dermis import Human
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, load_subject
+from dermis.apps.export.targets import engine_files
 from dermis.apps.export.targets.unity.project import asset_guid, guid_vector
+from dermis.apps.export.targets.unity.target import Unity
 from dermis.apps.export.targets.unreal.target import Unreal
 from dermis.gpu import failures
 from dermis.human.person_file import write_person_json
@@ -138,16 +140,21 @@ def test_levels_of_detail_have_slots_and_morphs(target: str, start: str, unity: 
 def test_eyes_of_all_levels_are_painted_once_on_the_chosen_adapter(
     person: Subject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    adapters, paint = list[str](), failures.run_on_device
+    adapters, paint, painted, given = list[str](), failures.run_on_device, list[object](), list[str]()
     monkeypatch.setattr(
         failures, "run_on_device", lambda adapter, job: (adapters.append(adapter), paint(adapter, job))[1]
     )
+    monkeypatch.setattr(
+        engine_files, "encode_glb", lambda subject, *_: (painted.append(subject.eye_pictures()), b"")[1]
+    )
     assert person.scene is not None and person.head is not None and person.head.eyes is not None
     eyes = person.head.eyes.with_look(EyeLook(seed=5))  # not painted before
-    head = replace(person.head, eyes=eyes)
-    fresh = replace(person, scene=person.scene.replace(head=head))
-    export_skin(fresh, "unity", tmp_path / "project", adapter="cpu")
-    assert adapters == ["cpu"]
+    scene = person.scene.replace(head=replace(person.head, eyes=eyes))
+    assert len(list(engine_files.lod_files(replace(person, scene=scene, adapter="cpu"), NAME))) == 2
+    assert adapters == ["cpu"] and painted[0] is painted[1]
+    monkeypatch.setattr(Unity, "write", lambda _, subject, *rest: (given.append(subject.adapter), [])[1])
+    export_skin(person, "unity", tmp_path / "project", adapter="cpu")
+    assert given == ["cpu"]
 
 
 def test_unreal_script_refers_to_the_written_files(unreal: Path, person: Subject) -> None:
