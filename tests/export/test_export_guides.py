@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from small_head import write_head
 
-from dermis.apps.export.guide import file_meaning, guide_lines
+from dermis.apps.export.guide import file_meaning, guide_lines, write_preview
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, load_subject
@@ -98,6 +99,19 @@ def test_steps_name_the_written_file(skin1: Subject) -> None:
 def test_names_with_spaces_are_links(skin1: Subject) -> None:
     page = "\n".join(guide_lines(TARGETS["gltf"], skin1, [Path("a|b.glb")], "my a.glb.preview.png"))
     assert "](my%20a.glb.preview.png)" in page and "`a\\|b.glb`" in page
+
+
+def test_picture_has_a_small_atlas(scan: Subject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An atlas of 1024 texels suffices for a small picture; the default of 2048 would double its time."""
+    sides = list[int]()
+
+    def rendered(scene: object, *, atlas: int, **settings: object) -> np.ndarray:
+        sides.append(atlas)
+        return np.zeros((8, 8, 3), np.float32)
+
+    monkeypatch.setattr("dermis.frame.renderer.render", rendered)
+    write_preview(scan, tmp_path / "a.png", 320, "cpu")
+    assert sides == [1024] and (tmp_path / "a.png").is_file()
 
 
 def test_similar_files_share_a_row(skin1: Subject) -> None:

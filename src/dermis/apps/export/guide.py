@@ -86,7 +86,11 @@ def write_preview(subject: Subject, file: Path, width: int, adapter: str) -> Pat
     """
     from dermis.frame.renderer import render
     from dermis.images.io import write_image
+    from dermis.scene.resolved_atlas import atlas_side_for_picture
+    from dermis.scene.settings import Settings
 
     assert subject.scene is not None
-    write_image(file, render(subject.scene, adapter=adapter, size=(width, width), background="gradient"))
+    size = width, width
+    side = atlas_side_for_picture(subject.scene, Settings(size=size))
+    write_image(file, render(subject.scene, adapter=adapter, size=size, atlas=side, background="gradient"))
     return file
