@@ -57,7 +57,7 @@ class OpenPbr(Target):
     versions = ("1.1.1",)
     variants = tuple(_SHADER_BY_VARIANT)
     needs_maps = True
-    import_steps = (
+    import_steps: ClassVar[tuple[str, ...]] = (
         "Import a mesh of the same head, such as an export to `usd` or `gltf`, into a scene in metres.",
         "Import the .mtlx file with the MaterialX editor of the program.",
         "Assign each material to the part with its name.",
