@@ -8,6 +8,7 @@ import json
 import re
 import runpy
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import MagicMock
@@ -17,14 +18,21 @@ import pytest
 import yaml
 from gltf_rules import check_rules
 from PIL import Image
+from small_head import obj_text
 
 from dermis import Human
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.run import export_skin
 from dermis.apps.export.subject import Subject, load_subject
+from dermis.apps.export.targets import engine_files
 from dermis.apps.export.targets.unity.project import asset_guid, guid_vector
+from dermis.apps.export.targets.unity.target import Unity
 from dermis.apps.export.targets.unreal.target import Unreal
+from dermis.gpu import failures
 from dermis.human.person_file import write_person_json
+from dermis.images.colour import decode_srgb
+from dermis.mesh.eye_look import EyeLook
+from dermis.mesh.maps import Maps
 
 NAME = "person"
 
@@ -34,6 +42,14 @@ def person(tmp_path_factory: pytest.TempPathFactory) -> Subject:
     file = tmp_path_factory.mktemp("person") / f"{NAME}.json"
     write_person_json(file, Human.sampled(7))
     return load_subject(file, subdivide=1, glasses="round").with_painted_maps(256, "cpu")
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+    """Return a head from a file, without rig and maps, whose skin has a name of its own."""
+    file = tmp_path_factory.mktemp("scan") / "face.obj"
+    file.write_text(obj_text().replace("usemtl skin", "usemtl face.002"))
+    return load_subject(file)
 
 
 @pytest.fixture(scope="module")
@@ -121,6 +137,26 @@ def test_levels_of_detail_have_slots_and_morphs(target: str, start: str, unity: 
     assert counts[1] < 0.5 * counts[0]
 
 
+def test_eyes_of_all_levels_are_painted_once_on_the_chosen_adapter(
+    person: Subject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    adapters, paint, painted, given = list[str](), failures.run_on_device, list[object](), list[str]()
+    monkeypatch.setattr(
+        failures, "run_on_device", lambda adapter, job: (adapters.append(adapter), paint(adapter, job))[1]
+    )
+    monkeypatch.setattr(
+        engine_files, "encode_glb", lambda subject, *_: (painted.append(subject.eye_pictures()), b"")[1]
+    )
+    assert person.scene is not None and person.head is not None and person.head.eyes is not None
+    eyes = person.head.eyes.with_look(EyeLook(seed=5))  # not painted before
+    scene = person.scene.replace(head=replace(person.head, eyes=eyes))
+    assert len(list(engine_files.lod_files(replace(person, scene=scene, adapter="cpu"), NAME))) == 2
+    assert adapters == ["cpu"] and painted[0] is painted[1]
+    monkeypatch.setattr(Unity, "write", lambda _, subject, *rest: (given.append(subject.adapter), [])[1])
+    export_skin(person, "unity", tmp_path / "project", adapter="cpu")
+    assert given == ["cpu"]
+
+
 def test_unreal_script_refers_to_the_written_files(unreal: Path, person: Subject) -> None:
     tree = ast.parse((unreal / f"{NAME}.py").read_text("utf-8"))
     values = {
@@ -157,7 +193,7 @@ def test_unreal_script_connects_maps_and_sets_the_skin(unreal: Path, monkeypatch
     mesh_class = type("SkeletalMesh", (MagicMock,), {})
     mesh = mesh_class()
     mesh.get_editor_property.return_value = slots
-    editor.SkeletalMesh = mesh_class
+    editor.SkeletalMesh, editor.StaticMesh = mesh_class, type("StaticMesh", (MagicMock,), {})
     editor.EditorAssetLibrary.does_asset_exist.return_value = False
     editor.EditorAssetLibrary.load_asset.side_effect = lambda path: mesh if path == "mesh" else MagicMock()
     editor.AssetImportTask.return_value.get_editor_property.return_value = ["mesh", "texture"]
@@ -175,6 +211,36 @@ def test_unreal_script_connects_maps_and_sets_the_skin(unreal: Path, monkeypatch
     assert {one.args for one in set_on_skin} == {
         ("material_interface", made.return_value)
     } and not set_on_hair
+
+
+def test_unreal_script_sets_the_skin_of_a_head_without_rig(
+    scan: Subject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The editor imports such a head as a static mesh, and may replace spaces in names of slots."""
+    export_skin(scan, "unreal", tmp_path / "files")
+    editor, slots = MagicMock(), [MagicMock(), MagicMock()]
+    for slot, name in zip(slots, ("face_002_skin", "hair"), strict=True):
+        slot.get_editor_property.return_value = name
+    classes = {name: type(name, (MagicMock,), {}) for name in ("SkeletalMesh", "StaticMesh")}
+    mesh = classes["StaticMesh"]()
+    mesh.get_editor_property.side_effect = {"static_materials": slots}.__getitem__
+    editor.SkeletalMesh, editor.StaticMesh = classes.values()
+    editor.EditorAssetLibrary.load_asset.side_effect = lambda path: mesh if path == "mesh" else MagicMock()
+    editor.AssetImportTask.return_value.get_editor_property.return_value = ["mesh"]
+    monkeypatch.setitem(sys.modules, "unreal", editor)
+    runpy.run_path(str(tmp_path / "files" / f"{scan.identifier}.py"))
+    assert [bool(slot.set_editor_property.call_args_list) for slot in slots] == [True, False]
+    mesh.set_editor_property.assert_called_once_with("static_materials", slots)
+
+
+def test_unity_colour_without_a_map_is_srgb(scan: Subject, tmp_path: Path) -> None:
+    assert scan.scene is not None
+    plain = replace(scan, scene=scan.scene.replace(head=replace(scan.scene.head, maps=Maps())))
+    export_skin(plain, "unity", tmp_path / "project")
+    material = read_yaml(next((tmp_path / "project").glob("Assets/*/*.mat")))
+    colours = {key: one for pair in material["m_SavedProperties"]["m_Colors"] for key, one in pair.items()}
+    written = [colours["_BaseColor"][channel] for channel in "rgb"]
+    np.testing.assert_allclose(decode_srgb(written), scan.albedo, rtol=1e-4)
 
 
 def test_single_files_stay_without_meshes(person: Subject, tmp_path: Path) -> None:

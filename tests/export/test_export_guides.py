@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from small_head import write_head
 
-from dermis.apps.export.guide import file_meaning, guide_lines
+from dermis.apps.export.guide import file_meaning, guide_lines, write_preview
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.run import export_skin
-from dermis.apps.export.subject import Subject
+from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.export.target import Target
 from dermis.images.codecs import png_size
 
@@ -58,6 +59,59 @@ def test_readme_has_a_picture_and_a_licence(tmp_path: Path) -> None:
     page = (tmp_path / "a.glb.md").read_text("utf-8")
     assert f"]({picture.name})" in page and "as its owner states" in page
     assert "MakeHuman" not in page
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+    """Return a head from a file, without morph targets and bones."""
+    return load_subject(write_head(tmp_path_factory.mktemp("scan") / "my face.obj"))
+
+
+@pytest.mark.parametrize("name", list(TARGETS))
+def test_steps_name_nothing_that_a_scan_lacks(name: str, scan: Subject) -> None:
+    files = [Path("a.py"), Path("SK_my_face_LOD0.glb")] if name == "unreal" else [Path("a.glb")]
+    text = " ".join(TARGETS[name].steps(scan, files))
+    for absent in ("NAME", "LOD1", "52 morph", "bones", "shape keys", "variant set", "skin.py"):
+        assert absent not in text
+    if name == "unity":
+        assert "`a`" in text and "`head`" in text and "`my_face_Skin`" in text
+    if name == "unreal":
+        assert "select `a.py`" in text and "`SK_my_face_LOD0`" in text
+
+
+def test_steps_of_a_person_name_expressions_bones_and_levels() -> None:
+    person = load_subject("human", subdivide=0)
+    files = [Path("human.py"), Path("SK_human_LOD0.glb"), Path("SK_human_LOD1.glb")]
+    texts = {name: " ".join(TARGETS[name].steps(person, files)) for name in TARGETS}
+    assert "the 52 morph targets of the mesh `head`, which have the names of ARKit" in texts["gltf"]
+    assert "bones" in texts["gltf"] and "variant set `expression`" in texts["usd"]
+    assert "shape keys" in texts["blender"] and "bones" in texts["blender"]
+    assert "`SK_human_LOD1`" in texts["unity"] and "`SK_human_LOD1`" in texts["unreal"]
+
+
+def test_steps_name_the_written_file(skin1: Subject) -> None:
+    assert "blender --python 'my skin.py'" in TARGETS["blender"].steps(skin1, [Path("my skin.py")])[0]
+    assert "python" not in TARGETS["blender"].steps(skin1, [Path("a.blend")])[0]
+    assert "pbrt a.pbrt" in TARGETS["pbrt"].steps(skin1, [Path("a.pbrt"), Path("b.ply")])[1]
+    assert "MI_skin1" in TARGETS["unreal"].steps(skin1, [Path("a.py")])[2]
+
+
+def test_names_with_spaces_are_links(skin1: Subject) -> None:
+    page = "\n".join(guide_lines(TARGETS["gltf"], skin1, [Path("a|b.glb")], "my a.glb.preview.png"))
+    assert "](my%20a.glb.preview.png)" in page and "`a\\|b.glb`" in page
+
+
+def test_picture_has_a_small_atlas(scan: Subject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An atlas of 1024 texels suffices for a small picture; the default of 2048 would double its time."""
+    sides = list[int]()
+
+    def rendered(scene: object, *, atlas: int, **settings: object) -> np.ndarray:
+        sides.append(atlas)
+        return np.zeros((8, 8, 3), np.float32)
+
+    monkeypatch.setattr("dermis.frame.renderer.render", rendered)
+    write_preview(scan, tmp_path / "a.png", 320, "cpu")
+    assert sides == [1024] and (tmp_path / "a.png").is_file()
 
 
 def test_similar_files_share_a_row(skin1: Subject) -> None:

@@ -32,7 +32,8 @@ AssetImportTask AssetToolsHelpers EditorAssetLibrary LinearColor Material Materi
 MaterialFactoryNew MaterialExpressionScalarParameter MaterialExpressionTextureSampleParameter2D
 MaterialExpressionVectorParameter
 MaterialInstanceConstant MaterialInstanceConstantFactoryNew MaterialProperty MaterialSamplerType
-MaterialShadingModel SkeletalMesh SubsurfaceProfile SubsurfaceProfileFactory TextureCompressionSettings log"""
+MaterialShadingModel SkeletalMesh StaticMesh SubsurfaceProfile SubsurfaceProfileFactory
+TextureCompressionSettings log"""
 EVIL = '"; import os; os._exit(3) # \n'
 
 
@@ -156,6 +157,19 @@ def test_only_export_folders_are_replaced(skin1: Subject, tmp_path: Path) -> Non
     with pytest.raises(DermisError, match=r"a folder that holds export\.json"):
         export_skin(skin1, "unity", tmp_path / "own")
     assert sorted(one.name for one in tmp_path.iterdir()) == ["exported", "own"]
+
+
+@pytest.mark.parametrize("name", ["mine", "none/such"])
+def test_folders_are_checked_before_the_head_is_loaded(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "work.txt").write_text("precious")
+    loaded = MagicMock()
+    monkeypatch.setattr("dermis.apps.export.run.load_subject", loaded)
+    with pytest.raises(DermisError, match=r"expected a (free name|writable path)"):
+        export_skin("human:7", "unity", tmp_path / name)
+    assert not loaded.called and [file.name for file in tmp_path.rglob("*")] == ["mine", "work.txt"]
 
 
 def test_unknown_names_are_reported_with_known_ones(skin1: Subject, tmp_path: Path) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -130,6 +133,19 @@ def test_mitsuba_renders_the_predicted_edge_response(mi: Any) -> None:
         fitted_error = _fitted_error(mi, bench, subject, "smooth", 0)
         naive_error = _naive_error(mi, bench, subject)
     assert fitted_error < EDGE_NOISE < naive_error
+
+
+def test_python_steps_of_the_readme_load_the_scene(mi: Any, ball: Path) -> None:
+    """The code of the README runs in a new interpreter, in which Mitsuba has no variant yet."""
+    steps = [line for line in (ball / "README.md").read_text("utf-8").splitlines() if line[1:3] == ". "]
+    code = [
+        one for one in re.findall("`([^`]*)`", " ".join(steps)) if "mi." in one or one.startswith("import")
+    ]
+    assert len(code) == 3
+    stub = "mi.render = lambda scene: print(len(scene.shapes()))"  # only loads the scene
+    run = [sys.executable, "-c", "\n".join([code[0], code[1], stub, code[2]])]
+    done = subprocess.run(run, cwd=ball, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and int(done.stdout) > 0, done.stderr
 
 
 def _fitted_error(mi: Any, bench: Any, subject: Subject, boundary: str, channel: int) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import re
 import warnings
 from pathlib import Path
@@ -195,7 +196,7 @@ def test_pages_contain_the_pictures(avatar: Subject, target: str, tmp_path: Path
     export_skin(avatar, target, tmp_path / "page.html")
     encoded = re.search(r'id="head"[^>]*>([^<]+)<', (tmp_path / "page.html").read_text("utf-8"))
     assert encoded is not None
-    (tmp_path / "page.glb").write_bytes(base64.b64decode(encoded[1]))
+    (tmp_path / "page.glb").write_bytes(gzip.decompress(base64.b64decode(encoded[1])))
     check_equal_parts(avatar, load_quietly(tmp_path / "page.glb"))
 
 

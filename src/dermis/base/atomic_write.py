@@ -70,6 +70,23 @@ def atomic_folder(path: str | Path, marker_name: str) -> Iterator[Path]:
 
     Raises DermisError for any other existing folder, and for paths that cannot be written.
     """
+    target = _replaceable_folder(path, marker_name)
+    with temporary_folder(target) as temporary:
+        yield temporary
+        _move_folder(temporary, target)
+
+
+def check_output_folder(path: str | Path, marker_name: str) -> None:
+    """Check before a long computation that `atomic_folder` can write a folder.
+
+    Raises DermisError as `atomic_folder` does.
+    """
+    with temporary_folder(_replaceable_folder(path, marker_name)):
+        pass
+
+
+def _replaceable_folder(path: str | Path, marker_name: str) -> Path:
+    """Return the real path of a folder that `atomic_folder` may replace or create."""
     try:
         target = Path(os.path.realpath(path))
         if target.exists() and not (
@@ -79,9 +96,7 @@ def atomic_folder(path: str | Path, marker_name: str) -> Iterator[Path]:
             refuse(path, expected, "something else is there", "Choose another name")
     except (OSError, ValueError) as fault:
         refuse_output(path, fault)
-    with temporary_folder(target) as temporary:
-        yield temporary
-        _move_folder(temporary, target)
+    return target
 
 
 @contextmanager

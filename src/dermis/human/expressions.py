@@ -26,6 +26,12 @@ def expression(name: str) -> dict[str, float]:
     return {target: weight for one, weight in EXPRESSIONS[name].items() for target in expand_sides(one)}
 
 
+def available_expressions(target_names: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of the expressions whose morph targets are all among given names."""
+    known = {*target_names}
+    return tuple(name for name in EXPRESSIONS if expression(name).keys() <= known)
+
+
 def expand_targets(names: Iterable[str]) -> tuple[str, ...]:
     """Return morph target names without duplicates; names without a side become the names for both sides.
 

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from dermis.base.arrays import Index
+from dermis.base.errors import refuse
 from dermis.formats.deformable_mesh import DeformableMesh
 from dermis.formats.gltf.write import part_name
 from dermis.human.landmarks.points import LandmarkPoints, landmark_points
 from dermis.human.landmarks.sets import LANDMARK_SETS, SILHOUETTE_SUFFIX
+from dermis.human.regions.average import is_human
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 
@@ -28,6 +30,9 @@ def correspondence_table(head: Head) -> dict[str, Any]:
     Each landmark is a weighted mean of four points, given as points of USD exports and as vertices of glTF
     exports. Raises DermisError for other heads.
     """
+    if not is_human(head):
+        actual, advice = "its mesh is another one", "Name a person: human, human:7 or a person's .json file"
+        refuse(head.name, "a head of the parametric human", actual, advice)
     sets = [name for name in LANDMARK_SETS if not name.endswith(SILHOUETTE_SUFFIX)]
     return {
         "head": head.name,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from fnmatch import fnmatch
 from pathlib import Path, PurePath
+from urllib.parse import quote
 
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import EXPORT_JSON_MEANING, Target
@@ -38,16 +39,18 @@ def file_meaning(target: Target, file_name: str) -> str:
 def guide_lines(target: Target, subject: Subject, files: Iterable[Path], picture: str) -> list[str]:
     """Return the first sections of the README as lines of Markdown.
 
-    files : paths of the written files, relative to the folder of the README
+    files : paths of the written files, relative to the folder of the README; the main file is first
     picture : name of the picture of the expected result; empty without a picture
     """
-    lines = ["It should look like this:", "", f"![{subject.identifier}]({picture})", ""] if picture else []
+    files = list(files)
+    link = f"![{subject.identifier}]({quote(picture)})"
+    lines = ["It should look like this:", "", link, ""] if picture else []
     if target.untested:
         lines += [f"Not run in {target.title}: the files follow its published documentation.", ""]
     lines += ["## Files", "", "| file | content |", "|---|---|", *_file_rows(target, files), ""]
-    if target.import_steps:
-        steps = [f"{number}. {step}" for number, step in enumerate(target.import_steps, 1)]
-        lines += [f"## Import into {target.title}", "", *steps, ""]
+    if steps := target.steps(subject, files):
+        numbered = [f"{number}. {step}" for number, step in enumerate(steps, 1)]
+        lines += [f"## Import into {target.title}", "", *numbered, ""]
     return [*lines, "## Licence", "", licence_text(subject, target), "", "## Parameters and errors", ""]
 
 
@@ -60,7 +63,8 @@ def _file_rows(target: Target, files: Iterable[Path]) -> Iterator[str]:
         key = meaning if any(letter.isdigit() for letter in file.stem[-3:]) else f"{meaning}\n{name}"
         rows.setdefault(key, []).append(name)
     for key, names in rows.items():
-        shown = f"`{names[0]}`" + (f" and {len(names) - 1} more like it" if len(names) > 1 else "")
+        more = f" and {len(names) - 1} more like it" if len(names) > 1 else ""
+        shown = f"`{names[0]}`{more}".replace("|", "\\|")
         yield f"| {shown} | {key.partition(chr(10))[0]} |"
 
 
@@ -82,7 +86,11 @@ def write_preview(subject: Subject, file: Path, width: int, adapter: str) -> Pat
     """
     from dermis.frame.renderer import render
     from dermis.images.io import write_image
+    from dermis.scene.resolved_atlas import atlas_side_for_picture
+    from dermis.scene.settings import Settings
 
     assert subject.scene is not None
-    write_image(file, render(subject.scene, adapter=adapter, size=(width, width), background="gradient"))
+    size = width, width
+    side = atlas_side_for_picture(subject.scene, Settings(size=size))
+    write_image(file, render(subject.scene, adapter=adapter, size=size, atlas=side, background="gradient"))
     return file

@@ -14,7 +14,13 @@ from dermis.apps.export.guide import PREVIEW_SUFFIX, guide_lines, write_preview
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import ModelName, Subject, load_subject
 from dermis.apps.export.target import Parameters, ParameterValue, Target
-from dermis.base.atomic_write import atomic_file, atomic_folder, check_output, temporary_folder
+from dermis.base.atomic_write import (
+    atomic_file,
+    atomic_folder,
+    check_output,
+    check_output_folder,
+    temporary_folder,
+)
 from dermis.base.errors import notify, refuse
 from dermis.optics.media import Floats
 from dermis.scene.living import SkinState
@@ -239,7 +245,7 @@ def export_skin(
         refuse(given[0], "a subject by name or file", "it is given with a Subject", "Omit this option")
     if subject.part_pictures is not None and target.part_limitations:
         notify(f"{subject.name}: {target.part_limitations}")
-    shown = subject
+    shown = subject = replace(subject, adapter=adapter)
     if target.needs_maps:
         subject = subject.with_painted_maps(side, adapter)
     report = evaluate_export(subject, target, resolved)
@@ -284,13 +290,16 @@ def evaluate_export(subject: Subject, target: Target, version: str) -> ExportRep
 
 
 def _check_output_path(target: Target, output: str | Path) -> Path:
-    """Return the output path; raise DermisError if the target cannot write files with this suffix."""
+    """Return the output path; raise DermisError for an unsupported suffix, and if it cannot be written."""
     path = Path(output)
     if path.suffix.lower() not in target.suffixes:
         allowed = [suffix or "no suffix, for a folder" for suffix in target.suffixes]
         actual = f"its suffix is {path.suffix!r}" if path.suffix else "it has no suffix"
         refuse(output, f"a name that ends in {' or '.join(allowed)}", actual, "Choose one of them")
-    return check_output(path, target.suffixes) if path.suffix else path
+    if path.suffix:
+        return check_output(path, target.suffixes)
+    check_output_folder(path, REPORT_JSON_FILE)
+    return path
 
 
 @contextmanager

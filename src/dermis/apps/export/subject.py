@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -19,6 +19,7 @@ from dermis.formats.part_pictures import PartPictures
 from dermis.formats.samples import SAMPLES
 from dermis.human.person import Human
 from dermis.human.person_file import relief_slopes
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -60,6 +61,7 @@ class Subject:
     tissue : tissue of the skin; None for a table of Gaussians
     scene : scene with the head and its skin; None for a skin without a head
     person : parametric person to whom the head belongs; None for other heads
+    adapter : graphics adapter on which the textures of the eyes are painted
     """
 
     name: str
@@ -69,6 +71,7 @@ class Subject:
     tissue: Tissue | None = None
     scene: Scene | None = None
     person: Human | None = None
+    adapter: str = "auto"
 
     @property
     def head(self) -> Head | None:
@@ -116,14 +119,12 @@ class Subject:
 
     def eye_pictures(self) -> EyeTextures | None:
         """Return the painted textures of the eyes, or None if there are no eyes."""
-        from dermis.frame.features.surface.painting.painted_head import paint_eye, reddened
-        from dermis.gpu.failures import run_on_device
+        from dermis.frame.features.surface.painting.painted_head import reddened
 
         eyes = self.head_or_ball.eyes
         if eyes is None:
             return None
-        look = reddened(eyes.look, self.scene.state if self.scene else None)
-        return run_on_device("auto", lambda device: paint_eye(device, look))
+        return _painted_eye(reddened(eyes.look, self.scene.state if self.scene else None), self.adapter)
 
     def with_painted_maps(self, map_side: int, adapter: str) -> Subject:
         """Return a copy of the subject with the head's procedural maps replaced by arrays of texels.
@@ -158,6 +159,14 @@ class Subject:
             return {}
         pictures, _ = encode_skin_maps(self.head.maps, relief_slopes(self.head))
         return {role: pictures[role] for role in _MAP_ROLES if role in pictures}
+
+
+@lru_cache(maxsize=1)  # levels of detail share the textures
+def _painted_eye(look: EyeLook, adapter: str) -> EyeTextures:
+    from dermis.frame.features.surface.painting.painted_head import paint_eye
+    from dermis.gpu.failures import run_on_device
+
+    return run_on_device(adapter, lambda device: paint_eye(device, look))
 
 
 def load_subject(

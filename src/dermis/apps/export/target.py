@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import ClassVar, TypeVar
 
 import numpy as np
@@ -126,7 +126,7 @@ class Target(ABC):
     untested: ClassVar[bool] = False
     """Whether the exported files have not been tested in the program."""
     import_steps: ClassVar[tuple[str, ...]] = ()
-    """Three steps that import the files into the program, for the README."""
+    """Three steps that import the files into the program, for the README; see `steps`."""
     file_meanings: ClassVar[Mapping[str, str]] = {}
     """Contents of the target's files by the patterns of their names; see `guide.file_meaning` for others."""
     licence: ClassVar[str] = ""
@@ -233,6 +233,23 @@ class Target(ABC):
         """
         suffix = suffix or next(filter(None, self.suffixes))
         return output if output.suffix else output / f"{subject.identifier}{suffix}"
+
+    def steps(self, subject: Subject, files: Sequence[PurePath]) -> tuple[str, ...]:
+        """Return three steps that import the written files of a subject into the program, for the README.
+
+        Parameters
+        ----------
+        subject : Subject
+            Exported skin or head.
+        files : sequence of PurePath
+            Paths of the written files, relative to the folder of the README; the main file is first.
+
+        Returns
+        -------
+        tuple of str
+            `import_steps`, unless the steps depend on the subject or the files.
+        """
+        return self.import_steps
 
     @abstractmethod
     def parameters(self, subject: Subject, version: str) -> Parameters:

@@ -164,6 +164,12 @@ def part_name(material: Material) -> str:
     return "_".join([*(word for word in words if word not in sides), *sides]) or "part"
 
 
+def skin_part_names(head: Head) -> list[str]:
+    """Return the names of the meshes of skin in the file of a head, which list all its morph targets."""
+    used = [head.mesh.materials[index] for index in np.unique(head.mesh.material)]
+    return [part_name(material) for material in used if material.kind == "skin"]
+
+
 def _hair_parts(
     deformable_mesh: DeformableMesh, pictures: dict[str, bytes], hair_detail: float, scalp_hair: bool
 ) -> Iterator[ExportedPart]:

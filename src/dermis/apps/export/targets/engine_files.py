@@ -19,7 +19,7 @@ from dermis.mesh.maps import Maps
 from dermis.optics.media import SKIN_ETA
 
 LOD_FILE_MEANINGS = {
-    "*_LOD0.glb": "head, eyes, hair and rig in full detail, with a plain skin material; metres, Y up",
+    "*_LOD0.glb": "all parts of the head in full detail, with a plain skin material; metres, Y up",
     "*_LOD1.glb": "the same with the coarsest mesh and a quarter of the hairs, for small or distant heads",
 }
 _HAIR_DETAIL = 1.0, 0.25  # fraction of the tubes and ribbons in each level of detail
@@ -36,7 +36,9 @@ def lod_files(subject: Subject, stem: str) -> Iterator[tuple[str, bytes]]:
         return
     heads = [subject.scene.head]
     if subject.person is not None and heads[0].levels > 0:
-        heads.append(subject.person.head(subdivide=0))
+        coarse = subject.person.head(subdivide=0)
+        look = heads[0].eyes and heads[0].eyes.look  # red from crying, for example
+        heads.append(replace(coarse, eyes=coarse.eyes.with_look(look)) if coarse.eyes and look else coarse)
     for level, (head, detail) in enumerate(zip(heads, _HAIR_DETAIL, strict=False)):
         yield f"{stem}_LOD{level}.glb", _encode_mesh(subject, replace(head, name=heads[0].name), detail)
 

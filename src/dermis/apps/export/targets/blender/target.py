@@ -5,9 +5,10 @@ The formulas follow the source of the kernels in the releases 4.5, 5.0 and 5.2 o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import shlex
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -199,15 +200,9 @@ class Blender(Target):
     versions = ("4.5", "5.0", "5.1", "5.2")
     variants = ("random-walk-skin", "random-walk", "burley", "eevee")
     needs_maps = True
-    import_steps = (
-        "Keep the files together, and run `blender --python skin.py`, or run the script in the text editor; "
-        "open a .blend file directly.",
-        "Choose the camera view (numpad 0) and rendered shading.",
-        "Set expressions with the shape keys of the meshes, and poses with the bones.",
-    )
     file_meanings: ClassVar[Mapping[str, str]] = {
         "*.py": "script that builds the scene",
-        "*.glb": "head, eyes, brows, lashes, beard and rig, which the script imports",
+        "*.glb": "all parts of the head except scalp hair, which the script imports",
         "*.npz": "scalp hair, from which the script makes hair curves",
         "*.npy": "panorama of the environment, which the script reads",
         "*.blend": "scene with all pictures",
@@ -218,6 +213,18 @@ class Blender(Target):
         " EEVEE was not tested."
     )
     part_limitations = ""
+
+    def steps(self, subject: Subject, files: Sequence[PurePath]) -> tuple[str, ...]:
+        """Return the steps for a script or a .blend file, and how to move the head, if it has a rig."""
+        name, head = shlex.quote(files[0].name), subject.head_or_ball
+        command = f"blender {'' if files[0].suffix == '.blend' else '--python '}{name}"
+        first = f"Open the scene: `{command}`."
+        if files[0].suffix != ".blend":
+            first = f"Keep the files together, and run `{command}`, or run the script in the text editor."
+        moves = ["expressions with the shape keys of the meshes"] if head.targets else []
+        moves += ["poses with the bones"] if head.bones else []
+        third = f"Set {', and '.join(moves)}." if moves else "Render the picture (F12)."
+        return first, "Choose the camera view (numpad 0) and rendered shading.", third
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return parameters with the subsurface radius whose profile is closest to the reference profile."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PurePath
 from typing import ClassVar
 
 import numpy as np
@@ -21,6 +21,8 @@ from dermis.apps.export.target import (
 )
 from dermis.apps.export.targets.gltf.file import encode_glb
 from dermis.apps.export.targets.gltf.volume import Volume, fit_volume, volume_profile
+from dermis.formats.gltf.write import skin_part_names
+from dermis.human.regions.average import is_human
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.media import SKIN_ETA, Floats
 
@@ -50,13 +52,9 @@ class Gltf(Target):
     versions = ("2.0",)
     variants = (CORE_VARIANT, TRANSMISSION_VARIANT, SCATTER_VARIANT)
     needs_maps = True
-    import_steps = (
-        "Open or import the .glb file: in Blender with File > Import > glTF, or in any viewer.",
-        "Set expressions with the 52 morph targets of the mesh `head`, which have the names of ARKit.",
-        "Turn head, neck and eyes with the bones.",
-    )
+    import_steps = ("Open or import the .glb file: in Blender with File > Import > glTF, or in any viewer.",)
     file_meanings: ClassVar[Mapping[str, str]] = {
-        "*.glb": "head, eyes, hair and rig with their pictures; metres, Y up",
+        "*.glb": "all parts of the head with their pictures; metres, Y up",
     }
     limitations = (
         f"The variants {CORE_VARIANT} and {TRANSMISSION_VARIANT} look like skin in all programs, but light is"
@@ -65,6 +63,21 @@ class Gltf(Target):
         " volume show dark glass; rasterisers use the multiscatter colour as base colour, which is too light."
     )
     part_limitations = ""
+
+    def steps(self, subject: Subject, files: Sequence[PurePath]) -> tuple[str, ...]:
+        """Return `import_steps`, and how to use morph targets and bones, if there are any."""
+        head, second = subject.head_or_ball, "Keep the unit at metres."
+        third = "Add lights: the file contains none."
+        is_person = subject.head is not None and is_human(subject.head)
+        if head.targets:
+            origin = ", which have the names of ARKit" if is_person else ""
+            names = " and ".join(f"`{name}`" for name in skin_part_names(head))
+            second = (
+                f"Set expressions with the {len(head.targets)} morph targets of the mesh {names}{origin}."
+            )
+        if head.bones:
+            third = "Turn head, neck and eyes with the bones." if is_person else "Set poses with the bones."
+        return (*self.import_steps, second, third)
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the material parameters for the variant of this target.

@@ -69,8 +69,9 @@ class Mitsuba(Target):
     needs_maps = True
     import_steps = (
         "Install Mitsuba 3: `pip install mitsuba`.",
-        "Render with `mitsuba scene.xml`, or in Python with `mi.render(mi.load_file('scene.xml'))`.",
-        "For another boundary of the skin, include another of the files `boundary_*.xml`.",
+        "Render with `mitsuba scene.xml`, or in Python, after `import mitsuba as mi`, with "
+        "`mi.set_variant('llvm_ad_rgb', 'scalar_rgb')` and `mi.render(mi.load_file('scene.xml'))`.",
+        "For another boundary of the skin, add `-D boundary=rough`, `smooth` or `matched` to the command.",
     )
     file_meanings: ClassVar[Mapping[str, str]] = {
         "scene.xml": "scene with camera and lights",

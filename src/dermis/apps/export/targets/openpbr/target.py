@@ -6,8 +6,8 @@ medium. The parameters are fitted so that the random walk has the skin's profile
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PurePath
 from typing import ClassVar
 
 import numpy as np
@@ -57,7 +57,7 @@ class OpenPbr(Target):
     versions = ("1.1.1",)
     variants = tuple(_SHADER_BY_VARIANT)
     needs_maps = True
-    import_steps = (
+    import_steps: ClassVar[tuple[str, ...]] = (
         "Import a mesh of the same head, such as an export to `usd` or `gltf`, into a scene in metres.",
         "Import the .mtlx file with the MaterialX editor of the program.",
         "Assign each material to the part with its name.",
@@ -87,6 +87,16 @@ class OpenPbr(Target):
     def uses_burley_profile(self) -> bool:
         """Return whether the radius is the width d of a Burley profile instead of a mean free path."""
         return self.variant.endswith("profile")
+
+    def steps(self, subject: Subject, files: Sequence[PurePath]) -> tuple[str, ...]:
+        """Return `import_steps`; skin without a head has no mesh to import."""
+        if subject.head is not None:
+            return self.import_steps
+        return (
+            "Open a scene in metres with the object that is to have the skin.",
+            self.import_steps[1],
+            "Assign the material to the object.",
+        )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the radii for which the random walk or Burley profile is closest to the reference."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -175,11 +176,6 @@ class Pbrt(Target):
     versions = ("4",)
     needs_maps = True
     untested = True
-    import_steps = (
-        "Build pbrt-v4, and keep the files together.",
-        "Render: `pbrt NAME.pbrt`, with the name of the scene.",
-        "Convert the OpenEXR picture with `imgtool convert`.",
-    )
     file_meanings: ClassVar[Mapping[str, str]] = {
         "*_hair_*.pbrt": "hairs with similar absorption",
         "*_brows_and_lashes_*.pbrt": "brows and lashes with similar absorption",
@@ -196,6 +192,14 @@ class Pbrt(Target):
         "Parts that are not skin do not emit light, and green of their normal maps is inverted where uv is "
         "mirrored."
     )
+
+    def steps(self, subject: Subject, files: Sequence[PurePath]) -> tuple[str, ...]:
+        """Return the steps that render the scene."""
+        return (
+            "Build pbrt-v4, and keep the files together.",
+            f"Render in this folder: `pbrt {shlex.quote(files[0].name)}`.",
+            "Convert the OpenEXR picture with `imgtool convert`.",
+        )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the reflectance, and the mean free paths that bring pbrt's profile closest to the skin's."""

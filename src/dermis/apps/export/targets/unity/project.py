@@ -19,6 +19,7 @@ from dermis.apps.export.targets.engine_files import (
     packed_png,
 )
 from dermis.base.arrays import Floats
+from dermis.images.colour import encode_srgb
 
 HDRP_LIT_GUID = "6e4ae4064600d784cac1e41a9e6f2e59"
 """GUID of the shader HDRP/Lit, the same in all versions of HDRP."""
@@ -119,14 +120,15 @@ def _material(subject: Subject, stem: str, map_names: list[str], profile_name: s
         for name in map_names
     )
     has_colour = "BaseMap" in map_names
-    r, g, b = np.ones(3) if has_colour else subject.clipped_albedo()
+    # Unity stores the colours of materials in sRGB
+    r, g, b = np.ones(3) if has_colour else encode_srgb(subject.clipped_albedo())
     roughness = float(np.sqrt(subject.skin.roughness * subject.skin.roughness_factor))
     x, y, z, w = (f"{number:.9g}" for number in guid_vector(asset_guid(profile_name)).tolist())
     return Template((_FOLDER / "skin.mat.txt").read_text("utf-8")).substitute(
         name=json.dumps(f"{stem}_Skin"),
         shader=HDRP_LIT_GUID,
         keywords="".join(f"  - {name}\n" for name in sorted(keywords)),
-        textures=textures or "    []\n",
+        textures=f"\n{textures}" if textures else " []\n",
         smoothness=f"{1.0 - roughness:.6g}",
         colour=f"{{r: {r:.6g}, g: {g:.6g}, b: {b:.6g}, a: 1}}",
         profile=f"{{r: {x}, g: {y}, b: {z}, a: {w}}}",

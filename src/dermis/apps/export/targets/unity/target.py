@@ -7,8 +7,8 @@ multiplier. The world scale must be the length of a scene unit in metres.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PurePath
 from string import Template
 from typing import ClassVar
 
@@ -28,6 +28,7 @@ from dermis.apps.export.target import (
 )
 from dermis.apps.export.targets.engine_files import LOD_FILE_MEANINGS
 from dermis.apps.export.targets.unity.project import project_files
+from dermis.formats.gltf.write import skin_part_names
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import BurleyProfile, unity_parameters
 from dermis.optics.media import Floats
@@ -58,13 +59,11 @@ class Unity(Target):
     versions = tuple(_FILE_VERSION_BY_HDRP_VERSION)
     needs_maps = True
     import_steps = (
-        "Open the folder as a project in the Unity Hub, and run Window > Rendering > HDRP Wizard > Fix All, "
-        "or copy the subfolder of Assets into a project with HDRP and glTFast. A single .asset goes "
-        "into Assets.",
-        "Drag the mesh NAME_LOD0 into the scene, and set the material of its part `head` to NAME_Skin; the "
-        "mesh NAME_LOD1 is the second level for a LOD Group.",
-        "Select NAME_Skin, choose the diffusion profile in its field, and press Fix to add the profile to "
-        "the list of the project.",
+        "Copy the diffusion profile, and the maps beside it if there are any, into Assets of a project with "
+        "HDRP.",
+        "Create a material of HDRP/Lit with the material type Subsurface Scattering.",
+        "Choose the diffusion profile in the material, and press Fix to add the profile to the list of the "
+        "project.",
     )
     file_meanings: ClassVar[Mapping[str, str]] = {
         "*.meta": "import settings and GUID of the file with this name",
@@ -85,6 +84,26 @@ class Unity(Target):
         "worldScale must be set to the length of a unit."
     )
     untested = True
+
+    def steps(self, subject: Subject, files: Sequence[PurePath]) -> tuple[str, ...]:
+        """Return the steps for a project, or `import_steps` for a profile alone."""
+        meshes = [file.stem for file in files if file.suffix == ".glb"]
+        if not meshes:
+            return self.import_steps
+        parts = " and ".join(f"`{name}`" for name in skin_part_names(subject.head_or_ball))
+        skin = f"`{subject.identifier}_Skin`"
+        second = (
+            f"Drag the mesh `{meshes[0]}` into the scene, and set the material of {parts} in it to {skin}"
+        )
+        if len(meshes) > 1:
+            second += f"; the mesh `{meshes[1]}` is the second level for a LOD Group"
+        return (
+            "Open the folder as a project in the Unity Hub, and run Window > Rendering > HDRP Wizard > Fix "
+            "All, or copy the subfolder of Assets into a project with HDRP and glTFast.",
+            f"{second}.",
+            f"Select {skin}, choose the diffusion profile in its field, and press Fix to add the profile to "
+            "the list of the project.",
+        )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the scattering colour and multiplier for which the profile is closest to the reference."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import ClassVar
 
 import numpy as np
@@ -60,13 +60,6 @@ class Unreal(Target):
     suffixes = ("", ".py")
     versions = (*_VERSIONS_BEFORE_5_8, "5.8")
     needs_maps = True
-    import_steps = (
-        "Keep the files together, and enable the plug-ins Python Editor Script and Interchange.",
-        "Choose Tools > Execute Python Script, and select the script: it imports meshes and maps, and "
-        "creates the subsurface profile, the material and its instance in /Game/Dermis.",
-        "Drag the skeletal mesh SK_NAME_LOD0 into the level; SK_NAME_LOD1 is the second level of detail for "
-        "its LOD settings.",
-    )
     file_meanings: ClassVar[Mapping[str, str]] = {
         "*.py": "script for the editor",
         "T_*_BC.png": "colour of the skin; sRGB",
@@ -83,6 +76,22 @@ class Unreal(Target):
         "they are correct if r.SSProfiles.Transmission.UseLegacy is 0."
     )
     untested = True
+
+    def steps(self, subject: Subject, files: Sequence[PurePath]) -> tuple[str, ...]:
+        """Return the steps that run the script, and how to use the meshes or the material alone."""
+        meshes = [file.stem for file in files if file.suffix == ".glb"]
+        imported = "imports meshes and maps, and " if meshes else ""
+        third = f"Set the material of the skin of a mesh to `MI_{subject.identifier}`."
+        if meshes:
+            third = f"Drag the mesh `{meshes[0]}` into the level."
+        if len(meshes) > 1:
+            third = f"{third[:-1]}; `{meshes[1]}` is the second level of detail for its LOD settings."
+        return (
+            "Keep the files together, and enable the plug-ins Python Editor Script and Interchange.",
+            f"Choose Tools > Execute Python Script, and select `{files[0].name}`: it {imported}creates the "
+            "subsurface profile, the material and its instance in /Game/Dermis.",
+            third,
+        )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the mean free paths for which the engine's Burley profile is closest to the reference."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pxr import Usd, UsdSkel
 
-from dermis.human.expressions import EXPRESSIONS, expression
+from dermis.human.expressions import available_expressions, expression
 from dermis.mesh.pose import Pose
 from dermis.mesh.rig import Rig
 
@@ -25,8 +25,8 @@ def add_expressions(head_prim: Usd.Prim, animation: UsdSkel.Animation, rig: Rig)
         return
     rest = np.zeros(len(rig.targets.names)) if rig.targets.rest is None else rig.targets.rest
     weights = {NEUTRAL: rest}
-    for name in EXPRESSIONS:
-        if name != NEUTRAL and expression(name).keys() <= rig.target_index.keys():
+    for name in available_expressions(rig.targets.names):
+        if name != NEUTRAL:
             weights[name] = rest + Pose(weights=expression(name)).to_arrays(rig).weights
     variants = head_prim.GetVariantSets().AddVariantSet(VARIANT_SET)
     for name, values in weights.items():

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
 from typing import ClassVar
 
@@ -21,6 +21,7 @@ from dermis.apps.export.targets.openpbr.materials import (
 from dermis.apps.export.targets.openpbr.target import OpenPbr, get_radii_mm
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
+from dermis.human.expressions import available_expressions
 
 _PACKAGE_SUFFIX, _BINARY_SUFFIX = ".usdz", ".usdc"
 _METERS_PER_UNIT_PARAMETER = Parameter("metersPerUnit", 1.0, "m", "unit of all lengths, also in materials")
@@ -36,12 +37,10 @@ class Usd(OpenPbr):
     import_steps = (
         "Open the stage in usdview, or import it: in Blender with File > Import > Universal Scene Desc.",
         "Keep the unit at metres; if the program converts it, scale `subsurface_radius` as well.",
-        "Choose an expression with the variant set `expression` of the top prim, or set the weights of blend "
-        "shapes in `skeleton/rest`.",
     )
     file_meanings: ClassVar[Mapping[str, str]] = {
-        "*.usd?": "stage with mesh, rig, hairs and materials; metres, Y up",
-        "*.usd": "stage with mesh, rig, hairs and materials; metres, Y up",
+        "*.usd?": "stage with all parts of the head and their materials; metres, Y up",
+        "*.usd": "stage with all parts of the head and their materials; metres, Y up",
         "*_roughness.png": "roughness of OpenPBR, the square root of Beckmann's m; linear",
     }
     limitations = (
@@ -50,6 +49,25 @@ class Usd(OpenPbr):
         "Programs that convert the unit of a stage must also scale the radii."
     )
     part_limitations = ""
+
+    def steps(self, subject: Subject, files: Sequence[PurePath]) -> tuple[str, ...]:
+        """Return `import_steps`, and how to move the head or, without a rig, how to render it."""
+        names = subject.head_or_ball.targets
+        if len(available_expressions(names)) > 1:  # more than "neutral"
+            last = (
+                "Choose an expression with the variant set `expression` of the top prim, or set the weights "
+                "of blend shapes in `skeleton/rest`."
+            )
+        elif names:
+            last = "Set the weights of blend shapes in `skeleton/rest`."
+        elif subject.head_or_ball.bones:
+            last = "Pose the joints in `skeleton/rest`."
+        else:
+            last = (
+                "Render with OpenPBR as MaterialX nodes, if the program supports these; UsdPreviewSurface "
+                "has no subsurface scattering."
+            )
+        return (*self.import_steps, last)
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the OpenPBR parameters for which the random walk is closest to the reference profile."""

@@ -100,7 +100,7 @@ class Web(Target):
     import_steps = (
         "Open the page in a browser with WebGPU, such as Chrome, Edge or Safari.",
         "Drag with the mouse to turn the head.",
-        "Change light, skin and expression with the panel of the page.",
+        "Change light and skin with the panel of the page; heads with expressions have them there, too.",
     )
     file_meanings: ClassVar[Mapping[str, str]] = {
         "*.html": "web page that renders the head by itself",
