@@ -29,6 +29,7 @@ from dermis.apps.batch.spec_tables import (
     LampTable,
     LightTable,
     PersonTable,
+    StateTable,
 )
 from dermis.apps.gallery.script import Script, find_scripts
 from dermis.base import citations as cite
@@ -68,6 +69,7 @@ SPEC_TABLES: dict[str, type[FrozenModel]] = {
     "[light.key], [light.fill], [light.rim]": LampTable,
     "[environment]": EnvironmentTable,
     "[background]": BackgroundTable,
+    "[state]": StateTable,
     "[clip]": ClipTable,
     "[rig]": RigTable,
     "[blur]": BlurTable,

@@ -115,5 +115,16 @@ def test_invalid_tables_are_refused(tables: dict[str, Any], message: str, tmp_pa
         parse_spec(tables, tmp_path)
 
 
+def test_arrays_have_the_same_numbers_with_and_without_a_picture(tmp_path: Path) -> None:
+    kinds = {"kind": {"choice": ["picture", "gradient"]}, "picture": {"files": "walls/*.png"}}
+    spec = spec_of(tmp_path, background=kinds)
+    assert drawn_here(spec, tmp_path / "out").is_complete
+    images = list(dermis.read_dataset(tmp_path / "out"))
+    names = [image["parameters"]["background.picture"] for image in images]
+    assert None in names and {*names} - {None}
+    lengths = {len(dermis.dataset.arrays(image)["parameters"]) for image in images}
+    assert lengths == {len(dermis.dataset.parameter_names(spec))}
+
+
 def test_without_pictures_specs_are_unchanged() -> None:
     assert "picture" not in parse_spec({"seed": 3}).to_toml()

@@ -104,6 +104,23 @@ def test_pictures_are_averages_in_linear_light_and_labels_those_of_sharp_picture
         assert np.abs(blurred["picture"].astype(int) - other["picture"]).max() > 10
 
 
+def test_the_aperture_is_that_of_the_lens_and_not_of_a_wider_pinhole() -> None:
+    """The distortion needs a wider picture before it is applied, which has another focal length."""
+    blur = {"f_number": 2.0}
+    sharp = {"seed": 4, "count": 1, "blur": blur, "person": {"head": "human"}}
+    distorted = parse_spec(sharp | {"lens": {"k1": -0.6}, "sensor": {}})
+    found = []
+    for spec in (parse_spec(sharp), distorted):
+        builder, parameters = SceneBuilder(spec), spec.parameters(0)
+        scene, _ = builder.build(parameters)
+        found.append(builder.facts(parameters, scene))
+        K = found[-1].picture_K
+        assert K is not None
+        focal_mm = 24.0 * K[1, 1] / spec.size[1]
+        assert found[-1].blur["blur.aperture_mm"] == pytest.approx(focal_mm / 2, rel=1e-5)
+    assert found[0].blur == pytest.approx(found[1].blur, rel=1e-5)
+
+
 def test_moving_people_are_averaged_over_the_exposure() -> None:
     clip = {"frames": 4, "rate_hz": 25, "head_motion_deg": 8}
     render = {"atlas": 64, "samples": 1, "shadow_size": 64, "transmission": "none"}
@@ -127,6 +144,9 @@ def test_moving_people_are_averaged_over_the_exposure() -> None:
     ("tables", "message"),
     [
         ({"blur": {"shutter_ms": 10}}, "blur: shutter_ms: expected a table \\[clip\\]"),
+        ({"blur": {"f_number": -1}}, "^blur: f_number: expected numbers from 0 to 64"),
+        ({"blur": 3}, "^blur: expected a table with samples"),
+        ({"f_number": 2}, r"^spec: f_number: expected this key in \[blur\]"),
         ({"blur": {}}, "blur: expected f_number or shutter_ms above 0"),
         (
             {"blur": {"f_number": 2}, "render": {"tone": "filmic"}},

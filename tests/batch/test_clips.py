@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from moving_head import CAPTURE, write_moving_head
+from small_head import obj_text
 from small_set import drawn_here
 
 import dermis
 from dermis.apps.batch.clips.flow import hidden_points
 from dermis.apps.batch.clips.motion import motion_at, pulse_time_s
 from dermis.apps.batch.goodness_of_fit import fit_tests
+from dermis.apps.batch.movie_files import _on_black
 from dermis.apps.batch.scenes import SceneBuilder
 from dermis.apps.batch.spec import Spec, parse_spec
 from dermis.apps.batch.worker import RunOptions, Worker
@@ -162,6 +164,22 @@ def test_rates_of_blinks_and_shifts_are_those_of_the_spec() -> None:
     np.testing.assert_allclose(np.sqrt((head**2).mean(axis=0)), [2.0, 1.2, 0.8], rtol=0.2)
 
 
+def test_motion_late_in_long_clips_is_as_exact_and_as_fast() -> None:
+    """Times with six digits would be multiples of 10 ms after 1,000 s."""
+    spec = parse_spec({**SMALL, "clip": CLIP | {"frames": 90_000, "rate_hz": 30}, "count": 90_000})
+    for number in (70_001, 70_002):
+        time_s = spec.parameters(number)["clip.time_s"]
+        assert time_s == pytest.approx(number / 30, abs=1e-6)
+    speech = {"speech": 1.0, "syllables_per_s": 4.0}
+    long, short = (motion_at(9, duration, QUIET | speech, 0.4).speech for duration in (3600.0, 2.0))
+    assert long == short and long["jawOpen"] > 0
+
+
+def test_weights_above_1_are_those_of_the_spec() -> None:
+    clip = parse_spec({**SMALL, "pose": {"mouthSmileLeft": 1.4}, "clip": CLIP | {"speech": 0}})
+    assert clip.parameters(2)["pose.mouthSmileLeft"] == 1.4
+
+
 def test_still_people_stay_still_and_the_motion_continues_before_the_clip() -> None:
     still = QUIET | {"head_motion_deg": 0.0}
     assert motion_at(1, 2.0, still, 0.7) == motion_at(1, 2.0, still, 1.9)
@@ -216,18 +234,39 @@ def test_clips_are_exported_as_movies(folder: Path, images: list[dict[str, Any]]
         dermis.dataset.export_movies(folder, tmp_path / "movies")
 
 
+def test_movies_of_pictures_without_a_background_are_over_black() -> None:
+    """Half of white in linear light is 188 in sRGB; uncovered pixels are black whatever their colour."""
+    picture = np.array([[[255, 255, 255, 255], [255, 255, 255, 128], [9, 90, 200, 0]]], np.uint8)
+    assert _on_black(picture).tolist() == [[[255] * 3, [188] * 3, [0] * 3]]
+    np.testing.assert_array_equal(_on_black(picture[..., :3]), picture[..., :3])
+
+
+def test_a_pulse_of_a_mesh_is_refused_as_such(tmp_path: Path) -> None:
+    """The mesh has neither painted skin nor the bone that a pulse nods."""
+    (tmp_path / "head.obj").write_text(obj_text())
+    spec = parse_spec({**SMALL, "person": {"head": "head.obj"}, "landmarks": [], "clip": CLIP}, tmp_path)
+    with pytest.raises(DermisError, match="state: expected a person whose skin is painted"):
+        SceneBuilder(spec).build(spec.parameters(0))
+
+
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"frames": 1}, "clip.*frames: expected"),
+        ({"frames": 1}, "^clip: frames: expected"),
         ({"frames": 4, "motion": "none.csv"}, 'clip: motion: expected "generated", or captures'),
         ({"frames": 4, "pulse_per_min": 5}, "clip: pulse_per_min: expected 0 or 20 and more"),
-        ({"frames": 4, "speech": 2}, "clip.*speech: expected numbers from 0 to 1"),
+        (
+            {"frames": 4, "pulse_per_min": {"uniform": [0, 90]}},
+            "clip: pulse_per_min: expected 0 or 20 and more",
+        ),
+        ({"frames": 4, "speech": 2}, "^clip: speech: expected numbers from 0 to 1"),
     ],
 )
 def test_invalid_tables_are_refused(table: dict[str, Any], message: str) -> None:
     with pytest.raises(DermisError, match=message):
         parse_spec({"clip": table})
+    with pytest.raises(DermisError, match=message):  # the table is named also with a given number
+        parse_spec({"clip": table, "images_per_person": 4})
     with pytest.raises(DermisError, match="images_per_person: expected a multiple of 4"):
         parse_spec({"clip": {"frames": 4}, "images_per_person": 6})
 

@@ -218,16 +218,49 @@ def test_lists_of_cameras_in_yaml_are_read() -> None:
         ({"kind": "file", "file": "rig.json"}, "a table \\[lens\\] for lenses with distortion"),
         ({"kind": "file", "file": "wrong.json"}, "camera 0: R: expected a rotation matrix"),
         ({"kind": "file", "file": "none.json"}, "none.json"),
+        ({"kind": "file", "file": "near.json"}, '0 mm from it.*anchor = "first"'),
     ],
 )
 def test_invalid_rigs_are_refused(rig: dict[str, Any], message: str, tmp_path: Path) -> None:
     K, eye = [[90.0, 0, 31.5], [0, 90.0, 31.5], [0, 0, 1]], np.eye(3).tolist()
     two = [{"K": K, "R": eye, "t": [0, 0, 900], "size": [64, 64], "dist": LENS}] * 2
     (tmp_path / "rig.json").write_text(json.dumps({"cameras": two}))
+    near = [{**one, "name": name, "t": [0, 0, 0], "dist": []} for name, one in zip("ab", two, strict=True)]
+    (tmp_path / "near.json").write_text(json.dumps({"cameras": near}))
     wrong = [{**one, "R": (2 * np.eye(3)).tolist()} for one in two]
     (tmp_path / "wrong.json").write_text(json.dumps({"cameras": wrong}))
     with pytest.raises(DermisError, match=message):
         parse_spec({"rig": rig}, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"dist": "none"}, "camera 0: dist: expected a list of numbers, but got 'none'"),
+        ({"dist": [[0.1, 0], [0]]}, "camera 0: dist: expected a list of numbers"),
+        ({"t": [[1, 2], [3]]}, "camera 0: t: expected a list of numbers"),
+        ({"size": [64, "high"]}, "camera 0: size: expected a list of numbers"),
+        ({"K": {"rows": "three", "cols": 3, "data": [1]}}, "K: expected a list of numbers"),
+        (
+            {"dist": [0.1, 0, 0, 0], "distortion_model": "equidistant"},
+            "distortion_model: expected one of plumb_bob",
+        ),
+        ({"name": 1}, "a name of its own for each camera"),
+        ({"K": None}, "K: expected the intrinsic matrix"),
+    ],
+)
+def test_damaged_cameras_are_refused(change: dict[str, Any], message: str, tmp_path: Path) -> None:
+    good = {"K": [[90.0, 0, 31.5], [0, 90.0, 31.5], [0, 0, 1]], "R": np.eye(3).tolist()}
+    good |= {"t": [0, 0, 900], "size": [64, 64]}
+    (tmp_path / "rig.json").write_text(json.dumps({"cameras": [good | change, good, good]}))
+    with pytest.raises(DermisError, match=message):
+        load_calibrations(tmp_path / "rig.json")
+
+
+def test_entries_that_are_no_cameras_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "rig.json").write_text(json.dumps({"cameras": [3, 4]}))
+    with pytest.raises(DermisError, match="camera 0: camera: expected a table"):
+        load_calibrations(tmp_path / "rig.json")
 
 
 def test_without_the_table_specs_are_unchanged() -> None:

@@ -15,7 +15,9 @@ from dermis.apps.batch.cameras import face_hull_indices
 from dermis.apps.batch.lighting import blackbody_colour, sampled_lights
 from dermis.apps.batch.scenes import SceneBuilder, sampled_person
 from dermis.apps.batch.spec import Spec, example_toml, parse_spec
+from dermis.apps.batch.spec_tables import StateTable
 from dermis.base.errors import DermisError
+from dermis.human.living.zones import STATE_NAMES
 from dermis.human.person import Human
 from dermis.human.person_file import write_person_json
 from dermis.mesh.pose import Pose
@@ -243,3 +245,39 @@ def test_a_sampled_person_is_released_after_its_images() -> None:
     builder.build(spec.parameters(1))
     gc.collect()
     assert first() is None
+
+
+def test_states_of_the_skin_are_sampled_recorded_and_rendered() -> None:
+    """Clips keep their state, beside the pulse, and other parameters are as without the table."""
+    state = {"state": {"blush": {"uniform": [0.2, 1]}, "cold": 0}}
+    clip = {"clip": {"frames": 2, "pulse_per_min": 60}}
+    plain, stated, moving = spec(""), spec("", **state), spec("", **state, **clip)
+    builder, weights = SceneBuilder(stated), []
+    for number in range(3):
+        parameters = stated.parameters(number)
+        assert parameters == plain.parameters(number) | {
+            name: parameters[name] for name in ("state.blush", "state.cold")
+        }
+        weights.append(parameters["state.blush"])
+        assert [moving.parameters(2 * number + k)["state.blush"] for k in (0, 1)] == [weights[-1]] * 2
+    scene, _ = builder.build(stated.parameters(1))
+    assert scene.state is not None and scene.state.weights == {"blush": weights[1]}
+    beating, _ = SceneBuilder(moving).build(moving.parameters(3))
+    assert beating.state is not None and beating.state.weights == {"blush": weights[1]}
+    assert beating.state.blood is not None and len({*weights}) == 3
+    assert builder.build(plain.parameters(0))[0].state is None and "[state]" not in plain.to_toml()
+    assert tuple(StateTable.model_fields) == STATE_NAMES
+    assert {"state.blush", "state.cold"} <= {*stated.parameter_names}
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"blush": 2}, "^state: blush: expected numbers from 0 to 1"),
+        ({"heat": 1}, "^state: heat: expected one of blush, pallor"),
+        (0.5, "^state: expected a table with blush"),
+    ],
+)
+def test_invalid_states_are_refused(table: object, message: str) -> None:
+    with pytest.raises(DermisError, match=message):
+        spec("", state=table)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dermis.base.errors import DermisError
+import dermis
+from dermis.base.errors import DermisError, DermisWarning
 from dermis.cli.spectral_options import SpectralOptions
 
 EXR, PNG = Path("cube.exr"), Path("face.png")
@@ -26,6 +28,24 @@ def test_bands_by_number_and_by_wavelength(tmp_path: Path) -> None:
     night = tmp_path / "night.csv"
     night.write_text("".join(f"{nm},1,1,{float(nm < 800)}\n" for nm in range(400, 1001, 10)))
     assert SpectralOptions(light_spectrum="A", camera_sensitivity=night).bands == 61
+    assert SpectralOptions("660,").bands == [660.0]
+
+
+def test_bands_end_where_the_camera_sees_nothing_or_the_lamp_is_unknown(tmp_path: Path) -> None:
+    """A tail at 741 nm needs a band at 750 nm; D65 is known to 780 nm."""
+    camera = tmp_path / "camera.csv"
+    for last, count, notes in ((720, 31, 0), (741, 36, 0), (780, 39, 0), (900, 39, 1)):
+        camera.write_text("".join(f"{nm},1,1,{float(nm <= last)}\n" for nm in range(400, last + 1)))
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            options = SpectralOptions(camera_sensitivity=camera)
+            assert options.bands == count
+        assert len(found) == notes, last
+        if notes:
+            assert "the power of D65 is known from 380 to 780 nm only" in str(found[0].message)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DermisWarning)
+        check(options, PNG)
 
 
 @pytest.mark.parametrize(
@@ -46,6 +66,15 @@ def test_bands_by_number_and_by_wavelength(tmp_path: Path) -> None:
 def test_combinations_that_are_refused(options: SpectralOptions, extra: dict[str, Any], message: str) -> None:
     with pytest.raises(DermisError, match=message):
         check(options, **extra)
+
+
+def test_a_tone_curve_of_a_scene_file_is_refused() -> None:
+    """Before anything is rendered; it would be left out silently."""
+    settings = dermis.Settings(tone="filmic")
+    with pytest.raises(
+        DermisError, match=r"--tone: expected none with spectra, but got filmic\. Add --tone none"
+    ):
+        SpectralOptions(light_spectrum="A").render(None, None, settings, PNG)  # type: ignore[arg-type]
 
 
 def test_damaged_sensitivities_are_refused(tmp_path: Path) -> None:

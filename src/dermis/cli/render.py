@@ -116,7 +116,8 @@ def render(
                 lines = spectra.render(renderer, loaded_scene, settings, output)
                 landmark_output.write(renderer, loaded_scene, settings)
                 summary = f"{output}  {time.perf_counter() - started:.1f} s on {renderer.device.adapter.name}"
-                print_report(False, {}, lambda: [summary, *lines])
+                attribution = [loaded_scene.head.attribution]
+                print_report(False, {}, lambda: [summary, *lines, *filter(None, attribution)])
                 return 0
             rendered = renderer.draw(loaded_scene, settings, timed=False, outputs=frame_outputs.names)
             values = {name: rendered.output(name) for name in frame_outputs.names}

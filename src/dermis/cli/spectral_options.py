@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from dermis.scene.settings import Settings
 
 _DEFAULT_LAMP = "D65"
+_LAST_NM_OF_31_BANDS = 720.0  # spectra are constant beyond 700 nm, at which eyes hardly see
 _SKIN_CLASSES = ("skin", "nose", "neck", "right_ear", "left_ear")
 
 
@@ -83,8 +85,7 @@ class SpectralOptions:
             )
         if as_json:
             refuse("--json", "a picture without spectra", "it is given", "Leave it out")
-        if not is_exr and settings.get("tone", "none") != "none":
-            refuse("--tone", "none with spectra", f"got {settings['tone']}", "Leave it out, or write .exr")
+        _check_tone(output, settings.get("tone", "none"), "Leave it out, or write .exr")
         from dermis.frame.spectral import band_wavelengths
         from dermis.optics.lamps import band_power, read_sensitivities
 
@@ -104,32 +105,41 @@ class SpectralOptions:
         Raises DermisError for invalid syntax.
         """
         if self.spectral is None:
-            from dermis.frame.spectral import MAX_BANDS
             from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 
-            return MAX_BANDS if self._sees_infrared() else len(WAVELENGTHS_NM)
+            return self._camera_bands() or len(WAVELENGTHS_NM)
         try:
             if "," not in self.spectral:
                 return int(self.spectral)
-            return [float(part) for part in self.spectral.split(",")]
+            return [float(part) for part in self.spectral.removesuffix(",").split(",")]
         except ValueError:
             expected = "a number of bands, or wavelengths in nm with commas"
             refuse("--spectral", expected, f"got {self.spectral!r}", "Write 31, or 660,940")
 
-    def _sees_infrared(self) -> bool:
-        """Return whether the camera of --camera-sensitivity responds to light of more than 720 nm."""
+    def _camera_bands(self) -> int:
+        """Return the number of bands that a camera needs which sees more than 720 nm; 0 for others.
+
+        Light at wavelengths at which the power of the lamp is not known is left out.
+        """
         if self.camera_sensitivity is None:
-            return False
-        from dermis.optics.lamps import read_sensitivities
+            return 0
+        from dermis.frame.spectral import BAND_NM, FIRST_BAND_NM, MAX_BANDS
+        from dermis.optics.lamps import power_ends_nm, read_sensitivities, seen_wavelengths
 
         grid, response = read_sensitivities(self.camera_sensitivity, self.lamp)
-        return bool((response[:, grid > 720.0] > 0.01 * response.max()).any())
+        last_nm = float(seen_wavelengths(grid, response)[-1])
+        if last_nm <= _LAST_NM_OF_31_BANDS:
+            return 0
+        longer = math.ceil((last_nm - FIRST_BAND_NM) / BAND_NM)
+        is_known = FIRST_BAND_NM + BAND_NM * longer <= power_ends_nm(self.lamp)[1]
+        return min(longer + 1 if is_known else longer, MAX_BANDS)
 
     def render(self, renderer: Renderer, scene: Scene, settings: Settings, output: Path) -> list[str]:
         """Render a spectral picture, write it, and return lines for the report."""
         from dermis.frame.spectral import render_spectrum
         from dermis.images.io import write_image
 
+        _check_tone(output, settings.tone, "Add --tone none, or write .exr")  # of a scene file
         picture = render_spectrum(renderer, scene, settings, self.bands)
         if self.spectral is not None:
             return self._write_cube(picture, output)
@@ -161,6 +171,12 @@ class SpectralOptions:
 
 
 NO_SPECTRA = SpectralOptions()
+
+
+def _check_tone(output: Path, tone: str, advice: str) -> None:
+    """Raise DermisError for a tone curve, which colours that are computed from spectra do not have."""
+    if output.suffix.lower() != ".exr" and tone != "none":
+        refuse("--tone", "none with spectra", f"got {tone}", advice)
 
 
 def _with_alpha(colours: Floats, picture: SpectralPicture, output: Path) -> Floats:

@@ -16,7 +16,13 @@ from dermis.frame.renderer import Renderer
 from dermis.images.colour import XYZ_OF_REC709
 from dermis.images.colour_spaces import BRADFORD_MATRIX
 from dermis.optics.bands import Bands, rgb_spectra
-from dermis.optics.lamps import band_power, read_sensitivities, sensor_weights, xyz_weights
+from dermis.optics.lamps import (
+    band_power,
+    read_sensitivities,
+    seen_wavelengths,
+    sensor_weights,
+    xyz_weights,
+)
 from dermis.optics.pigments.spectra import (
     LONGEST_WAVELENGTH_NM,
     SHORTEST_WAVELENGTH_NM,
@@ -135,7 +141,7 @@ class SpectralPicture(ShortRepr):
             For invalid files, and for spectra that do not cover the sensitivities.
         """
         grid, response = read_sensitivities(sensitivities, lamp)
-        seen = grid[response.max(axis=0) > 0.01 * response.max()]
+        seen = seen_wavelengths(grid, response)
         self._check_covers(max(seen[0], WAVELENGTHS_NM[0]), seen[-1])
         return self._with_backdrop(sensor_weights(lamp, grid, response, self.wavelengths_nm))
 

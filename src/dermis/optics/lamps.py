@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.base.errors import refuse
+from dermis.base.errors import notify, refuse
 from dermis.base.number_table import read_number_table
 from dermis.optics.media import Floats
 from dermis.optics.pigments.spectra import (
@@ -27,6 +27,7 @@ _TABULATED = {
 _VISIBLE_NM = np.arange(SHORTEST_WAVELENGTH_NM, LONGEST_VISIBLE_NM + 1.0, 1.0)
 _TABLE_NM = _VISIBLE_NM[::5]  # wavelengths of the tables of CIE
 _BAND_NM = 10.0
+_MIN_SEEN_RESPONSE = 0.01  # relative to the largest response
 _MIN_SIGNAL = 1e-12  # smallest signal of white by which others are divided
 _D65_AT_560_NM = 100.0
 _INCANDESCENT_NM = (
@@ -44,7 +45,7 @@ def band_power(lamp: str | Path, wavelength_nm: Floats) -> Floats:
     lamp, wavelength_nm : as in `lamp_power`
     """
     offset = np.linspace(-_BAND_NM, _BAND_NM, 2 * int(_BAND_NM) + 1)
-    ends = _power_ends_nm(str(lamp))
+    ends = power_ends_nm(str(lamp))
     lamp_power(lamp, wavelength_nm)  # refuses wavelengths beyond the table
     power = lamp_power(lamp, np.clip(wavelength_nm[:, None] + offset, *ends))
     return np.asarray(np.average(power, axis=1, weights=_BAND_NM - np.abs(offset)))
@@ -60,7 +61,7 @@ def xyz_weights(lamp: str | Path, wavelength_nm: Floats) -> Floats:
 
     Source: [CIE2018].
     """
-    low, high = _power_ends_nm(str(lamp))
+    low, high = power_ends_nm(str(lamp))
     grid = _TABLE_NM if lamp in LAMPS else _VISIBLE_NM
     grid = grid[(grid >= low) & (grid <= high)]
     observer = np.array([interpolate_spectrum("cie-1931-d65", f"{axis}_bar", grid) for axis in "xyz"])
@@ -93,14 +94,15 @@ def _checked_sums(lamp: str | Path, signals: Floats) -> Floats:
 def read_sensitivities(path: str | Path, lamp: str | Path) -> tuple[Floats, Floats]:
     """Return wavelengths (m,) [nm] and the sensitivities (3, m) of a camera in a CSV file, every nanometre.
 
-    The wavelengths are those of the file for which the power of the lamp is known.
+    The wavelengths are those of the file for which the power of the lamp is known. A warning states others
+    that the camera sees.
 
     Raises DermisError for a file that cannot be read, and for values that are not sensitivities.
     """
     expected = "a CSV file of wavelength [nm] and the sensitivities of red, green and blue"
     table = read_number_table(path, expected, (4,), "wavelength [nm] and three sensitivities in each line")
     check_spectra(path, table)
-    low, high = _power_ends_nm(str(lamp))
+    low, high = power_ends_nm(str(lamp))
     first, last = max(table[0, 0], low), min(table[-1, 0], high)
     if last - first < _BAND_NM:
         actual = f"got {first:g} to {last:g} nm"
@@ -109,7 +111,22 @@ def read_sensitivities(path: str | Path, lamp: str | Path) -> tuple[Floats, Floa
     relative = table.T[1:] / table[:, 1:].max()
     response = np.array([np.interp(grid, table[:, 0], column) for column in relative])
     _checked_sums(path, response.sum(axis=1))
+    seen = seen_wavelengths(table[:, 0], relative)
+    if (seen < low).any() or (seen > high).any():
+        notify(
+            f"{path}: the camera sees {seen[0]:g} to {seen[-1]:g} nm, but the power of {lamp} is known from "
+            f"{low:g} to {high:g} nm only: other light is left out"
+        )
     return grid, response
+
+
+def seen_wavelengths(grid_nm: Floats, sensitivity: Floats) -> Floats:
+    """Return the wavelengths (k,) at which a sensor of a camera has more than 1 % of the largest response.
+
+    grid_nm : (m,) wavelengths [nm]
+    sensitivity : (c, m) responses of the sensors [-]
+    """
+    return np.asarray(grid_nm[sensitivity.max(axis=0) > _MIN_SEEN_RESPONSE * sensitivity.max()])
 
 
 def lamp_power(lamp: str | Path, wavelength_nm: Floats) -> Floats:
@@ -127,7 +144,7 @@ def lamp_power(lamp: str | Path, wavelength_nm: Floats) -> Floats:
     return _raw_power(str(lamp), np.asarray(wavelength_nm, np.float64)) * _scale(str(lamp))
 
 
-def _power_ends_nm(lamp: str) -> tuple[float, float]:
+def power_ends_nm(lamp: str) -> tuple[float, float]:
     """Return the shortest and the longest wavelength at which the power of a lamp is known [nm]."""
     if lamp in _TABULATED:
         return SHORTEST_WAVELENGTH_NM, LONGEST_VISIBLE_NM

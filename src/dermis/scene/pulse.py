@@ -169,9 +169,10 @@ class Pulse(FrozenModel):
         DermisError
             For an invalid time, and for heads without painted skin.
         """
-        from dermis.scene.living import SkinState
+        from dermis.scene.living import SkinState, check_living_head
         from dermis.scene.pulse_files import with_nod
 
+        check_living_head(scene.head, scene.skin.albedo)  # before the pose, for which a head may lack bones
         sample = self.at(seconds)
         weights = scene.state.weights if scene.state else {}
         pose = scene.pose if self.head_motion_mm == 0.0 else with_nod(scene.pose, sample.nod_degrees)

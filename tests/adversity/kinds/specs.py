@@ -11,7 +11,7 @@ from adversity.kind import Kind
 from adversity.kinds.pictures import picture_bytes
 
 _MORE = """
-images_per_person = 2
+images_per_person = 4
 [person.skin]
 melanin = {log_uniform = [0.005, 0.2]}
 [person.hair]
@@ -26,6 +26,19 @@ mouthSmile = 0.4
 jawOpen = {uniform = [0, 0.3]}
 [environment]
 name = {files = "*.hdr"}
+[state]
+blush = {uniform = [0, 1]}
+[clip]
+frames = 2
+flow = true
+speech = {choice = [0, {uniform = [0.3, 1]}]}
+pulse_per_min = {truncated = [70, 10, 50, 110]}
+[rig]
+kind = "stereo"
+baseline_mm = {uniform = [50, 200]}
+[blur]
+f_number = {choice = [1.4, 8]}
+shutter_ms = 20
 [[correlated]]
 of = ["camera.yaw_deg", "camera.pitch_deg", "head.yaw_deg"]
 correlation = [[1, 0.2, 0.5], [0.2, 1, 0], [0.5, 0, 1]]

@@ -86,6 +86,7 @@ def _readme_text(dataset_folder: Path, spec: Spec, manifests: Sequence[ShardMani
 def _files_table(spec: Spec) -> str:
     alpha = ", with alpha" if "none" in spec.background.kind.support else ""
     sensor = ", as the camera of [sensor] stores it (decoded, if that is JPEG)" if spec.sensor else ""
+    rig = "rig (all cameras), " if spec.rig else ""
     outputs = [
         (f"{name}.{one['file']}", one["description"], one["unit"], one["stored"], f"{one['background']:g}")
         for name, one in output_formats(spec).items()
@@ -93,7 +94,7 @@ def _files_table(spec: Spec) -> str:
     rows = [
         ("png", f"picture, sRGB{alpha}{sensor}", "", "8-bit PNG", ""),
         *outputs,
-        ("json", "parameters, camera, head_pose, gaze, boxes, landmarks, split, licence", "", "", ""),
+        ("json", f"parameters, camera, {rig}head_pose, gaze, boxes, landmarks, split, licence", "", "", ""),
     ]
     return _markdown_table(("file", "content", "unit", "stored as", "background value"), rows)
 

@@ -10,6 +10,7 @@ from dermis.apps.batch.blur.samples import FOCUS_FACT_NAMES
 from dermis.apps.batch.face_boxes import Box
 from dermis.apps.batch.sampling import Parameters, hashed_uniform, round_significant
 from dermis.apps.batch.spec import Spec
+from dermis.apps.batch.spec_tables import PICTURE_NAME
 from dermis.base.arrays import Doubles
 from dermis.human.person import Human, worn_items
 from dermis.human.wear.look import NOTHING
@@ -85,8 +86,9 @@ def person_fact_names() -> tuple[str, ...]:
 
 @cache
 def text_fact_names() -> frozenset[str]:
-    """Return the names of the properties of `person_facts` whose values are strings."""
-    return frozenset(name for name, value in person_facts(Human()).items() if isinstance(value, str))
+    """Return the names of values in records that are strings, but that some images do not have."""
+    of_people = (name for name, value in person_facts(Human()).items() if isinstance(value, str))
+    return frozenset((*of_people, PICTURE_NAME))
 
 
 def fact_names(spec: Spec) -> tuple[str, ...]:

@@ -6,11 +6,15 @@ from collections.abc import Iterator
 from itertools import chain, groupby
 from pathlib import Path
 
+import numpy as np
+
 from dermis.apps.batch.clips.frames import FRAME_NAMES, VIEW_NAME
 from dermis.apps.batch.reader import ImageFields, read_dataset
+from dermis.base.arrays import Bytes
 from dermis.base.atomic_write import refuse_output, temporary_folder
 from dermis.base.errors import refuse
 from dermis.base.reading import checked_path
+from dermis.images.colour import decode_srgb_levels, encode_srgb8
 from dermis.images.movie import DEFAULT_CRF, MovieWriter
 
 _CLIP, _FRAME, _TIME = FRAME_NAMES
@@ -25,7 +29,8 @@ def export_movies(dataset: str | Path, output: str | Path, crf: int = DEFAULT_CR
     dataset : str or Path
         Folder of a data set with clips that `dermis batch` has written.
     output : str or Path
-        Folder to write, which must not exist. Movies are named by the number of the first image.
+        Folder to write, which must not exist. Movies are named by the number of the first image. Pictures
+        without a background are over black.
     crf : int
         Constant rate factor of the compression, from 0 (best) to 51.
 
@@ -78,4 +83,12 @@ def _write_movie(folder: Path, frames: Iterator[ImageFields], crf: int) -> None:
     height, width = first["picture"].shape[:2]
     with MovieWriter(folder / f"{first['number']:09d}.mp4", (width, height), rate, crf) as movie:
         for frame in chain((first, second), frames):
-            movie.write(frame["picture"][..., :3])
+            movie.write(_on_black(frame["picture"]))
+
+
+def _on_black(picture: Bytes) -> Bytes:
+    """Return a picture (h, w, 3 or 4) without alpha, in linear light over black."""
+    if picture.shape[2] == 3:
+        return picture
+    linear = decode_srgb_levels(np.ascontiguousarray(picture[..., :3]))
+    return encode_srgb8(linear * (picture[..., 3:] / np.float32(255.0)))

@@ -111,6 +111,7 @@ class SceneBuilder:
             skin=person.skin.replace(**skin_values) if skin_values else person.skin,
             environment=self._sampled_environment(parameters),
             pose=self._pose_with_gaze(parameters, head, pose, base.position),
+            state={name: one for name, one in table_numbers(parameters, "state").items() if one} or None,
         )
         if PULSE_NAMES[0] in parameters:
             seed, clip = int(parameters[PULSE_NAMES[0]]), table_numbers(parameters, "clip")
@@ -143,7 +144,8 @@ class SceneBuilder:
         indices = person.points if scene.head.eyes is None else scene.head.eyes.apex
         points = rig.pose_points(indices, pose) - np.array(scene.head.centre_mm)
         values = table_numbers(parameters, "blur")
-        return thin_lens(points, scene.camera, values["f_number"], values.get("focus_mm", 0.0))
+        camera = self._rig_camera(parameters, self._base_camera(parameters, person))  # with the focal length
+        return thin_lens(points, camera, values["f_number"], values.get("focus_mm", 0.0))
 
     def _blur_facts(self, parameters: Parameters, scene: Scene) -> dict[str, float]:
         if self.spec.blur is None or not parameters["blur.f_number"]:
@@ -159,10 +161,7 @@ class SceneBuilder:
         """
         person, size = self._cached_person(parameters), self.spec.size
         pose = scene.head.control_rig.rest if scene.pose_arrays is None else scene.pose_arrays
-        base, lens = (
-            self._sampled_camera(parameters, person, self._sampled_pose(parameters, person)),
-            sampled_lens(parameters),
-        )
+        base, lens = self._base_camera(parameters, person), sampled_lens(parameters)
         # with a lens, the camera of the scene shows what the lens shows, with another focal length
         picture_camera = self._rig_camera(parameters, base).to_opencv(size)
         errors = gaze_errors_deg(scene, _gaze_target(parameters, base.position))
@@ -235,6 +234,10 @@ class SceneBuilder:
         if not _has_turning_eyes(head) or self._captures_gaze(parameters, head):
             return pose
         return looking_at(head, _gaze_target(parameters, camera_position_mm), pose)
+
+    def _base_camera(self, parameters: Parameters, person: _Person) -> Camera:
+        """Return the camera that the table [camera] places, without the distortion of its lens."""
+        return self._sampled_camera(parameters, person, self._sampled_pose(parameters, person))
 
     def _sampled_camera(self, parameters: Parameters, person: _Person, pose: Pose) -> Camera:
         """Return the camera of an image without the distortion of its lens."""

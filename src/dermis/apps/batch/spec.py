@@ -9,7 +9,8 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from types import UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, Field, PrivateAttr
 
@@ -130,6 +131,8 @@ class Spec(FrozenModel):
     """Camera position."""
     skin: dict[str, Annotated[Distribution, tables.DistributionField()]] = Field(default_factory=dict)
     """Skin settings, as in scenes: roughness, oiliness, ..."""
+    state: tables.StateTable | None = None
+    """State of the skin: blush, pallor, cold, exertion, crying; without this table, skin is at rest."""
     light: tables.LightTable = tables.LightTable()
     """Lamps."""
     environment: tables.EnvironmentTable = tables.EnvironmentTable()
@@ -356,8 +359,8 @@ def _refuse_unknown_keys(toml_data: Mapping[str, object]) -> None:
 def _tables_with_key(model: type[BaseModel], key: str, table_name: str = "") -> Iterator[str]:
     """Yield the dotted names of the tables of a spec that have a key."""
     for name, info in model.model_fields.items():
-        kind, path = info.annotation, f"{table_name}.{name}" if table_name else name
-        if isinstance(kind, type) and issubclass(kind, FrozenModel):
+        kind, path = _table_class(info.annotation), f"{table_name}.{name}" if table_name else name
+        if kind is not None:
             if key in kind.model_fields:
                 yield path
             yield from _tables_with_key(kind, key, path)
@@ -388,6 +391,12 @@ def _parse_render_table(picture_size: object, render_table: object) -> Settings:
     return _build_model(Settings, "render", {**RENDER_DEFAULTS, **render_table, "size": picture_size})
 
 
+def _table_class(annotation: object) -> type[FrozenModel] | None:
+    """Return the class of the table that a field holds, which may be optional; None for other fields."""
+    kinds = get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
+    return next((one for one in kinds if isinstance(one, type) and issubclass(one, FrozenModel)), None)
+
+
 def _build_model(model_class: type[P], table_name: str, toml_table: object) -> P:
     """Convert a table of a spec, with its subtables, to an instance of a pydantic class.
 
@@ -402,10 +411,9 @@ def _build_model(model_class: type[P], table_name: str, toml_table: object) -> P
         refuse(table_name, expected, f"got {format_value(toml_table)}", "Correct it")
     values = dict(toml_table)
     for name, info in model_class.model_fields.items():
-        if name in values and isinstance(info.annotation, type) and issubclass(info.annotation, FrozenModel):
-            values[name] = _build_model(
-                info.annotation, f"{table_name}.{name}" if table_name else name, values[name]
-            )
+        kind = _table_class(info.annotation)
+        if kind is not None and values.get(name) is not None:
+            values[name] = _build_model(kind, f"{table_name}.{name}" if table_name else name, values[name])
     try:
         return model_class(**values)
     except InvalidFieldsError as error:

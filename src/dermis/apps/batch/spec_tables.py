@@ -19,7 +19,7 @@ LAMP_RIG = "rig"
 RANDOM_EXPRESSION = "mixture"
 NO_ENVIRONMENT = "none"
 GAZE_CAMERA, GAZE_ANGLES = "camera", "angles"
-PICTURE_BACKGROUND = "picture"
+PICTURE_BACKGROUND, PICTURE_NAME = "picture", "background.picture"
 BACKGROUND_KINDS = "none", "gradient", "environment", "colour", PICTURE_BACKGROUND
 _DISTRIBUTION_RANGE_NOTE = "; normal extends 6 sd to both sides, truncated to its limits"
 
@@ -216,6 +216,21 @@ class PersonTable(FrozenModel):
     """Fields of `HairLook`: style, length_mm, density, curl, grey, beard_mm ..."""
     targets: _Distributions = Field(default_factory=dict)
     """Weights of MakeHuman's targets by name, see `dermis head --list-targets`."""
+
+
+class StateTable(FrozenModel):
+    """TOML table of a data set's spec with the state of the skin of people, which holds for a whole clip."""
+
+    blush: Annotated[Distribution | None, _FRACTION_FIELD] = None
+    """Weight of a blush."""
+    pallor: Annotated[Distribution | None, _FRACTION_FIELD] = None
+    """Weight of pallor."""
+    cold: Annotated[Distribution | None, _FRACTION_FIELD] = None
+    """Weight of skin in the cold."""
+    exertion: Annotated[Distribution | None, _FRACTION_FIELD] = None
+    """Weight of exertion, with red and shiny skin."""
+    crying: Annotated[Distribution | None, _FRACTION_FIELD] = None
+    """Weight of crying, with red lids and eyes."""
 
 
 class ExpressionTable(FrozenModel):

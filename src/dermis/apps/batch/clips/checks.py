@@ -6,11 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from dermis.apps.batch.clips.table import GENERATED_MOTION, ClipTable
-from dermis.apps.batch.distributions import Distribution
+from dermis.apps.batch.distributions import Choice, Distribution
 from dermis.base.errors import refuse
 from dermis.base.reading import is_file
 
 _MIN_PULSE_PER_MIN = 20.0
+_PULSE_ADVICE = (
+    "Correct it; for people of whom some have no pulse, write {choice = [0, {uniform = [50, 90]}]}"
+)
 _CAPTURE_SUFFIXES = ".csv", ".tsv", ".json", ".jsonl", ".ndjson"
 
 
@@ -25,6 +28,8 @@ def check_clip(clip: ClipTable, distributions: Mapping[str, Distribution], folde
             continue
         expected = f'"{GENERATED_MOTION}", or captures ({", ".join(_CAPTURE_SUFFIXES)}) in the spec\'s folder'
         refuse("clip: motion", expected, f"{name!r} is neither", "Correct it")
-    if any(0.0 < float(rate) < _MIN_PULSE_PER_MIN for rate in clip.pulse_per_min.support):
+    rates = clip.pulse_per_min
+    alternatives = rates.values if isinstance(rates, Choice) else (rates,)
+    if any(one.support != (0.0,) and float(min(one.support)) < _MIN_PULSE_PER_MIN for one in alternatives):
         expected = f"0 or {_MIN_PULSE_PER_MIN:g} and more"
-        refuse("clip: pulse_per_min", expected, f"got {clip.pulse_per_min.spec_value()}", "Correct it")
+        refuse("clip: pulse_per_min", expected, f"got {rates.spec_value()}", _PULSE_ADVICE)

@@ -23,6 +23,7 @@ VIEW_NAME = "rig.view"
 """Parameter with the number of the camera."""
 FRAME_NAMES = "clip.number", "clip.frame", "clip.time_s"
 _SEED_COUNT = 2**32
+_TIME_DECIMALS = 9  # of times in seconds
 Values = dict[str, float | int | str]
 
 
@@ -82,7 +83,7 @@ def frame_parameters(
     values: Values = {
         "clip.number": place.moment,
         "clip.frame": place.frame,
-        "clip.time_s": round_number(time_s),
+        "clip.time_s": round(time_s, _TIME_DECIMALS),  # six digits would be coarse late in long clips
     }
     clip = {
         k.removeprefix("clip."): float(v)

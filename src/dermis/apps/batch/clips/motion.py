@@ -65,7 +65,9 @@ class MotionSample:
         """Return the weight of a morph target, given the weight without motion."""
         if target_name in _EYE_TARGETS:
             return weight + (1.0 - weight) * self.blink
-        return min(weight + self.speech.get(target_name, 0.0), 1.0)
+        return max(
+            min(weight + self.speech.get(target_name, 0.0), 1.0), weight
+        )  # weights of [pose] may exceed 1
 
 
 def motion_at(seed: int, duration_s: float, clip_values: Mapping[str, float], time_s: float) -> MotionSample:
@@ -134,13 +136,12 @@ class _Events:
 
     def speech(self, time_s: float) -> dict[str, float]:
         weights: dict[str, float] = {}
-        for begin, duration, jaw, shape in self.syllables:
-            progress = (time_s - begin) / duration
-            if 0.0 < progress < 1.0:
-                bump = 0.5 - 0.5 * np.cos(2 * np.pi * progress)
-                amount = jaw / _JAW_RANGE[1]
-                for name, weight in {"jawOpen": _JAW_RANGE[1], **_LIP_SHAPES[int(shape)]}.items():
-                    weights[name] = weights.get(name, 0.0) + float(amount * bump * weight)
+        begins, durations = self.syllables[:, 0], self.syllables[:, 1]
+        for begin, duration, jaw, shape in self.syllables[(begins < time_s) & (time_s < begins + durations)]:
+            bump = 0.5 - 0.5 * np.cos(2 * np.pi * (time_s - begin) / duration)
+            amount = jaw / _JAW_RANGE[1]
+            for name, weight in {"jawOpen": _JAW_RANGE[1], **_LIP_SHAPES[int(shape)]}.items():
+                weights[name] = weights.get(name, 0.0) + float(amount * bump * weight)
         return weights
 
 

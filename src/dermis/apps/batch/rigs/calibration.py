@@ -11,7 +11,7 @@ import numpy as np
 
 from dermis.apps.batch.sensor.lens import Lens
 from dermis.base.arrays import Doubles
-from dermis.base.errors import error_context, refuse, shorten
+from dermis.base.errors import error_context, format_value, refuse, shorten
 from dermis.base.quantities import checked_array
 from dermis.base.reading import parse_json, read_text
 from dermis.scene.camera import Camera
@@ -28,6 +28,7 @@ _KEYS: Mapping[str, tuple[str, ...]] = {
     "name": ("name", "camera_name"),
 }
 _LENS_FIELDS = tuple(Lens.model_fields)  # k1, k2, p1, p2, k3: the order of OpenCV
+_MODEL, _LENS_MODELS = "distortion_model", ("plumb_bob", "rational_polynomial", "radtan")
 _ITEMS, _ITEM_INDENT = "", 0.5  # key of the items of a list; indent of an item after its dash
 _LINE = re.compile(
     r'^(?P<indent> *)(?P<dash>-(?: +|$))?(?:(?P<key>[\w.-]+|"[^"]*") *:(?: +(?P<value>.*))?)?$'
@@ -69,6 +70,9 @@ def load_calibrations(path: Path) -> tuple[Calibration, ...]:
         cameras = tuple(_calibration(name, one) for name, one in _camera_tables(data))
         if not 2 <= len(cameras) <= MAX_CAMERAS:
             refuse("cameras", f"2 to {MAX_CAMERAS} cameras", f"got {len(cameras)}", "Correct it")
+        if len({one.name for one in cameras}) < len(cameras):
+            actual = f"got {shorten(', '.join(one.name for one in cameras), 80)}"
+            refuse("cameras", "a name of its own for each camera", actual, "Rename cameras")
         return cameras
 
 
@@ -156,12 +160,16 @@ def _camera_tables(data: object) -> list[tuple[str, Mapping[str, Any]]]:
         if isinstance(cameras, Mapping)
         else enumerate(cameras if isinstance(cameras, list) else ())
     )
-    tables = [
-        (str(name), one) for name, one in named if isinstance(one, Mapping) and _value(one, "K") is not None
-    ]
+    is_list = isinstance(cameras, list)
+    tables = [(str(name), one) for name, one in named if is_list or _is_camera(one)]
     if not tables:
         refuse("file", _FORMS, f"it has {shorten(', '.join(map(str, data)), 80)}", "Correct it")
     return tables
+
+
+def _is_camera(value: object) -> bool:
+    """Return whether a value in a file describes a camera, rather than something else."""
+    return isinstance(value, Mapping) and any(_value(value, name) is not None for name in ("K", "R", "t"))
 
 
 def _stereo_tables(data: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
@@ -183,8 +191,9 @@ def _value(table: Mapping[str, Any], name: str) -> Any:
     if found is None and name == "size" and {"image_width", "image_height"} <= table.keys():
         return [table["image_width"], table["image_height"]]
     if isinstance(found, Mapping) and {"rows", "cols", "data"} <= found.keys():
-        matrix = np.ravel(checked_array(name, found["data"], (0,), *_BOUNDS))
-        shape = int(found["rows"]), int(found["cols"])
+        matrix = _numbers(name, found["data"])
+        rows, cols = _numbers(name, [found["rows"], found["cols"]])
+        shape = int(rows), int(cols)
         if matrix.size != shape[0] * shape[1]:
             refuse(name, f"{shape[0]} x {shape[1]} numbers", f"got {matrix.size}", "Correct it")
         return matrix.reshape(shape).tolist()
@@ -193,20 +202,22 @@ def _value(table: Mapping[str, Any], name: str) -> Any:
 
 def _calibration(name: str, table: Mapping[str, Any]) -> Calibration:
     """Return a camera of a file; R, t and the distortion may be missing."""
-    stated = _value(table, "name")
-    name = str(stated) if stated is not None else name
+    stated = table.get("name") or table.get("camera_name") if isinstance(table, Mapping) else None
+    name = str(stated) if isinstance(stated, str | int | float) else name
     with error_context(f"camera {name}"):
+        if not isinstance(table, Mapping):
+            refuse("camera", "a table with K, R, t and size", f"got {format_value(table)}", "Correct it")
         if _value(table, "size") is None:
             refuse("size", "width and height of the pictures", "there are none", "Add size = [width, height]")
-        width, height = np.ravel(checked_array("size", np.ravel(_value(table, "size")), (2,), 1, 1e6)).astype(
+        width, height = checked_array("size", _numbers("size", _value(table, "size")), (2,), 1, 1e6).astype(
             int
         )
         K, R = (_matrix(table, part) for part in ("K", "R"))
         stated_t = _value(table, "t")
-        t = checked_array("t", np.ravel([0.0] * 3 if stated_t is None else stated_t), (3,), *_BOUNDS)
+        t = checked_array("t", _numbers("t", [0.0] * 3 if stated_t is None else stated_t), (3,), *_BOUNDS)
         size = int(width), int(height)
         Camera.from_opencv(K, R, t, size)  # refuses invalid matrices
-        return Calibration(name, K, _lens(_value(table, "dist")), R, t, size)
+        return Calibration(name, K, _lens(_value(table, "dist"), table.get(_MODEL)), R, t, size)
 
 
 def _matrix(table: Mapping[str, Any], name: str) -> Doubles:
@@ -217,8 +228,23 @@ def _matrix(table: Mapping[str, Any], name: str) -> Doubles:
     return checked_array(name, np.eye(3) if value is None else value, (3, 3), *_BOUNDS)
 
 
-def _lens(coefficients: object) -> Lens:
-    numbers = [] if coefficients is None else np.ravel(np.asarray(coefficients, np.float64)).tolist()
+def _numbers(name: str, value: object) -> Doubles:
+    """Return all numbers (n,) of nested lists; raise DermisError for anything else."""
+    try:
+        numbers: Doubles = np.ravel(np.asarray(value, np.float64))
+    except (TypeError, ValueError, OverflowError):
+        numbers = np.array([np.nan])
+    if not np.isfinite(numbers).all():
+        refuse(name, "a list of numbers", f"got {format_value(value)}", "Correct it")
+    return numbers
+
+
+def _lens(coefficients: object, model: object) -> Lens:
+    """Return the distortion with coefficients of a model, by its name in ROS; None for that of OpenCV."""
+    numbers = [] if coefficients is None else _numbers("dist", coefficients).tolist()
+    if any(numbers) and model not in (None, *_LENS_MODELS):
+        expected, advice = f"one of {', '.join(_LENS_MODELS)}", "Calibrate with the model of OpenCV's pinhole"
+        refuse(_MODEL, expected, f"got {format_value(model)}", advice)
     while len(numbers) > len(_LENS_FIELDS) and numbers[-1] == 0.0:
         numbers.pop()
     if len(numbers) > len(_LENS_FIELDS):

@@ -30,6 +30,7 @@ _DEFAULTS: Mapping[str, object] = {
     "unit_mm": 1.0,
     "anchor": "head",
 }
+_MIN_DISTANCE_MM = 100.0  # inside a head, there is nothing to see
 _STEREO_NAMES = "left", "right"
 
 
@@ -129,11 +130,25 @@ def check_rig(
         if any(one.lens.model_dump().values()) and not has_lens:
             advice = "Add the tables [sensor] and [lens], without keys, or undistort the calibration"
             refuse("rig: file", "a table [lens] for lenses with distortion", "there is none", advice)
+    if rig.calibrations and rig.table.anchor == "head":
+        _check_outside_the_head(rig)
     if rig.calibrations and has_lens:
         for name in (f"lens.{key}" for key in ("k1", "k2", "p1", "p2", "k3")):
             if distributions[name].support != (0.0,):
                 actual = "the file of [rig] states it for each camera"
                 refuse(name.replace(".", ": "), "no value", actual, "Remove it")
+
+
+def _check_outside_the_head(rig: Rig) -> None:
+    for one in rig.calibrations:
+        distance_mm = (rig.table.unit_mm or 1.0) * float(np.linalg.norm(one.t))
+        if distance_mm < _MIN_DISTANCE_MM:
+            expected = f"cameras {_MIN_DISTANCE_MM:g} mm or more from the head's centre"
+            actual = f"{one.name} is {distance_mm:.3g} mm from it"
+            advice = (
+                'Write anchor = "first" for calibrations relative to the first camera, or correct unit_mm'
+            )
+            refuse("rig: file", expected, actual, advice)
 
 
 def _beside(base: Camera, offset_mm: float, picture_size: tuple[int, int], *, is_parallel: bool) -> Camera:
