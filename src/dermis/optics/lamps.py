@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -154,7 +154,6 @@ def power_ends_nm(lamp: str) -> tuple[float, float]:
     return float(table[0, 0]), float(table[-1, 0])
 
 
-@cache
 def _scale(lamp: str) -> float:
     """Return the factor of the power of a lamp that gives it the luminance of D65."""
     observer = interpolate_spectrum("cie-1931-d65", "y_bar", _VISIBLE_NM)
@@ -189,11 +188,20 @@ def _raw_power(lamp: str, wavelength_nm: Floats) -> Floats:
     return np.interp(wavelength_nm, table[:, 0], table[:, 1])
 
 
-@cache
 def _read_lamp(lamp: str) -> Floats:
     """Return the wavelengths and powers (n, 2) of a file."""
-    if Path(lamp).suffix.lower() not in (".csv", ".txt", ".tsv"):
+    file = Path(lamp)
+    if file.suffix.lower() not in (".csv", ".txt", ".tsv"):
         refuse("--light-spectrum", _SPECTRUM_FILE, f"got {lamp!r}", "Choose one of them")
+    return _read_lamp_table(lamp, file.stat().st_mtime_ns if file.is_file() else 0)
+
+
+@lru_cache(maxsize=8)
+def _read_lamp_table(lamp: str, changed_ns: int) -> Floats:
+    """Return the table of `_read_lamp`.
+
+    changed_ns : time of the last change of the file; a changed file is read again [ns]
+    """
     table = read_number_table(lamp, _SPECTRUM_FILE, (2,), "wavelength [nm] and power in each line")
     check_spectra(lamp, table)
     return np.column_stack([table[:, 0], table[:, 1] / table[:, 1].max()])

@@ -178,7 +178,7 @@ class Spec(FrozenModel):
         if self.lens is not None:
             check_lens(distributions, self.stored_outputs)
         if self.clip is not None:
-            check_clip(self.clip, distributions, self.folder)
+            check_clip(self.clip, self.folder)
         if self.blur is not None:
             check_blur(distributions, self.render, has_clip=self.clip is not None)
         check_backgrounds(distributions, self.folder, has_rig=self.rig is not None)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
 from dermis.apps.batch.clips.table import GENERATED_MOTION, ClipTable
-from dermis.apps.batch.distributions import Choice, Distribution
+from dermis.apps.batch.distributions import Choice
 from dermis.base.errors import refuse
 from dermis.base.reading import is_file
 
@@ -17,10 +16,9 @@ _PULSE_ADVICE = (
 _CAPTURE_SUFFIXES = ".csv", ".tsv", ".json", ".jsonl", ".ndjson"
 
 
-def check_clip(clip: ClipTable, distributions: Mapping[str, Distribution], folder: Path) -> None:
+def check_clip(clip: ClipTable, folder: Path) -> None:
     """Raise DermisError for captures that do not exist, and for heart rates too low for a pulse.
 
-    distributions : distribution of each parameter by its dotted name
     folder : folder to which file names in the spec are relative
     """
     for name in map(str, clip.motion.support):
