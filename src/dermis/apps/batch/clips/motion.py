@@ -5,9 +5,11 @@ Motion is defined before the first and after the last frame too, so that these f
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import resources
 
 import numpy as np
 
@@ -22,20 +24,9 @@ _MIN_FIXATION_S, _PITCH_OF_YAW = 0.15, 0.6
 _HEAD_AXIS_FACTORS = 1.0, 0.6, 0.4  # of yaw, pitch and roll
 _HEAD_WAVES, _MAX_GAZE_SPREADS = 5, 2.0
 _SYLLABLE_OVERLAP = 1.5  # duration of a syllable's movement relative to the interval of syllables
-_LIP_SHAPES: tuple[Mapping[str, float], ...] = (
-    {},
-    {"mouthFunnel": 0.5},
-    {"mouthPucker": 0.55},
-    {"mouthStretchLeft": 0.35, "mouthStretchRight": 0.35},
-    {
-        "mouthLowerDownLeft": 0.4,
-        "mouthLowerDownRight": 0.4,
-        "mouthUpperUpLeft": 0.2,
-        "mouthUpperUpRight": 0.2,
-    },
-    {"mouthRollLower": 0.35, "mouthRollUpper": 0.25},
+_LIP_SHAPES: tuple[Mapping[str, float], ...] = tuple(
+    tomllib.loads(resources.files(__package__).joinpath("lips.toml").read_text("utf-8"))["shapes"]
 )
-"""Weights of lip movements of syllables; artistic values, chosen with equal probability."""
 _JAW_RANGE = 0.08, 0.38  # weight of jawOpen of a syllable
 _EYE_TARGETS = "eyeBlinkLeft", "eyeBlinkRight"
 MOVED_TARGETS: tuple[str, ...] = (
