@@ -51,7 +51,7 @@ def test_backgrounds_are_parts_of_the_pictures(tmp_path: Path) -> None:
             parameters["background.crop_y"] * (height - side),
         )
         crop = source[round(upper) : round(upper) + side, round(left) : round(left) + side]
-        mean = crop.reshape(-1, 3).mean(axis=0)  # the same area, whatever the interpolation
+        mean = crop.reshape(-1, 3).mean(axis=0)  # the same area for any interpolation
         shown = decode_srgb_levels(image["picture"])[uncovered].mean(axis=0)
         np.testing.assert_allclose(shown, mean, atol=0.06)
         assert "a file of the spec" in image["licence"]

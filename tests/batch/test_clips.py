@@ -235,7 +235,7 @@ def test_clips_are_exported_as_movies(folder: Path, images: list[dict[str, Any]]
 
 
 def test_movies_of_pictures_without_a_background_are_over_black() -> None:
-    """Half of white in linear light is 188 in sRGB; uncovered pixels are black whatever their colour."""
+    """Half of white in linear light is 188 in sRGB; uncovered pixels become black."""
     picture = np.array([[[255, 255, 255, 255], [255, 255, 255, 128], [9, 90, 200, 0]]], np.uint8)
     assert _on_black(picture).tolist() == [[[255] * 3, [188] * 3, [0] * 3]]
     np.testing.assert_array_equal(_on_black(picture[..., :3]), picture[..., :3])

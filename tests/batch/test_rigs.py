@@ -245,7 +245,7 @@ def test_invalid_rigs_are_refused(rig: dict[str, Any], message: str, tmp_path: P
             {"dist": [0.1, 0, 0, 0], "distortion_model": "equidistant"},
             "distortion_model: expected one of plumb_bob",
         ),
-        ({"name": 1}, "a name of its own for each camera"),
+        ({"name": 1}, "a different name for each camera"),
         ({"K": None}, "K: expected the intrinsic matrix"),
     ],
 )

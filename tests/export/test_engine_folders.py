@@ -46,7 +46,7 @@ def person(tmp_path_factory: pytest.TempPathFactory) -> Subject:
 
 @pytest.fixture(scope="module")
 def scan(tmp_path_factory: pytest.TempPathFactory) -> Subject:
-    """Return a head from a file, without rig and maps, whose skin has a name of its own."""
+    """Return a head from a file, without rig and maps, whose skin is not named "skin"."""
     file = tmp_path_factory.mktemp("scan") / "face.obj"
     file.write_text(obj_text().replace("usemtl skin", "usemtl face.002"))
     return load_subject(file)

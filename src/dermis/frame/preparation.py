@@ -135,8 +135,7 @@ class Preparation:
     ) -> FrameInputs:
         cached, device = self.memo.get, self.device
         if bands is not None:
-            lit = tuple(light_in_bands(light, bands) for light in scene.lights)
-            scene = replace(scene, head=cached(head_in_bands, scene.head, bands), lights=lit)
+            scene = _scene_in_bands(self.memo, scene, bands)
         head, environment = scene.head.without_maps, scene.environment
         (profile, *others), blend_weights = self._profiles(scene.skin, technique, bands)
         name = environment.name if environment else None
@@ -278,6 +277,12 @@ class Preparation:
 def interreflection_constants(resources: Resources) -> Constants:
     """Return the pipeline constant that enables interreflection, () for heads without interreflection."""
     return (("INTERREFLECTION", 1),) if resources.layouts[0].interreflection else ()
+
+
+def _scene_in_bands(memo: Memo, scene: Scene, bands: Bands) -> Scene:
+    """Return the scene with the colours of head and lights at three wavelengths."""
+    lights = tuple(light_in_bands(light, bands) for light in scene.lights)
+    return replace(scene, head=memo.get(head_in_bands, scene.head, bands), lights=lights)
 
 
 def _pose_bytes(head: Head, pose_arrays: PoseArrays, rest_bytes: PoseBytes) -> PoseBytes:

@@ -19,7 +19,7 @@ from dermis.images.colour import encode_srgb8
 def finished_image(
     observation: Observation, parameters: Parameters, facts: ImageFacts, spec: Spec
 ) -> tuple[Observation, ImageFacts]:
-    """Return the observation of an image as it is stored, and its facts.
+    """Return the observation to store for an image, and the facts for its record.
 
     observation : observation from `observe_images`
     parameters : sampled parameters of the image

@@ -128,7 +128,7 @@ def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
 
 
 def sky_directions() -> NDArray[np.float64]:
-    """Return the directions (n, 3) of sky_transmittance.wgsl, a Fibonacci lattice on the sphere."""
+    """Return the directions (n, 3) in which sky_transmittance.wgsl marches, a Fibonacci lattice."""
     k = np.arange(SKY_DIRECTIONS)
     z = 1.0 - (2.0 * k + 1.0) / SKY_DIRECTIONS
     turn = np.pi * (3.0 - np.sqrt(5.0)) * k
@@ -194,7 +194,7 @@ def environment_record(
         exposure=environment.exposure,
         albedo=np.minimum(albedo, 1.0),
         occluded=int(has_occlusion),
-        sky_light=sky_light.reshape(-1, 4),
+        sky=np.column_stack([sky_directions(), sky_light]),
         sky_moments=sky_moments(sky_light),
         mirrors=isotropic_lobe_table(lobe_name(skin)).reshape(-1, 4),
     )

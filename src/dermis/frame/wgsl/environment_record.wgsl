@@ -5,7 +5,7 @@ struct Environment {
     exposure: f32,
     albedo: vec3f, // of skin whose colour map is white
     occluded: u32, // whether there is an occlusion map
-    sky_light: array<vec4f, 8>, // relative luminance of the sky in the directions of sky_transmittance.wgsl
+    sky: array<vec4f, 32>, // directions all around, and the relative luminance of the sky in each
     sky_moments: array<vec4f, 3>, // of this light, see `SkyMoments`
     mirrors: array<vec4f, 960>, // by roughness, cosine and lobe: direction, roughness and weight
 }

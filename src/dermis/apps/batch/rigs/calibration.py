@@ -72,7 +72,7 @@ def load_calibrations(path: Path) -> tuple[Calibration, ...]:
             refuse("cameras", f"2 to {MAX_CAMERAS} cameras", f"got {len(cameras)}", "Correct it")
         if len({one.name for one in cameras}) < len(cameras):
             actual = f"got {shorten(', '.join(one.name for one in cameras), 80)}"
-            refuse("cameras", "a name of its own for each camera", actual, "Rename cameras")
+            refuse("cameras", "a different name for each camera", actual, "Rename cameras")
         return cameras
 
 

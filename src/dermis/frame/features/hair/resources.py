@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
+from dermis.frame.lights.environment import SKY_DIRECTIONS
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Buffer, Constants, Device, Memo, Texture, UniformRecord, make_texture
 from dermis.mesh.groom import (
@@ -373,6 +374,7 @@ def shader_constants() -> dict[str, float]:
     sky: dict[str, float] = {f"sky_cells_{axis}": n for axis, n in zip("xyz", SKY_CELLS, strict=True)}
     sky |= {
         "sky_cells_per_workgroup": SKY_CELLS_PER_WORKGROUP,
+        "sky_directions": SKY_DIRECTIONS,
         "sky_head_words": _SKY_HEADER_WORDS,
         "sky_cell_words": _SKY_CELL_WORDS,
     }

@@ -3,20 +3,13 @@
 //#include "sky_grid.wgsl"
 //#include "environment_record.wgsl"
 
-const DIRECTIONS: u32 = 32u;
+//#fill const DIRECTIONS: u32 = {sky_directions}u; // of `environment.sky`
 //#fill const CELLS: u32 = {sky_cells_per_workgroup}; // of a workgroup
 const RANDOM_CYLINDER: f32 = 0.7854; // mean extinction of a cylinder in all orientations, relative to its length times width
 
 var<workgroup> of_hair: array<array<vec4f, DIRECTIONS>, CELLS>;
 var<workgroup> of_all: array<array<vec4f, DIRECTIONS>, CELLS>;
 var<workgroup> of_sky: array<array<SkyMoments, DIRECTIONS>, CELLS>;
-
-// Direction of a Fibonacci lattice on the sphere.
-fn direction_at(k: u32) -> vec3f {
-    let z = 1.0 - (2.0 * f32(k) + 1.0) / f32(DIRECTIONS);
-    let turn = 2.3999632 * f32(k);
-    return vec3f(sqrt(1.0 - z * z) * vec2f(cos(turn), sin(turn)), z);
-}
 
 // Transmittance past hair alone, and past hair and head.
 fn march(grid: SkyGrid, cell: vec3u, direction: vec3f) -> vec2f {
@@ -52,13 +45,13 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let cell = vec3u(index % SKY_CELLS.x, index / SKY_CELLS.x % SKY_CELLS.y, index / (SKY_CELLS.x * SKY_CELLS.y));
     let inside = index < sky_cell_count() && all(grid.cell > vec3f(0.0));
     var passing = vec2f(1.0);
-    let direction = direction_at(id.x);
+    let direction = environment.sky[id.x].xyz;
     if (inside) {
         passing = march(grid, cell, direction);
     }
     of_hair[id.y][id.x] = passing.x * vec4f(3.0 * direction, 1.0);
     of_all[id.y][id.x] = passing.y * vec4f(3.0 * direction, 1.0);
-    of_sky[id.y][id.x] = sky_moments(direction, passing.x * environment.sky_light[id.x / 4u][id.x % 4u]);
+    of_sky[id.y][id.x] = sky_moments(direction, passing.x * environment.sky[id.x].w);
     for (var offset = DIRECTIONS / 2u; offset > 0u; offset /= 2u) {
         workgroupBarrier();
         if (id.x < offset) {

@@ -103,7 +103,7 @@ class Web(Target):
         "Change light and skin with the panel of the page; heads with expressions have them there, too.",
     )
     file_meanings: ClassVar[Mapping[str, str]] = {
-        "*.html": "web page that renders the head by itself",
+        "*.html": "web page that contains the renderer and the head",
     }
     limitations = (
         "The page renders square pictures with an atlas of 512 texels. Maps have at most 1024 texels per "
