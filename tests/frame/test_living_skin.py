@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.skin_colours import colour_table
 from dermis.scene.lights import studio
 
+ROOT = Path(__file__).parents[2]
 Doubles = NDArray[np.float64]
 SMALL = {"size": 64, "atlas": 128, "samples": 1, "interreflection": False}
 FRAMES_PER_S, RATE = 20.0, 75.0  # 16 frames a beat
@@ -46,36 +48,15 @@ def traces(renderer: Renderer, scene: Scene, still: NDArray[np.float32]) -> Doub
     return np.tile(np.array(beat, np.float64), (BEATS, 1))
 
 
-def _rate_per_min(signal: Doubles) -> float:
-    """Return the frequency of the spectral peak from 40 to 180 per minute, interpolated by zero padding."""
-    windowed = (signal - signal.mean()) * np.hanning(len(signal))
-    power = np.abs(np.fft.rfft(windowed, 1 << 14))
-    frequency = 60 * np.fft.rfftfreq(1 << 14, 1 / FRAMES_PER_S)
-    band = (frequency > 40) & (frequency < 180)
-    return float(frequency[band][power[band].argmax()])
+@pytest.mark.parametrize("method", ["pos", "chrom"])
+def test_the_pulse_rate_is_found_in_pictures_of_8_bits(
+    traces: Doubles, method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(ROOT / "tools")
+    import pulse_rates
 
-
-def _pos(colours: Doubles) -> Doubles:
-    """Return the pulse by the plane orthogonal to skin, in windows of 1.6 s that overlap."""
-    length, found = round(1.6 * FRAMES_PER_S), np.zeros(len(colours))
-    for begin in range(len(colours) - length + 1):
-        r, g, b = (colours[begin : begin + length] / colours[begin : begin + length].mean(axis=0)).T
-        x, y = g - b, g + b - 2 * r
-        window = x + x.std() / y.std() * y
-        found[begin : begin + length] += window - window.mean()
-    return found
-
-
-def _chrom(colours: Doubles) -> Doubles:
-    """Return the pulse by the difference of two chrominances."""
-    r, g, b = (colours / colours.mean(axis=0)).T
-    x, y = 3 * r - 2 * g, 1.5 * r + g - 1.5 * b
-    return x - x.std() / y.std() * y
-
-
-@pytest.mark.parametrize("method", [_pos, _chrom])
-def test_the_pulse_rate_is_found_in_pictures_of_8_bits(traces: Doubles, method: object) -> None:
-    assert _rate_per_min(method(traces)) == pytest.approx(RATE, abs=2)  # type: ignore[operator]
+    signal = getattr(pulse_rates, method)(traces, FRAMES_PER_S)
+    assert pulse_rates.spectral_peak_per_min(signal, FRAMES_PER_S) == pytest.approx(RATE, abs=2)
 
 
 def test_the_colour_of_the_pulse_is_that_of_measured_pulses(renderer: Renderer, scene: Scene) -> None:

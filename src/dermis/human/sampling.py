@@ -80,6 +80,11 @@ def sample_fields(seed: int, fixed_fields: Mapping[str, Any]) -> dict[str, Any]:
 
     fixed_fields : values of fields that are not sampled
     """
+    for name in _NESTED_FIELDS:
+        value = fixed_fields.get(name, {})
+        if not isinstance(value, Mapping):
+            expected, actual = "a dictionary of the fields that are not sampled", type(value).__name__
+            refuse(name, expected, f"got a {actual}", f"Or use dataclasses.replace(person, {name}=...)")
     excluded = *_NESTED_FIELDS, *_OPTIONAL_FIELDS
     fixed_numbers = {name: float(value) for name, value in fixed_fields.items() if name not in excluded}
     rng = np.random.default_rng(checked_integer("seed", seed, 0, _MAX_SEED))
