@@ -177,8 +177,8 @@ def test_unknown_targets_and_seeds_are_refused() -> None:
         _ = Human(targets={"wings": 1.0}).positions_mm
     with pytest.raises(DermisError, match="seed: expected a whole number"):
         Human.sampled(-1)
-    with pytest.raises(DermisError, match="hair: expected a dictionary of the fields .* got a HairLook"):
-        Human.sampled(1, hair=HairLook("bob"))
+    with pytest.raises(DermisError, match=r"hair: expected a dictionary of the fields .* got a HairLook"):
+        Human.sampled(1, hair=dermis.HairLook("bob"))
 
 
 def test_maps_of_files_leave_the_others_painted(tmp_path: Path) -> None:
