@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from dermis.apps.viewer.controls import Controls, SplitView
+from dermis.apps.viewer.heartbeat import Heartbeat
 from dermis.apps.viewer.player import MotionFile, MotionPlayer
 from dermis.apps.viewer.state import (
     LIGHT_COMPONENT_VIEWS,
@@ -166,6 +167,7 @@ class Session:
     ) -> None:
         self.history = UndoHistory(state)
         self.player = MotionPlayer(self.history, motion, clock)
+        self.heartbeat = Heartbeat(clock)
         self.controls = Controls(self.history, lambda: self.displayed_state)
         self.view_renderer = view_renderer
         self.split = SplitView()
@@ -186,8 +188,13 @@ class Session:
 
     @property
     def displayed_state(self) -> ViewerState:
-        """Return the state on screen: the current state, posed by the motion while the motion plays."""
-        return self.player.displayed_state
+        """Return the state on screen: the current state with the motion that plays and the pulse."""
+        return self.heartbeat.displayed(self.player.displayed_state)
+
+    @property
+    def is_playing(self) -> bool:
+        """Return whether the picture changes with time, by a motion or the pulse."""
+        return self.player.is_playing or self.heartbeat.is_running(self.state)
 
     def change(self, state: ViewerState, gesture_name: str = "") -> None:
         """Set a new state as a step of the undo history.

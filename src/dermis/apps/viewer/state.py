@@ -24,6 +24,7 @@ from dermis.scene.lights import NO_LIGHTS, Light
 from dermis.scene.living import SkinState, is_living_head
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
+from dermis.scene.pulse import Pulse
 from dermis.scene.saving import save_scene
 from dermis.scene.settings import PHOTOGRAPHIC_SETTINGS, Settings
 from dermis.scene.skin import Pigments
@@ -174,6 +175,10 @@ class ViewerState:
         present = {name: value for name, value in weights.items() if value > 0.0}
         blood = state.blood if state else None
         return self._with_scene(state=SkinState(present, blood) if present or blood is not None else None)
+
+    def with_pulse(self, pulse: Pulse, seconds: float) -> ViewerState:
+        """Return a copy with the blood volume and the head rotation of a pulse at a time [s]."""
+        return replace(self, scene=pulse.scene_at(self.scene, seconds))
 
     def with_head(self, head: Head, head_table: Table, rho_s: float) -> ViewerState:
         """Return a copy with another head, or with other maps for the same head.

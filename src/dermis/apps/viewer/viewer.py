@@ -167,6 +167,7 @@ class Viewer:
         session, size = self.session, self._picture_size()
         session.show_loaded_head()
         session.player.advance()
+        session.heartbeat.advance()
         state, elapsed = session.displayed_state, min(now_s - self._last_draw, _MAX_EASING_STEP_S)
         old_camera = self._easing.camera
         camera = self._easing.advance(state.scene.camera, elapsed)
@@ -246,7 +247,7 @@ class Viewer:
         self.session.message = message
 
     def _is_moving(self, now_s: float) -> bool:
-        return self.session.player.is_playing or now_s - self._last_change < _STILL_FRAME_DELAY_S
+        return self.session.is_playing or now_s - self._last_change < _STILL_FRAME_DELAY_S
 
     def _status_text(self, picture_size: tuple[int, int]) -> str:
         view_renderer = self.session.view_renderer

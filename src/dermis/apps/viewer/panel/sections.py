@@ -254,7 +254,7 @@ def _draw_target_weight(session: Session, target_name: str, animated_names: froz
     def state_with_value(weight: float) -> ViewerState:
         return session.state.with_pose(posing.with_target_weight(session.state.scene, target_name, weight))
 
-    weight = posing.target_weight(session.displayed_state.scene, target_name)
+    weight = posing.target_weight(session.player.displayed_state.scene, target_name)
     imgui.begin_disabled(target_name in animated_names)
     draw_slider(session, f"{target_name}##target", weight, state_with_value, _TARGET_WEIGHT_RANGE, "%.2f")
     imgui.end_disabled()
@@ -267,7 +267,7 @@ def _draw_bone_angles(session: Session, bone_name: str, animated_names: frozense
 
     animated_names : names of the morph targets and bones that the playing motion sets
     """
-    angles = posing.bone_angles(session.displayed_state.scene, bone_name)
+    angles = posing.bone_angles(session.player.displayed_state.scene, bone_name)
 
     def state_with_value(new_angles: list[float]) -> ViewerState:
         axis = max(range(3), key=lambda k: abs(new_angles[k] - angles[k]))
