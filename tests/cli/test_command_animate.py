@@ -83,7 +83,7 @@ def test_complete_frames_are_not_rendered_again(animate: Run) -> None:
     assert {path.name: path.read_bytes() for path in Path("f").glob("*.png")} == whole
     nothing = _report(animate(*words))
     assert (nothing["drawn"], nothing["adapter"]) == (0, None)
-    assert _report(animate(*words, "--anew"))["drawn"] == 4
+    assert _report(animate(*words, "--overwrite"))["drawn"] == 4
     assert _report(animate(*words, "--exposure", "2"))["drawn"] == 4
     ended = animate(*words[:-1], "--exposure", "2")
     assert ended.stdout.startswith("f/%d.png  4 frames (4 reused) at 10/s")
@@ -179,7 +179,7 @@ REFUSED = {
     "odd size": ("face.glb --size 31x32", "--size", "got 31x32"),
     "crf": ("face.glb --crf 99", "--crf", "got 99"),
     "crf of pictures": ("face.glb -o f/%d.png --crf 9", "--crf", "f/%d.png"),
-    "--anew with a movie": ("face.glb --anew", "--anew", "out.mp4"),
+    "--overwrite with a movie": ("face.glb --anew", "--overwrite", "out.mp4"),
     "one picture": ("face.glb -o a.png", "a.png", "one picture"),
     "another film": ("face.glb -o a.avi", "a.avi", "'.avi'"),
     "no folder": ("face.glb -o nowhere/a.mp4", "nowhere/a.mp4", "no folder"),

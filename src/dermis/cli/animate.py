@@ -98,7 +98,9 @@ def animate(
     begin: Annotated[float | None, Parameter(name="--from")] = None,
     end: Annotated[float | None, Parameter(name="--to")] = None,
     crf: IntegerOption = None,
-    overwrite: Annotated[bool, Parameter(name="--anew", negative="", show_default=False)] = False,
+    overwrite: Annotated[
+        bool, Parameter(name=("--overwrite", "--anew"), negative="", show_default=False)
+    ] = False,
     names: FlagOption = False,
     hair_motion: bool = True,
     pulse: str | None = None,

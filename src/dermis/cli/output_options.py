@@ -195,7 +195,7 @@ class AnimationOutput:
             FrameFiles(self.path).prepare_folder()
             return
         if self.overwrite:
-            refuse("--anew", "numbered pictures with it", f"got {self.path}", "Leave it out")
+            refuse("--overwrite", "numbered pictures with it", f"got {self.path}", "Leave it out")
         if self.path.suffix.lower() in (".png", ".exr"):
             numbered = self.path.with_name(f"%05d{self.path.suffix}")
             refuse(self.path, "a movie or numbered pictures", "it is one picture", f"Name it {numbered}")
