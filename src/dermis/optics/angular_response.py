@@ -9,6 +9,8 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dermis.base.disk import cached_array
+
 Floats = NDArray[np.float64]
 INTERPOLATION_STEPS = 64
 """Number of equal intervals between the columns of a table, whose positions range from 0 to 1."""
@@ -16,6 +18,7 @@ DIRECTION_ROWS = 32
 """Number of incident directions in tables; the square roots of their cosines are evenly spaced."""
 _QUADRATURE_NODES = 32
 _MAX_SINGLE_SCATTERING_ALBEDO = 1.0 - 1e-8
+_CACHE_VERSION = "angular response 1"
 CACHED_COLUMN_COUNT = 256
 """Number of table columns that each function caches."""
 
@@ -192,9 +195,16 @@ def _angular_response_column(eta: float, total_reflectance: float) -> Floats:
     The first DIRECTION_ROWS elements are `relative_reflectance`; the last two are
     `relative_diffuse_reflectance` and `single_scattering`.
 
+    Columns are cached on disk, because their computation and its imports take a second of a new process.
+
     eta : index of refraction relative to air [-]
     total_reflectance : reflectance of the half-space for light at normal incidence [-]
     """
+    inputs = np.array([eta, total_reflectance])
+    return cached_array(inputs, _CACHE_VERSION, partial(_compute_column, eta, total_reflectance))
+
+
+def _compute_column(eta: float, total_reflectance: float) -> Floats:
     albedo = albedo_for_reflectance(total_reflectance, eta)
     space = _HalfSpace(albedo, eta)
     normal = float(space.reflectance(1.0))
