@@ -46,7 +46,7 @@ def grow_strands(
     """
     count = min(len(groom), max_strands)
     guides = _posed_guides(groom, points_mm)
-    scale = len(groom.roots) / max(count, 1)
+    scale = groom.possible / max(count, 1)
     roots = Roots(groom.roots.roots.quad[:count], groom.roots.roots.position[:count])
     root_mm, frames = root_frames(mesh, roots, points_mm)
     middle = groom.roots.clump[:count]
@@ -263,7 +263,10 @@ def _growing_root_indices(groom: Groom, root_count: int) -> Ints:
     fade = _smoothstep(*_HAIRLINE_FADE_MM, edge.above_mm + _BABY_DROP_MM * edge.baby)
     density = 1.0 + edge.part["hairline"] * (fade - 1.0)
     density = density * edge.part["density"] * (1.0 - edge.part["thinning"] * place[:, 2])
-    return np.flatnonzero(_uniform_random(edge.seed, 0) < density).astype(np.int32)
+    seeds = groom.parameters["seed"].astype(np.uint32) * np.uint32(131071)
+    offset = _uniform_random(seeds, 0)[groom.roots.part[:root_count]]
+    threshold = np.modf(groom.roots.threshold[:root_count] + offset)[0]
+    return np.flatnonzero(threshold < density).astype(np.int32)
 
 
 def _length_fractions(groom: Groom, strand_index: Ints, hairline_effects: _HairlineEffects) -> Doubles:

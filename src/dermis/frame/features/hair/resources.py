@@ -64,7 +64,7 @@ _STRAND_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("absorption
 _ANCHOR_DTYPE = np.dtype([("corner", "u4", 4), ("local", "f4", 4)])
 _ROOT_MEMBERS = ("corner", "u4", 4), ("weight", "f4", 4), ("guide", "u4", 4), ("guide_weight", "f4", 4)
 _ROOT_DTYPE = np.dtype(
-    [*_ROOT_MEMBERS, ("place", "f4", 4), ("clump", "u4"), ("part", "u4"), ("along_mm", "f4"), ("pad", "u4")]
+    [*_ROOT_MEMBERS, ("place", "f4", 4), ("clump", "u4"), ("part", "u4"), ("along_mm", "f4"), ("threshold", "f4")]
 )
 _HAIR_COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
 _HAIRS_DTYPE = np.dtype(
@@ -97,8 +97,8 @@ class StrandDetail(NamedTuple):
 
 
 _GPU_DETAIL, _SOFTWARE_DETAIL = (
-    StrandDetail(1 << 23, 10_000, 24, 0.6, 0.15, 9.0),
-    StrandDetail(1 << 20, 5_000, 10, 0.9, 0.3, 14.0),
+    StrandDetail(1 << 23, 9_000, 24, 0.6, 0.15, 9.0),
+    StrandDetail(1 << 20, 4_500, 10, 0.9, 0.3, 14.0),
 )
 
 
@@ -442,7 +442,7 @@ def make_strand_tables(
         casters=caster_strand_counts(device, coarse_counts),
         detail=adapter_strand_detail(device),
         groom=groom,
-        possible=0 if hair is None else len(hair.roots),
+        possible=0 if hair is None else hair.possible,
         centre_mm=np.zeros(3) if hair is None else hair.centre_mm,
         length_mm=0.0 if largest is None else float(largest["length_mm"]),
         bend_mm=_MAX_BEND_MM if parts is None else float(bend_radius_mm(parts).min(initial=_MAX_BEND_MM)),
@@ -480,7 +480,7 @@ def make_strand_roots(device: Device, roots: StrandRoots, mesh: Mesh) -> Buffer:
     """
     rows = np.zeros(len(roots), _ROOT_DTYPE)
     rows["corner"], rows["weight"] = quad_corners(mesh, roots.roots.quad), quad_weights(roots.roots.position)
-    for name in ("guide", "guide_weight", "place", "clump", "part", "along_mm"):
+    for name in ("guide", "guide_weight", "place", "clump", "part", "along_mm", "threshold"):
         rows[name] = getattr(roots, name)
     return device.buffer(rows.view(np.uint32), "STORAGE")
 

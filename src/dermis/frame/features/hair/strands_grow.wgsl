@@ -37,7 +37,7 @@ struct StrandRoot {
     clump: u32, // strand at the middle of its clump
     part: u32,
     along_mm: f32, // position of the clump along its row
-    pad: u32,
+    threshold: f32, // see the field `threshold` of StrandRoots
 }
 
 // Numbers of a part of a groom, such as scalp or beard; see groom.py.
@@ -177,10 +177,10 @@ fn hairline_of(index: u32, strand: StrandRoot, part: GroomPart) -> Hairline {
     return Hairline(above, f32(random(index, 33u) < chance));
 }
 
-fn grows(index: u32, strand: StrandRoot, part: GroomPart, edge: Hairline) -> bool {
+fn grows(seed: u32, strand: StrandRoot, part: GroomPart, edge: Hairline) -> bool {
     let fade = smoothstep(HAIRLINE_FADE_MM.x, HAIRLINE_FADE_MM.y, edge.above + BABY_DROP_MM * edge.baby);
     let density = mix(1.0, fade, part.hairline) * part.density * (1.0 - part.thinning * strand.place.z);
-    return random(index, 0u) < density;
+    return fract(strand.threshold + random(seed, 0u)) < density;
 }
 
 // Length of a strand, as a fraction of its guides.
@@ -310,7 +310,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let edge = hairline_of(random_index, strand, part);
     let length = length_of(random_index, strand, part, edge);
     var at = vec4f(root.position, -1.0);
-    if (grows(random_index, strand, part, edge)) {
+    if (grows(seed, strand, part, edge)) {
         let along = f32(k) / f32(hairs.coarse_knots - 1u);
         let taper = mix(1.0, TIP_WIDTH, smoothstep(1.0 - TIP_FRACTION, 1.0, along));
         let radius = part.radius_mm * (0.8 + 0.4 * random(random_index, 3u)) * taper * thickness_of(part, edge);
