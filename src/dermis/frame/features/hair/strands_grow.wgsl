@@ -2,6 +2,7 @@
 // randomly varied. Strands that a person does not have, because of the hairline or a lower density, get a negative radius.
 //#include "each.wgsl"
 //#include "strand_knots.wgsl"
+//#include "skin_push.wgsl"
 
 //#fill const KNOTS_PER_GUIDE: u32 = {knots_per_guide}; // of each guide
 const MIN_HEIGHT_MM: f32 = 0.35; // least height of strands above the skin, away from their roots
@@ -284,7 +285,11 @@ fn strand_position(index: u32, seed: u32, strand: StrandRoot, part: GroomPart, e
     offset += frizz_offset(index, part, s, across) + edge.baby * BABY_TURN * s * random_normal(index, 35u) * across[0];
     let height = mix(own.height, at.height, pull) + dot(offset - pull * (at.position - own.position), own.normal);
     let least = MIN_HEIGHT_MM * min(s / RISE_MM, 1.0);
-    return own.position + offset + max(least - height, 0.0) * own.normal;
+    let lifted = own.position + offset + max(least - height, 0.0) * own.normal;
+    if (s == 0.0) {
+        return lifted;
+    }
+    return outside_skin(lifted, least);
 }
 
 // Cover and the fraction of a strand from which it is dyed, packed for strands_light.wgsl; 0 for a strand that is not dyed.
