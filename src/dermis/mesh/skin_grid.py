@@ -9,19 +9,22 @@ from dermis.base.arrays import Doubles
 from dermis.mesh.geometry import vertex_normals
 from dermis.mesh.mesh import Mesh
 
-SKIN_CELLS = 80, 80, 56
+SKIN_CELLS = 96, 96, 68
 """Number of cells of the grid along x, y and z."""
-SKIN_CELL_MM = 6.0
+SKIN_CELL_MM = 5.0
 """Side of a cell [mm]."""
 SKIN_GRID_LOW_MM = -240.0, -345.0, -250.0
 """Corner of the grid, relative to the midpoint between the eyes [mm]."""
 SKIN_WORDS_PER_VERTEX = 6
 """Number of words that the device stores for a vertex: its position and its normal."""
-FAR_VERTEX_STRIDE = 4
-"""One of this many vertices is entered into cells at a distance of two cells, all into those next to them."""
+MEDIUM_VERTEX_STRIDE, FAR_VERTEX_STRIDE, FAR_REACH = 4, 16, 4
+"""All vertices are entered into the cells next to their own, one of 4 into cells at a distance of two cells,
+and one of 16 into cells at a distance of up to four cells, for points deep inside the skin."""
+SKIN_CLEARANCE_RATIO = 1.3
+"""Ratio of the height to which knots are pushed to the least height of strands above the skin."""
 MAX_SKIN_VERTICES = 32_000
 """Largest number of vertices in the grid."""
-SKIN_PUSHES = 2
+SKIN_PUSHES = 3
 """Number of times that a knot is pushed out of the skin."""
 NEAR_SKIN_MM = 4.0
 """Height above the nearest vertex's tangent plane from which no more vertices are looked up [mm]."""
@@ -29,7 +32,8 @@ MAX_SKIN_PUSH_MM = 16.0
 """Largest distance by which a knot is pushed at once [mm]."""
 _INDEX_BITS, _DISTANCE_STEPS_PER_MM = 18, 256.0  # of a cell's word, see skin_grid.wgsl
 _EMPTY = 0xFFFFFFFF
-_REACH = range(-2, 3)
+_REACH = range(-FAR_REACH, FAR_REACH + 1)
+_STRIDE_BY_REACH = 1, 1, MEDIUM_VERTEX_STRIDE, FAR_VERTEX_STRIDE, FAR_VERTEX_STRIDE
 _SOFTENING_MM2 = 0.05
 
 
@@ -43,7 +47,10 @@ def skin_grid_constants() -> dict[str, float]:
         **low,
         "skin_cell_mm": SKIN_CELL_MM,
         "skin_words_per_vertex": SKIN_WORDS_PER_VERTEX,
+        "medium_vertex_stride": MEDIUM_VERTEX_STRIDE,
         "far_vertex_stride": FAR_VERTEX_STRIDE,
+        "far_reach": FAR_REACH,
+        "skin_clearance_ratio": SKIN_CLEARANCE_RATIO,
         "skin_pushes": SKIN_PUSHES,
         "near_skin_mm": NEAR_SKIN_MM,
         "max_skin_push_mm": MAX_SKIN_PUSH_MM,
@@ -78,7 +85,7 @@ class SkinGrid:
         at = (self._positions - SKIN_GRID_LOW_MM) / SKIN_CELL_MM
         numbers, cells = np.arange(len(index)), np.floor(at).astype(np.int64)
         for offset in np.stack(np.meshgrid(_REACH, _REACH, _REACH), axis=-1).reshape(-1, 3):
-            some = slice(None, None, FAR_VERTEX_STRIDE if np.abs(offset).max() == _REACH[-1] else 1)
+            some = slice(None, None, _STRIDE_BY_REACH[np.abs(offset).max()])
             cell = cells[some] + offset
             away_mm = SKIN_CELL_MM * np.linalg.norm(cell + 0.5 - at[some], axis=1)
             words = ((_DISTANCE_STEPS_PER_MM * away_mm).astype(np.int64) << _INDEX_BITS) | numbers[some]
@@ -88,14 +95,15 @@ class SkinGrid:
     def push_out(self, points_mm: Doubles, clearance_mm: Doubles) -> Doubles:
         """Return points (n, 3) after moving those that are inside the skin, or too close to it, outwards [mm].
 
-        clearance_mm : (n,) least heights above the skin [mm]
+        clearance_mm : (n,) heights above the skin that strands should have at least [mm]
         """
         moved = points_mm.copy()
         candidates = np.arange(len(moved))
         for _ in range(SKIN_PUSHES):
             candidates = candidates[self._is_near(moved[candidates])]
             height, normal = self._skin_below(moved[candidates])
-            pushed = np.clip(clearance_mm[candidates] - height, 0.0, MAX_SKIN_PUSH_MM)
+            least = SKIN_CLEARANCE_RATIO * clearance_mm[candidates]
+            pushed = np.clip(least - height, 0.0, MAX_SKIN_PUSH_MM)
             candidates, pushed, normal = (one[pushed > 0.0] for one in (candidates, pushed, normal))
             moved[candidates] += pushed[:, None] * normal
         return moved

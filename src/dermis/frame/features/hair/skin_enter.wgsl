@@ -3,7 +3,9 @@
 //#include "shape/geometry.wgsl"
 //#include "skin_grid.wgsl"
 
-//#fill const FAR_STRIDE: u32 = {far_vertex_stride}; // one of so many vertices is entered at a distance of two cells
+//#fill const MEDIUM_STRIDE: u32 = {medium_vertex_stride}; // one of so many vertices is entered at a distance of two cells,
+//#fill const FAR_STRIDE: u32 = {far_vertex_stride}; // and one of so many at a distance of up to
+//#fill const FAR_REACH: i32 = {far_reach}; // cells
 
 @group(0) @binding(25) var<storage, read> skin_vertices: array<u32>;
 @group(0) @binding(26) var<storage, read_write> skin: array<atomic<u32>>;
@@ -34,7 +36,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     store(skin_vertex_word(index) + 3u, vertex.normal);
     let at = (vertex.position - SKIN_LOW) / SKIN_CELL_MM;
     let middle = vec3i(floor(at));
-    let reach = select(1, 2, index % FAR_STRIDE == 0u);
+    let reach = select(select(1, 2, index % MEDIUM_STRIDE == 0u), FAR_REACH, index % FAR_STRIDE == 0u);
     for (var z = -reach; z <= reach; z += 1) {
         for (var y = -reach; y <= reach; y += 1) {
             for (var x = -reach; x <= reach; x += 1) {

@@ -3,6 +3,7 @@
 
 //#fill const SKIN_PUSHES: u32 = {skin_pushes};
 //#fill const NEAR_SKIN_MM: f32 = {near_skin_mm}; // height above a vertex's plane from which no more vertices are looked up
+//#fill const SKIN_CLEARANCE_RATIO: f32 = {skin_clearance_ratio}; // of the height to which points are pushed
 //#fill const MAX_SKIN_PUSH_MM: f32 = {max_skin_push_mm};
 
 @group(0) @binding(7) var<storage, read> skin: array<u32>;
@@ -42,18 +43,19 @@ fn skin_below(p: vec3f) -> vec4f {
     return sum / max(length(sum.xyz), 1e-12);
 }
 
-// clearance: least height above the skin [mm]
+// clearance: height above the skin that strands should have at least [mm]
 fn outside_skin(point: vec3f, clearance: f32) -> vec3f {
+    let least = SKIN_CLEARANCE_RATIO * clearance;
     var p = point;
     for (var i = 0u; i < SKIN_PUSHES; i += 1u) {
         if (!is_near_skin(p)) {
             break;
         }
         let below = skin_below(p);
-        if (below.w >= clearance) {
+        if (below.w >= least) {
             break;
         }
-        p += min(clearance - below.w, MAX_SKIN_PUSH_MM) * below.xyz;
+        p += min(least - below.w, MAX_SKIN_PUSH_MM) * below.xyz;
     }
     return p;
 }
