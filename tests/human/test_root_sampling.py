@@ -1,4 +1,4 @@
-"""Blue noise of hair roots: counts in circles vary less than those of independent points, whose variance is 1."""
+"""Blue noise of hair roots: counts in circles vary less than those of independent points."""
 
 from __future__ import annotations
 

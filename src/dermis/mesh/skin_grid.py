@@ -93,7 +93,7 @@ class SkinGrid:
             np.minimum.at(self._words, _cell_index(cell[inside]), words[inside])
 
     def push_out(self, points_mm: Doubles, clearance_mm: Doubles) -> Doubles:
-        """Return points (n, 3) after moving those that are inside the skin, or too close to it, outwards [mm].
+        """Return points (n, 3) after moving those in the skin, or too close to it, outwards [mm].
 
         clearance_mm : (n,) heights above the skin that strands should have at least [mm]
         """
@@ -109,7 +109,7 @@ class SkinGrid:
         return moved
 
     def _is_near(self, points_mm: Doubles) -> NDArray[np.bool_]:
-        """Return a mask (n,) of the points that are below, or less than `NEAR_SKIN_MM` above, a vertex's plane."""
+        """Return a mask (n,) of the points less than `NEAR_SKIN_MM` above the plane of a vertex."""
         cell = np.floor((points_mm - SKIN_GRID_LOW_MM) / SKIN_CELL_MM).astype(np.int64)
         inside = ((cell >= 1) & (cell < np.array(SKIN_CELLS) - 1)).all(axis=1)
         word = np.where(inside, self._words[_cell_index(np.where(inside[:, None], cell, 0))], _EMPTY)
@@ -118,11 +118,11 @@ class SkinGrid:
         return np.asarray((word != _EMPTY) & (height < NEAR_SKIN_MM))
 
     def _skin_below(self, points_mm: Doubles) -> tuple[Doubles, Doubles]:
-        """Return heights (n,) [mm] above the skin, and its normals (n, 3), means over the eight cells around."""
+        """Return heights (n,) above the skin [mm], and its normals (n, 3), from the eight cells around."""
         low = np.floor((points_mm - SKIN_GRID_LOW_MM) / SKIN_CELL_MM - 0.5).astype(np.int64)
         height, normal = np.zeros(len(points_mm)), np.zeros_like(points_mm)
         for k in range(8):
-            word = self._words[_cell_index(low + [k & 1, k >> 1 & 1, k >> 2])]
+            word = self._words[_cell_index(low + np.array([k & 1, k >> 1 & 1, k >> 2]))]
             vertex = self._vertex(word)
             away = points_mm - self._positions[vertex]
             weight = (word != _EMPTY) / ((away**2).sum(axis=1) + _SOFTENING_MM2)

@@ -64,7 +64,9 @@ def sample_roots(
     quad = _hairy_quads(mesh)
     corner_points = quad_corners(mesh, quad)
     candidates_per_cm2 = CANDIDATES_PER_SAMPLE * max_roots_per_cm2
-    counts = np.floor(candidates_per_cm2 * quad_areas_cm2(mesh, quad) + rng.random(len(quad))).astype(np.int64)
+    counts = np.floor(candidates_per_cm2 * quad_areas_cm2(mesh, quad) + rng.random(len(quad))).astype(
+        np.int64
+    )
     index = np.repeat(np.arange(len(quad)), counts)
     position = rng.random((len(index), 2))
     near = density.candidates[corner_points].any(axis=1)[index]

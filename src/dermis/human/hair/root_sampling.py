@@ -50,7 +50,7 @@ def _level_counts(count: int) -> list[int]:
 
 
 def _distant_points(points_mm: Doubles, radius_mm: float) -> Mask:
-    """Return a mask (n,) of the points that are accepted in order, if no accepted point is within a radius."""
+    """Return a mask (n,) of points, accepted in order if no accepted point is within a radius."""
     from scipy.spatial import cKDTree
 
     pairs = cKDTree(points_mm, compact_nodes=False, balanced_tree=False).query_pairs(

@@ -196,14 +196,12 @@ def _root_locations(corner_weight: Doubles, corner_points: Doubles) -> Doubles:
     return np.stack([angle, height, np.clip(thinning, 0.0, 1.0), top], axis=1)
 
 
-def _clump_centre_strands(
-    root_mm: Doubles, half_length_mm: Doubles, style: Style
-) -> NDArray[np.int64]:
+def _clump_centre_strands(root_mm: Doubles, half_length_mm: Doubles, style: Style) -> NDArray[np.int64]:
     """Return for each strand the index (n,) of the strand at the centre of its clump.
 
     In cornrows, the clump of a strand is found by moving its root sideways onto the centreline of its row;
-    the strand whose root is nearest to this position is the centre. In other styles, the centres are the first
-    strands, which are blue noise, and each strand belongs to the clump of the nearest centre.
+    the strand whose root is nearest to this position is the centre. In other styles, the centres are the
+    first strands, which are blue noise, and each strand belongs to the clump of the nearest centre.
 
     root_mm : (n, 3) roots on the mean person [mm]
     half_length_mm : (n, 3) points of the strands at half the length of their guides [mm]

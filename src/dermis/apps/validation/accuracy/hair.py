@@ -91,7 +91,10 @@ class HairCase:
         """Return a person with this hair."""
         african = float(self.style == "afro")
         look = HairLook(
-            style=self.style, density=density, curl=_CURL_BY_STYLE.get(self.style, 0.1), **COLOURS[self.colour]
+            style=self.style,
+            density=density,
+            curl=_CURL_BY_STYLE.get(self.style, 0.1),
+            **COLOURS[self.colour],
         )
         return Human(african=african, asian=0.0, caucasian=1.0 - african, sex=0.0, age=30.0, hair=look)
 
@@ -235,7 +238,9 @@ def _measure(renderer: Renderer, size: int, paths: int, variant: str, seconds: f
         comparison = compare_hair(renderer, case, size, paths, chosen)
         results["cases"][case.key] = hair_result(comparison)
         write_results(RESULTS_FILE, results, digits=5)
-        print_lines(f"{case.key}: {results['cases'][case.key]['error']} {results['cases'][case.key]['energy']}")
+        print_lines(
+            f"{case.key}: {results['cases'][case.key]['error']} {results['cases'][case.key]['energy']}"
+        )
         pictures = comparison.tone_mapped(comparison.ours), comparison.tone_mapped(comparison.reference)
         panels[f"{case.key}: frame, path-traced"] = np.hstack(pictures)
         PICTURE_FILE.write_bytes(sheet_bytes(panels, _SHEET_COLUMNS))
@@ -257,8 +262,9 @@ def summary_text(cases: JsonObject) -> str:
     close = [one for one in cases.values() if abs(one["energy"][0] - 1.0) <= ENERGY_GOAL]
     alike = [one for one in cases.values() if one["error"][0] <= ERROR_GOAL]
     return (
-        f"Of {len(cases)} measured cases, {len(close)} have an energy within {100 * ENERGY_GOAL:.0f} % of the path "
-        f"tracer's, and {len(alike)} a relative RMSE of at most {ERROR_GOAL:g}; there are {len(list_hair_cases())} cases."
+        f"Of {len(cases)} measured cases, {len(close)} have an energy within {100 * ENERGY_GOAL:.0f} % of "
+        f"the path tracer's, and {len(alike)} a relative RMSE of at most {ERROR_GOAL:g}; "
+        f"there are {len(list_hair_cases())} cases."
     )
 
 

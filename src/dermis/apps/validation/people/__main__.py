@@ -1,4 +1,4 @@
-"""Commands that check people sampled at random: against a spectral archive of measured people, and their hair.
+"""Commands that compare random people with a spectral archive of measured people, and check their hair.
 
 The comparisons need the archive in the folder DERMIS_DATA, see docs/measured.md.
 """

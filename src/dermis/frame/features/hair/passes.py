@@ -61,8 +61,8 @@ def draw_shadows(
 ) -> None:
     """Declare the passes that pose the strands that cast shadows, and compute the shadows of the hair.
 
-    The passes fill the grid of the skin, and the deep opacity maps of lights. For an environment, they also fill the grid of sky
-    transmittance.
+    The passes fill the grid of the skin, and the deep opacity maps of lights. For an environment, they also
+    fill the grid of sky transmittance.
 
     geometry : current shape of the head, and its vertices and triangles
     """

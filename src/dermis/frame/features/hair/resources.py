@@ -66,7 +66,14 @@ _STRAND_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("absorption
 _ANCHOR_DTYPE = np.dtype([("corner", "u4", 4), ("local", "f4", 4)])
 _ROOT_MEMBERS = ("corner", "u4", 4), ("weight", "f4", 4), ("guide", "u4", 4), ("guide_weight", "f4", 4)
 _ROOT_DTYPE = np.dtype(
-    [*_ROOT_MEMBERS, ("place", "f4", 4), ("clump", "u4"), ("part", "u4"), ("along_mm", "f4"), ("threshold", "f4")]
+    [
+        *_ROOT_MEMBERS,
+        ("place", "f4", 4),
+        ("clump", "u4"),
+        ("part", "u4"),
+        ("along_mm", "f4"),
+        ("threshold", "f4"),
+    ]
 )
 _HAIR_COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
 _HAIRS_DTYPE = np.dtype(

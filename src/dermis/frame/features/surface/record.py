@@ -119,7 +119,7 @@ def _derived_skin_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[
 
 
 def vellus_per_mm(maps: Maps) -> float:
-    """Return the extinction coefficient of the layer of vellus hair; 0 for skin that is not painted [1/mm]."""
+    """Return the extinction coefficient of the vellus hair's layer; 0 for unpainted skin [1/mm]."""
     return _VELLUS_PER_MM * maps.look.vellus if isinstance(maps, PaintedMaps) else 0.0
 
 
