@@ -33,7 +33,7 @@ def profiles() -> tuple[Floats, Floats]:
     return found[0], found[1]
 
 
-def test_vellus_hair_brightens_the_outline_against_the_light(profiles: tuple[Floats, Floats]) -> None:
+def test_vellus_hair_brightens_the_outline(profiles: tuple[Floats, Floats]) -> None:
     without, with_vellus = (one.mean(axis=2) for one in profiles)
     lit = without > 0.0
     changed = with_vellus[lit] / without[lit]

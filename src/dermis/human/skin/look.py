@@ -92,8 +92,8 @@ class SkinLook:
     scars : float
         Density of pitted scars of acne, 0 to 1 [-].
     vellus : float
-        Density of vellus hair, which shines at the outline of the face against the light, 0 to 1; 0.5 is
-        typical [-].
+        Density of vellus hair, which shines at the outline of the face in light from the side, 0 to 1;
+        0.5 is typical [-].
 
     Raises
     ------

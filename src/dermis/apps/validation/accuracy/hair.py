@@ -228,10 +228,6 @@ def _measure(renderer: Renderer, size: int, paths: int, variant: str, seconds: f
         results = {"settings": settings, "adapter": device, "cases": {}}
     results["variant"] = chosen
     panels: dict[str, NDArray[np.uint8]] = {}
-    for name, measured in (("costs", density_costs), ("details", detail_errors)):
-        if name not in results:
-            results[name] = measured(renderer)
-            write_results(RESULTS_FILE, results, digits=5)
     for case in list_hair_cases():
         if case.key in results["cases"] or (seconds and time.perf_counter() - started > seconds):
             continue
@@ -244,6 +240,10 @@ def _measure(renderer: Renderer, size: int, paths: int, variant: str, seconds: f
         pictures = comparison.tone_mapped(comparison.ours), comparison.tone_mapped(comparison.reference)
         panels[f"{case.key}: frame, path-traced"] = np.hstack(pictures)
         PICTURE_FILE.write_bytes(sheet_bytes(panels, _SHEET_COLUMNS))
+    for name, measured in (("costs", density_costs), ("details", detail_errors)):
+        if name not in results and not (seconds and time.perf_counter() - started > seconds):
+            results[name] = measured(renderer)
+            write_results(RESULTS_FILE, results, digits=5)
 
 
 def case_rows(cases: JsonObject) -> str:

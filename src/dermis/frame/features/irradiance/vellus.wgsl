@@ -1,9 +1,10 @@
 // Vellus hair of the face, as a layer of sparse pale fibres over the skin that scatters light once [KoenderinkPont2003]. The layer
-// follows the curvature of the face, so that the path of a grazing ray through it is limited. Views along the normal are those
-// without the layer, because measured colours of skin include it.
+// follows the curvature of the face, so that the path of a grazing ray through it is limited. Steeper views are those without the
+// layer, because measured colours of skin include it.
 
 const VELLUS_HEIGHT_MM: f32 = 1.0; // thickness of the layer
 const VELLUS_CURVATURE_RADIUS_MM: f32 = 50.0; // of a face
+const VELLUS_STEEP_MM: f32 = 1.93; // length of a ray through the layer at 60 degrees from the normal, up to which it has no effect
 const VELLUS_ALBEDO: vec3f = vec3f(0.85, 0.79, 0.7); // of pale fibres
 const VELLUS_FORWARD: f32 = 0.6; // asymmetry of scattering: fibres transmit more light than they reflect
 
@@ -15,11 +16,11 @@ fn vellus_albedo() -> vec3f {
     //#end
 }
 
-// Length of a ray through the layer beyond that of a ray along the normal [mm].
+// Length of a ray through the layer beyond that of a ray at 60 degrees from the normal [mm].
 // cosine : of the ray with the normal
 fn vellus_path_mm(cosine: f32) -> f32 {
     let depth = VELLUS_CURVATURE_RADIUS_MM * clamp(cosine, 0.0, 1.0);
-    return max(sqrt(depth * depth + 2.0 * VELLUS_CURVATURE_RADIUS_MM * VELLUS_HEIGHT_MM) - depth - VELLUS_HEIGHT_MM, 0.0);
+    return max(sqrt(depth * depth + 2.0 * VELLUS_CURVATURE_RADIUS_MM * VELLUS_HEIGHT_MM) - depth - VELLUS_STEEP_MM, 0.0);
 }
 
 // Fraction of light from below that passes the layer towards the eye; half of the scattered light goes on.
