@@ -104,14 +104,15 @@ class SkinGrid:
             height, normal = self._skin_below(moved[candidates])
             least = SKIN_CLEARANCE_RATIO * clearance_mm[candidates]
             pushed = np.clip(least - height, 0.0, MAX_SKIN_PUSH_MM)
-            candidates, pushed, normal = (one[pushed > 0.0] for one in (candidates, pushed, normal))
-            moved[candidates] += pushed[:, None] * normal
+            inside = pushed > 0.0
+            candidates = candidates[inside]
+            moved[candidates] += pushed[inside, None] * normal[inside]
         return moved
 
     def _is_near(self, points_mm: Doubles) -> NDArray[np.bool_]:
         """Return a mask (n,) of the points less than `NEAR_SKIN_MM` above the plane of a vertex."""
         cell = np.floor((points_mm - SKIN_GRID_LOW_MM) / SKIN_CELL_MM).astype(np.int64)
-        inside = ((cell >= 1) & (cell < np.array(SKIN_CELLS) - 1)).all(axis=1)
+        inside = np.asarray(((cell >= 1) & (cell < np.array(SKIN_CELLS) - 1)).all(axis=1))
         word = np.where(inside, self._words[_cell_index(np.where(inside[:, None], cell, 0))], _EMPTY)
         vertex = self._vertex(word)
         height = ((points_mm - self._positions[vertex]) * self._normals[vertex]).sum(axis=1)
