@@ -158,7 +158,7 @@ def _cached_roots(beard_area: BeardArea | None, root_finder: RootFinder) -> Root
         return {"quad": roots.quad, "position": roots.position}
 
     parameters = f"hair roots {_CACHE_VERSION} {beard_area}"
-    found = cached_arrays(root_finder.once_subdivided_mesh.points_mm, parameters, Roots._fields, sample)
+    found = cached_arrays(root_finder.once_subdivided_mesh.points_mm, parameters, list(Roots._fields), sample)
     return Roots(found["quad"], found["position"])
 
 
