@@ -69,7 +69,7 @@ def sample_roots(
     )
     index = np.repeat(np.arange(len(quad)), counts)
     position = rng.random((len(index), 2))
-    near = density.candidates[corner_points].any(axis=1)[index]
+    near = np.asarray(density.candidates[corner_points].any(axis=1)).take(index)
     index, position = index[near], position[near]
     corners = corner_points.T.take(index, axis=1)
     values = average_control_points().T.take(corners, axis=1)

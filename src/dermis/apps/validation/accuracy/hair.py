@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -90,12 +90,9 @@ class HairCase:
     def person(self, density: float = 0.9) -> Human:
         """Return a person with this hair."""
         african = float(self.style == "afro")
-        look = HairLook(
-            style=self.style,
-            density=density,
-            curl=_CURL_BY_STYLE.get(self.style, 0.1),
-            **COLOURS[self.colour],
-        )
+        look = HairLook(style=self.style, density=density, curl=_CURL_BY_STYLE.get(self.style, 0.1))
+        pigments: dict[str, Any] = dict(COLOURS[self.colour])
+        look = replace(look, **pigments)
         return Human(african=african, asian=0.0, caucasian=1.0 - african, sex=0.0, age=30.0, hair=look)
 
 
