@@ -44,7 +44,7 @@ def test_every_prefix_is_blue_noise(fraction: float) -> None:
 def test_samples_keep_their_distance() -> None:
     from scipy.spatial import cKDTree
 
-    distance = cKDTree(samples()).query(samples(), k=2)[0][:, 1]
+    distance = np.asarray(cKDTree(samples()).query(samples(), k=2)[0])[:, 1]
     assert distance.min() > 0.65 * SIDE_MM / np.sqrt(COUNT)
 
 
