@@ -190,7 +190,7 @@ def _grow_chunk(
     least = _MIN_HEIGHT_ABOVE_SKIN_MM * np.minimum(s / _RISE_LENGTH_MM, 1.0)
     positions = own.position + to_middle + varied + np.maximum(least - height, 0.0)[..., None] * own.normal
     above = s > 0.0
-    positions[above] = skin_grid.push_out(positions[above], least[above])
+    positions[above] = skin_grid.push_out(positions[above], least[above], s[above])
     taper = 1.0 - (1.0 - _TIP_WIDTH_RATIO) * _smoothstep(1.0 - _TIP_FRACTION, 1.0, t)
     thinned = _MIN_HAIRLINE_THICKNESS + (1.0 - _MIN_HAIRLINE_THICKNESS) * _smoothstep(
         *_SHORT_HAIR_HEIGHTS_MM, edge.above_mm

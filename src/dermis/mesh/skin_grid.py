@@ -28,8 +28,9 @@ SKIN_PUSHES = 3
 """Number of times that a knot is pushed out of the skin."""
 NEAR_SKIN_MM = 4.0
 """Height above the nearest vertex's tangent plane from which no more vertices are looked up [mm]."""
-MAX_SKIN_PUSH_MM = 16.0
-"""Largest distance by which a knot is pushed at once [mm]."""
+MAX_SKIN_PUSH_MM, MAX_PUSH_PER_LENGTH = 16.0, 0.4
+"""Largest distance by which a knot is pushed at once: in millimetres, and relative to its distance from the
+root along the strand. On coarse meshes, the height above the skin of short hair is inaccurate."""
 _INDEX_BITS, _DISTANCE_STEPS_PER_MM = 18, 256.0  # of a cell's word, see skin_grid.wgsl
 _EMPTY = 0xFFFFFFFF
 _REACH = range(-FAR_REACH, FAR_REACH + 1)
@@ -54,6 +55,7 @@ def skin_grid_constants() -> dict[str, float]:
         "skin_pushes": SKIN_PUSHES,
         "near_skin_mm": NEAR_SKIN_MM,
         "max_skin_push_mm": MAX_SKIN_PUSH_MM,
+        "max_push_per_length": MAX_PUSH_PER_LENGTH,
     }
 
 
@@ -92,10 +94,11 @@ class SkinGrid:
             inside = ((cell >= 0) & (cell < SKIN_CELLS)).all(axis=1)
             np.minimum.at(self._words, _cell_index(cell[inside]), words[inside])
 
-    def push_out(self, points_mm: Doubles, clearance_mm: Doubles) -> Doubles:
+    def push_out(self, points_mm: Doubles, clearance_mm: Doubles, length_mm: Doubles) -> Doubles:
         """Return points (n, 3) after moving those in the skin, or too close to it, outwards [mm].
 
         clearance_mm : (n,) heights above the skin that strands should have at least [mm]
+        length_mm : (n,) distances from the roots along the strands [mm]
         """
         moved = points_mm.copy()
         candidates = np.arange(len(moved))
@@ -103,7 +106,8 @@ class SkinGrid:
             candidates = candidates[self._is_near(moved[candidates])]
             height, normal = self._skin_below(moved[candidates])
             least = SKIN_CLEARANCE_RATIO * clearance_mm[candidates]
-            pushed = np.clip(least - height, 0.0, MAX_SKIN_PUSH_MM)
+            most = np.minimum(MAX_PUSH_PER_LENGTH * length_mm[candidates], MAX_SKIN_PUSH_MM)
+            pushed = np.clip(least - height, 0.0, most)
             inside = pushed > 0.0
             candidates = candidates[inside]
             moved[candidates] += pushed[inside, None] * normal[inside]

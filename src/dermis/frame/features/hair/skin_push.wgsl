@@ -5,6 +5,7 @@
 //#fill const NEAR_SKIN_MM: f32 = {near_skin_mm}; // height above a vertex's plane from which no more vertices are looked up
 //#fill const SKIN_CLEARANCE_RATIO: f32 = {skin_clearance_ratio}; // of the height to which points are pushed
 //#fill const MAX_SKIN_PUSH_MM: f32 = {max_skin_push_mm};
+//#fill const MAX_PUSH_PER_LENGTH: f32 = {max_push_per_length}; // largest push relative to the distance from the root
 
 @group(0) @binding(7) var<storage, read> skin: array<u32>;
 
@@ -44,8 +45,10 @@ fn skin_below(p: vec3f) -> vec4f {
 }
 
 // clearance: height above the skin that strands should have at least [mm]
-fn outside_skin(point: vec3f, clearance: f32) -> vec3f {
+// from_root: distance from the root along the strand [mm]
+fn outside_skin(point: vec3f, clearance: f32, from_root: f32) -> vec3f {
     let least = SKIN_CLEARANCE_RATIO * clearance;
+    let most = min(MAX_PUSH_PER_LENGTH * from_root, MAX_SKIN_PUSH_MM);
     var p = point;
     for (var i = 0u; i < SKIN_PUSHES; i += 1u) {
         if (!is_near_skin(p)) {
@@ -55,7 +58,7 @@ fn outside_skin(point: vec3f, clearance: f32) -> vec3f {
         if (below.w >= least) {
             break;
         }
-        p += min(least - below.w, MAX_SKIN_PUSH_MM) * below.xyz;
+        p += min(least - below.w, most) * below.xyz;
     }
     return p;
 }

@@ -289,7 +289,7 @@ fn strand_position(index: u32, seed: u32, strand: StrandRoot, part: GroomPart, e
     if (s == 0.0) {
         return lifted;
     }
-    return outside_skin(lifted, least);
+    return outside_skin(lifted, least, s);
 }
 
 // Cover and the fraction of a strand from which it is dyed, packed for strands_light.wgsl; 0 for a strand that is not dyed.
