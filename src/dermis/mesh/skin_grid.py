@@ -28,7 +28,7 @@ SKIN_PUSHES = 3
 """Number of times that a knot is pushed out of the skin."""
 NEAR_SKIN_MM = 4.0
 """Height above the nearest vertex's tangent plane from which no more vertices are looked up [mm]."""
-MAX_SKIN_PUSH_MM, MAX_PUSH_PER_LENGTH = 16.0, 0.4
+MAX_SKIN_PUSH_MM, MAX_PUSH_PER_LENGTH = 16.0, 0.8
 """Largest distance by which a knot is pushed at once: in millimetres, and relative to its distance from the
 root along the strand. On coarse meshes, the height above the skin of short hair is inaccurate."""
 _INDEX_BITS, _DISTANCE_STEPS_PER_MM = 18, 256.0  # of a cell's word, see skin_grid.wgsl
