@@ -172,9 +172,6 @@ SWUNG_KNOTS_MM = 0.01
 WRITTEN_CURVES_MM = 1e-3
 """Knots of hair in files of other programs against the head's, by seven digits [mm]."""
 
-KNOTS_INSIDE_SKIN = 0.006
-"""Share of knots of hair more than 0.5 mm inside the skin: strands are interpolated between guides."""
-
 SPECTRAL_COLOUR = 0.3
 """Median CIEDE2000 of a picture from spectra under D65 against one in red, green and blue: products of
 colours differ from colours of products."""

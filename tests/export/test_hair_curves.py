@@ -30,7 +30,7 @@ from dermis.scene.heads import load_head
 
 @pytest.fixture(scope="module")
 def head() -> Head:
-    return Human(hair=HairLook(style="bob", density=0.2)).head(subdivide=0, hairs=0.05)
+    return Human(hair=HairLook(style="bob", density=0.2)).head(subdivide=0, hairs=0.06)
 
 
 @pytest.fixture(scope="module")

@@ -74,13 +74,14 @@ def woolly(
         place=np.tile(np.array([0.0, 100.0, 0.0, 1.0], np.float32), (count, 1)),
         along_mm=np.zeros(count, np.float32),
         part=np.zeros(count, np.int32),
+        threshold=np.zeros(count, np.float32),
     )
     part = np.zeros(1, HAIR_PARAMETERS_DTYPE)
     for name in ("density", "length_mm", "guide_mm", "clump_start_mm", "pitch_mm", "hairs_per_strand"):
         part[name] = 1.0
     part["radius_mm"], part["cover"], part["dark"] = radius_mm, cover, absorption
     centre = np.array([0.0, 0.0, 1.0])
-    hair = Groom(guides, roots, part, count, 5, np.zeros(91, np.float32), centre)
+    hair = Groom(guides, roots, part, count, count, 5, np.zeros(91, np.float32), centre)
     return Head("sheet", mesh, Maps(colour=np.ones((4, 4, 3), np.float32)), hair=hair)
 
 

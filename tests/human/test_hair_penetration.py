@@ -6,13 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tolerances import KNOTS_INSIDE_SKIN
 
-from dermis.apps.validation.people.hair_penetration import hair_penetration, with_style
+from dermis.apps.validation.people.hair_penetration import (
+    LIMIT_MM,
+    device_hair_penetration,
+    hair_penetration,
+    with_style,
+)
+from dermis.frame.renderer import Renderer
 from dermis.human.hair.look import HAIR_STYLES
 from dermis.human.person import Human
 
-LIMIT_MM = 0.5
 PEOPLE = 20
 
 
@@ -27,7 +31,13 @@ def test_hair_of_twenty_people_in_all_styles_is_outside_their_skin() -> None:
     ]
     assert len(styles) <= PEOPLE
     assert all(one.knots > 300 for one in found)
-    assert sum(one.inside for one in found) <= KNOTS_INSIDE_SKIN * sum(one.knots for one in found)
+    assert [one.inside for one in found] == [0] * PEOPLE
+
+
+@pytest.mark.parametrize("style", ["long", "twists"])
+def test_hair_that_the_device_grows_is_outside_the_skin(style: str) -> None:
+    found = device_hair_penetration(Renderer(), with_style(Human.sampled(1), style), LIMIT_MM)
+    assert found.knots > 10_000 and found.inside == 0
 
 
 def test_hair_through_the_head_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -124,9 +124,9 @@ def head(
         Weights of morph targets in the rest pose of the written file, such as jawOpen=0.2; repeatable.
     skin:
         Pigments and texture, such as melanin=0.1,freckles=0.4: melanin, eumelanin, blood, oxygen, redness,
-        freckles, moles, spots, tan, veins, stubble, recession, beard, oil, age, blemishes and scars from 0 to
-        1, stubble_eumelanin and stubble_pheomelanin from 0 to 10, epidermis_mm, and seed. [default: from the
-        person]
+        freckles, moles, spots, tan, veins, stubble, recession, beard, oil, age, blemishes, scars and vellus
+        from 0 to 1, stubble_eumelanin and stubble_pheomelanin from 0 to 10, epidermis_mm, and seed. [default:
+        from the person]
     eye:
         Eye appearance, such as eumelanin=0.2: eumelanin from 0 (blue) to 1 (dark brown), pupil_mm, redness,
         seed. [default: from the person]

@@ -28,7 +28,7 @@ from dermis.frame.features.shape.curvature import placeholder_curvature
 from dermis.frame.features.shape.mesh import HeadGeometry, rest_geometry, upload_geometry
 from dermis.frame.features.shape.shape import Shape
 from dermis.frame.features.surface.maps import detail_bindings, has_part_materials, upload_maps
-from dermis.frame.features.surface.record import skin_record, surface_constants
+from dermis.frame.features.surface.record import skin_record, surface_constants, vellus_per_mm
 from dermis.frame.features.surface.texels import make_surface_texture
 from dermis.frame.features.translucency.build import make_translucency, thin_part_tables
 from dermis.frame.features.translucency.pair_shape import pair_positions_mm
@@ -116,6 +116,7 @@ def _shade_constants(request: FrameRequest) -> Constants:
     used["WORN"] = not used["PARTS"] and request.head.undressed is not None
     used["METALS"] = used["PARTS"] or used["WORN"]
     used["BANDS"] = request.bands is not None
+    used["VELLUS"] = vellus_per_mm(request.head.maps) > 0.0
     return tuple((name, 1) for name, value in used.items() if value)
 
 

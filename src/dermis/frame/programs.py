@@ -25,7 +25,7 @@ FLOAT_TEXEL_FORMAT = "rgba32float"
 HALF_TEXEL_FORMAT = "rgba16float"
 """Texture format of light in half precision."""
 FRAME_FOLDER = Path(__file__).parent
-OPTIONAL_BINDING_CONSTANTS = ("PARTS", "CUTOUTS", "LIVING", "WORN", "METALS", "BANDS")
+OPTIONAL_BINDING_CONSTANTS = ("PARTS", "CUTOUTS", "LIVING", "WORN", "METALS", "BANDS", "VELLUS")
 """Pipeline constants that are also conditions of `//#if`: they decide which bindings or code a shader has."""
 FEATURES_FOLDER = FRAME_FOLDER / "features"
 """Folder to which shader paths such as "shading/shade.wgsl" are relative."""

@@ -46,7 +46,9 @@ class Guides(ShortRepr):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StrandRoots(ShortRepr):
-    """Roots of all strands that a hair style can have, in random order, with their guides and clumps.
+    """Roots of all strands that a hair style can have, with their guides and clumps.
+
+    The order is progressive: the first n roots are spread evenly over the skin for each n.
 
     Which of the strands grow depends on hair density, hairline and baldness of the person.
 
@@ -59,6 +61,8 @@ class StrandRoots(ShortRepr):
         its middle (1)
     along_mm : (n,) position of each strand's clump along its cornrow [mm]
     part : (n,) index of the row of `Groom.parameters` for each strand: the row of scalp hair or of the beard
+    threshold : (n,) density of hair, 0 to 1, from which each strand grows; a random number of the person is
+        added to it, modulo 1
     """
 
     roots: Roots
@@ -68,6 +72,7 @@ class StrandRoots(ShortRepr):
     place: Floats
     along_mm: Floats
     part: Ints
+    threshold: Floats
 
     def __len__(self) -> int:
         """Return the number of roots."""
@@ -80,8 +85,9 @@ class Groom(ShortRepr):
 
     guides, roots : guides and strand roots of the style
     parameters : (p,) structured array with one row of parameters for scalp hair and one for the beard
-    strands : number of roots to use, from the start of `roots`; if it is less than all, the strands are
-        widened to keep coverage
+    possible : number of roots that the density of the person's hair needs, from the start of `roots`
+    strands : number of roots to use, from the start of `roots`; if it is less than `possible`, the strands
+        are widened to keep coverage
     knots : number of knots per strand
     hairline_mm : (91,) heights of the hairline at angles of 0 to 180 degrees from the front [mm]
     centre_mm : (3,) centre of the roots on the mean person [mm]
@@ -90,6 +96,7 @@ class Groom(ShortRepr):
     guides: Guides
     roots: StrandRoots
     parameters: NDArray[np.void]
+    possible: int
     strands: int
     knots: int
     hairline_mm: Floats

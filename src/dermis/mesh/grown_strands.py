@@ -11,6 +11,7 @@ from dermis.base.arrays import Doubles, Ints, Mask
 from dermis.mesh.groom import KNOTS_PER_GUIDE, Groom
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
+from dermis.mesh.skin_grid import SkinGrid
 from dermis.mesh.strands import Roots, Strands, offsets_in_root_axes, root_frames
 
 UInt32s = NDArray[np.uint32]
@@ -46,16 +47,16 @@ def grow_strands(
     """
     count = min(len(groom), max_strands)
     guides = _posed_guides(groom, points_mm)
-    scale = len(groom.roots) / max(count, 1)
+    scale = groom.possible / max(count, 1)
     roots = Roots(groom.roots.roots.quad[:count], groom.roots.roots.position[:count])
     root_mm, frames = root_frames(mesh, roots, points_mm)
     middle = groom.roots.clump[:count]
     every = groom.roots.roots
     middles = Roots(every.quad.take(middle), every.position.take(middle, axis=0))
     middle_mm, _ = root_frames(mesh, middles, points_mm)
-    grown = _growing_root_indices(groom, count)
+    grown, skin = _growing_root_indices(groom, count), SkinGrid(mesh, points_mm)
     parts = [
-        _grow_chunk(groom, guides, index, root_mm[index], frames[index], middle_mm[index])
+        _grow_chunk(groom, guides, skin, index, root_mm[index], frames[index], middle_mm[index])
         for index in np.array_split(grown, max(1, -(-len(grown) // _STRANDS_PER_CHUNK)))
     ]
     knots, radius, absorption, cover = (np.concatenate(columns) for columns in zip(*parts, strict=True))
@@ -135,6 +136,7 @@ def _posed_guides(groom: Groom, points_mm: NDArray[np.floating]) -> tuple[Double
 def _grow_chunk(
     groom: Groom,
     posed_guides: tuple[Doubles, Doubles],
+    skin_grid: SkinGrid,
     strand_index: Ints,
     root_mm: Doubles,
     root_axes: Doubles,
@@ -143,6 +145,7 @@ def _grow_chunk(
     """Return the knots, radii, absorption coefficients and `cover` of n strands, as in `Strands`.
 
     posed_guides : knots of the posed guides, and skin normals below the knots
+    skin_grid : grid of the posed skin, which keeps strands outside
     strand_index : (n,) indices of the strands
     root_mm : (n, 3) positions of the roots [mm]
     root_axes : (n, 3, 3) axes of the coordinate system at each root, as rows
@@ -186,6 +189,8 @@ def _grow_chunk(
     height = (1.0 - pull) * own.height + pull * at.height + (varied * own.normal).sum(axis=-1)
     least = _MIN_HEIGHT_ABOVE_SKIN_MM * np.minimum(s / _RISE_LENGTH_MM, 1.0)
     positions = own.position + to_middle + varied + np.maximum(least - height, 0.0)[..., None] * own.normal
+    above = s > 0.0
+    positions[above] = skin_grid.push_out(positions[above], least[above], s[above])
     taper = 1.0 - (1.0 - _TIP_WIDTH_RATIO) * _smoothstep(1.0 - _TIP_FRACTION, 1.0, t)
     thinned = _MIN_HAIRLINE_THICKNESS + (1.0 - _MIN_HAIRLINE_THICKNESS) * _smoothstep(
         *_SHORT_HAIR_HEIGHTS_MM, edge.above_mm
@@ -263,7 +268,10 @@ def _growing_root_indices(groom: Groom, root_count: int) -> Ints:
     fade = _smoothstep(*_HAIRLINE_FADE_MM, edge.above_mm + _BABY_DROP_MM * edge.baby)
     density = 1.0 + edge.part["hairline"] * (fade - 1.0)
     density = density * edge.part["density"] * (1.0 - edge.part["thinning"] * place[:, 2])
-    return np.flatnonzero(_uniform_random(edge.seed, 0) < density).astype(np.int32)
+    seeds = groom.parameters["seed"].astype(np.uint32) * np.uint32(131071)
+    offset = _uniform_random(seeds, 0)[groom.roots.part[:root_count]]
+    threshold = np.modf(groom.roots.threshold[:root_count] + offset)[0]
+    return np.flatnonzero(threshold < density).astype(np.int32)
 
 
 def _length_fractions(groom: Groom, strand_index: Ints, hairline_effects: _HairlineEffects) -> Doubles:

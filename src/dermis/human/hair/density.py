@@ -1,4 +1,4 @@
-"""Density of scalp hair and beard over the skin, and random hair roots with that density."""
+"""Density of scalp hair and beard over the skin, and hair roots with that density."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from dermis.base.arrays import Doubles, Floats
 from dermis.base.tables import read_rows
 from dermis.human.curves import smoothstep
 from dermis.human.hair.root_finder import Index, RootFinder
+from dermis.human.hair.root_sampling import CANDIDATES_PER_SAMPLE, progressive_samples, spread_thresholds
 from dermis.human.hair.styles import BeardArea
 from dermis.human.skin.face import HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, hairline_heights, zone_table
 from dermis.human.skin.surface import BORDER_FIELDS, average_surface
@@ -22,9 +23,7 @@ from dermis.mesh.strands import Roots, interpolate_quads, quad_corners
 
 HEAD_AXIS_Z = -72.0
 """z coordinate of the vertical axis of the head; angles along the hairline are about this axis [mm]."""
-_R2_SEQUENCE_STEPS = np.array(
-    [0.7548776662, 0.5698402909]
-)  # of a low-discrepancy sequence in the unit square
+_MIN_RELATIVE_DENSITY = 0.02  # below which no hair grows, so that no hair is alone beyond an edge
 _SCALP_BOTTOM_Y = -80.0  # lower end of the hair of the head [mm]
 _HAIRLINE_FADE_MM = (-3.0, 11.0)  # heights above the hairline between which density rises from 0 to 1
 _LIP_FADE_MM = (0.8, 3.0)  # distances from the lips between which the density of the beard rises
@@ -53,10 +52,10 @@ class HairDensity(NamedTuple):
 def sample_roots(
     mesh: Mesh, density: HairDensity, max_roots_per_cm2: float, rng: np.random.Generator
 ) -> Roots:
-    """Return random hair roots, ordered by quad, whose number per area follows `density`.
+    """Return hair roots as progressive blue noise, whose number per area follows `density`.
 
-    The roots in a quad are selected from the points of a low-discrepancy sequence, so that they do not
-    cluster. No hair grows on the ears, on the lips or in the mouth.
+    The roots of each prefix are spread evenly, too, so that a prefix can represent all roots. No hair grows
+    on the ears, on the lips or in the mouth.
 
     mesh : control mesh of the person
     density : relative density over the skin
@@ -64,20 +63,25 @@ def sample_roots(
     """
     quad = _hairy_quads(mesh)
     corner_points = quad_corners(mesh, quad)
-    counts = np.floor(max_roots_per_cm2 * quad_areas_cm2(mesh, quad) + rng.random(len(quad))).astype(np.int64)
-    starts, threshold = rng.random((len(quad), 2)), rng.random(int(counts.sum()))
-    near = density.candidates[corner_points].any(axis=1)
-    quad_index = np.repeat(np.flatnonzero(near), counts[near])
-    ends = np.cumsum(counts)[near]
-    threshold_index = np.arange(len(quad_index)) + np.repeat(ends - np.cumsum(counts[near]), counts[near])
-    step = threshold_index - (np.cumsum(counts) - counts)[quad_index]
-    position = starts.take(quad_index, axis=0) + step[:, None] * _R2_SEQUENCE_STEPS
-    position -= np.floor(position)
-    values = average_control_points().T.take(corner_points.T.take(quad_index, axis=1), axis=1)
+    candidates_per_cm2 = CANDIDATES_PER_SAMPLE * max_roots_per_cm2
+    counts = np.floor(candidates_per_cm2 * quad_areas_cm2(mesh, quad) + rng.random(len(quad))).astype(
+        np.int64
+    )
+    index = np.repeat(np.arange(len(quad)), counts)
+    position = rng.random((len(index), 2))
+    near = np.asarray(density.candidates[corner_points].any(axis=1)).take(index)
+    index, position = index[near], position[near]
+    corners = corner_points.T.take(index, axis=1)
+    values = average_control_points().T.take(corners, axis=1)
     relative_density = density.relative_density(interpolate_quads(position, values).T)
-    accepted = np.flatnonzero(threshold.take(threshold_index) < relative_density)
-    rooted = quad.take(quad_index.take(accepted)).astype(np.int32)
-    return Roots(rooted, position.take(accepted, axis=0).astype(np.float32))
+    some = np.flatnonzero(relative_density > _MIN_RELATIVE_DENSITY)
+    some = some[rng.permutation(len(some))]
+    points_mm = interpolate_quads(position[some], mesh.points_mm.T.take(corners[:, some], axis=1)).T
+    count = round(len(some) / CANDIDATES_PER_SAMPLE)
+    accepted = progressive_samples(points_mm, 100.0 * len(some) / candidates_per_cm2, count)
+    thinned = spread_thresholds(points_mm[accepted]) < relative_density[some[accepted]]
+    root = some[accepted[thinned]]
+    return Roots(quad[index[root]].astype(np.int32), position[root].astype(np.float32))
 
 
 def height_above_hairline(points: Doubles, recession: float = 0.0) -> Doubles:

@@ -76,10 +76,15 @@ def make_groom(
     tables = strands_of_style(scalp, longest_beard, root_finder, subdivision_levels)
     parts = [_scalp_parameters(scalp, hair_look, recession)] if scalp else []
     parts += [_beard_parameters(beard, hair_look)] if beard else []
-    parameters, strands = np.array(parts, HAIR_PARAMETERS_DTYPE), round(hair_fraction * len(tables.roots))
+    parameters = np.array(parts, HAIR_PARAMETERS_DTYPE)
+    # A prefix of the roots is spread evenly, so that sparse hair is a prefix of dense hair.
+    largest = float(parameters["density"].max())
+    possible = round(largest * len(tables.roots))
+    parameters["density"] /= largest
     receding = max(recession, scalp.crown if scalp else 0.0)
     heights, knots = hairline_heights(receding, hair_look.widows_peak), _knot_count(parameters)
-    return Groom(tables.guides, tables.roots, parameters, strands, knots, heights, tables.centre_mm)
+    strands = round(hair_fraction * possible)
+    return Groom(tables.guides, tables.roots, parameters, possible, strands, knots, heights, tables.centre_mm)
 
 
 def _scalp_style(hair_look: HairLook) -> Style | None:

@@ -23,7 +23,8 @@ from dermis.human.hair.guides import (
     parting_side,
 )
 from dermis.human.hair.root_finder import RootFinder
-from dermis.human.hair.styles import Style
+from dermis.human.hair.root_sampling import spread_thresholds
+from dermis.human.hair.styles import BeardArea, Style
 from dermis.mesh.groom import KNOTS_PER_GUIDE, Guides, StrandRoots
 from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
@@ -31,7 +32,7 @@ STRANDS_PER_CM2 = 150.0
 """Density of the strand roots on the scalp; strands grow from all or some of them [1/cm2]."""
 BEARD_STRANDS_PER_CM2 = 220.0
 """Density of the strand roots in beards [1/cm2]."""
-_CACHE_VERSION = 14  # of this module's algorithm, part of the keys of cached tables
+_CACHE_VERSION = 16  # of this module's algorithm, part of the keys of cached tables
 _MAX_CACHED_STYLES, _MAX_CACHED_LOOKS = 4, 24  # single styles; hair styles with or without a beard
 # Distances between guides from which strands are less, and then not at all, interpolated between them [mm].
 _GUIDE_SEPARATION_MM = 25.0, 55.0
@@ -40,7 +41,7 @@ _BEARD_EDGE_DENSITY = 0.05, 0.9  # relative densities between which hairs of a b
 _SEED = 20
 _CENTRE_ROOT_COUNT = 2000  # number of roots whose mean is the centre of the hair
 _GUIDE_FIELDS = "corner", "local_mm", "weight", "rest_mm", "cut"
-_ROOT_FIELDS = "quad", "position", "guide", "guide_weight", "clump", "place", "along_mm"
+_ROOT_FIELDS = "quad", "position", "guide", "guide_weight", "clump", "place", "along_mm", "threshold"
 
 
 class StyleStrands(NamedTuple):
@@ -71,7 +72,8 @@ def strands_of_style(
     parts = [_cached_style_arrays(style, root_finder) for style in worn]
     guides = Guides(*(np.concatenate([part[name] for part in parts]) for name in _GUIDE_FIELDS))
     counts = [len(part["quad"]) for part in parts]
-    order = np.random.default_rng(_SEED).permutation(sum(counts))
+    # A prefix of all strands has equal fractions of each part, because each is in progressive order.
+    order = np.argsort(np.concatenate([(np.arange(n) + 0.5) / n for n in counts]), kind="stable")
     place = np.argsort(order)  # new index of each strand
     first_guide = np.cumsum([0, *(len(part["cut"]) for part in parts)])
     first_strand = np.cumsum([0, *counts])
@@ -79,12 +81,13 @@ def strands_of_style(
     columns["guide"] += np.repeat(first_guide[:-1], counts)[:, None].astype(np.int32)
     columns["clump"] = place[columns["clump"] + np.repeat(first_strand[:-1], counts)].astype(np.int32)
     columns["part"] = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
-    quad, position, *rest = (columns[name].take(order, axis=0) for name in (*_ROOT_FIELDS, "part"))
+    columns = {name: column.take(order, axis=0) for name, column in columns.items()}
+    quad, position = columns.pop("quad"), columns.pop("position")
     some = slice(None, _CENTRE_ROOT_COUNT)
     corners_mm = root_finder.once_subdivided_mesh.points_mm[quad_corners(root_finder.mesh, quad[some])]
     centre_mm = np.einsum("nk,nkc->nc", quad_weights(position[some]), corners_mm).mean(axis=0)
     roots = refine_roots(root_finder.mesh, Roots(quad, position), subdivision_levels)
-    return StyleStrands(guides, StrandRoots(roots, *rest), centre_mm)
+    return StyleStrands(guides, StrandRoots(roots, **columns), centre_mm)
 
 
 @lru_cache(_MAX_CACHED_STYLES)
@@ -99,11 +102,9 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
 
     The names are those of the fields of `Guides` and of `StrandRoots`.
     """
-    mesh, rng = root_finder.mesh, np.random.default_rng(_SEED)
-    beard = style.comb == "beard"
-    where = density.beard_density(style.area) if beard else density.scalp_density(0.0, _HAIRLINE_MARGIN_MM)
-    max_roots_per_cm2 = BEARD_STRANDS_PER_CM2 if beard else STRANDS_PER_CM2
-    roots = density.sample_roots(mesh, where, max_roots_per_cm2, rng)
+    mesh, beard = root_finder.mesh, style.comb == "beard"
+    where, _ = _density_of_area(style.area if beard else None)
+    roots = _cached_roots(style.area if beard else None, root_finder)
     corners = quad_corners(mesh, roots.quad)
     points, guide = np.unique(corners, return_inverse=True)
     guide = guide.reshape(corners.shape)
@@ -124,16 +125,41 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
         points = np.einsum("nk,nkc->nc", weight, average_control_points()[corners])
         place[:, 3] = smoothstep(*_BEARD_EDGE_DENSITY, where.relative_density(points))
     guides = bind_guides(mesh, points_mm, knots, heights, cut_fractions(knots, style))
-    clump = _clump_centre_strands(
-        root_mm, np.einsum("nk,nkc->nc", weight, knots[guide, KNOTS_PER_GUIDE // 2]), style, rng
+    half_length_mm = np.einsum("nk,nkc->nc", weight, knots[guide, KNOTS_PER_GUIDE // 2])
+    clump = _clump_centre_strands(root_mm, half_length_mm, style)
+    columns = (
+        *(roots.quad, roots.position, guide, weight, clump, place, -root_mm[clump, 2]),
+        spread_thresholds(root_mm),
     )
-    columns = roots.quad, roots.position, guide, weight, clump, place, -root_mm[clump, 2]
-    types = np.int32, np.float32, np.int32, np.float32, np.int32, np.float32, np.float32
+    types = np.int32, np.float32, np.int32, np.float32, np.int32, np.float32, np.float32, np.float32
     found = {
         name: np.asarray(column, kind)
         for name, column, kind in zip(_ROOT_FIELDS, columns, types, strict=True)
     }
     return found | {name: getattr(guides, name) for name in _GUIDE_FIELDS}
+
+
+def _density_of_area(beard_area: BeardArea | None) -> tuple[density.HairDensity, float]:
+    """Return the relative density of roots in a part of the skin, and their density where it is 1 [1/cm2].
+
+    beard_area : part of the face that a beard covers; None for the scalp
+    """
+    if beard_area is not None:
+        return density.beard_density(beard_area), BEARD_STRANDS_PER_CM2
+    return density.scalp_density(0.0, _HAIRLINE_MARGIN_MM), STRANDS_PER_CM2
+
+
+def _cached_roots(beard_area: BeardArea | None, root_finder: RootFinder) -> Roots:
+    """Return the roots in a part of the skin, which all styles share, see `_density_of_area`."""
+
+    def sample() -> Arrays:
+        rng = np.random.default_rng(_SEED)
+        roots = density.sample_roots(root_finder.mesh, *_density_of_area(beard_area), rng)
+        return {"quad": roots.quad, "position": roots.position}
+
+    parameters = f"hair roots {_CACHE_VERSION} {beard_area}"
+    found = cached_arrays(root_finder.once_subdivided_mesh.points_mm, parameters, list(Roots._fields), sample)
+    return Roots(found["quad"], found["position"])
 
 
 def _near_guide_weights(guide_weight: Doubles, guide: NDArray[np.int64], knots: Doubles) -> Doubles:
@@ -170,14 +196,12 @@ def _root_locations(corner_weight: Doubles, corner_points: Doubles) -> Doubles:
     return np.stack([angle, height, np.clip(thinning, 0.0, 1.0), top], axis=1)
 
 
-def _clump_centre_strands(
-    root_mm: Doubles, half_length_mm: Doubles, style: Style, rng: np.random.Generator
-) -> NDArray[np.int64]:
+def _clump_centre_strands(root_mm: Doubles, half_length_mm: Doubles, style: Style) -> NDArray[np.int64]:
     """Return for each strand the index (n,) of the strand at the centre of its clump.
 
     In cornrows, the clump of a strand is found by moving its root sideways onto the centreline of its row;
-    the strand whose root is nearest to this position is the centre. In other styles, the centres are strands
-    chosen at random, and each strand belongs to the clump of the nearest centre.
+    the strand whose root is nearest to this position is the centre. In other styles, the centres are the
+    first strands, which are blue noise, and each strand belongs to the clump of the nearest centre.
 
     root_mm : (n, 3) roots on the mean person [mm]
     half_length_mm : (n, 3) points of the strands at half the length of their guides [mm]
@@ -192,8 +216,6 @@ def _clump_centre_strands(
         )[1]
         return np.asarray(found, np.int64)
     count = max(1, round(len(root_mm) / (STRANDS_PER_CM2 * (style.clump_mm / 10.0) ** 2)))
-    middles = rng.permutation(len(root_mm))[:count]
-    near = np.column_stack(
-        [root_mm, 0.5 * half_length_mm]
-    )  # hairs that part from each other are not in one clump
-    return np.asarray(middles[cKDTree(near[middles]).query(near)[1]], np.int64)
+    # Hairs that part from each other are not in one clump.
+    near = np.column_stack([root_mm, 0.5 * half_length_mm])
+    return np.asarray(cKDTree(near[:count]).query(near)[1], np.int64)

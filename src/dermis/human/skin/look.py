@@ -91,6 +91,9 @@ class SkinLook:
         Density of inflamed spots, 0 to 1 [-].
     scars : float
         Density of pitted scars of acne, 0 to 1 [-].
+    vellus : float
+        Density of vellus hair, which shines at the outline of the face in light from the side, 0 to 1;
+        0.5 is typical [-].
 
     Raises
     ------
@@ -126,6 +129,7 @@ class SkinLook:
     stubble_pheomelanin: float = 0.3
     blemishes: float = 0.0
     scars: float = 0.0
+    vellus: float = 0.5
 
     def __post_init__(self) -> None:
         """Raise DermisError for fields out of range."""

@@ -29,6 +29,10 @@ COMMANDS = {
         f"{PACKAGE}.person:write_path_traced_page",
         "Write docs/path_traced.md from the last measurement.",
     ),
+    "hair-page": (
+        f"{PACKAGE}.hair:write_hair_page",
+        "Compare hair with path tracing and write docs/hair.md; needs Mitsuba.",
+    ),
     "highlights": (
         f"{PACKAGE}.cycles_comparison:compare_highlights",
         "Measure highlights for docs/accuracy.md; needs bpy.",

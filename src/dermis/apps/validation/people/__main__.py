@@ -1,6 +1,6 @@
-"""Commands that compare people sampled at random with a spectral archive of measured people.
+"""Commands that compare random people with a spectral archive of measured people, and check their hair.
 
-The commands need the archive in the folder DERMIS_DATA, see docs/measured.md.
+The comparisons need the archive in the folder DERMIS_DATA, see docs/measured.md.
 """
 
 from __future__ import annotations
@@ -20,6 +20,10 @@ COMMANDS = {
     "page": (
         f"{PACKAGE}.drawn:write_random_people_tables",
         "Measure the variation of people and write docs/measured.md.",
+    ),
+    "hair": (
+        f"{PACKAGE}.hair_penetration:print_hair_penetration",
+        "Print how much hair is inside the skin of people, by hair style; needs no archive.",
     ),
 }
 """Function and description of each command, by its name."""

@@ -19,6 +19,7 @@ from dermis.frame.features.hair.resources import (
     drawn_strand_counts,
     sky_cell_count,
 )
+from dermis.frame.features.hair.skin_grid import draw_skin_grid
 from dermis.frame.features.hair.swing import Swing, run_step
 from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.frame.features.shape.shape import Shape
@@ -60,12 +61,14 @@ def draw_shadows(
 ) -> None:
     """Declare the passes that pose the strands that cast shadows, and compute the shadows of the hair.
 
-    The passes fill the deep opacity maps of lights. For an environment, they also fill the grid of sky
-    transmittance.
+    The passes fill the grid of the skin, and the deep opacity maps of lights. For an environment, they also
+    fill the grid of sky transmittance.
 
     geometry : current shape of the head, and its vertices and triangles
     """
     tables = strands.tables
+    if tables.groom is not None:
+        draw_skin_grid(graph, tables.groom.skin, geometry[1])
     pose_strands(graph, tables, geometry[0], tables.buffers.casters, tables.casters)
     if len(shadow_views.clips) or has_environment:
         _draw_deep_opacity(graph, strands, lighting_bindings)
@@ -125,9 +128,13 @@ def pose_strands(
     if strand_tables.groom is not None:
         groom, style = strand_tables.groom, strand_tables.groom.style
         person: Bindings = {"roots": groom.roots, "parts": groom.parts, "hairline": groom.hairline}
+        skin: Bindings = {"skin": groom.skin.skin}
         guides: Bindings = {"guides": style.guides, "guide_cuts": style.guide_cuts}
         _dispatch_hair(
-            graph, "hair/strands_grow.wgsl", {**shared, **person, **guides}, coarse_counts.total_knot_count()
+            graph,
+            "hair/strands_grow.wgsl",
+            {**shared, **person, **guides, **skin},
+            coarse_counts.total_knot_count(),
         )
 
 

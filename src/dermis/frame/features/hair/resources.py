@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
+from dermis.frame.features.hair.skin_grid import SkinGridBuffers, make_skin_grid
 from dermis.frame.lights.environment import SKY_DIRECTIONS
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Buffer, Constants, Device, Memo, Texture, UniformRecord, make_texture
@@ -23,6 +24,7 @@ from dermis.mesh.groom import (
 from dermis.mesh.grown_strands import mean_hair_absorptance
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
+from dermis.mesh.skin_grid import skin_grid_constants
 from dermis.mesh.strands import Strands, quad_corners, quad_weights
 from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_constants
@@ -64,7 +66,14 @@ _STRAND_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("absorption
 _ANCHOR_DTYPE = np.dtype([("corner", "u4", 4), ("local", "f4", 4)])
 _ROOT_MEMBERS = ("corner", "u4", 4), ("weight", "f4", 4), ("guide", "u4", 4), ("guide_weight", "f4", 4)
 _ROOT_DTYPE = np.dtype(
-    [*_ROOT_MEMBERS, ("place", "f4", 4), ("clump", "u4"), ("part", "u4"), ("along_mm", "f4"), ("pad", "u4")]
+    [
+        *_ROOT_MEMBERS,
+        ("place", "f4", 4),
+        ("clump", "u4"),
+        ("part", "u4"),
+        ("along_mm", "f4"),
+        ("threshold", "f4"),
+    ]
 )
 _HAIR_COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
 _HAIRS_DTYPE = np.dtype(
@@ -97,8 +106,8 @@ class StrandDetail(NamedTuple):
 
 
 _GPU_DETAIL, _SOFTWARE_DETAIL = (
-    StrandDetail(1 << 23, 10_000, 24, 0.6, 0.15, 9.0),
-    StrandDetail(1 << 20, 5_000, 10, 0.9, 0.3, 14.0),
+    StrandDetail(1 << 23, 9_000, 24, 0.6, 0.15, 9.0),
+    StrandDetail(1 << 20, 4_500, 10, 0.9, 0.3, 14.0),
 )
 
 
@@ -279,12 +288,16 @@ class GuideTables:
 
 @dataclass(frozen=True, eq=False)
 class GroomTables:
-    """Buffers of a person's groom: guides of the hair style, and parameters such as length and colour."""
+    """Buffers of a person's groom: guides of the hair style, and parameters such as length and colour.
+
+    skin : grid by which the strands are kept outside the skin
+    """
 
     style: GuideTables
     roots: Buffer
     parts: Buffer
     hairline: Buffer
+    skin: SkinGridBuffers
 
 
 @dataclass(frozen=True, eq=False)
@@ -379,7 +392,8 @@ def shader_constants() -> dict[str, float]:
         "sky_cell_words": _SKY_CELL_WORDS,
     }
     guides = {"anchors_per_guide_knot": ANCHORS_PER_GUIDE_KNOT, "knots_per_guide": KNOTS_PER_GUIDE}
-    return {**opacity, **words, "view_texel": VIEW_TEXEL_PIXELS, **sky, **guides, **hair_constants()}
+    own = {**opacity, **words, "view_texel": VIEW_TEXEL_PIXELS, **sky, **guides}
+    return {**own, **skin_grid_constants(), **hair_constants()}
 
 
 def has_strands(head: Head, settings: Settings) -> bool:
@@ -442,7 +456,7 @@ def make_strand_tables(
         casters=caster_strand_counts(device, coarse_counts),
         detail=adapter_strand_detail(device),
         groom=groom,
-        possible=0 if hair is None else len(hair.roots),
+        possible=0 if hair is None else hair.possible,
         centre_mm=np.zeros(3) if hair is None else hair.centre_mm,
         length_mm=0.0 if largest is None else float(largest["length_mm"]),
         bend_mm=_MAX_BEND_MM if parts is None else float(bend_radius_mm(parts).min(initial=_MAX_BEND_MM)),
@@ -480,19 +494,22 @@ def make_strand_roots(device: Device, roots: StrandRoots, mesh: Mesh) -> Buffer:
     """
     rows = np.zeros(len(roots), _ROOT_DTYPE)
     rows["corner"], rows["weight"] = quad_corners(mesh, roots.roots.quad), quad_weights(roots.roots.position)
-    for name in ("guide", "guide_weight", "place", "clump", "part", "along_mm"):
+    for name in ("guide", "guide_weight", "place", "clump", "part", "along_mm", "threshold"):
         rows[name] = getattr(roots, name)
     return device.buffer(rows.view(np.uint32), "STORAGE")
 
 
-def make_groom_tables(device: Device, groom: Groom, guide_tables: GuideTables, roots: Buffer) -> GroomTables:
+def make_groom_tables(
+    device: Device, groom: Groom, guide_tables: GuideTables, roots: Buffer, skin: SkinGridBuffers
+) -> GroomTables:
     """Upload the parameters of a person's groom, such as colour and length.
 
     guide_tables : guides of the hair style, shared by all people with that style
     roots : buffer of the strand roots of the hair style, shared by all people with that style
+    skin : grid of the skin, shared by all people with the same topology
     """
     parts = device.buffer(groom.parameters.view(np.float32), "STORAGE")
-    return GroomTables(guide_tables, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"))
+    return GroomTables(guide_tables, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"), skin)
 
 
 def _fill_strand_rows(strand_rows: NDArray[np.void], head: Head, strands: Strands) -> None:
@@ -530,7 +547,8 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest) -> Resourc
         roots = cached(
             make_strand_roots, device, head.hair.roots, head.topology_head.mesh, min_cache_size=kept
         )
-        groom = cached(make_groom_tables, device, head.hair, style, roots)
+        skin = cached(make_skin_grid, device, head.topology_head)
+        groom = cached(make_groom_tables, device, head.hair, style, roots, skin)
     buffers = cached(make_strand_buffers, device, capacity, casters)
     tables = cached(make_strand_tables, device, head.without_maps, coarse, buffers, groom)
     picture = cached(make_strand_picture, device, capacity, request.settings.size)

@@ -2,6 +2,7 @@
 // randomly varied. Strands that a person does not have, because of the hairline or a lower density, get a negative radius.
 //#include "each.wgsl"
 //#include "strand_knots.wgsl"
+//#include "skin_push.wgsl"
 
 //#fill const KNOTS_PER_GUIDE: u32 = {knots_per_guide}; // of each guide
 const MIN_HEIGHT_MM: f32 = 0.35; // least height of strands above the skin, away from their roots
@@ -37,7 +38,7 @@ struct StrandRoot {
     clump: u32, // strand at the middle of its clump
     part: u32,
     along_mm: f32, // position of the clump along its row
-    pad: u32,
+    threshold: f32, // see the field `threshold` of StrandRoots
 }
 
 // Numbers of a part of a groom, such as scalp or beard; see groom.py.
@@ -177,10 +178,10 @@ fn hairline_of(index: u32, strand: StrandRoot, part: GroomPart) -> Hairline {
     return Hairline(above, f32(random(index, 33u) < chance));
 }
 
-fn grows(index: u32, strand: StrandRoot, part: GroomPart, edge: Hairline) -> bool {
+fn grows(seed: u32, strand: StrandRoot, part: GroomPart, edge: Hairline) -> bool {
     let fade = smoothstep(HAIRLINE_FADE_MM.x, HAIRLINE_FADE_MM.y, edge.above + BABY_DROP_MM * edge.baby);
     let density = mix(1.0, fade, part.hairline) * part.density * (1.0 - part.thinning * strand.place.z);
-    return random(index, 0u) < density;
+    return fract(strand.threshold + random(seed, 0u)) < density;
 }
 
 // Length of a strand, as a fraction of its guides.
@@ -284,7 +285,11 @@ fn strand_position(index: u32, seed: u32, strand: StrandRoot, part: GroomPart, e
     offset += frizz_offset(index, part, s, across) + edge.baby * BABY_TURN * s * random_normal(index, 35u) * across[0];
     let height = mix(own.height, at.height, pull) + dot(offset - pull * (at.position - own.position), own.normal);
     let least = MIN_HEIGHT_MM * min(s / RISE_MM, 1.0);
-    return own.position + offset + max(least - height, 0.0) * own.normal;
+    let lifted = own.position + offset + max(least - height, 0.0) * own.normal;
+    if (s == 0.0) {
+        return lifted;
+    }
+    return outside_skin(lifted, least, s);
 }
 
 // Cover and the fraction of a strand from which it is dyed, packed for strands_light.wgsl; 0 for a strand that is not dyed.
@@ -310,7 +315,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let edge = hairline_of(random_index, strand, part);
     let length = length_of(random_index, strand, part, edge);
     var at = vec4f(root.position, -1.0);
-    if (grows(random_index, strand, part, edge)) {
+    if (grows(seed, strand, part, edge)) {
         let along = f32(k) / f32(hairs.coarse_knots - 1u);
         let taper = mix(1.0, TIP_WIDTH, smoothstep(1.0 - TIP_FRACTION, 1.0, along));
         let radius = part.radius_mm * (0.8 + 0.4 * random(random_index, 3u)) * taper * thickness_of(part, edge);

@@ -13,6 +13,9 @@
 //#if WORN
 //#include "sheen.wgsl"
 //#end
+//#if VELLUS
+//#include "vellus.wgsl"
+//#end
 
 // Whether each point skips lights behind its surface. Without it, software adapters shade a point with all lights that its
 // neighbours see; GPUs are faster when all points read the same light.
@@ -25,6 +28,7 @@ struct Lit {
     reflected: vec3f, // radiance reflected by the surface
     directional: vec3f, // part of `entered` by which the light towards the eye exceeds the mean over exit directions
     across: vec3f, // `entered`, times the relative transmittance of deep slabs
+    vellus: vec3f, // radiance scattered by vellus hair
 }
 
 // Reflecting film over a surface.
@@ -126,7 +130,7 @@ fn illuminate(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
 }
 
 fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f32) -> Lit {
-    var lit = Lit(vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0));
+    var lit = Lit(vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0));
     let mirror = visible_normal(film.normal, v);
     let smoothness = select(0.0, film.smoothness, EYES && SHAPES);
     let directional = HALF_SPACE && (point.flags & OPAQUE) == 0u;
@@ -171,6 +175,9 @@ fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f
                     //#if WORN
                     lit.reflected += e * sheen_lobe(mirror, arriving.direction, v, cosine);
                     //#end
+                    //#if VELLUS
+                    lit.vellus += e * vellus_lobe(point.normal, arriving.direction, v);
+                    //#end
                 }
                 part++;
                 if (part >= parts_of(light)) {
@@ -191,6 +198,9 @@ fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f
             lit.across += entering;
         }
         lit.entered += entering;
+        //#if VELLUS
+        lit.vellus += entering * vellus_of_uniform(point.normal, v);
+        //#end
         //#if WORN
         lit.reflected += entering * sheen_of_uniform(mirror, v);
         //#end

@@ -11,6 +11,7 @@
 //#include "irradiance/subtexel_light.wgsl"
 
 override SPLIT: bool = false; // whether light below the skin is stored in layers of its own, to be diffused over the picture
+override VELLUS: bool = false; // whether the skin has vellus hair
 override MIXED: bool = false; // whether a map mixes profiles: the alpha of `scattered` then holds their blend weights
 
 struct Shade {
@@ -109,6 +110,10 @@ fn shaded_skin(shading_point: ShadingPoint, lit: Lit, exit_factor: f32) -> Shade
         local = below * leaving * max(excess, vec3f(0.0));
         leaving *= 1.0 + min(excess, vec3f(0.0));
     }
+    //#if VELLUS
+    leaving *= through_vellus(point.normal, shading_point.v);
+    local += shade.light_factors.x * lit.vellus;
+    //#end
     return Shaded(below, leaving, local, reflected, dot(point.position - shade.eye, shade.forward));
 }
 

@@ -9,6 +9,7 @@ from dermis.gpu import ComputeProgram, UniformRecord
 from dermis.gpu.shader_types import struct_dtype
 from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.human import teeth
+from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_plane_mm
 from dermis.mesh.maps import Maps
@@ -27,6 +28,7 @@ DEFAULT_COLOUR = 0.8
 """Albedo of heads without a colour map [-]."""
 _EYE_SEED_COUNT = 1000  # number of different eyes
 _NO_RELIEF_LEVEL = -1.0
+_VELLUS_PER_MM = 0.1  # extinction of the densest vellus hair, about 3 hairs of 1.5 mm by 20 um per mm2 [1/mm]
 _MAX_OBLIQUE_OFFSET_MM = 3.0  # limit of the offset of oblique light, as the surface is flat only near a texel
 
 
@@ -110,9 +112,15 @@ def _derived_skin_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[
         "returned": energy.returns_internal_light,
         "tint": skin.specular_colour == "wrong",
         "relief_band": _normal_map_level(maps),
+        "vellus_per_mm": vellus_per_mm(maps),
         "lobes": _lobe_widths(skin),
         **(_light_direction_members(skin, maps, profile) if skin.direction == "half-space" else {}),
     }
+
+
+def vellus_per_mm(maps: Maps) -> float:
+    """Return the extinction coefficient of the vellus hair's layer; 0 for unpainted skin [1/mm]."""
+    return _VELLUS_PER_MM * maps.look.vellus if isinstance(maps, PaintedMaps) else 0.0
 
 
 def _lobe_widths(skin: Skin) -> tuple[float, float, float]:

@@ -23,6 +23,7 @@ struct Skin {
     uniform_reflectance: vec3f, // reflectance of uniform light relative to that at normal incidence
     reflectance: array<vec4f, 32>, // reflectance of light from one direction relative to that at normal incidence, at evenly spaced roots of the cosine
     bands: array<vec4f, 3>, // matrix from RGB colours to the channels of the picture, by rows
+    vellus_per_mm: f32, // extinction of the layer of vellus hair [1/mm]
     transmittance: array<vec4f, 32>, // light from one direction that passes deep slabs, relative to that of uniform light with equal reflectance
 }
 
