@@ -37,7 +37,7 @@ from dermis.human.skin.measured import (
 )
 from dermis.human.skin.painted import PaintedMaps
 from dermis.human.wear.dress import Outfit, dress, dressed_template, worn_points_mm
-from dermis.human.wear.look import ITEM_TYPES, Clothing, Glasses, Item
+from dermis.human.wear.look import ITEM_TYPES, Clothing, Glasses, Headwear, Item
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -81,8 +81,9 @@ class Human:
         Weights of MakeHuman's morph targets, such as {"nose/nose-hump-incr": 0.5}, normally 0 to 1.
     skin, eyes, hair : SkinLook, EyeLook and HairLook, optional
         Looks of skin, eyes and hair; by default typical for the person.
-    clothing, glasses : Clothing and Glasses, optional
-        Garment and glasses, or words such as "navy denim shirt" and "brown square"; by default none.
+    clothing, glasses, headwear : Clothing, Glasses and Headwear, optional
+        Garment, glasses and headwear, or words such as "navy denim shirt", "brown square" and "red beanie";
+        by default none.
     skin_ancestry : str
         Name of a group of measured people, such as "south asian". The person gets the skin, eye and hair
         colours of this group, independently of the shape; "" for the colours of the shape's ancestries.
@@ -120,6 +121,7 @@ class Human:
     ita: float | None = None
     clothing: Clothing | None = None
     glasses: Glasses | None = None
+    headwear: Headwear | None = None
 
     def __post_init__(self) -> None:
         """Raise DermisError for fields out of range."""
@@ -288,7 +290,7 @@ class Human:
     def positions_mm(self) -> NDArray[np.float32]:
         """Return the control points (p, 3) in rest pose, relative to the midpoint between the eyes [mm].
 
-        `Pose(positions_mm=...)` gives any head with the same clothing and glasses this shape, because all
+        `Pose(positions_mm=...)` gives any head with the same clothing, glasses and headwear this shape, because all
         people have corresponding points.
 
         Raises DermisError if `targets` contains names that are not morph targets of MakeHuman.
@@ -337,7 +339,7 @@ class Human:
 
 
 def worn_items(person: Human) -> dict[str, Item | None]:
-    """Return clothing and glasses of a person by field of `Human`; None for a field without an item."""
+    """Return what a person wears by field of `Human`, such as "glasses"; None for a field without an item."""
     return {name: getattr(person, name) for name in ITEM_TYPES}
 
 

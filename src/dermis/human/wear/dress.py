@@ -1,4 +1,4 @@
-"""Dressed heads: mesh, rig and materials of a head, followed by those of clothing and glasses."""
+"""Dressed heads: mesh, rig and materials of a head, followed by those of what is worn."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from dermis.base.arrays import Doubles, Floats
 from dermis.human.model import Layout, head_template
 from dermis.human.wear.clothing import garment_materials, garment_points_mm, worn_garment
 from dermis.human.wear.eyewear import glasses_materials, glasses_points_mm, worn_glasses
-from dermis.human.wear.look import Clothing, Glasses, Item
+from dermis.human.wear.hats import headwear_materials, headwear_points_mm, worn_headwear
+from dermis.human.wear.look import Clothing, Glasses, Headwear, Item
 from dermis.human.wear.worn import Worn
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, build_mesh
@@ -39,6 +40,7 @@ class Wearable(NamedTuple):
 WEARABLES: Mapping[type[Item], Wearable] = {
     Clothing: Wearable(worn_garment, garment_points_mm, garment_materials),
     Glasses: Wearable(worn_glasses, glasses_points_mm, glasses_materials),
+    Headwear: Wearable(worn_headwear, headwear_points_mm, headwear_materials),
 }
 """Functions that build items, by the type of item."""
 

@@ -1,4 +1,4 @@
-"""Clothing and glasses as plain data, which can also be given as words."""
+"""Clothing, glasses and headwear as plain data, which can also be given as words."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ GARMENT_CLOTHS = {
 GARMENT_NAMES: tuple[str, ...] = tuple(GARMENT_CLOTHS)
 CLOTH_NAMES: tuple[str, ...] = tuple(CLOTHS)
 NOTHING = "none"
-"""Word for no garment and for no glasses."""
+"""Word for no garment, no glasses and no headwear."""
 _HEX_COLOUR = re.compile("#[0-9a-fA-F]{6}")
 
 
@@ -187,5 +187,54 @@ class Glasses(Item):
         check_colour("colour", self.colour)
 
 
-ITEM_TYPES: Mapping[str, type[Item]] = MappingProxyType({"clothing": Clothing, "glasses": Glasses})
+HEADWEAR_CLOTHS = {"cap": "cotton", "beanie": "wool", "turban": "linen", "headscarf": "cotton"}
+"""Usual cloth of each kind of headwear."""
+HEADWEAR_STYLES: tuple[str, ...] = tuple(HEADWEAR_CLOTHS)
+
+
+@dataclass(frozen=True)
+class Headwear(Item):
+    """Headwear, under which hair is flat.
+
+    Parameters
+    ----------
+    style : {"cap", "beanie", "turban", "headscarf"}
+        Kind of headwear.
+    cloth : {"cotton", "wool", "denim", "linen"}, optional
+        Cloth, which determines weave and sheen; by default the usual cloth of the style.
+    colour : str
+        Name of the palette, such as "navy", or "#rrggbb" (sRGB).
+
+    Raises
+    ------
+    DermisError
+        For unknown styles, cloths and colours.
+
+    Examples
+    --------
+    >>> import dermis
+    >>> dermis.Human(headwear="red beanie").headwear
+    Headwear(style='beanie', cloth='wool', colour='red')
+    """
+
+    style: str = "beanie"
+    cloth: str = None  # type: ignore[assignment]  # `__post_init__` replaces None
+    colour: str = "charcoal"
+
+    @classmethod
+    def _names_by_field(cls) -> dict[str, tuple[str, ...]]:
+        return {"colour": COLOURS, "cloth": CLOTH_NAMES, "style": HEADWEAR_STYLES}
+
+    def __post_init__(self) -> None:
+        """Replace a missing cloth by the usual one; raise DermisError for unknown names."""
+        check_name("style", self.style, HEADWEAR_STYLES)
+        if self.cloth is None:
+            object.__setattr__(self, "cloth", HEADWEAR_CLOTHS[self.style])
+        check_name("cloth", self.cloth, CLOTH_NAMES)
+        check_colour("colour", self.colour)
+
+
+ITEM_TYPES: Mapping[str, type[Item]] = MappingProxyType(
+    {"clothing": Clothing, "glasses": Glasses, "headwear": Headwear}
+)
 """Types of items by field of `Human`."""
