@@ -290,8 +290,8 @@ class Human:
     def positions_mm(self) -> NDArray[np.float32]:
         """Return the control points (p, 3) in rest pose, relative to the midpoint between the eyes [mm].
 
-        `Pose(positions_mm=...)` gives any head with the same clothing, glasses and headwear this shape, because all
-        people have corresponding points.
+        `Pose(positions_mm=...)` gives any head with the same clothing, glasses and headwear this shape,
+        because all people have corresponding points.
 
         Raises DermisError if `targets` contains names that are not morph targets of MakeHuman.
         """

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dermis.base.arrays import Doubles, Floats, Index, Ints
+from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
 from dermis.human.makehuman import makehuman_arrays
+from dermis.human.model import MEAN_PERSON_WEIGHTS, control_points_mm
 from dermis.human.movement import expression_targets
 from dermis.human.wear.fabrics import CLOTHS, linear_colour
 from dermis.human.wear.garments import garment_panels
+from dermis.human.wear.hair_obstacles import ClothObstacle
 from dermis.human.wear.look import Clothing
 from dermis.human.wear.panels import Panel
-from dermis.human.wear.skin_sheet import skin_sheet
+from dermis.human.wear.skin_sheet import point_normals, skin_sheet
 from dermis.human.wear.worn import Worn
 from dermis.mesh.fabric import MM_PER_UV
 from dermis.mesh.mesh import Material
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 _MIN_DELTA_MM = 0.02  # smaller displacements of cloth by expressions are left out
+_MIN_OUTSIDE_COSINE = 0.2  # between normals of cloth and of the skin below, on the outside of a garment
 _LABEL = "clothing"
 _BUTTON_COLOUR, _BUTTON_ROUGHNESS = (0.62, 0.6, 0.54), 0.35
 _CORD_COLOUR = (0.72, 0.71, 0.68)
@@ -44,6 +47,30 @@ def garment_points_mm(control_mm: Floats, clothing: Clothing) -> Doubles:
         if panel.covers:
             cover = np.maximum(cover, panel.heights_on_sheet(points, skin_mm, normals))
     return np.concatenate(placed)
+
+
+def garment_obstacle(points_mm: Doubles, clothing: Clothing) -> ClothObstacle:
+    """Return the outside of a garment, on which hair lies.
+
+    points_mm : (m, 3) points of the garment on a person, from `garment_points_mm` [mm]
+    """
+    worn = worn_garment(clothing)
+    normals = point_normals(points_mm, worn.point[worn.triangles])
+    outside = _outside_mask(clothing.garment, clothing.cloth)
+    return ClothObstacle(points_mm[outside], normals[outside])
+
+
+@cache
+def _outside_mask(garment: str, cloth: str) -> Mask:
+    """Return the mask (m,) of the points of a garment whose normals point away from the skin."""
+    clothing, sheet = Clothing(garment, cloth), skin_sheet()
+    points = garment_points_mm(control_points_mm(MEAN_PERSON_WEIGHTS), clothing)
+    worn, panels = worn_garment(clothing), _panels(garment, cloth)
+    skin_normals = point_normals(sheet.mean_mm, sheet.triangles)
+    outward = np.concatenate([panel.bind @ skin_normals for panel in panels])
+    above = np.concatenate([panel.height_mm > 0.0 for panel in panels])
+    facing = (point_normals(points, worn.point[worn.triangles]) * outward).sum(axis=1)
+    return np.asarray(above & (facing > _MIN_OUTSIDE_COSINE))
 
 
 def garment_materials(clothing: Clothing) -> tuple[Material, ...]:

@@ -11,9 +11,16 @@ import numpy as np
 
 from dermis.base.arrays import Doubles, Floats
 from dermis.human.model import Layout, head_template
-from dermis.human.wear.clothing import garment_materials, garment_points_mm, worn_garment
+from dermis.human.wear.clothing import (
+    garment_materials,
+    garment_obstacle,
+    garment_points_mm,
+    worn_garment,
+)
 from dermis.human.wear.eyewear import glasses_materials, glasses_points_mm, worn_glasses
+from dermis.human.wear.hair_obstacles import HeadwearObstacle, Obstacle, fit_groom
 from dermis.human.wear.hats import headwear_materials, headwear_points_mm, worn_headwear
+from dermis.human.wear.headwear import headwear_room
 from dermis.human.wear.look import Clothing, Glasses, Headwear, Item
 from dermis.human.wear.worn import Worn
 from dermis.mesh.head import Head
@@ -30,17 +37,30 @@ class Wearable(NamedTuple):
     mesh : mesh of an item, which does not depend on the person or on colours
     points_mm : points (m, 3) of an item on a person with control points (p, 3) [mm]
     materials : materials of an item
+    obstacle : limits of hair, from the points (m, 3) of the item on a person, the control points (p, 3) of
+        the person and the item [mm]; None for items that hair may cross
     """
 
     mesh: Callable[[Any], Worn]
     points_mm: Callable[[Floats, Any], Doubles]
     materials: Callable[[Any], tuple[Material, ...]]
+    obstacle: Callable[[Doubles, Doubles, Any], Obstacle] | None = None
 
 
 WEARABLES: Mapping[type[Item], Wearable] = {
-    Clothing: Wearable(worn_garment, garment_points_mm, garment_materials),
+    Clothing: Wearable(
+        worn_garment,
+        garment_points_mm,
+        garment_materials,
+        lambda points, control, item: garment_obstacle(points, item),
+    ),
     Glasses: Wearable(worn_glasses, glasses_points_mm, glasses_materials),
-    Headwear: Wearable(worn_headwear, headwear_points_mm, headwear_materials),
+    Headwear: Wearable(
+        worn_headwear,
+        headwear_points_mm,
+        headwear_materials,
+        lambda points, control, item: HeadwearObstacle(headwear_room(item.style, control)),
+    ),
 }
 """Functions that build items, by the type of item."""
 
@@ -64,11 +84,14 @@ def dress(head: Head, outfit: Outfit, template: Head | None) -> Head:
     positions, uv, triangles = [mesh.positions], [mesh.uv], [mesh.triangles]
     point, material, materials = [mesh.point], [mesh.material], mesh.materials
     vertex_count, done = len(mesh.positions), 0
+    obstacles, control = list[Obstacle](), rig.positions_mm.astype(np.float64)
     for item in outfit:
         make = WEARABLES[type(item)]
         worn = make.mesh(item)
         own = points[done : done + worn.point_count]
         rig = _dressed_rig(rig, worn, own)
+        if make.obstacle is not None and head.hair is not None:
+            obstacles.append(make.obstacle(own.astype(np.float64), control, item))
         positions.append(own[worn.point])
         uv.append(worn.uv)
         triangles.append(worn.triangles + vertex_count)
@@ -86,7 +109,8 @@ def dress(head: Head, outfit: Outfit, template: Head | None) -> Head:
         quads=mesh.quads,
     )
     rig = replace(rig, template=None if template is None else template.control_rig)
-    return replace(head, mesh=dressed, rig=rig, template=template, undressed=head)
+    hair = head.hair and fit_groom(head.hair, mesh.points_mm, obstacles)
+    return replace(head, mesh=dressed, rig=rig, template=template, undressed=head, hair=hair)
 
 
 def dressed_template(layout: Layout, levels: int, outfit: Outfit) -> Head:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +12,7 @@ from dermis.human.curves import smoothstep
 from dermis.human.wear.crown import AZIMUTH, COLUMNS, Crown, Height, Rim, Row, fit_crown
 from dermis.human.wear.folds import smooth_noise
 from dermis.human.wear.panels import Grid, PanelVertices
+from dermis.human.wear.skin_sheet import unit_vectors
 from dermis.human.wear.skull import unit_direction
 from dermis.human.wear.tubes import Solid, tube
 
@@ -51,20 +51,28 @@ class HeadwearRoom(NamedTuple):
     crown: Crown
     outer_mm: Height
 
-    def limits_mm(self, points_mm: Doubles) -> tuple[Doubles, Doubles]:
-        """Return the radial distance by which points (..., 3) exceed the outside, and the room there [mm].
+    def limits_mm(self, points_mm: Doubles) -> tuple[Doubles, Doubles, Doubles]:
+        """Return height above the skin, height of the outside, and distance inside the rim of points [mm].
 
-        Both are for points that the headwear covers; the room is infinite elsewhere.
+        The heights are along the radius. That of the outside is infinite where headwear does not cover the
+        skin.
+
+        points_mm : (n, 3) points [mm]
         """
         offset = points_mm - self.crown.skull.centre_mm
         radius = np.linalg.norm(offset, axis=-1)
         azimuth = np.arctan2(offset[..., 0], offset[..., 2])
         elevation = np.arcsin(np.clip(offset[..., 1] / np.maximum(radius, 1e-6), -1.0, 1.0))
         way = self.crown.way(azimuth, elevation)
-        covered, way = way > 0.0, np.clip(way, 0.0, 1.0)
-        outside = self.crown.base_radius_mm(azimuth, way) + self.outer_mm(azimuth, way)
+        inside = (elevation - self.crown.elevation(azimuth, np.zeros_like(way))) * radius
+        on_crown = np.clip(way, 0.0, 1.0)
+        outside = self.crown.base_radius_mm(azimuth, on_crown) + self.outer_mm(azimuth, on_crown)
         skin = self.crown.skull.radius_in(unit_direction(azimuth, elevation))
-        return np.where(covered, radius - outside, -np.inf), np.where(covered, outside - skin, np.inf)
+        return radius - skin, np.where(way > 0.0, outside - skin, np.inf), inside
+
+    def outward(self, points_mm: Doubles) -> Doubles:
+        """Return unit vectors (n, 3) from the centre of the skull to points (n, 3) [mm]."""
+        return unit_vectors(points_mm - self.crown.skull.centre_mm)
 
 
 def headwear_room(style: str, control_mm: Doubles) -> HeadwearRoom:
@@ -112,7 +120,12 @@ def _beanie(crown: Crown) -> list[Solid]:
 def _cap_height(azimuth: Doubles, way: Doubles) -> Doubles:
     front = 0.5 + 0.5 * np.cos(azimuth)
     standing = (5.0 + 9.0 * front) * smoothstep(0.0, 0.45, way) + 3.0 * smoothstep(0.4, 1.0, way)
-    apart = np.degrees(np.abs((azimuth * _CAP_SEAMS / (2.0 * np.pi) + 0.5) % 1.0 - 0.5)) * 2.0 * np.pi / _CAP_SEAMS
+    apart = (
+        np.degrees(np.abs((azimuth * _CAP_SEAMS / (2.0 * np.pi) + 0.5) % 1.0 - 0.5))
+        * 2.0
+        * np.pi
+        / _CAP_SEAMS
+    )
     seam = _SEAM_DEPTH_MM * np.exp(-((apart / _SEAM_WIDTH_DEGREES) ** 2)) * smoothstep(0.02, 0.08, way)
     return np.asarray(3.0 + standing - seam)
 
@@ -132,7 +145,7 @@ def _brim(crown: Crown) -> Solid:
     side[13:15] *= 0.4
     x = np.broadcast_to(start[:, 0] * (1.0 + 0.12 * out), (28, 65))
     z = start[:, 2] + out * length
-    arch = _BRIM_ARCH * (start[:, 0] ** 2) * smoothstep(0.0, 1.0, out)
+    arch = _BRIM_ARCH * start[:, 0] ** 2 * (length / _BRIM_LENGTH_MM) ** 0.5 * smoothstep(0.0, 1.0, out)
     y = start[:, 1] - out * length * _BRIM_DROP - arch + side * _BRIM_THICKNESS_MM
     points = np.stack([x, y, z], axis=-1).reshape(-1, 3)
     grid = Grid(28, 65, False)
@@ -158,7 +171,7 @@ def _turban_height(azimuth: Doubles, way: Doubles) -> Doubles:
     band = 5.2 * way + 1.25 * lift - 0.5 * side + 0.5 * (signed > 0) * smoothstep(0.0, 0.25, lift)
     part = band - np.floor(band)
     roll = np.sqrt(np.maximum(part * (1.0 - part), 0.0)) * 2.0
-    bulk = 9.0 + (15.0 + 6.0 * lift) * smoothstep(0.0, 0.3, way) - 10.0 * smoothstep(0.55, 1.0, way)
+    bulk = 7.0 + (11.0 + 2.0 * lift) * smoothstep(0.0, 0.35, way) - 4.0 * smoothstep(0.55, 1.0, way)
     wrinkle = 1.2 * smooth_noise(unit_direction(azimuth, 3.0 * way) * [5.0, 9.0, 5.0], 22)
     fade = smoothstep(1.0, 0.92, way)
     return np.asarray(bulk + (4.5 * roll + wrinkle) * fade)
@@ -172,7 +185,9 @@ def _scarf_height(azimuth: Doubles, way: Doubles) -> Doubles:
     back = np.sin(0.5 * azimuth) ** 2
     pull = np.sin(9.0 * azimuth + 6.0 * way) * back**3 * smoothstep(0.75, 0.2, way)
     soft = smooth_noise(unit_direction(azimuth, 1.5 * way) * [3.0, 5.0, 3.0], 23)
-    return np.asarray(3.4 + 2.5 * smoothstep(0.0, 0.4, way) + 1.3 * pull + 1.2 * soft * smoothstep(0.0, 0.15, way))
+    return np.asarray(
+        3.4 + 2.5 * smoothstep(0.0, 0.4, way) + 1.3 * pull + 1.2 * soft * smoothstep(0.0, 0.15, way)
+    )
 
 
 def _headscarf(crown: Crown) -> list[Solid]:
@@ -197,7 +212,7 @@ STYLES: Mapping[str, Style] = {
         ((0.0, 50.0, 90.0, 110.0, 135.0, 180.0), (15.0, 8.0, -2.0, -4.0, -11.0, -17.0)), _cap_height, _cap
     ),
     "beanie": Style(
-        ((0.0, 50.0, 90.0, 112.0, 135.0, 180.0), (13.0, 5.0, -6.0, -9.0, -22.0, -30.0)),
+        ((0.0, 50.0, 90.0, 112.0, 135.0, 180.0), (9.0, 3.0, -7.0, -9.0, -24.0, -34.0)),
         _beanie_height,
         _beanie,
     ),
