@@ -18,7 +18,7 @@ from dermis.human.wear.garments import garment_panels
 from dermis.human.wear.hair_obstacles import ClothObstacle
 from dermis.human.wear.look import Clothing
 from dermis.human.wear.panels import Panel
-from dermis.human.wear.skin_sheet import point_normals, skin_sheet
+from dermis.human.wear.skin_sheet import NECK_AXIS_Z_MM, point_normals, skin_sheet
 from dermis.human.wear.worn import Worn
 from dermis.mesh.fabric import MM_PER_UV
 from dermis.mesh.mesh import Material
@@ -57,7 +57,7 @@ def garment_obstacle(points_mm: Doubles, clothing: Clothing) -> ClothObstacle:
     worn = worn_garment(clothing)
     normals = point_normals(points_mm, worn.point[worn.triangles])
     outside = _outside_mask(clothing.garment, clothing.cloth)
-    return ClothObstacle(points_mm[outside], normals[outside])
+    return ClothObstacle(points_mm[outside], normals[outside], (0.0, NECK_AXIS_Z_MM))
 
 
 @cache

@@ -18,6 +18,8 @@ from dermis.human.wear.tubes import Solid, tube
 
 _LINING_MM = 1.0  # height of the inside of headwear above the skin
 _LINING_WAYS = 0.3, 0.2, 0.1
+_FLARE = 1.2  # slope of the outside of hair below the rim
+_FLARE_REACH_MM = 30.0  # distance from the rim up to which hair below it is limited
 _BRIM_HALF_ANGLE = np.radians(62.0)
 _BRIM_LENGTH_MM, _BRIM_THICKNESS_MM, _BRIM_DROP, _BRIM_ARCH = 66.0, 2.2, 0.2, 0.0034
 _CAP_SEAMS, _SEAM_WIDTH_DEGREES, _SEAM_DEPTH_MM = 6, 2.2, 0.7
@@ -54,8 +56,8 @@ class HeadwearRoom(NamedTuple):
     def limits_mm(self, points_mm: Doubles) -> tuple[Doubles, Doubles, Doubles]:
         """Return height above the skin, height of the outside, and distance inside the rim of points [mm].
 
-        The heights are along the radius. That of the outside is infinite where headwear does not cover the
-        skin.
+        The heights are along the radius. That of the outside rises below the rim, and is infinite farther
+        down.
 
         points_mm : (n, 3) points [mm]
         """
@@ -68,7 +70,8 @@ class HeadwearRoom(NamedTuple):
         on_crown = np.clip(way, 0.0, 1.0)
         outside = self.crown.base_radius_mm(azimuth, on_crown) + self.outer_mm(azimuth, on_crown)
         skin = self.crown.skull.radius_in(unit_direction(azimuth, elevation))
-        return radius - skin, np.where(way > 0.0, outside - skin, np.inf), inside
+        room = outside - skin + _FLARE * np.maximum(-inside, 0.0)
+        return radius - skin, np.where(inside > -_FLARE_REACH_MM, room, np.inf), inside
 
     def outward(self, points_mm: Doubles) -> Doubles:
         """Return unit vectors (n, 3) from the centre of the skull to points (n, 3) [mm]."""
