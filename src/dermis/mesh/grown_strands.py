@@ -197,7 +197,7 @@ def _grow_chunk(
     varied = across[0][..., None] * side + across[1][..., None] * other
     height = (1.0 - pull) * own.height + pull * at.height + (varied * own.normal).sum(axis=-1)
     least = _MIN_HEIGHT_ABOVE_SKIN_MM * np.minimum(s / _RISE_LENGTH_MM, 1.0)
-    lift = np.maximum(least - height, 0.0) + np.minimum(own.ceiling - height, 0.0)
+    lift = np.maximum(least - height, 0.0) + np.minimum(np.maximum(own.ceiling, least) - height, 0.0)
     positions = own.position + to_middle + varied + lift[..., None] * own.normal
     taper = 1.0 - (1.0 - _TIP_WIDTH_RATIO) * _smoothstep(1.0 - _TIP_FRACTION, 1.0, t)
     thinned = _MIN_HAIRLINE_THICKNESS + (1.0 - _MIN_HAIRLINE_THICKNESS) * _smoothstep(
@@ -206,12 +206,8 @@ def _grow_chunk(
     thickness = 1.0 + part["hairline"] * (
         np.minimum(thinned, 1.0 + edge.baby * (_BABY_THICKNESS - 1.0)) - 1.0
     )
-    visible = own.ceiling >= HIDDEN_CEILING_MM
-    radius = (
-        visible
-        * (part["radius_mm"] * (0.8 + 0.4 * _uniform_random(strand_seed, 3)) * thickness)[:, None]
-        * taper
-    )
+    radius = (part["radius_mm"] * (0.8 + 0.4 * _uniform_random(strand_seed, 3)) * thickness)[:, None] * taper
+    radius *= own.ceiling >= HIDDEN_CEILING_MM
     return (
         offsets_in_root_axes(root_axes, positions - root_mm[:, None]),
         radius,

@@ -57,15 +57,18 @@ class ClothObstacle:
     from the axis of the neck.
 
     points_mm, normals : (m, 3) points of the outside of the garment [mm], and unit normals there
+    is_collar : (m,) mask of the points of collars and hoods
     axis_mm : x and z of the vertical axis of the neck [mm]
     """
 
-    def __init__(self, points_mm: Doubles, normals: Doubles, axis_mm: tuple[float, float]) -> None:
+    def __init__(
+        self, points_mm: Doubles, normals: Doubles, is_collar: Mask, axis_mm: tuple[float, float]
+    ) -> None:
         self._surface, self._axis = SkinSurface(points_mm, normals), np.array(axis_mm)
         self._low, self._high = points_mm.min(axis=0), points_mm.max(axis=0)
         radial, radius, angle = self._polar(points_mm)
-        facing = (normals[:, [0, 2]] * radial).sum(axis=1) > _MIN_WALL_COSINE
-        self._wall_mm = self._wall(angle[facing], points_mm[facing, 1], radius[facing])
+        wall = is_collar & ((normals[:, [0, 2]] * radial).sum(axis=1) > _MIN_WALL_COSINE)
+        self._wall_mm = self._wall(angle[wall], points_mm[wall, 1], radius[wall])
 
     def limits(self, knots_mm: Doubles, grown: Mask) -> Limits:
         """Return the limits at the knots (g, k, 3) of guides [mm]; see `Obstacle.limits`."""
@@ -114,7 +117,7 @@ class ClothObstacle:
         from scipy.ndimage import maximum_filter
 
         column, row = self._cell(angle, y_mm)
-        wall = np.zeros((_WALL_COLUMNS, int(row.max()) + 1))
+        wall = np.zeros((_WALL_COLUMNS, int(row.max(initial=0)) + 1))
         np.maximum.at(wall, (column, row), radius_mm)
         return np.asarray(maximum_filter(wall, 3, mode=("wrap", "nearest")))
 

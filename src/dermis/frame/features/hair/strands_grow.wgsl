@@ -290,7 +290,7 @@ fn strand_position(index: u32, seed: u32, strand: StrandRoot, part: GroomPart, e
     offset += frizz_offset(index, part, s, across) + edge.baby * BABY_TURN * s * random_normal(index, 35u) * across[0];
     let height = mix(own.height, at.height, pull) + dot(offset - pull * (at.position - own.position), own.normal);
     let least = MIN_HEIGHT_MM * min(s / RISE_MM, 1.0);
-    let lift = max(least - height, 0.0) + min(own.ceiling - height, 0.0);
+    let lift = max(least - height, 0.0) + min(max(own.ceiling, least) - height, 0.0);
     return vec4f(own.position + offset + lift * own.normal, select(1.0, -1.0, own.ceiling < HIDDEN_CEILING));
 }
 
