@@ -154,6 +154,8 @@ class Human:
             Fields that are not sampled, such as `age=70`; for targets, skin, eyes and hair also some of the
             values, such as `skin={"melanin": 0.1}`. Skin and hair fit the given age, sex and ancestry. With
             `ita` and without an ancestry, the ancestry is sampled from measured people with this angle.
+            People wear nothing, except what is given as `clothing`, `glasses` and `headwear`; the word
+            "sampled" gives them an item, or none, by the chances of `dermis.human.wear.chances`.
 
         Returns
         -------

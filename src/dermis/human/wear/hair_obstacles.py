@@ -18,6 +18,7 @@ _BORDER_MM = 9.0  # distance beyond the border of cloth within which the cloth i
 _REACH_MM = 60.0  # depth in clothing from which hair is moved out
 _MIN_WALL_COSINE = 0.5  # between normals of cloth and the direction from the axis of the neck, on walls
 _WALL_COLUMNS, _WALL_ROW_MM = 72, 6.0
+_HANG_DECAY, _RISE_DECAY = 0.94, 0.75  # of the push by a collar, from knot to knot below and above it
 _HANGING_MM = 70.0  # distance below the top of a garment that hair over its collar reaches
 _ROOM_FRACTION = 0.55  # height of pressed hair relative to the outside of headwear
 _HIDDEN_MM = 10.0  # distance inside the rim of headwear from which hair is hidden
@@ -98,7 +99,12 @@ class ClothObstacle:
         lowest = np.where(grown, knots_mm[..., 1], np.inf).min(axis=1)
         hangs = np.repeat(lowest < self._high[1] - _HANGING_MM, knots_mm.shape[1])
         need = np.where(hangs & (wall > 0.0), wall + _CLOTH_CLEARANCE_MM - radius, 0.0)
-        outward = np.where(need < _REACH_MM, np.maximum(need, 0.0), 0.0)[:, None] * radial
+        push = np.where(need < _REACH_MM, np.maximum(need, 0.0), 0.0).reshape(grown.shape)
+        for k in range(1, KNOTS_PER_GUIDE):  # hair hangs from a collar instead of following it inwards
+            push[:, k] = np.maximum(push[:, k], _HANG_DECAY * push[:, k - 1])
+        for k in range(KNOTS_PER_GUIDE - 2, 0, -1):
+            push[:, k] = np.maximum(push[:, k], _RISE_DECAY * push[:, k + 1])
+        outward = push.reshape(-1, 1) * radial
         return np.stack([outward[:, 0], np.zeros(len(points)), outward[:, 1]], axis=1)
 
     def _polar(self, points_mm: Doubles) -> tuple[Doubles, Doubles, Doubles]:
