@@ -219,9 +219,9 @@ class Human:
         shared = head_template(layout, resolve_levels(control_head, subdivide))
         head = shared.refine_head(control_head)
         head = add_hair(head, control_head, shared.root_finder, self.hair_look, self.look.recession, hairs)
-        if not self._outfit:
+        if not self.outfit:
             return head
-        return dress(head, self._outfit, dressed_template(layout, head.levels, self._outfit))
+        return dress(head, self.outfit, dressed_template(layout, head.levels, self.outfit))
 
     def transfer_skin_to(self, head: Head) -> Head:
         """Return the head of another person with the skin and eyes of this person.
@@ -276,7 +276,8 @@ class Human:
         return typical_hair(self._demographics, self.hair_eumelanin, self.hair_pheomelanin)
 
     @property
-    def _outfit(self) -> Outfit:
+    def outfit(self) -> Outfit:
+        """Return the items that the person wears."""
         return tuple(item for item in worn_items(self).values() if item is not None)
 
     @property
@@ -298,9 +299,9 @@ class Human:
         Raises DermisError if `targets` contains names that are not morph targets of MakeHuman.
         """
         points = control_points_mm(self.target_weights())
-        if not self._outfit:
+        if not self.outfit:
             return points
-        return np.concatenate([points, worn_points_mm(points, self._outfit)])
+        return np.concatenate([points, worn_points_mm(points, self.outfit)])
 
     def target_weights(self) -> dict[str, float]:
         """Return the nonzero weights of MakeHuman's morph targets for this person, by target name."""

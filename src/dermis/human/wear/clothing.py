@@ -56,10 +56,15 @@ def garment_obstacle(points_mm: Doubles, clothing: Clothing) -> ClothObstacle:
     """
     worn = worn_garment(clothing)
     normals = point_normals(points_mm, worn.point[worn.triangles])
-    outside = _outside_mask(clothing.garment, clothing.cloth)
+    outside = garment_outside(clothing)
     body = len(_panels(clothing.garment, clothing.cloth)[0].height_mm)
     is_collar = (np.arange(len(points_mm)) >= body)[outside]
     return ClothObstacle(points_mm[outside], normals[outside], is_collar, (0.0, NECK_AXIS_Z_MM))
+
+
+def garment_outside(clothing: Clothing) -> Mask:
+    """Return the mask (m,) of the points of a garment whose normals point away from the skin."""
+    return _outside_mask(clothing.garment, clothing.cloth)
 
 
 @cache

@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dermis.base.arrays import Doubles, Floats
+from dermis.base.arrays import Doubles, Floats, Mask
 from dermis.human.model import Layout, head_template
 from dermis.human.wear.clothing import (
     garment_materials,
     garment_obstacle,
+    garment_outside,
     garment_points_mm,
     worn_garment,
 )
@@ -22,6 +23,7 @@ from dermis.human.wear.hair_obstacles import HeadwearObstacle, Obstacle, fit_gro
 from dermis.human.wear.hats import headwear_materials, headwear_points_mm, worn_headwear
 from dermis.human.wear.headwear import headwear_room
 from dermis.human.wear.look import Clothing, Glasses, Headwear, Item
+from dermis.human.wear.skin_sheet import point_normals
 from dermis.human.wear.worn import Worn
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, build_mesh
@@ -72,6 +74,23 @@ def worn_points_mm(control_mm: Floats, outfit: Outfit) -> Floats:
     """
     points = [WEARABLES[type(item)].points_mm(control_mm, item) for item in outfit]
     return np.concatenate(points).astype(np.float32)
+
+
+def worn_outside(points_mm: Doubles, outfit: Outfit) -> tuple[Doubles, Doubles, Mask]:
+    """Return points (n, 3) [mm] on the outside of items, unit normals there, and a mask of those of clothing.
+
+    points_mm : (m, 3) points of all items, from `worn_points_mm` [mm]
+    """
+    found, done = list[tuple[Doubles, Doubles, Mask]](), 0
+    for item in outfit:
+        worn = WEARABLES[type(item)].mesh(item)
+        own = points_mm[done : done + worn.point_count].astype(np.float64)
+        normals, done = point_normals(own, worn.point[worn.triangles]), done + worn.point_count
+        is_cloth = isinstance(item, Clothing)
+        outside = garment_outside(item) if isinstance(item, Clothing) else np.ones(len(own), bool)
+        found.append((own[outside], normals[outside], np.full(int(outside.sum()), is_cloth)))
+    points, normals, is_cloth = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return points, normals, is_cloth
 
 
 def dress(head: Head, outfit: Outfit, template: Head | None) -> Head:
