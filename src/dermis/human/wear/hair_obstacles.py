@@ -13,7 +13,7 @@ from dermis.human.hair.skin_surface import SkinSurface
 from dermis.mesh.groom import KNOTS_PER_GUIDE, NO_CEILING_MM, Groom, Guides
 from dermis.mesh.grown_strands import guide_frames, posed_guide_knots
 
-_CLOTH_CLEARANCE_MM = 2.5  # distance of guides from cloth; strands between them need less
+_CLOTH_CLEARANCE_MM = 5.0  # distance of guides from cloth; strands between guides sag by some millimetres
 _BORDER_MM = 9.0  # distance beyond the border of cloth within which the cloth is continued as a plane
 _REACH_MM = 60.0  # depth in clothing from which hair is moved out
 _MIN_WALL_COSINE = 0.5  # between normals of cloth and the direction from the axis of the neck, on walls
