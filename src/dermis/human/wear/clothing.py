@@ -116,8 +116,8 @@ def _worn_garment(garment: str, cloth: str) -> Worn:
     seams = [panel.vertices for panel in panels]
     first_vertex = np.cumsum([0, *(len(one.point) for one in seams)])
     bind = (vstack([panel.bind for panel in panels]) @ skin_sheet().weights).tocsr()
-    bone, weight = _bone_weights(bind)
-    target, point, delta = _displacements(bind)
+    bone, weight = bone_weights(bind)
+    target, point, delta = displacements(bind)
     return Worn(
         np.concatenate([one.point + first for one, first in zip(seams, counts, strict=False)]),
         np.concatenate([one.uv_mm for one in seams]).astype(np.float32) / np.float32(MM_PER_UV),
@@ -131,7 +131,7 @@ def _worn_garment(garment: str, cloth: str) -> Worn:
     )
 
 
-def _bone_weights(bind: csr_array) -> tuple[Ints, Floats]:
+def bone_weights(bind: csr_array) -> tuple[Ints, Floats]:
     """Return the four strongest bones (m, 4) of points, and their weights (m, 4).
 
     bind : (m, p) weights of p points of MakeHuman in each of the m points
@@ -146,10 +146,10 @@ def _bone_weights(bind: csr_array) -> tuple[Ints, Floats]:
     return bone.astype(np.int32), (weight / weight.sum(axis=1, keepdims=True)).astype(np.float32)
 
 
-def _displacements(bind: csr_array) -> tuple[Index, Index, Floats]:
+def displacements(bind: csr_array) -> tuple[Index, Index, Floats]:
     """Return the displacements of points by expressions: the last three arrays of `Worn`.
 
-    bind : see `_bone_weights`
+    bind : see `bone_weights`
     """
     targets, count = expression_targets(), bind.shape[1]
     found: list[tuple[Index, Index, Doubles]] = []

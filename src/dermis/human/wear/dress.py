@@ -19,10 +19,16 @@ from dermis.human.wear.clothing import (
     worn_garment,
 )
 from dermis.human.wear.eyewear import glasses_materials, glasses_points_mm, worn_glasses
+from dermis.human.wear.file_clothing import (
+    file_garment_materials,
+    file_garment_obstacle,
+    file_garment_points_mm,
+    worn_file_garment,
+)
 from dermis.human.wear.hair_obstacles import HeadwearObstacle, Obstacle, fit_groom
 from dermis.human.wear.hats import headwear_materials, headwear_points_mm, worn_headwear
 from dermis.human.wear.headwear import headwear_room
-from dermis.human.wear.look import Clothing, Glasses, Headwear, Item
+from dermis.human.wear.look import Clothing, FileClothing, Glasses, Headwear, Item
 from dermis.human.wear.skin_sheet import point_normals
 from dermis.human.wear.worn import Worn
 from dermis.mesh.head import Head
@@ -56,6 +62,12 @@ WEARABLES: Mapping[type[Item], Wearable] = {
         garment_materials,
         lambda points, control, item: garment_obstacle(points, item),
     ),
+    FileClothing: Wearable(
+        worn_file_garment,
+        file_garment_points_mm,
+        file_garment_materials,
+        lambda points, control, item: file_garment_obstacle(points, item),
+    ),
     Glasses: Wearable(worn_glasses, glasses_points_mm, glasses_materials),
     Headwear: Wearable(
         worn_headwear,
@@ -87,7 +99,7 @@ def worn_outside(points_mm: Doubles, outfit: Outfit) -> tuple[Doubles, Doubles, 
         own = points_mm[done : done + worn.point_count].astype(np.float64)
         normals, done = point_normals(own, worn.point[worn.triangles]), done + worn.point_count
         is_cloth = isinstance(item, Clothing)
-        outside = garment_outside(item) if isinstance(item, Clothing) else np.ones(len(own), bool)
+        outside = garment_outside(item) if type(item) is Clothing else np.ones(len(own), bool)
         found.append((own[outside], normals[outside], np.full(int(outside.sum()), is_cloth)))
     points, normals, is_cloth = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return points, normals, is_cloth
@@ -137,11 +149,14 @@ def dressed_template(layout: Layout, levels: int, outfit: Outfit) -> Head:
 
     It is the template of all people who wear these items in any colour, and who share its atlas.
     """
-    return _dressed_template(layout, levels, tuple(item.without_colour for item in outfit))
+    stamps = tuple(item.stamp for item in outfit)
+    return _dressed_template(layout, levels, tuple(item.without_colour for item in outfit), stamps)
 
 
 @cache
-def _dressed_template(layout: Layout, levels: int, outfit: Outfit) -> Head:
+def _dressed_template(
+    layout: Layout, levels: int, outfit: Outfit, stamps: tuple[tuple[int, int] | None, ...]
+) -> Head:
     return dress(head_template(layout, levels).head, outfit, None)
 
 
