@@ -32,7 +32,7 @@ def main(base: Path) -> None:
     quads = arrays["quads"][is_body].astype(np.int64)
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [2, 3, 0]]])
     corners = points[triangles]
-    near = cKDTree(corners.mean(axis=1)).query(vertices, k=CANDIDATES)[1]
+    near = np.asarray(cKDTree(corners.mean(axis=1)).query(vertices, k=CANDIDATES)[1], np.int64)
     repeated = np.repeat(vertices, CANDIDATES, axis=0)
     hit = closest_point(corners[near.ravel()], repeated)
     best = np.linalg.norm(hit - repeated, axis=1).reshape(near.shape).argmin(axis=1)
@@ -42,8 +42,8 @@ def main(base: Path) -> None:
     steps = np.rint(WEIGHT_STEPS * weight.clip(0.0, 1.0)).astype(np.int64)
     steps[rows, weight.argmax(axis=1)] += WEIGHT_STEPS - steps.sum(axis=1)
     point = triangles[triangle]
-    away, same = cKDTree(points).query(vertices)
-    is_point = away < SAME_MM
+    away, same = (np.asarray(part) for part in cKDTree(points).query(vertices))
+    is_point = np.asarray(away < SAME_MM)
     point[is_point], steps[is_point] = same[is_point, None], (WEIGHT_STEPS, 0, 0)
     offset = vertices - np.einsum("nk,nkc->nc", steps / WEIGHT_STEPS, points[point])
     np.savez_compressed(

@@ -98,9 +98,10 @@ def worn_outside(points_mm: Doubles, outfit: Outfit) -> tuple[Doubles, Doubles, 
         worn = WEARABLES[type(item)].mesh(item)
         own = points_mm[done : done + worn.point_count].astype(np.float64)
         normals, done = point_normals(own, worn.point[worn.triangles]), done + worn.point_count
-        is_cloth = isinstance(item, Clothing)
         outside = garment_outside(item) if type(item) is Clothing else np.ones(len(own), bool)
-        found.append((own[outside], normals[outside], np.full(int(outside.sum()), is_cloth)))
+        found.append(
+            (own[outside], normals[outside], np.full(int(outside.sum()), isinstance(item, Clothing)))
+        )
     points, normals, is_cloth = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return points, normals, is_cloth
 

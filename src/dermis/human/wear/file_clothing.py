@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dermis.base.arrays import Doubles, Floats
+from dermis.base.arrays import Doubles, Floats, Index
 from dermis.human.wear.base_mesh import base_mesh
 from dermis.human.wear.clothing import bone_weights, displacements
 from dermis.human.wear.hair_obstacles import ClothObstacle
@@ -57,12 +57,12 @@ def _worn(file: str, stamp: tuple[int, int] | None) -> Worn:
     garment = read_garment(file)
     bind = _bind(garment.base, garment.weight)
     bone, weight = bone_weights(bind)
-    material = np.zeros(len(garment.triangles), np.int64)
+    material = np.zeros(len(garment.triangles), np.int32)
     uv = garment.uv.astype(np.float32)
     return Worn(garment.point, uv, garment.triangles, material, bone, weight, *displacements(bind))
 
 
-def _bind(base: np.ndarray[tuple[int, ...], np.dtype[np.int64]], weight: Doubles) -> csr_array:
+def _bind(base: Index, weight: Doubles) -> csr_array:
     """Return the weights (m, p) of the points of the bust in each point of a garment.
 
     base, weight : (m, 3) vertices of hm08 and their weights
@@ -72,4 +72,4 @@ def _bind(base: np.ndarray[tuple[int, ...], np.dtype[np.int64]], weight: Doubles
     mesh = base_mesh()
     rows = np.repeat(np.arange(len(base)), 3)
     shape = len(base), len(mesh.offset_mm)
-    return (csr_array((weight.ravel(), (rows, base.ravel())), shape=shape) @ mesh.weights).tocsr()
+    return csr_array(csr_array((weight.ravel(), (rows, base.ravel())), shape=shape) @ mesh.weights)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dermis.base.arrays import Doubles, Index, Ints
+from dermis.base.arrays import Doubles, Index, Ints, Mask
 from dermis.base.errors import notify, refuse
 from dermis.base.reading import file_stamp, is_file, read_text
 from dermis.formats.obj import read_obj_text
@@ -63,7 +63,8 @@ class FileGarment(NamedTuple):
             if scale is not None:
                 first, second, length_mm = scale
                 factors[axis] *= abs(vertices[first, axis] - vertices[second, axis]) / length_mm
-        return np.einsum("mk,mkc->mc", self.weight, vertices[self.base]) + factors * self.offset
+        mean = np.einsum("mk,mkc->mc", self.weight, vertices[self.base])
+        return np.asarray(mean + factors * self.offset)
 
 
 def read_garment(path: str) -> FileGarment:
@@ -92,7 +93,8 @@ def _read_garment(path: str, stamp: tuple[int, int] | None) -> FileGarment:
         actual = f"it binds {len(base)} of the {len(polygons.positions)} vertices of {object_file.name}"
         refuse(file, _EXPECTED, actual, "Use the files of one garment")
     corner = _fan_triangles(polygons.counts)
-    kept = base_mesh().is_near[base].all(axis=1)[polygons.corners[corner, 0]].all(axis=1)
+    is_near: Mask = np.asarray(base_mesh().is_near[base].all(axis=1))
+    kept = np.asarray(is_near[polygons.corners[corner, 0]].all(axis=1))
     if kept.sum() < _MIN_TRIANGLES:
         expected = "a garment over shoulders, chest, neck or head"
         refuse(file, expected, "it covers other parts of the body", "Choose another")
