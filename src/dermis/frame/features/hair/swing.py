@@ -25,9 +25,6 @@ _MAX_SUBSTEPS = 60
 _COLLIDER_SPACING_MM = 4.0  # at most one collider for each cube with this side
 _CLOTHING = "clothing"  # label of clothing
 _COVERED_SKIN_MM = 14.0  # distance from clothing within which skin is covered
-    "clothing",
-    14.0,
-)  # label of clothing; distance from it within which skin is covered
 _GRAVITY_MM_PER_S2 = np.array([0.0, -9810.0, 0.0])
 _KNOT_BYTES = 48  # struct Knot of swing_guides.wgsl
 _COLLIDER_BYTES = _GUIDE_KNOT_BYTES = 32  # two rows of vec4f
