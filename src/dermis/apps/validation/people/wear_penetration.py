@@ -14,7 +14,7 @@ from dermis.base.arrays import Doubles
 from dermis.base.command_line import run_script
 from dermis.base.console import print_report
 from dermis.human.hair.skin_surface import SkinSurface
-from dermis.human.person import Human
+from dermis.human.person import Human, outfit
 from dermis.human.wear.dress import worn_outside
 from dermis.human.wear.look import GARMENT_NAMES, GLASSES_STYLES, HEADWEAR_STYLES
 from dermis.mesh.grown_strands import grow_strands
@@ -54,7 +54,7 @@ def wear_penetration(person: Human, max_strands: int = 1500) -> WearPenetration:
     mesh, count = head.mesh, int(head.body.mesh.point.max()) + 1
     skin = np.unique(mesh.triangles[mesh.material == 0])
     surface = SkinSurface(mesh.positions[skin], mesh.normals[skin])
-    points_mm, normals, is_cloth = worn_outside(mesh.points_mm[count:], person.outfit)
+    points_mm, normals, is_cloth = worn_outside(mesh.points_mm[count:], outfit(person))
     depth = _depths(surface, points_mm)
     inside = depth[(depth > _LIMIT_MM) & (depth < _MAX_DEPTH_MM)]
     hair = _hair_inside(head, points_mm[is_cloth], normals[is_cloth], max_strands)
