@@ -165,3 +165,20 @@ def test_rims_are_symmetric_and_above_the_brows() -> None:
     for style in STYLES:
         points = np.concatenate([part.points for part in headwear_solids(style, control)])
         assert points[points[:, 2] > 0.0, 1].min() > 14.0, style
+
+
+def test_hair_swings_outside_clothing_and_inside_headwear() -> None:
+    """Colliders of swinging hair are on clothing, not on the skin below it, and not on headwear."""
+    from dermis.frame.features.hair.swing import collider_vertices
+
+    person = dermis.Human(hair=dermis.HairLook("none"), clothing="crew neck", headwear="beanie")
+    head = person.head(subdivide=1, hairs=0.05)
+    mesh = head.mesh
+    labels = ["clothing", "headwear", ""]
+    on = {one: np.isin(np.array([m.label for m in mesh.materials])[mesh.material], one) for one in labels}
+    vertices = {one: np.unique(mesh.triangles[mask]) for one, mask in on.items()}
+    colliders = collider_vertices(head)
+    assert np.isin(colliders, vertices["clothing"]).sum() > 1000
+    assert not np.isin(colliders, vertices["headwear"]).any()
+    skin = mesh.positions[colliders[np.isin(colliders, vertices[""])]]
+    assert skin[:, 1].min() > -240.0
