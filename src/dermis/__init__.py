@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from dermis.human.person import Human
     from dermis.human.regions.apply import with_regions
     from dermis.human.skin.look import SkinLook
-    from dermis.human.wear.look import Clothing, Glasses
+    from dermis.human.wear.look import Clothing, Glasses, Headwear
     from dermis.images.io import write_image
     from dermis.images.movie import MovieWriter
     from dermis.mesh.clip import Clip
@@ -67,6 +67,7 @@ _MODULE_OF_NAME = {
     "HairLook": "human.hair.look",
     "Clothing": "human.wear.look",
     "Glasses": "human.wear.look",
+    "Headwear": "human.wear.look",
     "HairMotion": "frame.hair_motion",
     "human_targets": "human.makehuman",
     "with_regions": "human.regions.apply",
@@ -125,6 +126,7 @@ __all__ = [
     "HairLook",
     "HairMotion",
     "Head",
+    "Headwear",
     "Human",
     "MovieWriter",
     "Observation",

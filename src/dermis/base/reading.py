@@ -93,6 +93,14 @@ def is_file(path: str | Path) -> bool:
         return False
 
 
+def file_stamp(path: str | Path) -> tuple[int, int] | None:
+    """Return time and size of a file, which change when it is written again; None for a missing file."""
+    if not is_file(path):
+        return None
+    status = Path(path).stat()
+    return status.st_mtime_ns, status.st_size
+
+
 def read_text(path: str | Path, expected: str, max_bytes: int = MAX_TEXT_BYTES) -> str:
     """Return the text of a file in UTF-8, or in UTF-16 with a byte order mark.
 

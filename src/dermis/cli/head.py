@@ -57,6 +57,7 @@ def head(
     hair: Annotated[list[str] | None, _ValuesParameter] = None,
     clothing: str | None = None,
     glasses: str | None = None,
+    headwear: str | None = None,
     colour: Path | None = None,
     normal: Path | None = None,
     roughness: Path | None = None,
@@ -143,6 +144,9 @@ def head(
     glasses:
         Glasses in words for colour and frame, such as "brown square": round, square, aviator, rimless or
         sunglasses. [default: none]
+    headwear:
+        Headwear in words for colour, cloth and style, such as "red beanie": cap, beanie, turban or headscarf;
+        cotton, wool, denim or linen. [default: none]
     colour:
         Colour map of the skin, sRGB. [default: painted]
     normal:
@@ -183,7 +187,7 @@ def head(
         skin=_look_with_values(person.look, skin, "--skin"),
         eyes=_look_with_values(person.iris, eye, "--eye"),
         hair=_hair_look_with_values(person.hair_look, hair),
-        **drop_none(clothing=clothing, glasses=glasses),
+        **drop_none(clothing=clothing, glasses=glasses, headwear=headwear),
     )
     weights = check_constant_states(parse_states(state or ()))
     skin_state = SkinState(weights) if weights else None

@@ -84,8 +84,9 @@ def render(
     Parameters
     ----------
     head:
-        human (the head of the package), human:SEED (a random person), a person (.json), a sample
-        (lee_perry_smith), a mesh (.glb .gltf .vrm .usdz .obj .ply .stl) or a scene (.toml).
+        human (the head of the package), human:SEED (a random person, dressed by chance), human:SEED?bare (the
+        same person with bare shoulders), a person (.json), a sample (lee_perry_smith), a mesh (.glb .gltf
+        .vrm .usdz .obj .ply .stl) or a scene (.toml).
     output:
         Image to write: .png (sRGB, 8 bit) or .exr (linear Rec. 709, float); it has alpha if --background is
         none.

@@ -242,13 +242,14 @@ def _base_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Setti
     """Return the scene and settings of a scene file, or default ones for a head, before options apply."""
     from dermis.scene import Scene, load_camera, load_scene
     from dermis.scene.files import load_head_and_skin
+    from dermis.scene.heads import dressed_name
     from dermis.scene.smoothness import SmoothOutlineLevels
 
     if Path(head_or_scene).suffix.lower() == ".toml":
         refuse_options(options.head, HEAD_OPTION_NAMES, "with a scene file", "Set it in the file's [head]")
         return load_scene(Path(head_or_scene), camera=options.camera, size=options.settings.get("size"))
     region_options = {"regions": NO_REGIONS} if options.surface == "deck-2007" else {}
-    table = HeadTable(**{"name": head_or_scene, **region_options, **options.head})
+    table = HeadTable(**{"name": dressed_name(head_or_scene), **region_options, **options.head})
     if has_region_table(vars(table)) and "rho_s" in options.skin:
         actual = "it is given with --regions, which sets it for each region"
         refuse(option_name("rho_s"), "only one of the two", actual, "Remove one, or use --oiliness")

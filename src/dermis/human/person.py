@@ -37,7 +37,7 @@ from dermis.human.skin.measured import (
 )
 from dermis.human.skin.painted import PaintedMaps
 from dermis.human.wear.dress import Outfit, dress, dressed_template, worn_points_mm
-from dermis.human.wear.look import ITEM_TYPES, Clothing, Glasses, Item
+from dermis.human.wear.look import ITEM_TYPES, Clothing, Glasses, Headwear, Item
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -75,14 +75,14 @@ class Human:
     weight, muscle : float
         Body weight and muscle, from -1 (least) to 1 (most); 0 is average [-].
     hair_eumelanin, hair_pheomelanin : float
-        Pigments of the hair if `hair` is not given, 0 to 10 [-]. A eumelanin of 0.3 gives blond hair, 1.3
-        brown, 4 dark and 8 black hair; a eumelanin of 0.3 with a pheomelanin of 2 gives red hair.
+        Pigments of the hair if `hair` is not given, 0 to 10 [-]. Eumelanin of 0.3 gives blond hair, 1.3
+        brown, 4 dark and 8 black hair; 0.3 with pheomelanin of 2 gives red hair.
     targets : mapping
         Weights of MakeHuman's morph targets, such as {"nose/nose-hump-incr": 0.5}, normally 0 to 1.
     skin, eyes, hair : SkinLook, EyeLook and HairLook, optional
         Looks of skin, eyes and hair; by default typical for the person.
-    clothing, glasses : Clothing and Glasses, optional
-        Garment and glasses, or words such as "navy denim shirt" and "brown square"; by default none.
+    clothing, glasses, headwear : Clothing, Glasses and Headwear, optional
+        What the person wears, or words such as "navy denim shirt"; by default none.
     skin_ancestry : str
         Name of a group of measured people, such as "south asian". The person gets the skin, eye and hair
         colours of this group, independently of the shape; "" for the colours of the shape's ancestries.
@@ -120,6 +120,7 @@ class Human:
     ita: float | None = None
     clothing: Clothing | None = None
     glasses: Glasses | None = None
+    headwear: Headwear | None = None
 
     def __post_init__(self) -> None:
         """Raise DermisError for fields out of range."""
@@ -150,8 +151,8 @@ class Human:
             0 to 2**32 - 1; the same seed gives the same person.
         **given
             Fields that are not sampled, such as `age=70`; for targets, skin, eyes and hair also some of the
-            values, such as `skin={"melanin": 0.1}`. Skin and hair fit the given age, sex and ancestry. With
-            `ita` and without an ancestry, the ancestry is sampled from measured people with this angle.
+            values, such as `skin={"melanin": 0.1}`; "sampled" for what is worn by chance. Skin and hair fit
+            age, sex and ancestry; with `ita` alone, the ancestry is that of measured people with this angle.
 
         Returns
         -------
@@ -215,9 +216,9 @@ class Human:
         shared = head_template(layout, resolve_levels(control_head, subdivide))
         head = shared.refine_head(control_head)
         head = add_hair(head, control_head, shared.root_finder, self.hair_look, self.look.recession, hairs)
-        if not self._outfit:
+        if not outfit(self):
             return head
-        return dress(head, self._outfit, dressed_template(layout, head.levels, self._outfit))
+        return dress(head, outfit(self), dressed_template(layout, head.levels, outfit(self)))
 
     def transfer_skin_to(self, head: Head) -> Head:
         """Return the head of another person with the skin and eyes of this person.
@@ -272,10 +273,6 @@ class Human:
         return typical_hair(self._demographics, self.hair_eumelanin, self.hair_pheomelanin)
 
     @property
-    def _outfit(self) -> Outfit:
-        return tuple(item for item in worn_items(self).values() if item is not None)
-
-    @property
     def _demographics(self) -> Demographics:
         total = self.african + self.asian + self.caucasian
         fractions = self.african / total, self.asian / total, self.caucasian / total
@@ -288,15 +285,13 @@ class Human:
     def positions_mm(self) -> NDArray[np.float32]:
         """Return the control points (p, 3) in rest pose, relative to the midpoint between the eyes [mm].
 
-        `Pose(positions_mm=...)` gives any head with the same clothing and glasses this shape, because all
-        people have corresponding points.
-
+        `Pose(positions_mm=...)` gives any head that wears the same this shape: all have the same points.
         Raises DermisError if `targets` contains names that are not morph targets of MakeHuman.
         """
         points = control_points_mm(self.target_weights())
-        if not self._outfit:
+        if not outfit(self):
             return points
-        return np.concatenate([points, worn_points_mm(points, self._outfit)])
+        return np.concatenate([points, worn_points_mm(points, outfit(self))])
 
     def target_weights(self) -> dict[str, float]:
         """Return the nonzero weights of MakeHuman's morph targets for this person, by target name."""
@@ -336,8 +331,13 @@ class Human:
     drawn = renamed_classmethod("drawn", "sampled")
 
 
+def outfit(person: Human) -> Outfit:
+    """Return the items that a person wears."""
+    return tuple(item for item in worn_items(person).values() if item is not None)
+
+
 def worn_items(person: Human) -> dict[str, Item | None]:
-    """Return clothing and glasses of a person by field of `Human`; None for a field without an item."""
+    """Return what a person wears by field of `Human`, such as "glasses"; None for a field without an item."""
     return {name: getattr(person, name) for name in ITEM_TYPES}
 
 

@@ -30,6 +30,7 @@ from dermis.human.skin.measured import (
     group_weights,
     pigment_ancestry,
 )
+from dermis.human.wear.chances import SAMPLED, sampled_items
 from dermis.human.wear.look import ITEM_TYPES
 
 _MAX_SEED = 2**32 - 1
@@ -120,6 +121,9 @@ def sample_fields(seed: int, fixed_fields: Mapping[str, Any]) -> dict[str, Any]:
     colour = {"hair_eumelanin": brown, "hair_pheomelanin": red} | fixed_numbers
     fields |= colour | {"eyes": replace(eyes, **fixed_fields.get("eyes", {}))}
     fields |= {name: fixed_fields[name] for name in _OPTIONAL_FIELDS if fixed_fields.get(name) is not None}
+    if SAMPLED in (fields.get(name) for name in ITEM_TYPES):
+        items = sampled_items(int(seed), fields["sex"], fields["age"])
+        fields |= {name: item for name, item in items.items() if fields.get(name) == SAMPLED}
     typical = typical_hair(demographics, colour["hair_eumelanin"], colour["hair_pheomelanin"])
     hair_rng = np.random.default_rng((int(seed), 2))
     return fields | _sample_hair_and_skin(hair_rng, demographics, typical, skin, fixed_fields)

@@ -14,6 +14,10 @@ from dermis.mesh.strands import Roots, refine_roots
 
 KNOTS_PER_GUIDE = 40
 """Number of knots of each guide."""
+NO_CEILING_MM = 1000.0
+"""Largest height of strands above the skin where nothing covers them [mm]."""
+HIDDEN_CEILING_MM = -200.0
+"""Largest height of strands above the skin below which headwear hides them [mm]."""
 ANCHORS_PER_GUIDE_KNOT = 4
 """Number of quads that each knot of a guide follows."""
 # Pitch of twists relative to their radius; that of braids is 8, see strands_grow.wgsl.
@@ -35,6 +39,8 @@ class Guides(ShortRepr):
     weight : (g, k, m) weights of the quads, which add up to 1 for each knot [-]
     rest_mm : (g, k, 4) position of each knot on the mean person at rest, and its height above the skin [mm]
     cut : (g,) where the style cuts each guide, as a fraction of the guide's length [-]
+    ceiling_mm : (g, k) largest height of strands above the skin at each knot near the rim of headwear, and
+        `-NO_CEILING_MM` where headwear hides them [mm]; None for hair without headwear
     """
 
     corner: Ints
@@ -42,6 +48,14 @@ class Guides(ShortRepr):
     weight: Floats
     rest_mm: Floats
     cut: Floats
+    ceiling_mm: Floats | None = None
+
+    @property
+    def ceilings_mm(self) -> Floats:
+        """Return `ceiling_mm`, or `NO_CEILING_MM` at all knots."""
+        if self.ceiling_mm is not None:
+            return self.ceiling_mm
+        return np.full(self.rest_mm.shape[:2], NO_CEILING_MM, np.float32)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Ints, Mask
-from dermis.mesh.groom import KNOTS_PER_GUIDE, Groom
+from dermis.mesh.groom import HIDDEN_CEILING_MM, KNOTS_PER_GUIDE, Groom, Guides
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.skin_grid import SkinGrid
@@ -40,13 +40,15 @@ def grow_strands(
 ) -> Strands:
     """Return the strands that grow from the roots of a groom on a posed skin.
 
+    The radius of knots that headwear hides is 0.
+
     mesh : mesh of quads on which the strands are rooted
     points_mm : (p, 3) points of the mesh in a pose [mm]
     max_strands : largest number of roots to use; if the groom has more, the strands are widened to keep
         coverage
     """
     count = min(len(groom), max_strands)
-    guides = _posed_guides(groom, points_mm)
+    guides = posed_guide_knots(groom.guides, points_mm)
     scale = groom.possible / max(count, 1)
     roots = Roots(groom.roots.roots.quad[:count], groom.roots.roots.position[:count])
     root_mm, frames = root_frames(mesh, roots, points_mm)
@@ -101,26 +103,24 @@ class _Curves(NamedTuple):
 
     position, normal, tangent : (n, k, 3) positions [mm], skin normals and tangents at the points
     height : (n, k) heights of the points above the skin [mm]
+    ceiling : (n, k) largest heights there, below headwear [mm]
     """
 
     position: Doubles
     height: Doubles
     normal: Doubles
     tangent: Doubles
+    ceiling: Doubles
 
 
-def _posed_guides(groom: Groom, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
+def posed_guide_knots(guides: Guides, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
     """Return the knots (g, k, 3) of the guides on a posed skin [mm], and unit normals of the skin below them.
 
     points_mm : (p, 3) points of the mesh in a pose [mm]
     """
-    guides = groom.guides
-    a, b, c, d = np.moveaxis(points_mm.astype(np.float64)[guides.corner], -2, 0)
-    along = _unit_vectors((b - a) + (c - d))
-    across = np.cross(c - a, d - b)
-    normal = _unit_vectors(across - (across * along).sum(axis=-1, keepdims=True) * along)
-    axes = np.stack([along, np.cross(normal, along), normal], axis=-2)
-    knots = 0.25 * (a + b + c + d) + np.einsum("gkaic,gkai->gkac", axes, guides.local_mm)
+    middle, axes = guide_frames(guides, points_mm)
+    normal = axes[..., 2, :]
+    knots = middle + np.einsum("gkaic,gkai->gkac", axes, guides.local_mm)
     weight = guides.weight[..., None]
     bound, outward = (weight * knots).sum(axis=2), _unit_vectors((weight * normal).sum(axis=2))
     moved, total = bound - guides.rest_mm[..., :3], 0.0
@@ -131,6 +131,18 @@ def _posed_guides(groom: Groom, points_mm: NDArray[np.floating]) -> tuple[Double
         total += factor
     far = _smoothstep(*_SMOOTH_HEIGHTS_MM, guides.rest_mm[..., 3].astype(np.float64))[..., None]
     return (1.0 - far) * bound + far * (guides.rest_mm[..., :3] + smooth / total), outward
+
+
+def guide_frames(guides: Guides, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
+    """Return the middles (g, k, m, 3) and the axes (g, k, m, 3, 3), as rows, of the quads of guides [mm].
+
+    points_mm : (p, 3) points of the mesh in a pose [mm]
+    """
+    a, b, c, d = np.moveaxis(points_mm.astype(np.float64)[guides.corner], -2, 0)
+    along = _unit_vectors((b - a) + (c - d))
+    across = np.cross(c - a, d - b)
+    normal = _unit_vectors(across - (across * along).sum(axis=-1, keepdims=True) * along)
+    return 0.25 * (a + b + c + d), np.stack([along, np.cross(normal, along), normal], axis=-2)
 
 
 def _grow_chunk(
@@ -188,7 +200,8 @@ def _grow_chunk(
     varied = across[0][..., None] * side + across[1][..., None] * other
     height = (1.0 - pull) * own.height + pull * at.height + (varied * own.normal).sum(axis=-1)
     least = _MIN_HEIGHT_ABOVE_SKIN_MM * np.minimum(s / _RISE_LENGTH_MM, 1.0)
-    positions = own.position + to_middle + varied + np.maximum(least - height, 0.0)[..., None] * own.normal
+    lift = np.maximum(least - height, 0.0) + np.minimum(np.maximum(own.ceiling, least) - height, 0.0)
+    positions = own.position + to_middle + varied + lift[..., None] * own.normal
     above = s > 0.0
     positions[above] = skin_grid.push_out(positions[above], least[above], s[above])
     taper = 1.0 - (1.0 - _TIP_WIDTH_RATIO) * _smoothstep(1.0 - _TIP_FRACTION, 1.0, t)
@@ -199,6 +212,7 @@ def _grow_chunk(
         np.minimum(thinned, 1.0 + edge.baby * (_BABY_THICKNESS - 1.0)) - 1.0
     )
     radius = (part["radius_mm"] * (0.8 + 0.4 * _uniform_random(strand_seed, 3)) * thickness)[:, None] * taper
+    radius *= own.ceiling >= HIDDEN_CEILING_MM
     return (
         offsets_in_root_axes(root_axes, positions - root_mm[:, None]),
         radius,
@@ -317,10 +331,10 @@ def _interpolate_guides(
         [np.maximum(first, 1) - 1, first, first + 1, np.minimum(first + 2, KNOTS_PER_GUIDE - 1)]
     )
     value, slope = _spline_weights(at - first)
-    height_mm = groom.guides.rest_mm[..., 3]
+    height_mm, ceiling_mm = groom.guides.rest_mm[..., 3], groom.guides.ceilings_mm
     position = np.repeat(root_mm[:, None], guide_position.shape[1], axis=1)
     normal, tangent, middle = (np.zeros_like(position) for _ in range(3))
-    height, square = np.zeros(guide_position.shape), np.zeros(guide_position.shape)
+    height, square, ceiling = (np.zeros(guide_position.shape) for _ in range(3))
     for k in range(4):
         guide, weight = (
             groom.roots.guide[strand_index, k][:, None],
@@ -334,11 +348,13 @@ def _interpolate_guides(
         normal += weight * ((1.0 - part) * normals[guide, first] + part * normals[guide, first + 1])
         tangent += weight * np.einsum("jnk,jnkc->nkc", slope, near)
         height += weight[..., 0] * (value * height_mm[guide[None], around]).sum(axis=0)
+        low, high = ceiling_mm[guide, first], ceiling_mm[guide, first + 1]
+        ceiling += weight[..., 0] * (low + part[..., 0] * (high - low))
     normal = _unit_vectors(normal)
     close = 1.0 / (1.0 + (np.maximum(height, 0.0) / _LIFTED_HEIGHT_MM) ** 2)
     sag = close * np.maximum(square - (middle**2).sum(axis=-1), 0.0) / (2.0 * _HEAD_RADIUS_MM)
     position += sag[..., None] * normal
-    return _Curves(position, height, normal, _unit_vectors(tangent + 1e-9 * normal))
+    return _Curves(position, height, normal, _unit_vectors(tangent + 1e-9 * normal), ceiling)
 
 
 def _spline_weights(t: Doubles) -> tuple[Doubles, Doubles]:

@@ -107,6 +107,9 @@ class HeadTable(FrozenModel):
     glasses: str | None = None
     """Glasses of a person in words, such as "brown square": round, square, aviator, rimless or sunglasses;
     none for no glasses."""
+    headwear: str | None = None
+    """Headwear of a person in words, such as "red beanie": cap, beanie, turban or headscarf; none for a bare
+    head."""
     eye: EyeTable | None = None
     """Overrides of the look of the eyes."""
     subdivide: _SubdivisionLevels = AUTO

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from dermis.human.person import Human
 
 HUMAN = "human"
+BARE, DRESSED = "bare", "dressed"
+"""Words after "human:SEED?" for a person who wears nothing, and for one dressed by chance."""
 _MAX_SEED_DIGITS = 20
 MIN_HUMAN_SUBDIVISION_LEVELS = 1
 """Lowest level of subdivision of the parametric human."""
@@ -66,6 +68,7 @@ def load_head(
     eye: Mapping[str, float] | None = None,
     clothing: str | None = None,
     glasses: str | None = None,
+    headwear: str | None = None,
     subdivide: Subdivide = AUTO,
     regions: Literal["auto", "none"] = "auto",
 ) -> Head:
@@ -78,8 +81,9 @@ def load_head(
     Parameters
     ----------
     head : str or path
-        "human" for the parametric human, "human:7" for the person of seed 7, a .json file written by `dermis
-        head`, a sample ("lee_perry_smith") or a mesh file (.glb, .gltf, .vrm, .usdz, .obj, .ply, .stl).
+        "human" for the parametric human, "human:7" for the person of seed 7, "human:7?dressed" for this
+        person with clothing, glasses and headwear by chance, a .json file written by `dermis head`, a sample
+        ("lee_perry_smith") or a mesh file (.glb, .gltf, .vrm, .usdz, .obj, .ply, .stl).
     colour, normal, height, specular, roughness : str or path, optional
         Image files of the maps; see `dermis.formats.maps.load_maps`.
     skin_site : str, optional
@@ -122,6 +126,9 @@ def load_head(
         shoulders. By default, the person's own.
     glasses : str, optional
         Glasses of a parametric human in words, such as "brown square", see `Glasses`; "none" for no glasses.
+        By default, the person's own.
+    headwear : str, optional
+        Headwear of a parametric human in words, such as "red beanie", see `Headwear`; "none" for a bare head.
         By default, the person's own.
     subdivide : int, "auto" or callable
         Number of subdivision levels, 0 to 3, and at least 1 for the human. Meshes of quads are subdivided by
@@ -175,12 +182,12 @@ def load_head(
     check_options(
         **mesh_options, **others, skin_site=skin_site, subdivide=AUTO if callable(subdivide) else subdivide
     )
+    worn = {"clothing": clothing, "glasses": glasses, "headwear": headwear}
     if is_person_name(name):
         mesh_options |= {"eyes": eyes, "skin_site": skin_site}
-        worn = {"clothing": clothing, "glasses": glasses}
         loaded = _load_human(name, map_files, height_mm, normal_y, mesh_options, levels, worn)
         return _with_eye_look(loaded, eye)
-    for item, words in (("clothing", clothing), ("glasses", glasses)):
+    for item, words in worn.items():
         if words is not None:
             refuse(
                 item,
@@ -258,7 +265,7 @@ def _load_human(
     height_mm, normal_y : interpretation of the height map and the normal map, see `load_head`
     mesh_options : options that apply only to mesh files; DermisError is raised unless all have their defaults
     subdivision_levels : number of levels, or a function of the head that returns it
-    worn : clothing and glasses in words, by field of `Human`; None keeps those of the person
+    worn : clothing, glasses and headwear in words, by field of `Human`; None keeps those of the person
     """
     texts = {"v_origin": "auto", "front": "auto", "eyes": "fitted"}
     defaults = {
@@ -288,22 +295,36 @@ def _load_human(
 def load_person(head_name: str) -> Human:
     """Return the person that a head name denotes.
 
-    head_name : "human" for the average person, "human:SEED" for a random person, or a person's .json file
+    head_name : "human" for the average person, "human:SEED" for a random person who wears nothing,
+        "human:SEED?dressed" for the same person in clothes, and perhaps glasses or headwear, by chance, or a
+        person's .json file
 
     Raises DermisError for an invalid seed or file.
     """
     from dermis.human.person import Human
     from dermis.human.person_file import read_person
+    from dermis.human.wear.chances import SAMPLED
+    from dermis.human.wear.look import ITEM_TYPES
 
     if head_name == HUMAN:
         return Human()
     if Path(head_name).suffix.lower() == ".json":
         return read_person(Path(head_name))
-    words = head_name.partition(":")[2]
+    words, _, dress = head_name.partition(":")[2].partition("?")
+    if dress not in ("", BARE, DRESSED):
+        refuse(
+            head_name, f"?{BARE} or ?{DRESSED} after the seed", f"got ?{dress}", f"Try {HUMAN}:7?{DRESSED}"
+        )
     if not words.isdecimal() or len(words) > _MAX_SEED_DIGITS:
         actual = f"got {format_value(words)}"
         refuse(head_name, f"{HUMAN}, or {HUMAN}:SEED with a whole number", actual, f"Try {HUMAN}:7")
-    return Human.sampled(int(words))
+    return Human.sampled(int(words), **(dict.fromkeys(ITEM_TYPES, SAMPLED) if dress == DRESSED else {}))
+
+
+def dressed_name(head_name: str) -> str:
+    """Return the name of the dressed person for "human:SEED"; other names are returned unchanged."""
+    is_seed = head_name.partition(":")[0] == HUMAN and head_name.partition(":")[2].isdecimal()
+    return f"{head_name}?{DRESSED}" if is_seed else head_name
 
 
 def _head_names() -> list[str]:

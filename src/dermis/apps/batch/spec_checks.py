@@ -31,6 +31,8 @@ from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.human.makehuman import human_targets
 from dermis.human.person import Human
 from dermis.human.skin.look import SITES_FIELD, SkinLook
+from dermis.human.wear.chances import SAMPLED
+from dermis.human.wear.look import ITEM_TYPES
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.pose import MAX_WEIGHT
 from dermis.scene.heads import HUMAN
@@ -40,7 +42,6 @@ from dermis.scene.skin import Skin
 
 _UNSAMPLED_SKIN_FIELDS = "pigments", "layers", "profile_map", "other_profiles"  # fields of `Skin`
 _SEED_FIELD = "seed"  # an integer that follows from the person
-_WORN_FIELDS = "clothing", "glasses"
 _LOOK_MODELS: Mapping[str, type] = {"skin": SkinLook, "eyes": EyeLook, "hair": HairLook}
 _ANCESTRY_PARAMETERS = "person.african", "person.asian", "person.caucasian"
 _ITA_PARAMETER, _MELANIN_PARAMETER = "person.ita", "person.skin.melanin"
@@ -263,9 +264,11 @@ def _check_looks(distributions: Mapping[str, Distribution]) -> None:
 
     distributions : distribution of each parameter by its dotted name
     """
-    for name in _WORN_FIELDS:
+    for name in ITEM_TYPES:
         distribution = distributions.get(f"person.{name}")
         for value in () if distribution is None else distribution.support:
+            if value == SAMPLED:
+                continue
             fields_of_human: dict[str, Any] = {name: value}
             Human(**fields_of_human)
     for part, kind in _LOOK_MODELS.items():

@@ -205,9 +205,11 @@ class PersonTable(FrozenModel):
     hair_pheomelanin: Annotated[Distribution | None, _HAIR_MELANIN_FIELD] = None
     """Pheomelanin of the hair before greying: 2 with little eumelanin is red."""
     clothing: Annotated[Distribution | None, NameField()] = None
-    """Garment in words, such as "navy denim shirt"; by default "none", for bare shoulders."""
+    """Garment in words, such as "navy denim shirt", or "sampled" for one by chance; by default "none"."""
     glasses: Annotated[Distribution | None, NameField()] = None
-    """Glasses in words, such as "brown square"; by default "none"."""
+    """Glasses in words, such as "brown square", or "sampled" for some people; by default "none"."""
+    headwear: Annotated[Distribution | None, NameField()] = None
+    """Headwear in words, such as "red beanie", or "sampled" for some people; by default "none"."""
     skin: _Distributions = Field(default_factory=dict)
     """Fields of `SkinLook`: melanin, blood, freckles, spots, oil ..."""
     eyes: _Distributions = Field(default_factory=dict)

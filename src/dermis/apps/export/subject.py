@@ -19,6 +19,7 @@ from dermis.formats.part_pictures import PartPictures
 from dermis.formats.samples import SAMPLES
 from dermis.human.person import Human
 from dermis.human.person_file import relief_slopes
+from dermis.human.wear.look import ITEM_TYPES
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyeball import EyeTextures
 from dermis.mesh.head import Head
@@ -208,8 +209,8 @@ def load_subject(
 
 
 def _person_with_options(name: str, loaded: Head, head_options: Mapping[str, Any]) -> Human:
-    """Return the person of a loaded head, with clothing, glasses and eyes from the options of the head."""
-    changed = {item: head_options[item] for item in ("clothing", "glasses") if head_options.get(item)}
+    """Return the person of a loaded head, with eyes and what is worn from the options of the head."""
+    changed = {item: head_options[item] for item in ITEM_TYPES if head_options.get(item)}
     if head_options.get("eye") and loaded.eyes is not None:
         changed["eyes"] = loaded.eyes.look
     return replace(load_person(name), **changed)

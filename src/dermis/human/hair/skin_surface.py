@@ -37,6 +37,10 @@ class SkinSurface:
         normal = plane[:, :3] / np.sqrt((plane[:, :3] ** 2).sum(axis=1, keepdims=True))
         return points_mm - height[:, None] * normal, normal
 
+    def distances_mm(self, points_mm: Doubles) -> Doubles:
+        """Return the distances (n,) of points (n, 3) from the nearest vertex [mm]."""
+        return np.asarray(self._vertex_kd_tree.query(points_mm)[0])
+
     @cached_property
     def _vertex_kd_tree(self) -> Any:
         from scipy.spatial import cKDTree

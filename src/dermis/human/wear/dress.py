@@ -1,4 +1,4 @@
-"""Dressed heads: mesh, rig and materials of a head, followed by those of clothing and glasses."""
+"""Dressed heads: mesh, rig and materials of a head, followed by those of what is worn."""
 
 from __future__ import annotations
 
@@ -9,11 +9,27 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dermis.base.arrays import Doubles, Floats
+from dermis.base.arrays import Doubles, Floats, Mask
 from dermis.human.model import Layout, head_template
-from dermis.human.wear.clothing import garment_materials, garment_points_mm, worn_garment
+from dermis.human.wear.clothing import (
+    garment_materials,
+    garment_obstacle,
+    garment_outside,
+    garment_points_mm,
+    worn_garment,
+)
 from dermis.human.wear.eyewear import glasses_materials, glasses_points_mm, worn_glasses
-from dermis.human.wear.look import Clothing, Glasses, Item
+from dermis.human.wear.file_clothing import (
+    file_garment_materials,
+    file_garment_obstacle,
+    file_garment_points_mm,
+    worn_file_garment,
+)
+from dermis.human.wear.hair_obstacles import HeadwearObstacle, Obstacle, fit_groom
+from dermis.human.wear.hats import headwear_materials, headwear_points_mm, worn_headwear
+from dermis.human.wear.headwear import headwear_room
+from dermis.human.wear.look import Clothing, FileClothing, Glasses, Headwear, Item
+from dermis.human.wear.skin_sheet import point_normals
 from dermis.human.wear.worn import Worn
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, build_mesh
@@ -29,16 +45,36 @@ class Wearable(NamedTuple):
     mesh : mesh of an item, which does not depend on the person or on colours
     points_mm : points (m, 3) of an item on a person with control points (p, 3) [mm]
     materials : materials of an item
+    obstacle : limits of hair, from the points (m, 3) of the item on a person, the control points (p, 3) of
+        the person and the item [mm]; None for items that hair may cross
     """
 
     mesh: Callable[[Any], Worn]
     points_mm: Callable[[Floats, Any], Doubles]
     materials: Callable[[Any], tuple[Material, ...]]
+    obstacle: Callable[[Doubles, Doubles, Any], Obstacle] | None = None
 
 
 WEARABLES: Mapping[type[Item], Wearable] = {
-    Clothing: Wearable(worn_garment, garment_points_mm, garment_materials),
+    Clothing: Wearable(
+        worn_garment,
+        garment_points_mm,
+        garment_materials,
+        lambda points, control, item: garment_obstacle(points, item),
+    ),
+    FileClothing: Wearable(
+        worn_file_garment,
+        file_garment_points_mm,
+        file_garment_materials,
+        lambda points, control, item: file_garment_obstacle(points, item),
+    ),
     Glasses: Wearable(worn_glasses, glasses_points_mm, glasses_materials),
+    Headwear: Wearable(
+        worn_headwear,
+        headwear_points_mm,
+        headwear_materials,
+        lambda points, control, item: HeadwearObstacle(headwear_room(item.style, control)),
+    ),
 }
 """Functions that build items, by the type of item."""
 
@@ -52,6 +88,24 @@ def worn_points_mm(control_mm: Floats, outfit: Outfit) -> Floats:
     return np.concatenate(points).astype(np.float32)
 
 
+def worn_outside(points_mm: Doubles, outfit: Outfit) -> tuple[Doubles, Doubles, Mask]:
+    """Return points (n, 3) [mm] on the outside of items, unit normals there, and a mask of those of clothing.
+
+    points_mm : (m, 3) points of all items, from `worn_points_mm` [mm]
+    """
+    found, done = list[tuple[Doubles, Doubles, Mask]](), 0
+    for item in outfit:
+        worn = WEARABLES[type(item)].mesh(item)
+        own = points_mm[done : done + worn.point_count].astype(np.float64)
+        normals, done = point_normals(own, worn.point[worn.triangles]), done + worn.point_count
+        outside = garment_outside(item) if type(item) is Clothing else np.ones(len(own), bool)
+        found.append(
+            (own[outside], normals[outside], np.full(int(outside.sum()), isinstance(item, Clothing)))
+        )
+    points, normals, is_cloth = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return points, normals, is_cloth
+
+
 def dress(head: Head, outfit: Outfit, template: Head | None) -> Head:
     """Return a head that wears an outfit of at least one item.
 
@@ -62,11 +116,14 @@ def dress(head: Head, outfit: Outfit, template: Head | None) -> Head:
     positions, uv, triangles = [mesh.positions], [mesh.uv], [mesh.triangles]
     point, material, materials = [mesh.point], [mesh.material], mesh.materials
     vertex_count, done = len(mesh.positions), 0
+    obstacles, control = list[Obstacle](), rig.positions_mm.astype(np.float64)
     for item in outfit:
         make = WEARABLES[type(item)]
         worn = make.mesh(item)
         own = points[done : done + worn.point_count]
         rig = _dressed_rig(rig, worn, own)
+        if make.obstacle is not None and head.hair is not None:
+            obstacles.append(make.obstacle(own.astype(np.float64), control, item))
         positions.append(own[worn.point])
         uv.append(worn.uv)
         triangles.append(worn.triangles + vertex_count)
@@ -84,7 +141,8 @@ def dress(head: Head, outfit: Outfit, template: Head | None) -> Head:
         quads=mesh.quads,
     )
     rig = replace(rig, template=None if template is None else template.control_rig)
-    return replace(head, mesh=dressed, rig=rig, template=template, undressed=head)
+    hair = head.hair and fit_groom(head.hair, mesh.points_mm, obstacles)
+    return replace(head, mesh=dressed, rig=rig, template=template, undressed=head, hair=hair)
 
 
 def dressed_template(layout: Layout, levels: int, outfit: Outfit) -> Head:
@@ -92,11 +150,14 @@ def dressed_template(layout: Layout, levels: int, outfit: Outfit) -> Head:
 
     It is the template of all people who wear these items in any colour, and who share its atlas.
     """
-    return _dressed_template(layout, levels, tuple(item.without_colour for item in outfit))
+    stamps = tuple(item.stamp for item in outfit)
+    return _dressed_template(layout, levels, tuple(item.without_colour for item in outfit), stamps)
 
 
 @cache
-def _dressed_template(layout: Layout, levels: int, outfit: Outfit) -> Head:
+def _dressed_template(
+    layout: Layout, levels: int, outfit: Outfit, stamps: tuple[tuple[int, int] | None, ...]
+) -> Head:
     return dress(head_template(layout, levels).head, outfit, None)
 
 

@@ -62,7 +62,8 @@ def high_neck(folds: Folds) -> list[Panel]:
 
     def slouch_mm(angle: Doubles, row: Doubles) -> Doubles:
         around = np.stack([3.0 * np.cos(angle), 3.0 * np.sin(angle), 0.55 * row], axis=1)
-        return np.asarray(1.5 * np.maximum(smooth_noise(around, 8), 0.0) * smoothstep(18.5, 16.0, row))
+        outside = smoothstep(6.0, 9.5, row) * smoothstep(18.5, 16.0, row)  # without the folded edges
+        return np.asarray(1.5 * np.maximum(smooth_noise(around, 8), 0.0) * outside)
 
     return [body_panel(level - 11.0, folds, 5.0), swept_panel(level, profile, fold_mm=slouch_mm)]
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dermis.base.arrays import Doubles
 from dermis.human.wear.skin_sheet import SkinSheet, head_sheet
+from dermis.human.wear.skull import ear_mask
 from dermis.human.wear.tubes import Solid, disc, ring, tube
 
 
@@ -113,18 +113,11 @@ def _measure(sheet: SkinSheet, control_mm: Doubles) -> _Fit:
     front = points[faces_front]
     sides = {}
     for side in (1.0, -1.0):
-        own = points[(side * points[:, 0] > 38.0) & ~_ear_mask()]
+        own = points[(side * points[:, 0] > 38.0) & ~ear_mask()]
         sides[side] = cKDTree(own[:, 1:]), np.abs(own[:, 0])
     width = np.abs(control_mm[list(_TRAGI), 0]).mean()
     scale = float(np.clip(width / _REFERENCE_HALF_WIDTH_MM, 0.9, 1.15))
     return _Fit((cKDTree(front[:, :2]), front[:, 2]), sides, control_mm, scale)
-
-
-@cache
-def _ear_mask() -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Return the mask (n,) of the points of the sheet of the head that belong to ears."""
-    x, y, z = head_sheet().mean_mm.T
-    return np.asarray((np.abs(x) > 69.0 + 0.2 * np.maximum(y, 0.0)) & (np.abs(y + 20.0) < 32.0) & (z < -58.0))
 
 
 def _outline(frame: Frame, side: float, scale: float) -> Doubles:

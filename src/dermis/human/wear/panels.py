@@ -26,6 +26,11 @@ class PanelVertices(NamedTuple):
     uv_mm: Doubles
     triangles: Ints
 
+    @property
+    def triangles_of_points(self) -> Ints:
+        """Return the triangles (t, 3) as indices of points."""
+        return np.asarray(self.point[self.triangles], np.int32)
+
 
 class Panel:
     """Surface of cloth that is bound to the skin sheet.
@@ -77,15 +82,7 @@ class Panel:
         """Return the vertices; the first column of a closed grid is duplicated at its end, where uv jumps."""
         if self.grid is None or not self.grid.is_closed:
             return PanelVertices(np.arange(len(self.height_mm), dtype=np.int32), self.uv_mm, self.triangles)
-        rows, columns, _ = self.grid
-        point = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
-        uv = self.uv_mm.reshape(rows, columns, 2)
-        last = 2.0 * uv[:, -1:] - uv[:, -2:-1]
-        return PanelVertices(
-            np.concatenate([point, point[:, :1]], axis=1).ravel(),
-            np.concatenate([uv, last], axis=1).reshape(-1, 2),
-            Grid(rows, columns + 1, False).triangles,
-        )
+        return self.grid.vertices(self.uv_mm)
 
     def heights_on_sheet(self, points: Doubles, skin_mm: Doubles, skin_normals: Doubles) -> Doubles:
         """Return the height (n,) of this panel above the points of the sheet, 0 where it is not [mm].
@@ -147,6 +144,20 @@ class Grid(NamedTuple):
         a, b = row * self.columns + column, row * self.columns + after
         c, d = a + self.columns, b + self.columns
         return np.stack([a, b, d, a, d, c], axis=-1).reshape(-1, 3).astype(np.int32)
+
+    def vertices(self, uv_mm: Doubles) -> PanelVertices:
+        """Return the vertices of a closed grid, whose first column is duplicated at its end, where uv jumps.
+
+        uv_mm : (m, 2) position of the points on the cloth [mm]
+        """
+        point = np.arange(self.rows * self.columns, dtype=np.int32).reshape(self.rows, self.columns)
+        uv = uv_mm.reshape(self.rows, self.columns, 2)
+        last = 2.0 * uv[:, -1:] - uv[:, -2:-1]
+        return PanelVertices(
+            np.concatenate([point, point[:, :1]], axis=1).ravel(),
+            np.concatenate([uv, last], axis=1).reshape(-1, 2),
+            Grid(self.rows, self.columns + 1, False).triangles,
+        )
 
     @property
     def end_caps(self) -> Ints:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.base.arrays import Doubles, Ints
-from dermis.human.wear.panels import Grid
+from dermis.human.wear.panels import Grid, PanelVertices
 from dermis.human.wear.skin_sheet import unit_vectors
 
 TUBE_SIDES = 10
@@ -16,11 +16,19 @@ _SQUARENESS = 0.55  # exponent of the cross-section; 1 is an ellipse, smaller va
 
 
 class Solid(NamedTuple):
-    """Rigid surface: points (m, 3) [mm], triangles (t, 3), and the name of its material."""
+    """Rigid surface.
+
+    points : (m, 3) points [mm]
+    triangles : (t, 3) indices of points
+    slot : name of the material
+    vertices : vertices with positions on cloth, whose triangles correspond to `triangles`; None for surfaces
+        without threads
+    """
 
     points: Doubles
     triangles: Ints
     slot: str
+    vertices: PanelVertices | None = None
 
 
 def tube(path: Doubles, side: Doubles, half_width: Doubles, half_height: Doubles, slot: str) -> Solid:

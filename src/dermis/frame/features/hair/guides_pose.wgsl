@@ -11,7 +11,8 @@ struct Anchor {
 @group(0) @binding(0) var<storage, read> points: array<f32>; // x, y, z [mm]
 @group(0) @binding(1) var<storage, read> anchors: array<Anchor>;
 @group(0) @binding(2) var<storage, read> guide_rest: array<vec4f>; // position of each knot on the mean person, and its height above the skin [mm]
-@group(0) @binding(3) var<storage, read_write> bound_guides: array<vec4f>; // of each knot: position and height; normal of the skin
+@group(0) @binding(3) var<storage, read_write> bound_guides: array<vec4f>; // of each knot: position and height; normal of the skin and ceiling
+@group(0) @binding(4) var<storage, read> guide_ceilings: array<f32>; // largest height of strands at each knot, below headwear [mm]
 
 fn point_at(index: u32) -> vec3f {
     return vec3f(points[3u * index], points[3u * index + 1u], points[3u * index + 2u]);
@@ -39,5 +40,5 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         outward += anchor.local.w * normal;
     }
     bound_guides[2u * index] = vec4f(position, guide_rest[index].w);
-    bound_guides[2u * index + 1u] = vec4f(normalize(outward), 0.0);
+    bound_guides[2u * index + 1u] = vec4f(normalize(outward), guide_ceilings[index]);
 }

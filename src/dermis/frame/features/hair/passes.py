@@ -97,9 +97,8 @@ def pose_guides(graph: Recorder, strand_tables: StrandTables, shape: Shape) -> N
     style = strand_tables.groom.style
     guides: Bindings = {"guide_rest": style.guide_rest, "bound_guides": style.bound_guides}
     knots, points = style.guide_rest.size // 16, shape.surface["points"]
-    _dispatch_hair(
-        graph, "hair/guides_pose.wgsl", {**guides, "points": points, "anchors": style.anchors}, knots
-    )
+    bound: Bindings = {"points": points, "anchors": style.anchors, "guide_ceilings": style.guide_ceilings}
+    _dispatch_hair(graph, "hair/guides_pose.wgsl", {**guides, **bound}, knots)
     _dispatch_hair(graph, "hair/guides_smooth.wgsl", {**guides, "guides": style.guides}, knots)
 
 

@@ -15,6 +15,7 @@ from dermis.frame.request import FrameRequest
 from dermis.gpu import Buffer, Constants, Device, Memo, Texture, UniformRecord, make_texture
 from dermis.mesh.groom import (
     ANCHORS_PER_GUIDE_KNOT,
+    HIDDEN_CEILING_MM,
     KNOTS_PER_GUIDE,
     Groom,
     Guides,
@@ -281,6 +282,7 @@ class GuideTables:
 
     anchors: Buffer
     guide_rest: Buffer
+    guide_ceilings: Buffer
     guide_cuts: Buffer
     bound_guides: Buffer
     guides: Buffer
@@ -391,7 +393,11 @@ def shader_constants() -> dict[str, float]:
         "sky_head_words": _SKY_HEADER_WORDS,
         "sky_cell_words": _SKY_CELL_WORDS,
     }
-    guides = {"anchors_per_guide_knot": ANCHORS_PER_GUIDE_KNOT, "knots_per_guide": KNOTS_PER_GUIDE}
+    guides: dict[str, float] = {
+        "anchors_per_guide_knot": ANCHORS_PER_GUIDE_KNOT,
+        "knots_per_guide": KNOTS_PER_GUIDE,
+        "hidden_ceiling_mm": HIDDEN_CEILING_MM,
+    }
     own = {**opacity, **words, "view_texel": VIEW_TEXEL_PIXELS, **sky, **guides}
     return {**own, **skin_grid_constants(), **hair_constants()}
 
@@ -483,8 +489,9 @@ def make_guide_tables(device: Device, guides: Guides) -> GuideTables:
     anchors["corner"] = guides.corner
     anchors["local"][..., :3], anchors["local"][..., 3] = guides.local_mm, guides.weight
     bound, smooth = (_make_word_buffer(device, 2 * guides.rest_mm.size) for _ in range(2))
-    rest, cuts = (device.buffer(array, "STORAGE") for array in (guides.rest_mm, guides.cut))
-    return GuideTables(device.buffer(anchors.view(np.uint32), "STORAGE"), rest, cuts, bound, smooth)
+    uploaded = guides.rest_mm, guides.ceilings_mm, guides.cut
+    rest, ceilings, cuts = (device.buffer(array, "STORAGE") for array in uploaded)
+    return GuideTables(device.buffer(anchors.view(np.uint32), "STORAGE"), rest, ceilings, cuts, bound, smooth)
 
 
 def make_strand_roots(device: Device, roots: StrandRoots, mesh: Mesh) -> Buffer:

@@ -15,7 +15,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let a = posed[row];
     let b = posed[row + 1u];
     let grid = sky_grid();
-    if (a.w < 0.0 || any(grid.cell <= vec3f(0.0))) {
+    if (min(a.w, b.w) < 0.0 || any(grid.cell <= vec3f(0.0))) {
         return;
     }
     let begin = (a.xyz - grid.low) / grid.cell;

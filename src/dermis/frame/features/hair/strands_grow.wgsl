@@ -1,5 +1,6 @@
 // Grows the coarse strands of a groom: each strand is interpolated between four guides, drawn into its clump, curled and
-// randomly varied. Strands that a person does not have, because of the hairline or a lower density, get a negative radius.
+// randomly varied. Strands that a person does not have, because of the hairline or a lower density, and knots below headwear
+// get a negative radius.
 //#include "each.wgsl"
 //#include "strand_knots.wgsl"
 //#include "skin_push.wgsl"
@@ -24,6 +25,7 @@ const TEMPLE_ANGLES: vec2f = vec2f(140.0, 95.0); // and angles from the front be
 const HAIRLINE_STEP: f32 = 2.0; // angle between heights of the hairline [degrees]
 const HEAD_RADIUS_MM: f32 = 80.0;
 const LIFTED_MM: f32 = 20.0; // height above the skin to which strands between guides are lifted onto the curved head
+//#fill const HIDDEN_CEILING: f32 = {hidden_ceiling_mm}; // ceiling below which knots are hidden by headwear [mm]
 const TIP_FRACTION: f32 = 0.12; // part of a strand along which it tapers
 const TIP_WIDTH: f32 = 0.35;
 const COLOURED_HAIRS: u32 = 5u; // hairs whose colours are averaged in a strand
@@ -122,6 +124,7 @@ struct CurvePoint {
     height: f32, // above the skin [mm]
     normal: vec3f, // of the skin below
     tangent: vec3f,
+    ceiling: f32, // largest height, below headwear [mm]
 }
 
 // u: position along the guides, 0 to 1; root: position of the root, through which the curve passes
@@ -134,7 +137,7 @@ fn curve_at(strand: StrandRoot, u: f32, root: vec3f) -> CurvePoint {
     // a Catmull-Rom spline through the knots, and its derivative
     let value = 0.5 * vec4f(t * (t * (2.0 - t) - 1.0), t * t * (3.0 * t - 5.0) + 2.0, t * (t * (4.0 - 3.0 * t) + 1.0), t * t * (t - 1.0));
     let slope = 0.5 * vec4f(t * (4.0 - 3.0 * t) - 1.0, t * (9.0 * t - 10.0), t * (8.0 - 9.0 * t) + 1.0, t * (3.0 * t - 2.0));
-    var sum = CurvePoint(root, 0.0, vec3f(0.0), vec3f(0.0));
+    var sum = CurvePoint(root, 0.0, vec3f(0.0), vec3f(0.0), 0.0);
     var middle = vec3f(0.0);
     var square = 0.0;
     for (var k = 0u; k < 4u; k += 1u) {
@@ -148,7 +151,9 @@ fn curve_at(strand: StrandRoot, u: f32, root: vec3f) -> CurvePoint {
         let from_root = here.xyz - root;
         middle += weight * from_root;
         square += weight * dot(from_root, from_root);
-        sum.normal += weight * mix(guides[row + 1u].xyz, guides[row + 3u].xyz, t);
+        let outward = mix(guides[row + 1u], guides[row + 3u], t);
+        sum.normal += weight * outward.xyz;
+        sum.ceiling += weight * outward.w;
         sum.tangent += weight * (knots * slope).xyz;
     }
     sum.normal = normalize(sum.normal);
@@ -265,7 +270,8 @@ fn absorption_of(index: u32, place: vec4f, part: GroomPart) -> vec3f {
     return max(mixed, part.white) / (part.hairs_per_strand * hairs.width_scale);
 }
 
-fn strand_position(index: u32, seed: u32, strand: StrandRoot, part: GroomPart, edge: Hairline, root: Root, u: f32) -> vec3f {
+// Position of a knot, and 1, or -1 if headwear hides it.
+fn strand_position(index: u32, seed: u32, strand: StrandRoot, part: GroomPart, edge: Hairline, root: Root, u: f32) -> vec4f {
     let s = u * part.guide_mm;
     let own = curve_at(strand, u, root.position);
     let middle = roots[strand.clump];
@@ -285,11 +291,13 @@ fn strand_position(index: u32, seed: u32, strand: StrandRoot, part: GroomPart, e
     offset += frizz_offset(index, part, s, across) + edge.baby * BABY_TURN * s * random_normal(index, 35u) * across[0];
     let height = mix(own.height, at.height, pull) + dot(offset - pull * (at.position - own.position), own.normal);
     let least = MIN_HEIGHT_MM * min(s / RISE_MM, 1.0);
-    let lifted = own.position + offset + max(least - height, 0.0) * own.normal;
+    let lift = max(least - height, 0.0) + min(max(own.ceiling, least) - height, 0.0);
+    let lifted = own.position + offset + lift * own.normal;
+    let shown = select(1.0, -1.0, own.ceiling < HIDDEN_CEILING);
     if (s == 0.0) {
-        return lifted;
+        return vec4f(lifted, shown);
     }
-    return outside_skin(lifted, least, s);
+    return vec4f(outside_skin(lifted, least, s), shown);
 }
 
 // Cover and the fraction of a strand from which it is dyed, packed for strands_light.wgsl; 0 for a strand that is not dyed.
@@ -320,7 +328,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         let taper = mix(1.0, TIP_WIDTH, smoothstep(1.0 - TIP_FRACTION, 1.0, along));
         let radius = part.radius_mm * (0.8 + 0.4 * random(random_index, 3u)) * taper * thickness_of(part, edge);
         let position = strand_position(random_index, seed, strand, part, edge, root, along * length);
-        at = vec4f(position, hairs.width_scale * radius);
+        at = vec4f(position.xyz, position.w * hairs.width_scale * radius);
     }
     posed[row_of_knot(hairs.fine * hairs.fine_knots + knot, hair)] = at;
     if (k == 0u) {

@@ -66,7 +66,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     }
     let hair = hair_of_segment(index);
     let row = row_of_knot(index + hair, hair);
-    if (posed[row].w < 0.0) { // does not grow
+    if (min(posed[row].w, posed[row + 1u].w) < 0.0) { // does not grow, or is below headwear
         return;
     }
     let spread = select(0.0, SPREAD * posed[row].w * (1.0 - 1.0 / max(hairs.width_scale, 1.0)), is_coarse(hair));

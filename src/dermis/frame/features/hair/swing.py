@@ -23,6 +23,8 @@ SUBSTEPS_PER_S = 240.0
 """Number of substeps of the simulation per second."""
 _MAX_SUBSTEPS = 60
 _COLLIDER_SPACING_MM = 4.0  # at most one collider for each cube with this side
+_CLOTHING = "clothing"  # label of clothing
+_COVERED_SKIN_MM = 14.0  # distance from clothing within which skin is covered
 _GRAVITY_MM_PER_S2 = np.array([0.0, -9810.0, 0.0])
 _KNOT_BYTES = 48  # struct Knot of swing_guides.wgsl
 _COLLIDER_BYTES = _GUIDE_KNOT_BYTES = 32  # two rows of vec4f
@@ -44,7 +46,7 @@ class SwingStep(NamedTuple):
 
 
 class Colliders(NamedTuple):
-    """Vertices of the skin that keep hair outside.
+    """Vertices of skin and clothing that keep hair outside.
 
     vertices : buffer of the indices of the vertices
     low_mm : (3,) corner of the grid of colliders [mm]
@@ -92,9 +94,19 @@ def swing_constants() -> dict[str, float]:
 
 
 def collider_vertices(head: Head) -> NDArray[np.uint32]:
-    """Return the indices of the vertices of the skin that keep hair outside, spread evenly over it."""
+    """Return the indices of the vertices that keep hair outside, spread evenly over skin and clothing.
+
+    Skin below clothing is left out. Headwear is not among them, because hair is inside it.
+    """
     mesh = head.mesh
     skin = np.unique(mesh.triangles[mesh.material == 0])
+    is_cloth = np.array([one.label == _CLOTHING for one in mesh.materials])[mesh.material]
+    if is_cloth.any():
+        from scipy.spatial import cKDTree
+
+        cloth = np.unique(mesh.triangles[is_cloth])
+        away = cKDTree(mesh.positions[cloth]).query(mesh.positions[skin])[0]
+        skin = np.concatenate([skin[away > _COVERED_SKIN_MM], cloth])
     cubes = np.floor(mesh.positions[skin] / _COLLIDER_SPACING_MM).astype(np.int64)
     _, first = np.unique(cubes, axis=0, return_index=True)
     return np.sort(skin[first]).astype(np.uint32)

@@ -1,4 +1,4 @@
-// Copies the vertices of the skin that keep hair outside, and enters them into the cells of the grid around them.
+// Copies the vertices of skin and clothing that keep hair outside, and enters them into the cells of the grid around them.
 //#include "each.wgsl"
 //#include "shape/geometry.wgsl"
 //#include "swing_grid.wgsl"

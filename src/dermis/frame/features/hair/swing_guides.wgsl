@@ -143,15 +143,15 @@ fn restore_lengths() {
     }
 }
 
-fn store(index: u32, knot: Knot, guide: vec4f, outward: vec3f) {
+fn store(index: u32, knot: Knot, guide: vec4f, outward: vec4f) {
     let here = nearest_skin(knot.position, vec3f(0.0), 0.0);
     let stiff = nearest_skin(knot.shape, vec3f(0.0), 0.0);
     let height = guide.w + (here.distance - stiff.distance);
     let both = length(here.normal) > 0.0 && length(stiff.normal) > 0.0;
-    let normal = select(outward, normalize(outward + here.normal - stiff.normal + 1e-6 * outward), both);
+    let normal = select(outward.xyz, normalize((1.0 + 1e-6) * outward.xyz + here.normal - stiff.normal), both);
     knots_now[index] = knot;
     swung_guides[2u * index] = vec4f(knot.position, height);
-    swung_guides[2u * index + 1u] = vec4f(normal, 0.0);
+    swung_guides[2u * index + 1u] = vec4f(normal, outward.w);
 }
 
 @compute @workgroup_size(64)
@@ -160,7 +160,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     let is_knot = lane < KNOTS_PER_GUIDE;
     let first = group.x * KNOTS_PER_GUIDE;
     let guide = guides[2u * (first + k)];
-    let outward = guides[2u * (first + k) + 1u].xyz;
+    let outward = guides[2u * (first + k) + 1u];
     if (swing.frame == 0u) {
         if (is_knot) {
             let edge = distance(guide.xyz, guides[2u * (first + max(k, 1u) - 1u)].xyz);
