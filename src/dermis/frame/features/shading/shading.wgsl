@@ -5,6 +5,7 @@
 //#include "mouth.wgsl"
 //#include "occlusion/open_sky.wgsl"
 //#include "lids.wgsl"
+//#include "lips.wgsl"
 //#include "footprint.wgsl"
 //#include "pre_integrated.wgsl"
 //#include "diffusion/packed_blend_weights.wgsl"
@@ -29,6 +30,8 @@ struct Shade {
     eyes: array<Eye, 2>,
     skin_albedo: vec3f, // mean of the head
     lids: array<vec4f, 112>, // edges of the lids in the space of each eye, half of the points for each; see human/lid_rings.csv
+    lips: array<vec4f, 38>, // edge of the lips in head space, and the area of the opening between them [mm^2]; zeros if unknown
+    tongue: array<vec4f, 2>, // from (u, v, 1) to distances from the midline and behind the tip of the tongue [mm]
     material_colour: array<vec4f, 64>,
     part_materials: array<PartMaterial, 64>,
     jitter: array<vec4f, 64>, // positions of samples in the pixel, 0..1
@@ -185,8 +188,10 @@ fn apply_modelled_parts(shading_point: ptr<function, ShadingPoint>) {
         }
         let material = shade.material_colour[point.flags >> 8u];
         if (material.w > 0.0) {
-            (*shading_point).surface = mouth_at(point, material);
-            (*shading_point).film = Film((*shading_point).surface.normal, mouth_shadow_scatter(point, material.w), vec3f(1.0), 0.0);
+            (*shading_point).open = min((*shading_point).open, open_between_lips(point.position, point.normal));
+            (*shading_point).surface = mouth_at(point, material, shade.tongue);
+            let scattered = mouth_shadow_scatter(material.w, (*shading_point).open, shade.lips[0].w);
+            (*shading_point).film = Film((*shading_point).surface.normal, scattered, vec3f(1.0), 0.0);
             (*shading_point).point.lit_position += TOOTH_SHADOW_OFFSET_MM * point.normal;
             break;
         }

@@ -1,0 +1,28 @@
+// Part of the sky that a point behind the lips sees through the opening between them, whose edge is stored in `shade.lips`.
+
+const LIP_POINTS: u32 = 38u; // points of the edge
+
+// Direction from p to a point of the edge; below the horizon of the normal n, the direction of the horizon next to it.
+fn lip_direction(index: u32, p: vec3f, n: vec3f) -> vec3f {
+    let d = shade.lips[index].xyz - p;
+    return normalize(d - min(dot(d, n), 0.0) * n + vec3f(0.0, 0.0, 1e-6));
+}
+
+// Fraction of the irradiance by a uniform sky: the form factor of the polygon [Lambert1760]. 1 if the edge is unknown.
+fn open_between_lips(p: vec3f, n: vec3f) -> f32 {
+    let known = select(0u, LIP_POINTS, shade.lips[0].w > 0.0);
+    var a = lip_direction(LIP_POINTS - 1u, p, n);
+    var sum = 0.0;
+    var i = 0u;
+    loop {
+        if (i >= known) {
+            break;
+        }
+        let b = lip_direction(i, p, n);
+        let c = cross(a, b);
+        sum += acos(clamp(dot(a, b), -1.0, 1.0)) * dot(n, c) / max(length(c), 1e-9);
+        a = b;
+        i++;
+    }
+    return select(1.0, saturate(sum / (2.0 * PI)), known > 0u);
+}
