@@ -169,7 +169,7 @@ fn shading_point_at(triangle: u32, position: vec2f, coverage: f32, size: vec2f) 
         area_u = deviation * (wx.x * a.position + wx.y * b.position + wx.z * c.position);
         area_v = deviation * (wy.x * a.position + wy.y * b.position + wy.z * c.position);
     }
-    let film = Film(surface.normal, vec3f(0.0), vec3f(1.0), 0.0);
+    let film = plain_film(surface.normal, vec3f(0.0));
     var shading_point = ShadingPoint(point, surface, film, v, footprint, open, texel, part.metalness, part.emission, part.sheen);
     if (EYES) {
         apply_modelled_parts(&shading_point);
@@ -191,7 +191,7 @@ fn apply_modelled_parts(shading_point: ptr<function, ShadingPoint>) {
             (*shading_point).open = min((*shading_point).open, open_between_lips(point.position, point.normal));
             (*shading_point).surface = mouth_at(point, material, shade.tongue);
             let scattered = mouth_shadow_scatter(material.w, (*shading_point).open, shade.lips[0].w);
-            (*shading_point).film = Film((*shading_point).surface.normal, scattered, vec3f(1.0), 0.0);
+            (*shading_point).film = plain_film((*shading_point).surface.normal, scattered);
             (*shading_point).point.lit_position += TOOTH_SHADOW_OFFSET_MM * point.normal;
             break;
         }
