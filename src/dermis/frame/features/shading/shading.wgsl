@@ -188,7 +188,7 @@ fn apply_modelled_parts(shading_point: ptr<function, ShadingPoint>) {
         }
         let material = shade.material_colour[point.flags >> 8u];
         if (material.w > 0.0) {
-            (*shading_point).open = min((*shading_point).open, open_between_lips(point.position, point.normal));
+            (*shading_point).open = open_between_lips(point.position, point.normal, (*shading_point).open);
             (*shading_point).surface = mouth_at(point, material, shade.tongue);
             let scattered = mouth_shadow_scatter(material.w, (*shading_point).open, shade.lips[0].w);
             (*shading_point).film = plain_film((*shading_point).surface.normal, scattered);
