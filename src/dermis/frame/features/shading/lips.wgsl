@@ -8,7 +8,7 @@ fn lip_direction(index: u32, p: vec3f, n: vec3f) -> vec3f {
     return normalize(d - min(dot(d, n), 0.0) * n + vec3f(0.0, 0.0, 1e-6));
 }
 
-// Fraction of the irradiance by a uniform sky: the form factor of the polygon. Where the edge is unknown,
+// Fraction of the irradiance by a uniform sky: the form factor of the polygon, which is clockwise as seen from outside. Where the edge is unknown,
 // the fraction is that of the mesh.
 fn open_between_lips(p: vec3f, n: vec3f, of_mesh: f32) -> f32 {
     let known = select(0u, LIP_POINTS, shade.lips[0].w > 0.0);
@@ -25,5 +25,5 @@ fn open_between_lips(p: vec3f, n: vec3f, of_mesh: f32) -> f32 {
         a = b;
         i++;
     }
-    return select(of_mesh, saturate(sum / (2.0 * PI)), known > 0u);
+    return select(of_mesh, saturate(-sum / (2.0 * PI)), known > 0u);
 }
