@@ -36,15 +36,21 @@ def ring(half_width_mm: float, half_height_mm: float) -> Floats:
     return np.column_stack([x, y, 0 * x, np.full(38, np.pi * half_width_mm * half_height_mm)])
 
 
-def open_fractions(renderer: Renderer, lips: Floats, points: Floats, normals: Floats) -> Floats:
-    """Return the fractions (n,) by the shader."""
+def open_fractions(
+    renderer: Renderer, lips: Floats, points: Floats, normals: Floats, teeth_mm: float = 0.0
+) -> Floats:
+    """Return the fractions (n,) by the shader.
+
+    teeth_mm : length of teeth below the upper lip
+    """
     count = len(points)
     bound = {
         name: texture_from_array(renderer.device, np.column_stack([one, np.ones(count)])[None], "rgba32float")
         for name, one in (("points", points), ("normals", normals))
     }
+    shade = {"lips": lips.astype(np.float32), "teeth_below_lip": (0.0, -teeth_mm, 0.0)}
     (found,) = probe(
-        renderer.device, "lips_probe", (count, 1), ["open"], shade={"lips": lips.astype(np.float32)}, **bound
+        renderer.device, "lips_probe", (count, 1), ["open"], shade=shade, **bound
     )
     return np.asarray(found)[0, :, 0]
 
@@ -76,6 +82,12 @@ def test_open_fraction_matches_numerical_integration(renderer: Renderer) -> None
     assert found[0] > 0.5 > found[1] > 0.1
 
 
+def test_teeth_narrow_the_opening(renderer: Renderer) -> None:
+    points, normals = np.array([[0.0, -4.0, -15.0]]), np.array([[0.0, 0.0, 1.0]])
+    free, hidden = (open_fractions(renderer, ring(24.0, 6.0), points, normals, teeth)[0] for teeth in (0.0, 8.0))
+    assert 0.3 * free < hidden < 0.7 * free
+
+
 def test_points_before_the_lips_see_the_whole_sky(renderer: Renderer) -> None:
     points, normals = np.array([[0.0, 0.0, 2.0]]), np.array([[0.0, 0.0, 1.0]])
     assert open_fractions(renderer, ring(24.0, 6.0), points, normals)[0] == pytest.approx(1.0, abs=1e-3)
@@ -90,11 +102,13 @@ def test_mouth_edge_surrounds_the_teeth_of_a_smile(head: Head) -> None:
     """In joy the lips open by several millimetres, and the edge is clockwise as seen from the front."""
     rig = head.control_rig
     assert rig.mouth_edge is not None
-    np.testing.assert_array_equal(rig.mouth_edge, mouth_edge())
-    edge = rig.mouth_edge_mm(Pose(expression("joy")).to_arrays(rig))
+    np.testing.assert_array_equal(rig.mouth_edge[:-1], mouth_edge())
+    *points, biting_edge = rig.mouth_edge_mm(Pose(expression("joy")).to_arrays(rig))
+    edge = np.array(points)
+    assert abs(biting_edge[0]) < 5.0 and 4.0 < edge[0, 1] - biting_edge[1] < 10.0
     area = 0.5 * np.cross(edge, np.roll(edge, -1, axis=0)).sum(axis=0)
     assert area[2] < -150.0
-    closed = rig.mouth_edge_mm(rig.rest)
+    closed = rig.mouth_edge_mm(rig.rest)[:-1]
     assert edge[:, 1].max() - edge[19, 1] > 6.0
     assert abs(0.5 * np.cross(closed, np.roll(closed, -1, axis=0)).sum(axis=0)[2]) < 30.0
 
@@ -106,7 +120,7 @@ def mouth_luminances(renderer: Renderer, scene: Scene) -> dict[str, Floats]:
     return {name: y[labels == class_number(name)] for name in ("teeth", "tongue", "skin")}
 
 
-@pytest.mark.parametrize("lights", ["studio", "overcast"])
+@pytest.mark.parametrize("lights", ["studio", "portrait"])
 def test_teeth_of_a_smile_are_darker_than_skin(renderer: Renderer, head: Head, lights: str) -> None:
     """Their luminance is 0.4 to 0.8 of that of the skin, as lips and cavity shade them."""
     scene = Scene(head, lights=lights, camera=MOUTH_CAMERA, pose=expression("joy"))

@@ -97,7 +97,7 @@ def build_head(target_weights: Mapping[str, float], maps: Maps, layout: Layout, 
         bones,
         bone_rotations=gaze_rotations(),
         contact=contact,
-        mouth_edge=mouth_edge(),
+        mouth_edge=np.append(mouth_edge(), teeth.biting_edge_point()).astype(np.int32),
     )
     return Head("human", mesh, maps, MAKEHUMAN_CREDIT, rig, _build_eyes(eye_look))
 

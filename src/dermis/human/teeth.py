@@ -45,6 +45,14 @@ def place_teeth(points_mm: Points) -> Points:
     return placed
 
 
+@cache
+def biting_edge_point() -> int:
+    """Return the index of a point on the biting edge of the upper middle incisors."""
+    points = group_points(_UPPER)
+    x, y, z = average_surface()[0][points].astype(np.float64).T
+    return int(points[np.where((np.abs(x) < _INCISOR_HALF_WIDTH_MM) & (z > z.max() - 4.0), y, np.inf).argmin()])
+
+
 def _incisor_points(points_mm: Points, group_name: str) -> Points:
     """Return the points (n, 3) of the middle incisors of a group of teeth."""
     points = points_mm[group_points(group_name)]

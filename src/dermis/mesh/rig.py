@@ -118,8 +118,8 @@ class Rig(ShortRepr):
     rigid_followers : points that dermis added, such as the points of fitted eyeballs, and the points of the
         file that they follow
     contact : lids that must stay outside the eyeballs; None if lids may intersect eyeballs
-    mouth_edge : (r,) control points along the edge of the lips, once around the opening of the mouth; None if
-        they are unknown
+    mouth_edge : (r + 1,) control points along the edge of the lips, once around the opening of the mouth, and
+        then one on the biting edge of the upper incisors; None if they are unknown
     template : rig with corresponding points, targets and bones, from which this rig takes the points of its
         `outline`, to avoid a search for its own; None if there is no such rig
     """
@@ -225,7 +225,7 @@ class Rig(ShortRepr):
         return self._lid_edges.posed_mm(pose_arrays).reshape(*self.contact.edge.shape, 3)
 
     def mouth_edge_mm(self, pose_arrays: PoseArrays) -> Doubles:
-        """Return points (r, 3) along the edge of the lips in a pose, on the subdivided surface [mm]."""
+        """Return the points (r + 1, 3) of `mouth_edge` in a pose, on the subdivided surface [mm]."""
         return self._mouth_edge.posed_mm(pose_arrays)
 
     @cached_property

@@ -108,6 +108,20 @@ fn mouth_shadow_scatter(part: f32, open: f32, opening: f32) -> vec3f {
     //#end
 }
 
+// Factor of ambient light: it is reflected by the lining of the mouth instead of surfaces of the colour of the point.
+fn ambient_among_lining(colour: vec3f, open: f32) -> vec3f {
+    if (!ENVIRONMENT) {
+        return vec3f(1.0);
+    }
+    let albedo = environment.albedo;
+    //#if BANDS
+    let lining = in_channels(LINING);
+    //#else
+    let lining = LINING;
+    //#end
+    return open_with_bounces(open, lining * albedo) / max(open_with_bounces(open, colour * albedo), vec3f(1e-4));
+}
+
 // material: colour and part of the mouth; tongue: see Shade
 fn mouth_at(point: Point, material: vec4f, tongue: array<vec4f, 2>) -> Surface {
     if (material.w == TONGUE) {

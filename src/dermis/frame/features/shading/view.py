@@ -189,12 +189,16 @@ def with_mouth(shade_record: UniformRecord, mouth_edge_mm: NDArray[np.float64] |
     """Return a Shade record with the opening between the lips.
 
     shade_record : result of `with_camera`, which is changed
-    mouth_edge_mm : (r, 3) points along the edge of the lips [mm]; None for unknown lips
+    mouth_edge_mm : (r + 1, 3) result of `Rig.mouth_edge_mm` [mm]; None for unknown lips
     """
     if mouth_edge_mm is not None:
-        area = np.cross(mouth_edge_mm, np.roll(mouth_edge_mm, -1, axis=0)).sum(axis=0) / 2.0
-        shade_record["lips"][:, :3] = mouth_edge_mm
+        lips, biting_edge = mouth_edge_mm[:-1], mouth_edge_mm[-1]
+        area = np.cross(lips, np.roll(lips, -1, axis=0)).sum(axis=0) / 2.0
+        across = lips[len(lips) // 2] - lips[0]
+        below = (biting_edge - lips[0]) @ across / max(across @ across, 1e-6)
+        shade_record["lips"][:, :3] = lips
         shade_record["lips"][:, 3] = np.linalg.norm(area)
+        shade_record["teeth_below_lip"] = min(max(below, 0.0), 1.0) * across
     return shade_record
 
 
