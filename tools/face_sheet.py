@@ -20,7 +20,10 @@ from dermis.scene.camera import camera_preset
 from dermis.scene.people import skin_of
 from dermis.scene.settings import PHOTOGRAPHIC_SETTINGS
 
-EXPRESSIONS = "neutral smile joy laugh surprise anger sadness disgust fear contempt pain sleep".split()
+EXPRESSIONS = (
+    *("neutral", "smile", "joy", "laugh", "surprise", "anger"),
+    *("sadness", "disgust", "fear", "contempt", "pain", "sleep"),
+)
 RIGS = "studio", "window", "rembrandt", "beauty"
 CLOSE_UPS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], float]] = {
     "cheek": ((38, -25, 15), (250, 0, 500), 48),
@@ -102,7 +105,8 @@ def main(
         pictures = [renderer.draw(scene, settings).srgb8() for scene in scenes]
         rows.append(np.concatenate(pictures, axis=1))
     width = max(row.shape[1] for row in rows)
-    write_png(output, np.concatenate([np.pad(row, ((0, 0), (0, width - row.shape[1]), (0, 0))) for row in rows]))
+    padded = [np.pad(row, ((0, 0), (0, width - row.shape[1]), (0, 0))) for row in rows]
+    write_png(output, np.concatenate(padded))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Make src/dermis/mesh/iris_light.csv: light that an iris receives through the cornea.
 
-Takes about 20 s. Parallel light from 18 directions is refracted at the cornea by Snell's law and counted on the plane of the
-iris. Polynomials of position and direction are fitted to the irradiance.
+Takes about 20 s. Parallel light from 18 directions is refracted at the cornea by Snell's law and counted on
+the plane of the iris. Polynomials of position and direction are fitted to the irradiance.
 """
 
 from __future__ import annotations
@@ -29,10 +29,11 @@ RARE_DEGREES = 75.0  # from here on, directions have half the weight
 MIN_IRRADIANCE = 0.02
 ROUNDS = 20
 HEAD = """\
-# quantity: coefficients of polynomials for the irradiance of the iris through the cornea, see dermis.mesh.iris_light
-#   direct: by parallel light, relative to the irradiance of a surface that faces the light, without reflection
-#   sky: by a uniform sky up to 75 degrees from the axis, relative to that of a flat surface below a whole sky; powers of the
-#   squared distance from the axis
+# quantity: coefficients of polynomials for the irradiance of the iris through the cornea
+#   direct: by parallel light, relative to the irradiance of a surface that faces the light, without
+#     reflection; the terms are those of dermis.mesh.iris_light
+#   sky: by a uniform sky up to 75 degrees from the axis, relative to that of a flat surface below a whole
+#     sky; powers of the squared distance from the axis
 # unit: dimensionless, for positions relative to the radius of the iris
 # source: tools/iris_light.py, least squares over refracted rays
 # licence: Apache-2.0
@@ -41,7 +42,8 @@ HEAD = """\
 
 def main() -> None:
     """Trace rays, fit the polynomials and write the table."""
-    x, y = np.meshgrid(*[(np.arange(BINS_ACROSS) + 0.5) * 2 * IRIS_MM / BINS_ACROSS - IRIS_MM] * 2, indexing="ij")
+    middle = (np.arange(BINS_ACROSS) + 0.5) * 2 * IRIS_MM / BINS_ACROSS - IRIS_MM
+    x, y = np.meshgrid(middle, middle, indexing="ij")
     square = (x**2 + y**2) / IRIS_MM**2
     inside = square < (FITTED_RADIUS_MM / IRIS_MM) ** 2
     terms, irradiance, weights, sky = list[Doubles](), list[Doubles](), list[Doubles](), np.zeros_like(square)
@@ -89,14 +91,13 @@ def traced_irradiance(to_light: Doubles) -> tuple[Doubles, Doubles]:
     flux = np.where(lit, cosine * area, 0.0)
     passed = flux * np.where(lit, transmittance(np.where(lit, cosine, 1.0)), 0.0)
     bin_mm2 = (2.0 * IRIS_MM / BINS_ACROSS) ** 2
-    direct, transmitted = (
-        np.histogram2d(at[:, 0], at[:, 1], bins=(edges, edges), weights=one)[0] / bin_mm2 for one in (flux, passed)
-    )
-    return direct, transmitted
+    bins = (edges, edges)
+    direct, transmitted = (np.histogram2d(*at.T, bins=bins, weights=one)[0] for one in (flux, passed))
+    return direct / bin_mm2, transmitted / bin_mm2
 
 
 def fit_positive(terms: Doubles, values: Doubles, weights: Doubles) -> Doubles:
-    """Return coefficients (k,) of a fit that is clamped at 0: where values and fit are 0, points do not count."""
+    """Return coefficients (k,) of a fit that is clamped at 0, where points do not count."""
     used = values > MIN_IRRADIANCE
     for _ in range(ROUNDS):
         root = weights[used]

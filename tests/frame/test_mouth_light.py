@@ -31,7 +31,7 @@ def head() -> Head:
 
 def ring(half_width_mm: float, half_height_mm: float) -> Floats:
     """Return an elliptic opening (38, 4) in the plane z = 0, counter-clockwise as seen from behind."""
-    turn = -np.arange(38) / 38 * 2 * np.pi
+    turn = np.pi / 2 - np.arange(38) / 38 * 2 * np.pi
     x, y = half_width_mm * np.cos(turn), half_height_mm * np.sin(turn)
     return np.column_stack([x, y, 0 * x, np.full(38, np.pi * half_width_mm * half_height_mm)])
 
@@ -49,9 +49,7 @@ def open_fractions(
         for name, one in (("points", points), ("normals", normals))
     }
     shade = {"lips": lips.astype(np.float32), "teeth_below_lip": (0.0, -teeth_mm, 0.0)}
-    (found,) = probe(
-        renderer.device, "lips_probe", (count, 1), ["open"], shade=shade, **bound
-    )
+    (found,) = probe(renderer.device, "lips_probe", (count, 1), ["open"], shade=shade, **bound)
     return np.asarray(found)[0, :, 0]
 
 
@@ -71,10 +69,13 @@ def integrated(lips: Floats, point: Floats, normal: Floats) -> float:
 
 
 def test_open_fraction_matches_numerical_integration(renderer: Renderer) -> None:
-    """The form factor of an ellipse: on its axis, beside it, and from oblique surfaces whose horizon cuts it."""
+    """The form factor of an ellipse from its axis, from beside it, and where the horizon cuts it."""
     lips = ring(24.0, 6.0)
-    points = np.array([[0, 0, -4], [0, 0, -15], [0, 5, -4], [18, 0, -8], [0, -10, -20], [12, 2, -3], [0, 9, -3]], float)
-    normals = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 1], [0.6, 0, 0.8], [0, 1, 0.2], [0, -0.6, 0.8], [0, 0, 1]], float)
+    z, y = (0.0, 0.0, 1.0), (0.0, 1.0, 0.2)
+    points = np.array(
+        [(0, 0, -4), (0, 0, -15), (0, 5, -4), (18, 0, -8), (0, -10, -20), (12, 2, -3), (0, 9, -3)]
+    )
+    normals = np.array([z, z, z, (0.6, 0, 0.8), y, (0, -0.6, 0.8), z])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     found = open_fractions(renderer, lips, points, normals)
     expected = [integrated(lips, p, n) for p, n in zip(points, normals, strict=True)]
@@ -84,7 +85,8 @@ def test_open_fraction_matches_numerical_integration(renderer: Renderer) -> None
 
 def test_teeth_narrow_the_opening(renderer: Renderer) -> None:
     points, normals = np.array([[0.0, -4.0, -15.0]]), np.array([[0.0, 0.0, 1.0]])
-    free, hidden = (open_fractions(renderer, ring(24.0, 6.0), points, normals, teeth)[0] for teeth in (0.0, 8.0))
+    lips = ring(24.0, 6.0)
+    free, hidden = (open_fractions(renderer, lips, points, normals, one)[0] for one in (0.0, 8.0))
     assert 0.3 * free < hidden < 0.7 * free
 
 
@@ -128,10 +130,15 @@ def test_teeth_of_a_smile_are_darker_than_skin(renderer: Renderer, head: Head, l
     assert 0.4 < np.median(found["teeth"]) / np.median(found["skin"]) < 0.8
 
 
-def test_open_mouths_are_dark_but_not_black_in_uniform_light(renderer: Renderer, head: Head) -> None:
+def test_open_mouths_are_not_black_in_uniform_light(renderer: Renderer, head: Head) -> None:
+    """The albedo of teeth is 2.4 times that of this skin, and lips shade them."""
     scene = Scene(
-        head, lights=(), camera=MOUTH_CAMERA, pose=expression("laugh"), environment=Environment(name="uniform")
+        head,
+        lights=(),
+        camera=MOUTH_CAMERA,
+        pose=expression("laugh"),
+        environment=Environment(name="uniform"),
     )
     found = mouth_luminances(renderer, scene)
     tongue, teeth = (np.median(found[name]) / np.median(found["skin"]) for name in ("tongue", "teeth"))
-    assert 0.02 < tongue < 0.4 and tongue < teeth < 1.3
+    assert 0.02 < tongue < 0.3 and 0.4 < teeth < 1.8

@@ -43,7 +43,7 @@ class CheekBulge(NamedTuple):
 
 @cache
 def cheek_bulges() -> dict[str, CheekBulge]:
-    """Return the displacements that are added to MakeHuman's blend shapes, by the name of the morph target."""
+    """Return the displacements that are added to MakeHuman's blend shapes, by name of the morph target."""
     bulges = dict[str, CheekBulge]()
     for side_name, side in (("Left", 1.0), ("Right", -1.0)):
         point, weight = _cheek_weights(side)

@@ -64,16 +64,15 @@ def expression_targets() -> MorphTargets:
                 point, delta_mm = _sum_displacements(point, delta_mm, *cheek_bulges()[name])
             points.append(point)
             deltas.append(delta_mm)
-    first = np.cumsum([0, *map(len, points)]).astype(np.int32)
-    return MorphTargets(
-        tuple(names), first, np.concatenate(points).astype(np.int32), np.concatenate(deltas).astype(np.float32)
-    )
+    first, point = np.cumsum([0, *map(len, points)]), np.concatenate(points)
+    delta_mm = np.concatenate(deltas).astype(np.float32)
+    return MorphTargets(tuple(names), first.astype(np.int32), point.astype(np.int32), delta_mm)
 
 
 def _sum_displacements(
     point: NDArray[np.int64], delta_mm: Points, more_points: NDArray[np.int64], more_mm: Points
 ) -> tuple[NDArray[np.int64], Points]:
-    """Return the points that two sets of displacements move, in ascending order, and their sums (n, 3) [mm]."""
+    """Return the points that two sets of displacements move, sorted, and their sums (n, 3) [mm]."""
     union, index = np.unique(np.concatenate([point, more_points]), return_inverse=True)
     total = np.zeros((len(union), 3))
     np.add.at(total, index.reshape(-1), np.concatenate([delta_mm, more_mm]))

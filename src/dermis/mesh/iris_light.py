@@ -1,7 +1,7 @@
 """Light that an iris receives through the cornea, as polynomials of position and direction.
 
-The cornea focuses light, most on the side of the iris opposite to an oblique light, and its far side faces away from such
-light. tools/iris_light.py fits the polynomials to refracted rays.
+The cornea focuses light, most on the side of the iris opposite to an oblique light, and its far side faces
+away from such light. tools/iris_light.py fits the polynomials to refracted rays.
 """
 
 from __future__ import annotations

@@ -205,8 +205,8 @@ def with_mouth(shade_record: UniformRecord, mouth_edge_mm: NDArray[np.float64] |
 def tongue_coordinates(mesh: Mesh) -> NDArray[np.float64]:
     """Return the matrix (2, 3) from (u, v, 1) to positions on the tongue [mm].
 
-    The positions are the distance from the midline towards +X and the distance behind the tip, by a least-squares fit to
-    the mesh. The result is zeros for a mesh without a tongue.
+    The positions are the distance from the midline towards +X and the distance behind the tip, by a
+    least-squares fit to the mesh. The result is zeros for a mesh without a tongue.
     """
     is_tongue = np.array([one.part == "tongue" for one in mesh.materials])[mesh.material]
     if not is_tongue.any():
