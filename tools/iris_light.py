@@ -92,7 +92,9 @@ def traced_irradiance(to_light: Doubles) -> tuple[Doubles, Doubles]:
     passed = flux * np.where(lit, transmittance(np.where(lit, cosine, 1.0)), 0.0)
     bin_mm2 = (2.0 * IRIS_MM / BINS_ACROSS) ** 2
     bins = (edges, edges)
-    direct, transmitted = (np.histogram2d(*at.T, bins=bins, weights=one)[0] for one in (flux, passed))
+    direct, transmitted = (
+        np.histogram2d(at[:, 0], at[:, 1], bins=bins, weights=one)[0] for one in (flux, passed)
+    )
     return direct / bin_mm2, transmitted / bin_mm2
 
 

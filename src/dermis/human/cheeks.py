@@ -16,8 +16,6 @@ from dermis.human.makehuman import Points, makehuman_arrays
 from dermis.human.skin.surface import average_surface
 
 # Artist's values for the average person.
-_BULGE_MM = {"cheekSquint": 3.4, "mouthSmile": 2.6}
-"""Largest displacement at a weight of 1 by each target [mm]."""
 _APPLE_MM = 34.0, -27.0
 """Distance from the middle of the face, and height, of the largest displacement [mm]."""
 _HALF_SIZE_MM = 15.0, 13.0
@@ -45,11 +43,13 @@ class CheekBulge(NamedTuple):
 def cheek_bulges() -> dict[str, CheekBulge]:
     """Return the displacements that are added to MakeHuman's blend shapes, by name of the morph target."""
     bulges = dict[str, CheekBulge]()
+    rows = read_rows("dermis.human", "cheek_bulges")
     for side_name, side in (("Left", 1.0), ("Right", -1.0)):
         point, weight = _cheek_weights(side)
         direction = _DIRECTION * [side, 1.0, 1.0]
-        for target_name, length_mm in _BULGE_MM.items():
-            bulges[target_name + side_name] = CheekBulge(point, length_mm * weight[:, None] * direction)
+        for row in rows:
+            delta_mm = float(row["bulge_mm"]) * weight[:, None] * direction
+            bulges[row["target"] + side_name] = CheekBulge(point, delta_mm)
     return bulges
 
 
