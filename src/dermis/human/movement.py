@@ -64,9 +64,13 @@ def expression_targets() -> MorphTargets:
                 point, delta_mm = _sum_displacements(point, delta_mm, *cheek_bulges()[name])
             points.append(point)
             deltas.append(delta_mm)
-    first, point = np.cumsum([0, *map(len, points)]), np.concatenate(points)
-    delta_mm = np.concatenate(deltas).astype(np.float32)
-    return MorphTargets(tuple(names), first.astype(np.int32), point.astype(np.int32), delta_mm)
+    first, all_points = np.cumsum([0, *map(len, points)]), np.concatenate(points)
+    return MorphTargets(
+        tuple(names),
+        first.astype(np.int32),
+        all_points.astype(np.int32),
+        np.concatenate(deltas).astype(np.float32),
+    )
 
 
 def _sum_displacements(
