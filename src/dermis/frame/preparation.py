@@ -178,7 +178,7 @@ class Preparation:
         constants += interreflection_constants(resources)
         texel_format = resources.diffusion.levels.texel_format
         scale = half_precision_scale(texel_format, peak_irradiance(scene, environment_map))
-        view = with_mouth(with_camera(resources.view, camera, state.eyes), state.mouth_edge_mm)
+        record = with_mouth(with_camera(resources.view, camera, state.eyes), state.mouth_edge_mm)
         animated = resources.expression_maps is not None
         return FrameInputs(
             resources=resources,
@@ -193,7 +193,7 @@ class Preparation:
             camera_views=camera_views(camera, state.outline, settings.samples),
             image_rectangle=camera.image_rectangle,
             sky_view=self._sky_view(head, scene.pose_arrays, state.outline) if resources.sky else None,
-            view=with_redness(view, head, scene.state),
+            view=with_redness(record, head, scene.state),
             constants=resources.constants + constants,
             centre_mm=head.centre_mm,
         )
