@@ -40,7 +40,7 @@ def expression_rows(people: Sequence[dermis.Human]) -> Iterator[Row]:
     """Yield a row for each person, with a picture for each expression."""
     for person in people:
         head = person.head()
-        camera = camera_preset("portrait", head)
+        camera = camera_preset("headshot", head)
         yield [(head, person, {"camera": camera, "pose": expression(name)}) for name in EXPRESSIONS]
 
 
