@@ -14,7 +14,7 @@ from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.gpu.textures import texture_from_array
 from dermis.mesh.eye_look import EyeLook
-from dermis.mesh.eyeball import CORNEA_MM, apex_mm, cornea_centre_mm, iris_plane_mm
+from dermis.mesh.eyeball import CORNEA_MM, IRIS_MM, LIMBUS_MM, apex_mm, cornea_centre_mm, iris_plane_mm
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.pose import Pose
@@ -81,24 +81,75 @@ def test_the_cornea_dims_the_iris(renderer: Renderer) -> None:
     p[..., 0], p[..., 2] = off, cornea_centre_mm() + np.sqrt(CORNEA_MM**2 - off**2)
     straight = np.tile(np.array([0.0, 0.0, -1.0]), (SIZE, SIZE, 1))
     drawn_to = traced(p[:1, :1], straight[:1, :1])[0, 0, 0] / off
-    shown = probed(renderer, p, straight)[0, 0, 2]
+    shown = probed(renderer, p, straight)[0][0, 0, 2]
     assert shown == pytest.approx(1 / (ETA * drawn_to) ** 2, rel=1e-3)
 
 
 def on_iris(renderer: Renderer, places: Floats, ways: Floats) -> Floats:
     """Return (n, n, 2) hits with the plane of the iris by the shader."""
-    return probed(renderer, places, ways)[..., :2]
+    return probed(renderer, places, ways)[0][..., :2]
 
 
-def probed(renderer: Renderer, places: Floats, ways: Floats) -> Floats:
-    """Return (n, n, 4) results of the shader."""
+def traced_light(to_light: Floats, side: int) -> Floats:
+    """Return the irradiance (side, side) of the iris by parallel light, by counting refracted rays."""
+    grid = (np.arange(700) + 0.5) / 350 * LIMBUS_MM - LIMBUS_MM
+    x, y = (one[np.hypot(*np.meshgrid(grid, grid)) < LIMBUS_MM] for one in np.meshgrid(grid, grid))
+    places = np.stack([x, y, cornea_centre_mm() + np.sqrt(CORNEA_MM**2 - x**2 - y**2)], axis=-1)
+    normal = (places - [0, 0, cornea_centre_mm()]) / CORNEA_MM
+    cosine = normal @ to_light
+    beside = cosine[:, None] * normal - to_light
+    inside = beside / ETA - np.sqrt(1 - (beside**2).sum(axis=1) / ETA**2)[:, None] * normal
+    at = places + ((iris_plane_mm() - places[:, 2]) / inside[:, 2])[:, None] * inside
+    flux = np.maximum(cosine, 0) / normal[:, 2] * (LIMBUS_MM / 350) ** 2
+    edges = np.linspace(-IRIS_MM, IRIS_MM, side + 1)
+    counted = np.histogram2d(at[:, 1], at[:, 0], bins=(edges, edges), weights=flux)[0]
+    return np.asarray(counted * (side / (2 * IRIS_MM)) ** 2)
+
+
+@pytest.mark.parametrize(("degrees", "mean_error"), [(5.0, 0.02), (35.0, 0.02), (55.0, 0.04)])
+def test_iris_receives_the_light_of_traced_rays(
+    renderer: Renderer, degrees: float, mean_error: float
+) -> None:
+    """The cornea focuses light, and more on the side opposite to the light."""
+    side = 16
+    turn = np.radians(degrees)
+    to_light = np.array([np.sin(turn), 0.0, np.cos(turn)])
+    middle = (np.arange(side) + 0.5) / side * 2 * IRIS_MM - IRIS_MM
+    x, y = np.meshgrid(middle, middle)
+    places = np.zeros((SIZE, SIZE, 3))
+    places[:side, :side] = np.stack([x, y, 0 * x], axis=-1)
+    light = probed(renderer, places, np.tile(to_light, (SIZE, SIZE, 1)))[1][:side, :side, 0]
+    expected, within = traced_light(to_light, side), np.hypot(x, y) < 5.0
+    assert np.abs(light - expected)[within].mean() < mean_error
+    assert light[within].sum() == pytest.approx(expected[within].sum(), rel=0.02)
+    assert np.abs(np.cos(turn) - expected)[within].mean() > 3 * mean_error
+
+
+def test_iris_receives_the_sky_of_traced_rays(renderer: Renderer) -> None:
+    """A uniform sky up to 75 degrees from the axis, by traced light that the cornea does not reflect."""
+    side, degrees = 16, np.arange(3.75, 75, 7.5)
+    middle = (np.arange(side) + 0.5) / side * 2 * IRIS_MM - IRIS_MM
+    x, y = np.meshgrid(middle, middle)
+    places = np.zeros((SIZE, SIZE, 3))
+    places[:side, :side] = np.stack([x, y, 0 * x], axis=-1)
+    sky = probed(renderer, places, np.tile(np.array([0.0, 0.0, 1.0]), (SIZE, SIZE, 1)))[1][:side, :side, 1]
+    within, total = np.hypot(x, y) < 4.0, 0.0
+    for turn in np.radians(degrees):
+        by_light = traced_light(np.array([np.sin(turn), 0.0, np.cos(turn)]), side)
+        total += by_light[within].mean() * 2 * np.sin(turn) * np.radians(7.5)
+    # the cornea reflects more of the steep light than a flat surface does
+    assert sky[within].mean() == pytest.approx(total, rel=0.05)
+
+
+def probed(renderer: Renderer, places: Floats, ways: Floats) -> tuple[Floats, Floats]:
+    """Return (n, n, 4) results of the shader: what is seen, and light that is received."""
     lit = run_frame(renderer, scene_of(head_of(plane(50.0)), frontal())).bindings
     bound = {
         name: texture_from_array(renderer.device, np.dstack([one, np.ones((SIZE, SIZE))]), "rgba32float")
         for name, one in (("places", places), ("ways", ways))
     }
-    (seen,) = probe(renderer.device, "eye_probe", (SIZE, SIZE), ["seen"], **lit, **bound)
-    return np.asarray(seen, np.float64)
+    seen, received = probe(renderer.device, "eye_probe", (SIZE, SIZE), ["seen", "iris_light"], **lit, **bound)
+    return np.asarray(seen, np.float64), np.asarray(received, np.float64)
 
 
 def axes(head: Head, pose: Pose) -> Floats:

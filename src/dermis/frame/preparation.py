@@ -34,6 +34,7 @@ from dermis.frame.features.shading.view import (
     EyePoses,
     camera_views,
     with_camera,
+    with_mouth,
     with_redness,
     world_space_pinhole,
 )
@@ -70,11 +71,12 @@ RequestedNames = tuple[str, ...]
 
 
 class HeadState(NamedTuple):
-    """Current state of a head: its pose, the outline of the posed shape, and the poses of its eyes."""
+    """Current state of a head: its pose, the outline of the posed shape, its eyes and its mouth."""
 
     pose_bytes: PoseBytes
     outline: Outline
     eyes: EyePoses | None
+    mouth_edge_mm: NDArray[np.float64] | None
 
 
 class Preparation:
@@ -176,6 +178,7 @@ class Preparation:
         constants += interreflection_constants(resources)
         texel_format = resources.diffusion.levels.texel_format
         scale = half_precision_scale(texel_format, peak_irradiance(scene, environment_map))
+        record = with_mouth(with_camera(resources.view, camera, state.eyes), state.mouth_edge_mm)
         animated = resources.expression_maps is not None
         return FrameInputs(
             resources=resources,
@@ -190,7 +193,7 @@ class Preparation:
             camera_views=camera_views(camera, state.outline, settings.samples),
             image_rectangle=camera.image_rectangle,
             sky_view=self._sky_view(head, scene.pose_arrays, state.outline) if resources.sky else None,
-            view=with_redness(with_camera(resources.view, camera, state.eyes), head, scene.state),
+            view=with_redness(record, head, scene.state),
             constants=resources.constants + constants,
             centre_mm=head.centre_mm,
         )
@@ -326,10 +329,11 @@ def _eye_poses(head: Head, pose_arrays: PoseArrays) -> EyePoses | None:
 def _posed_state(head: Head, pose_arrays: PoseArrays, rest_bytes: PoseBytes) -> HeadState:
     rig, posed = head.control_rig, _pose_bytes(head, pose_arrays, rest_bytes)
     if posed == rest_bytes:  # the outline of the mesh is exact
-        return HeadState(posed, head.mesh.outline, _eye_poses(head, pose_arrays))
-    return HeadState(
-        posed, Outline(rig.outline_mm(pose_arrays), _OUTLINE_MARGIN_MM), _eye_poses(head, pose_arrays)
-    )
+        outline = head.mesh.outline
+    else:
+        outline = Outline(rig.outline_mm(pose_arrays), _OUTLINE_MARGIN_MM)
+    mouth_edge_mm = None if rig.mouth_edge is None else rig.mouth_edge_mm(pose_arrays)
+    return HeadState(posed, outline, _eye_poses(head, pose_arrays), mouth_edge_mm)
 
 
 def _sky_view(

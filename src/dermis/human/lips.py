@@ -59,6 +59,15 @@ def close_lips(points_mm: Points) -> Points:
     return closed
 
 
+def mouth_edge() -> NDArray[np.int32]:
+    """Return the points (r,) on which the lips touch, counter-clockwise around the mouth as seen from inside.
+
+    They start in the middle of the upper lip and pass the left corner first.
+    """
+    left, right = _lip_pairs().rings[:, :, _CONTACT]
+    return np.concatenate([left, right[-2:0:-1]]).astype(np.int32)
+
+
 class LipWall(NamedTuple):
     """Position of the inner surface of closed lips in the middle of the mouth.
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dermis.human import lids, teeth
 from dermis.human.hair.root_finder import RootFinder, eye_centres
 from dermis.human.lids import fit_lid_targets
-from dermis.human.lips import close_lips
+from dermis.human.lips import close_lips, mouth_edge
 from dermis.human.makehuman import Points, group_points, makehuman_arrays, mesh_point_count, morphed_points_mm
 from dermis.human.movement import build_skeleton, expression_targets, gaze_rotations
 from dermis.mesh import eyeball
@@ -91,7 +91,14 @@ def build_head(target_weights: Mapping[str, float], maps: Maps, layout: Layout, 
     targets = replace(expression_targets(), delta_mm=fit_lid_targets(points_mm, sockets))
     apex, back, _ = eyeball.axis_points()
     contact = lids.lid_contact(mesh_point_count(), len(left), apex, back)
-    rig = Rig(points.astype(np.float32), targets, bones, bone_rotations=gaze_rotations(), contact=contact)
+    rig = Rig(
+        points.astype(np.float32),
+        targets,
+        bones,
+        bone_rotations=gaze_rotations(),
+        contact=contact,
+        mouth_edge=np.append(mouth_edge(), teeth.biting_edge_point()).astype(np.int32),
+    )
     return Head("human", mesh, maps, MAKEHUMAN_CREDIT, rig, _build_eyes(eye_look))
 
 

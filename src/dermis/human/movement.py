@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.human.cheeks import cheek_bulges
 from dermis.human.makehuman import EXPRESSION_PREFIX, Points, makehuman_arrays, target_deltas
 from dermis.mesh.rig import BoneRotation, MorphTargets, Skeleton
 
@@ -51,15 +52,35 @@ def gaze_rotations() -> tuple[BoneRotation, ...]:
 @cache
 def expression_targets() -> MorphTargets:
     """Return the ARKit blend shapes of skin, teeth and tongue; eyeballs are rotated by bones instead."""
-    targets, names, rows = target_deltas(), list[str](), list[NDArray[np.intp]]()
-    for index, name in enumerate(targets.names):
-        if name.startswith(EXPRESSION_PREFIX):
+    targets, names = target_deltas(), list[str]()
+    points, deltas = list[NDArray[np.int64]](), list[Points]()
+    for index, full_name in enumerate(targets.names):
+        if full_name.startswith(EXPRESSION_PREFIX):
             part = np.arange(*targets.first[index : index + 2])
-            names.append(name.removeprefix(EXPRESSION_PREFIX))
-            rows.append(part[_blend_shape_point_mask()[targets.point[part]]])
-    first, chosen = np.cumsum([0, *map(len, rows)]), np.concatenate(rows)
-    point, delta_mm = targets.point[chosen].astype(np.int32), targets.delta_mm[chosen]
-    return MorphTargets(tuple(names), first.astype(np.int32), point, delta_mm)
+            part = part[_blend_shape_point_mask()[targets.point[part]]]
+            names.append(name := full_name.removeprefix(EXPRESSION_PREFIX))
+            point, delta_mm = targets.point[part].astype(np.int64), targets.delta_mm[part].astype(np.float64)
+            if name in cheek_bulges():
+                point, delta_mm = _sum_displacements(point, delta_mm, *cheek_bulges()[name])
+            points.append(point)
+            deltas.append(delta_mm)
+    first, all_points = np.cumsum([0, *map(len, points)]), np.concatenate(points)
+    return MorphTargets(
+        tuple(names),
+        first.astype(np.int32),
+        all_points.astype(np.int32),
+        np.concatenate(deltas).astype(np.float32),
+    )
+
+
+def _sum_displacements(
+    point: NDArray[np.int64], delta_mm: Points, more_points: NDArray[np.int64], more_mm: Points
+) -> tuple[NDArray[np.int64], Points]:
+    """Return the points that two sets of displacements move, sorted, and their sums (n, 3) [mm]."""
+    union, index = np.unique(np.concatenate([point, more_points]), return_inverse=True)
+    total = np.zeros((len(union), 3))
+    np.add.at(total, index.reshape(-1), np.concatenate([delta_mm, more_mm]))
+    return union, total
 
 
 @cache

@@ -25,6 +25,8 @@ _LIP_CLEARANCE_MM = 1.0
 """Distance between the upper incisors and the inner surface of the lips [mm]."""
 _INCISOR_HALF_WIDTH_MM = 8.0
 """Distance from the middle within which points of the teeth belong to the middle incisors [mm]."""
+_INCISOR_DEPTH_MM = 4.0
+"""Distance behind the foremost point of the teeth within which points belong to the incisors [mm]."""
 
 
 def place_teeth(points_mm: Points) -> Points:
@@ -43,6 +45,15 @@ def place_teeth(points_mm: Points) -> Points:
     for name, rise in ((_UPPER, edge_y - upper[:, 1].min()), (_LOWER, lower_rise), (_TONGUE, lower_rise)):
         placed[group_points(name)] += [0.0, rise, forward]
     return placed
+
+
+@cache
+def biting_edge_point() -> int:
+    """Return the index of a point on the biting edge of the upper middle incisors."""
+    points = group_points(_UPPER)
+    x, y, z = average_surface()[0][points].astype(np.float64).T
+    is_incisor = (np.abs(x) < _INCISOR_HALF_WIDTH_MM) & (z > z.max() - _INCISOR_DEPTH_MM)
+    return int(points[np.where(is_incisor, y, np.inf).argmin()])
 
 
 def _incisor_points(points_mm: Points, group_name: str) -> Points:

@@ -17,6 +17,8 @@ from dermis.base.summary import ShortRepr
 
 SCLERA_MM, CORNEA_MM, LIMBUS_MM = 12.0, 7.8, 5.85
 """Radii in adults: of the ball, of the front of the cornea, and of the circle where they meet [mm]."""
+IRIS_MM = 6.0
+"""Radius of the iris [mm]."""
 IRIS_DEPTH_MM = 3.0
 """Depth of the plane of the iris behind the cornea's apex [mm]."""
 QUADS_PER_EDGE = 10

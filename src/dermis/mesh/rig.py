@@ -88,6 +88,25 @@ class RigidFollowers(NamedTuple):
     points: Ints
 
 
+class _SurfaceCurve(NamedTuple):
+    """Curve on a subdivided surface as weighted means of control points.
+
+    points : (n,) indices of the control points around the curve
+    weights : (e, n) weights of these control points in the e points of the curve
+    outline : these control points in a form that can be posed
+    """
+
+    points: Intp
+    weights: Doubles
+    outline: RigOutline
+
+    def posed_mm(self, pose_arrays: PoseArrays) -> Doubles:
+        """Return the points of the curve (e, 3) in a pose [mm]."""
+        rest = np.vstack([pose_arrays.positions_mm[self.points].T, self.outline.rest_mm[3]])
+        posed = replace(self.outline, rest_mm=rest).pose(pose_arrays.weights, pose_arrays.matrices)
+        return np.asarray(self.weights @ posed)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Rig(ShortRepr):
     """Control points of a head, moved by morph targets first and then by bones.
@@ -99,6 +118,8 @@ class Rig(ShortRepr):
     rigid_followers : points that dermis added, such as the points of fitted eyeballs, and the points of the
         file that they follow
     contact : lids that must stay outside the eyeballs; None if lids may intersect eyeballs
+    mouth_edge : (r + 1,) control points along the edge of the lips, once around the opening of the mouth, and
+        then one on the biting edge of the upper incisors; None if they are unknown
     template : rig with corresponding points, targets and bones, from which this rig takes the points of its
         `outline`, to avoid a search for its own; None if there is no such rig
     """
@@ -110,6 +131,7 @@ class Rig(ShortRepr):
     bone_rotations: tuple[BoneRotation, ...] = ()
     rigid_followers: tuple[RigidFollowers, ...] = ()
     contact: LidContact | None = None
+    mouth_edge: Ints | None = None
     template: Rig | None = None
 
     @cached_property
@@ -200,20 +222,28 @@ class Rig(ShortRepr):
         There are k eyes with r points around each opening, see `LidContact.edge`.
         """
         assert self.contact is not None
-        points, weights, outline = self._posable_lid_edges
-        rest = np.vstack([pose_arrays.positions_mm[points].T, outline.rest_mm[3]])
-        posed = replace(outline, rest_mm=rest).pose(pose_arrays.weights, pose_arrays.matrices)
-        return np.asarray(weights @ posed).reshape(*self.contact.edge.shape, 3)
+        return self._lid_edges.posed_mm(pose_arrays).reshape(*self.contact.edge.shape, 3)
+
+    def mouth_edge_mm(self, pose_arrays: PoseArrays) -> Doubles:
+        """Return the points (r + 1, 3) of `mouth_edge` in a pose, on the subdivided surface [mm]."""
+        return self._mouth_edge.posed_mm(pose_arrays)
 
     @cached_property
-    def _posable_lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
-        """Return arrays for `lid_edges_mm` that do not depend on the pose.
-
-        They are the indices (n,) of the control points around the lid edges, the weights (e, n) of these
-        control points in the e points along the edges, and a `RigOutline` that poses these control points.
-        """
+    def _lid_edges(self) -> _SurfaceCurve:
         assert self.contact is not None
-        edge = self.contact.edge.ravel().astype(np.intp)
+        return self._surface_curve(self.contact.edge)
+
+    @cached_property
+    def _mouth_edge(self) -> _SurfaceCurve:
+        assert self.mouth_edge is not None
+        return self._surface_curve(self.mouth_edge)
+
+    def _surface_curve(self, edge_points: Ints) -> _SurfaceCurve:
+        """Return a curve on the subdivided surface that follows control points, in any pose.
+
+        edge_points : indices of the control points, of any shape
+        """
+        edge = edge_points.ravel().astype(np.intp)
         points, weights = edge, np.eye(len(edge))
         if self.stencils is not None:  # whose first points are the control points on the surface
             parts = [slice(*self.stencils.first[one : one + 2]) for one in edge]
@@ -221,7 +251,8 @@ class Rig(ShortRepr):
             weights = np.zeros((len(edge), len(points)))
             for row, part in zip(weights, parts, strict=True):
                 row[np.searchsorted(points, self.stencils.point[part])] = self.stencils.weight[part]
-        return points, weights, rig_outline(self.positions_mm, self.targets, self.skeleton, points)
+        outline = rig_outline(self.positions_mm, self.targets, self.skeleton, points)
+        return _SurfaceCurve(points, weights, outline)
 
     def pose_points(self, points: Ints, pose_arrays: PoseArrays) -> Doubles:
         """Return selected control points (n, 3) in a pose [mm].

@@ -41,10 +41,14 @@ fn reflection(direction: vec3f, m: f32) -> vec3f {
 
 // Irradiance with occlusion and the interreflection of the occluding skin: a fit to path-traced corners [Jimenez2016].
 fn ambient(normal: vec3f, open: f32, albedo: vec3f) -> vec3f {
+    return panorama_at(normal, 0u) * open_with_bounces(open, albedo);
+}
+
+fn open_with_bounces(open: f32, albedo: vec3f) -> vec3f {
     let a = 2.0404 * albedo - 0.3324;
     let b = -4.7951 * albedo + 0.6417;
     let c = 2.7552 * albedo + 0.6903;
-    return panorama_at(normal, 0u) * max(vec3f(open), ((open * a + b) * open + c) * open);
+    return max(vec3f(open), ((open * a + b) * open + c) * open);
 }
 
 // Coordinates in the table of lobes: square root of the cosine, and logarithm of the roughness.

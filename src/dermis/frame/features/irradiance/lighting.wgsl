@@ -10,6 +10,7 @@
 //#include "environment.wgsl"
 //#include "interreflection/interreflection.wgsl"
 //#include "mirrored_lights.wgsl"
+//#include "irradiance/below_cornea.wgsl"
 //#if WORN
 //#include "sheen.wgsl"
 //#end
@@ -37,6 +38,12 @@ struct Film {
     scattered: vec3f, // fraction of the light that reaches shadows by scattering around the point
     ambient: vec3f, // fraction of ambient light that arrives
     smoothness: f32, // 1 for a film that mirrors area lights, 0 for one that reflects by the lobe of its roughness
+    below: BelowCornea,
+}
+
+// Film without smoothness over a surface that all light reaches.
+fn plain_film(normal: vec3f, scattered: vec3f) -> Film {
+    return Film(normal, scattered, vec3f(1.0), 0.0, NO_CORNEA);
 }
 
 // Normal clamped to the horizon of the eye: beyond it the lobe is undefined.
@@ -126,7 +133,7 @@ fn ambient_entering(point: Point, surface: Surface, open: f32) -> vec3f {
 
 // open : unoccluded fraction of the sky
 fn illuminate(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
-    return illuminate_film(point, surface, Film(surface.normal, vec3f(0.0), vec3f(1.0), 0.0), v, open);
+    return illuminate_film(point, surface, plain_film(surface.normal, vec3f(0.0)), v, open);
 }
 
 fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f32) -> Lit {
@@ -164,6 +171,9 @@ fn illuminate_film(point: Point, surface: Surface, film: Film, v: vec3f, open: f
                     let e = arriving.irradiance * seen;
                     let filled = arriving.irradiance * max(vec3f(seen), film.scattered);
                     var entering = filled * (cosine * enters(cosine, surface.roughness, surface.rho_s));
+                    if (EYES) {
+                        entering *= light_below_cornea(film.below, arriving.direction, cosine);
+                    }
                     if (directional) {
                         lit.directional += entering * directional_excess(cosine, facing);
                         entering *= relative_reflectance(cosine);

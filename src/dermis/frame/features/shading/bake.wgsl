@@ -24,7 +24,7 @@ fn shading_point_from_above(triangle: u32, weights: vec3f) -> ShadingPoint {
     let part = surface_or_part(point, baking.footprint);
     let surface = part.surface;
     let open = open_sky(point, t, weights);
-    let film = Film(surface.normal, vec3f(0.0), vec3f(1.0), 0.0);
+    let film = plain_film(surface.normal, vec3f(0.0));
     let side = f32(textureDimensions(scattered).x);
     let texel = texel_axes(triangle, corner_at(t.x), corner_at(t.y), corner_at(t.z), side);
     var shading_point = ShadingPoint(point, surface, film, surface.normal, baking.footprint, open, texel, part.metalness, part.emission, part.sheen);

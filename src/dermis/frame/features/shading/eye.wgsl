@@ -56,11 +56,13 @@ fn eye_at(eye: Eye, p: vec3f, lids: Lids, v: vec3f, lid_albedo: vec3f) -> EyeLit
     let cornea = normalize(p - vec3f(0.0, 0.0, CORNEA_AT));
     let on_iris = clamped_to_iris(refracted_to_iris(p, d));
     let film = tears_at(normalize(mix(ball, cornea, clear)), lids);
-    let below = normalize(mix(ball, iris_normal(on_iris), clear));
+    let normal = normalize(mix(ball, vec3f(0.0, 0.0, 1.0), clear));
+    let iris = clear / (EYE_ETA * EYE_ETA) * iris_colour(eye, on_iris); // light that leaves the medium spreads
+    let mixed = (1.0 - clear) * white_colour(eye, p) + iris;
     //#if BANDS
-    let colour = in_channels(mix(white_colour(eye, p), IRIS_FACTOR * iris_colour(eye, on_iris), clear));
+    let colour = in_channels(mixed);
     //#else
-    let colour = mix(white_colour(eye, p), IRIS_FACTOR * iris_colour(eye, on_iris), clear);
+    let colour = mixed;
     //#end
     //#if BANDS
     let open = in_channels(lid_transmittance(lids));
@@ -68,6 +70,7 @@ fn eye_at(eye: Eye, p: vec3f, lids: Lids, v: vec3f, lid_albedo: vec3f) -> EyeLit
     let open = lid_transmittance(lids);
     //#end
     let back = transpose(rotation); // rotation and uniform scale, so that it transforms normals
+    let below = BelowCornea(length(on_iris) / IRIS_MM * normalize(back * vec3f(on_iris + vec2f(1e-6, 0.0), 0.0)), normalize(back[2]), iris.g / max(mixed.g, 1e-6));
     let film_roughness = mix(TEARS, MENISCUS_ROUGHNESS, meniscus_weight(lids));
-    return EyeLit(Surface(normalize(back * below), colour, film_roughness, 1.0), Film(normalize(back * film), LIT_LIDS * (1.0 - open) * lid_albedo, open, 1.0 - meniscus_weight(lids)));
+    return EyeLit(Surface(normalize(back * normal), colour, film_roughness, 1.0), Film(normalize(back * film), LIT_LIDS * (1.0 - open) * lid_albedo, sky_below_cornea(below) * open, 1.0 - meniscus_weight(lids), below));
 }

@@ -21,12 +21,21 @@ const NECK: vec3f = vec3f(0.45, 0.375, 0.275);
 const CLEAR_EDGE: vec3f = vec3f(0.42, 0.405, 0.36);
 const GAP: vec3f = vec3f(0.42, 0.34, 0.28); // fraction of the light that leaves narrow gaps between teeth
 const GUM: vec3f = vec3f(0.42, 0.15, 0.14);
-const TOOTH_SHADOW_OFFSET_MM: f32 = 1.2; // light spreads about as far in dentine, so shadows on teeth start beside the lips
+const TOOTH_SHADOW_OFFSET_MM: f32 = 0.3; // of the points at which shadows of lips on teeth are evaluated
 const SALIVA_ROUGHNESS: f32 = 0.12; // roughness of wet surfaces
-const TOOTH_SHADOW_SCATTER: vec3f = vec3f(0.22, 0.20, 0.17); // fraction of a light that reaches shadowed teeth through their lit parts and from the lips
-const CANINE_MM: f32 = 22.0; // distance of the canines from the middle along the arch
-const SHADE_MM: f32 = 10.0; // length along the arch over which cheeks shade the teeth behind the canines to 1/e
-const MOUTH_SHADOW_SCATTER: vec3f = vec3f(0.04, 0.014, 0.008); // fraction of a light that enters through some 8 mm of cheeks and lips
+// Walls of the cavity: albedo, and area of the tongue, the palate and the inner sides of the teeth, and of the space between teeth and lips [mm^2].
+const LINING: vec3f = vec3f(0.45, 0.2, 0.17);
+const MOUTH_WALLS_MM2: f32 = 7000.0;
+const VESTIBULE_WALLS_MM2: f32 = 2500.0;
+// The tongue: depth and half width of its groove [mm], distance behind its tip at which the groove begins, and slope of its papillae.
+const GROOVE_MM: f32 = 1.3;
+const GROOVE_HALF_WIDTH_MM: f32 = 2.4;
+const GROOVE_FROM_MM: f32 = 5.0;
+const PAPILLA_SLOPE: f32 = 0.35;
+const PAPILLAE_PER_MM: f32 = 1.1;
+const TONGUE_ROUGHNESS: f32 = 0.3; // between papillae
+const FUNGIFORM: vec3f = vec3f(1.1, 0.62, 0.6); // colour of round papillae relative to the tongue
+const COATING: vec3f = vec3f(0.52, 0.36, 0.32); // of the back of the tongue
 
 fn tooth_width(kind: f32, index: u32) -> f32 {
     return select(LOWER_MM[index], UPPER_MM[index], kind == UPPER_TEETH);
@@ -64,25 +73,59 @@ fn teeth_at(point: Point, kind: f32) -> Surface {
     //#end
 }
 
-fn tongue_at(point: Point, colour: vec3f) -> Surface {
-    let noise = eye_noise(1.1 * point.position.xz, 1.0) + 0.5 * eye_noise(2.7 * point.position.xz, 2.0);
-    return Surface(point.normal, colour * (0.75 + 0.35 * noise), 0.25, 1.0);
-}
-
-// Fraction of a light that reaches shadowed parts of the mouth.
-fn mouth_shadow_scatter(point: Point, part: f32) -> vec3f {
-    let behind_canines = max(abs(point.uv.x - MIDDLE) * ARCH_MM - CANINE_MM, 0.0);
+// axes: see Shade
+fn tongue_at(point: Point, colour: vec3f, axes: array<vec4f, 2>) -> Surface {
+    let uv = vec3f(point.uv, 1.0);
+    let at = vec2f(dot(axes[0].xyz, uv), dot(axes[1].xyz, uv)); // from the midline, behind the tip [mm]
+    let above = smoothstep(-0.2, 0.5, point.normal.y);
+    let groove = above * smoothstep(0.0, GROOVE_FROM_MM, at.y - GROOVE_FROM_MM) * exp(-pow(at.x / GROOVE_HALF_WIDTH_MM, 2.0));
+    let fine = PAPILLAE_PER_MM * at;
+    let noise = eye_noise(fine, 1.0);
+    let bumps = vec2f(eye_noise(fine + vec2f(0.5, 0.0), 1.0) - eye_noise(fine - vec2f(0.5, 0.0), 1.0), eye_noise(fine + vec2f(0.0, 0.5), 1.0) - eye_noise(fine - vec2f(0.0, 0.5), 1.0));
+    let slope = PAPILLA_SLOPE * above * bumps + vec2f(2.0 * GROOVE_MM / (GROOVE_HALF_WIDTH_MM * GROOVE_HALF_WIDTH_MM) * at.x * groove, 0.0);
+    let coated = mix(colour, COATING, 0.5 * above * smoothstep(8.0, 30.0, at.y) * (0.6 + 0.4 * noise));
+    let spots = above * smoothstep(0.72, 0.85, eye_noise(0.6 * at, 3.0));
+    let shown = coated * mix(vec3f(1.0), FUNGIFORM, 0.5 * spots) * (0.8 + 0.3 * noise) * (1.0 - 0.45 * groove);
+    // slopes along x and z as derivatives along u and v
+    let along_uv = slope.x * axes[0].xy + slope.y * axes[1].xy;
     //#if BANDS
-    return in_channels(select(TOOTH_SHADOW_SCATTER * exp(-behind_canines / SHADE_MM), MOUTH_SHADOW_SCATTER, part == TONGUE));
+    return Surface(bend(point, along_uv), in_channels(shown), mix(SALIVA_ROUGHNESS, TONGUE_ROUGHNESS, above), 1.0);
     //#else
-    return select(TOOTH_SHADOW_SCATTER * exp(-behind_canines / SHADE_MM), MOUTH_SHADOW_SCATTER, part == TONGUE);
+    return Surface(bend(point, along_uv), shown, mix(SALIVA_ROUGHNESS, TONGUE_ROUGHNESS, above), 1.0);
     //#end
 }
 
-// material: colour and part of the mouth
-fn mouth_at(point: Point, material: vec4f) -> Surface {
+// Fraction of a light that reaches shadowed parts of the mouth: the flux through the opening between the lips, reflected within the
+// cavity as in an integrating sphere.
+// open: fraction of the sky that the point sees; the rest are walls. opening: [mm^2]
+fn mouth_shadow_scatter(part: f32, open: f32, opening: f32) -> vec3f {
+    let f = min(opening / select(VESTIBULE_WALLS_MM2, MOUTH_WALLS_MM2, part == TONGUE), 0.5);
+    let scattered = (1.0 - open) * f * LINING / (1.0 - LINING * (1.0 - f));
+    //#if BANDS
+    return in_channels(scattered);
+    //#else
+    return scattered;
+    //#end
+}
+
+// Factor of ambient light: it is reflected by the lining of the mouth instead of surfaces of the colour of the point.
+fn ambient_among_lining(colour: vec3f, open: f32) -> vec3f {
+    if (!ENVIRONMENT) {
+        return vec3f(1.0);
+    }
+    let albedo = environment.albedo;
+    //#if BANDS
+    let lining = in_channels(LINING);
+    //#else
+    let lining = LINING;
+    //#end
+    return open_with_bounces(open, lining * albedo) / max(open_with_bounces(open, colour * albedo), vec3f(1e-4));
+}
+
+// material: colour and part of the mouth; tongue: see Shade
+fn mouth_at(point: Point, material: vec4f, tongue: array<vec4f, 2>) -> Surface {
     if (material.w == TONGUE) {
-        return tongue_at(point, material.rgb);
+        return tongue_at(point, material.rgb, tongue);
     }
     return teeth_at(point, material.w);
 }

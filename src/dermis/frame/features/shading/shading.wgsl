@@ -5,6 +5,7 @@
 //#include "mouth.wgsl"
 //#include "occlusion/open_sky.wgsl"
 //#include "lids.wgsl"
+//#include "lips.wgsl"
 //#include "footprint.wgsl"
 //#include "pre_integrated.wgsl"
 //#include "diffusion/packed_blend_weights.wgsl"
@@ -30,6 +31,9 @@ struct Shade {
     eyes: array<Eye, 2>,
     skin_albedo: vec3f, // mean of the head
     lids: array<vec4f, 112>, // edges of the lids in the space of each eye, half of the points for each; see human/lid_rings.csv
+    lips: array<vec4f, 38>, // edge of the lips in head space, and the area of the opening between them [mm^2]; zeros if unknown
+    teeth_below_lip: vec3f, // from the upper lip to the biting edge of the upper teeth, in the middle [mm]
+    tongue: array<vec4f, 2>, // from (u, v, 1) to distances from the midline and behind the tip of the tongue [mm]
     material_colour: array<vec4f, 64>,
     part_materials: array<PartMaterial, 64>,
     jitter: array<vec4f, 64>, // positions of samples in the pixel, 0..1
@@ -171,7 +175,7 @@ fn shading_point_at(triangle: u32, position: vec2f, coverage: f32, size: vec2f) 
         area_u = deviation * (wx.x * a.position + wx.y * b.position + wx.z * c.position);
         area_v = deviation * (wy.x * a.position + wy.y * b.position + wy.z * c.position);
     }
-    let film = Film(surface.normal, vec3f(0.0), vec3f(1.0), 0.0);
+    let film = plain_film(surface.normal, vec3f(0.0));
     var shading_point = ShadingPoint(point, surface, film, v, footprint, open, texel, part.metalness, part.emission, part.sheen);
     if (EYES) {
         apply_modelled_parts(&shading_point);
@@ -190,8 +194,12 @@ fn apply_modelled_parts(shading_point: ptr<function, ShadingPoint>) {
         }
         let material = shade.material_colour[point.flags >> 8u];
         if (material.w > 0.0) {
-            (*shading_point).surface = mouth_at(point, material);
-            (*shading_point).film = Film((*shading_point).surface.normal, mouth_shadow_scatter(point, material.w), vec3f(1.0), 0.0);
+            let hidden = select(vec3f(0.0), shade.teeth_below_lip, material.w == TONGUE);
+            (*shading_point).open = open_between_lips(point.position, point.normal, hidden, (*shading_point).open);
+            (*shading_point).surface = mouth_at(point, material, shade.tongue);
+            let scattered = mouth_shadow_scatter(material.w, (*shading_point).open, shade.lips[0].w);
+            (*shading_point).film = plain_film((*shading_point).surface.normal, scattered);
+            (*shading_point).film.ambient = ambient_among_lining((*shading_point).surface.colour, (*shading_point).open);
             (*shading_point).point.lit_position += TOOTH_SHADOW_OFFSET_MM * point.normal;
             break;
         }

@@ -26,7 +26,7 @@ from dermis.gpu import ComputeProgram, UniformRecord
 from dermis.human.living.zones import eye_redness
 from dermis.mesh.fabric import WEAVES
 from dermis.mesh.head import Head
-from dermis.mesh.mesh import MOUTH_PARTS
+from dermis.mesh.mesh import MOUTH_PARTS, Mesh
 from dermis.mesh.outline import Outline
 from dermis.optics.bands import Bands
 from dermis.scene.camera import Camera, ImageRectangle
@@ -125,6 +125,7 @@ def view_record(
             part["weave"], part["thread_mm"] = 1 + WEAVES.index(fabric.weave), fabric.thread_mm
             part["relief"], part["contrast"] = fabric.relief, fabric.contrast
             part["crumple"], part["sheen"] = fabric.crumple, fabric.sheen
+    record["tongue"][:, :3] = tongue_coordinates(head.mesh)
     for name, value in profile_split.fine.items():
         record["fine"][name] = value
     if head.eyes is not None:
@@ -182,6 +183,39 @@ def with_camera(shade_record: UniformRecord, pinhole: Pinhole, eyes: EyePoses | 
         homogeneous = np.concatenate([points, np.ones((*points.shape[:2], 1))], axis=-1)
         record["lids"] = np.einsum("kij,krj->kri", eyes.frames, homogeneous).reshape(-1, 4)
     return record
+
+
+def with_mouth(shade_record: UniformRecord, mouth_edge_mm: NDArray[np.float64] | None) -> UniformRecord:
+    """Return a Shade record with the opening between the lips.
+
+    shade_record : result of `with_camera`, which is changed
+    mouth_edge_mm : (r + 1, 3) result of `Rig.mouth_edge_mm` [mm]; None for unknown lips
+    """
+    if mouth_edge_mm is not None:
+        lips, biting_edge = mouth_edge_mm[:-1], mouth_edge_mm[-1]
+        area = np.cross(lips, np.roll(lips, -1, axis=0)).sum(axis=0) / 2.0
+        across = lips[len(lips) // 2] - lips[0]
+        below = (biting_edge - lips[0]) @ across / max(across @ across, 1e-6)
+        shade_record["lips"][:, :3] = lips
+        shade_record["lips"][:, 3] = np.linalg.norm(area)
+        shade_record["teeth_below_lip"] = min(max(below, 0.0), 1.0) * across
+    return shade_record
+
+
+def tongue_coordinates(mesh: Mesh) -> NDArray[np.float64]:
+    """Return the matrix (2, 3) from (u, v, 1) to positions on the tongue [mm].
+
+    The positions are the distance from the midline towards +X and the distance behind the tip, by a
+    least-squares fit to the mesh. The result is zeros for a mesh without a tongue.
+    """
+    is_tongue = np.array([one.part == "tongue" for one in mesh.materials])[mesh.material]
+    if not is_tongue.any():
+        return np.zeros((2, 3))
+    vertices = np.unique(mesh.triangles[is_tongue])
+    x, _, z = mesh.positions[vertices].astype(np.float64).T
+    known = np.column_stack([mesh.uv[vertices].astype(np.float64), np.ones(len(vertices))])
+    across, behind = x - 0.5 * (x.min() + x.max()), z.max() - z
+    return np.asarray(np.linalg.lstsq(known, np.column_stack([across, behind]), rcond=None)[0].T)
 
 
 def with_redness(shade_record: UniformRecord, head: Head, skin_state: SkinState | None) -> UniformRecord:

@@ -4,7 +4,7 @@
 //#fill const IRIS_AT: f32 = {iris_at}; // plane of the iris on the axis [mm]
 
 const EYE_ETA: f32 = 1.336; // of the cornea and the aqueous humour as one medium
-const IRIS_MM: f32 = 6.0; // radius
+//#fill const IRIS_MM: f32 = {iris_mm}; // radius
 const CONCAVE: f32 = 0.30; // slope of the iris normal at its rim: the cornea focuses light on the opposite side
 // Radiance of a diffuse disc under the cornea: light that leaves the medium spreads over a solid angle larger by the squared
 // index, and the cornea concentrates incident light on the iris.

@@ -11,7 +11,16 @@ from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.human import teeth
 from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.eye_look import EyeLook
-from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_plane_mm
+from dermis.mesh.eyeball import (
+    CORNEA_MM,
+    IRIS_MM,
+    LIMBUS_MM,
+    SCLERA_MM,
+    apex_mm,
+    cornea_centre_mm,
+    iris_plane_mm,
+)
+from dermis.mesh.iris_light import iris_light_constants
 from dermis.mesh.maps import Maps
 from dermis.optics.bands import Bands, band_rows
 from dermis.optics.equivalent_medium import equivalent_medium, oblique_offset_mm
@@ -58,6 +67,8 @@ def eye_constants() -> dict[str, float]:
         "cornea_mm": CORNEA_MM,
         "apex_at": apex_mm(),
         "iris_at": iris_plane_mm(),
+        "iris_mm": IRIS_MM,
+        **iris_light_constants(),
         "arch_mm": teeth.MM_PER_U,
         "crown_mm": teeth.MM_PER_V,
         "bite": teeth.BITING_EDGE_V,
