@@ -81,8 +81,8 @@ def main(
                 before = levels
             file.write(packer.flush())
         record = {"rate_per_min": rate_per_min, "ita_deg": ita_deg, "rate_hz": rate_hz}
-        record["shape"] = [count, side, side, 3]
-        (folder / f"{number}.json").write_text(json.dumps(record))
+        shape = {"shape": [count, side, side, 3]}
+        (folder / f"{number}.json").write_text(json.dumps(record | shape))
 
 
 if __name__ == "__main__":

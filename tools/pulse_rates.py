@@ -72,7 +72,8 @@ def skin_mask(pictures: NDArray[np.int16]) -> NDArray[np.bool_]:
     height, width = first.shape[:2]
     y, x = np.ogrid[:height, :width]
     oval = ((x - width / 2) / (0.22 * width)) ** 2 + ((y - height / 2) / (0.3 * height)) ** 2 < 1
-    return oval & (first[..., 0] > first[..., 2]) & (first.min(-1) > 0)
+    mask: NDArray[np.bool_] = oval & (first[..., 0] > first[..., 2]) & (first.min(axis=-1) > 0)
+    return mask
 
 
 def network_signals(model: Any, pictures: NDArray[np.int16], rate_hz: float) -> dict[str, Doubles]:
@@ -81,7 +82,7 @@ def network_signals(model: Any, pictures: NDArray[np.int16], rate_hz: float) -> 
     The network's own preparation accepts bytes only: it crops and shrinks them to bytes. The pictures of 12
     bits are cropped by the same detector once and shrunk to floats.
     """
-    import cv2
+    import cv2  # type: ignore[import-not-found]
 
     eight = np.rint(pictures * (255 / LEVELS)).astype(np.uint8)
     model.process_video_tensor(eight, fps=rate_hz)
@@ -114,7 +115,7 @@ def main() -> None:
     given = parser.parse_args()
     models = {}
     if given.networks:
-        import rppg
+        import rppg  # type: ignore[import-not-found]
 
         models = {name: rppg.Model(name) for name in given.networks}
     methods: dict[str, Callable[[Doubles, float], Doubles]] = {"POS": pos, "CHROM": chrom}

@@ -70,8 +70,8 @@ def test_sets_of_another_generator_are_not_continued(
     small_spec: Spec, undisturbed: Files, tmp_path: Path
 ) -> None:
     put(undisturbed, tmp_path)
-    assert "generator = 5" in small_spec.to_toml()
-    (tmp_path / "spec.toml").write_text(small_spec.to_toml().replace("generator = 5\n", ""))
+    assert "generator = 6" in small_spec.to_toml()
+    (tmp_path / "spec.toml").write_text(small_spec.to_toml().replace("generator = 6\n", ""))
     with pytest.raises(DermisError, match=r"of generator number 5, but it was made with number 1"):
         drawn(small_spec, tmp_path)
     assert b"generator" not in contents(tmp_path)["spec.toml"], "the folder is as it was"

@@ -49,7 +49,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.toml_text import key_text, table_text
 
 MAX_IMAGES = 10**9
-GENERATOR_VERSION = 5
+GENERATOR_VERSION = 6
 """Number of the rules that turn seeds into people and pictures; with other rules, a seed gives other people.
 
 Number 1 stands for the people of version 0.1, number 2 for people with the skin of measured people, number 3

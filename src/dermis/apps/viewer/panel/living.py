@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 from imgui_bundle import imgui
 
@@ -42,7 +43,7 @@ def _draw_pulse(session: Session) -> None:
     session.heartbeat.pulse = pulse = (pulse or Pulse()) if runs else None
     if pulse is None:
         return
-    fields: dict[str, float] = {}
+    fields: dict[str, Any] = {}
     for name, number_format in _PULSE_SLIDERS.items():
         value_range = field_slider_range(Pulse, name) or _WEIGHT_RANGE
         label, before = name.partition("_")[0], getattr(pulse, name)
