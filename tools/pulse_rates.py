@@ -41,7 +41,7 @@ def chrom(colours: Doubles, rate_hz: float) -> Doubles:
     """Return the pulse from mean colours (n, 3) by the difference of two chrominances [de Haan 2013]."""
     r, g, b = (colours / colours.mean(axis=0)).T
     x, y = 3 * r - 2 * g, 1.5 * r + g - 1.5 * b
-    return x - x.std() / y.std() * y
+    return np.asarray(x - x.std() / y.std() * y)
 
 
 def spectral_peak_per_min(signal: Doubles, rate_hz: float) -> float:

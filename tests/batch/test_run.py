@@ -72,7 +72,7 @@ def test_sets_of_another_generator_are_not_continued(
     put(undisturbed, tmp_path)
     assert "generator = 6" in small_spec.to_toml()
     (tmp_path / "spec.toml").write_text(small_spec.to_toml().replace("generator = 6\n", ""))
-    with pytest.raises(DermisError, match=r"of generator number 5, but it was made with number 1"):
+    with pytest.raises(DermisError, match=r"of generator number 6, but it was made with number 1"):
         drawn(small_spec, tmp_path)
     assert b"generator" not in contents(tmp_path)["spec.toml"], "the folder is as it was"
 

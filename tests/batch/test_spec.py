@@ -37,7 +37,7 @@ REFUSED = {
     "[person]\nita = 80": "person: ita: expected numbers from -65 to 70",
     "[person]\nita = 20\n[person.skin]\nmelanin = 0.1": "person: ita: expected an ITA or the melanin",
     "[person]\nskin_ancestry = 'martian'": "person: skin_ancestry: expected one of caucasian",
-    "generator = 1": "generator: expected 5",
+    "generator = 1": "generator: expected 6",
     "[person]\nafrican = 0": "person: expected a fraction of african",
     '[person]\nhead = "human"\nage = 30': r"person\.age: expected sampled people",
     "[person.skin]\nshine = 1": r"person\.skin: shine: expected one of melanin",
