@@ -129,7 +129,7 @@ class SkinLook:
     stubble_pheomelanin: float = 0.3
     blemishes: float = 0.0
     scars: float = 0.0
-    vellus: float = 0.5
+    vellus: float = 0.0
 
     def __post_init__(self) -> None:
         """Raise DermisError for fields out of range."""
