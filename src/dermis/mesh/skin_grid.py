@@ -26,7 +26,7 @@ MAX_SKIN_VERTICES = 32_000
 """Largest number of vertices in the grid."""
 SKIN_PUSHES = 3
 """Number of times that a knot is pushed out of the skin."""
-NEAR_SKIN_MM = 4.0
+NEAR_SKIN_MM = 1.5
 """Height above the nearest vertex's tangent plane from which no more vertices are looked up [mm]."""
 MAX_SKIN_PUSH_MM, MAX_PUSH_PER_LENGTH = 16.0, 0.8
 """Largest distance by which a knot is pushed at once: in millimetres, and relative to its distance from the
