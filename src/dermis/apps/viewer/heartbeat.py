@@ -1,4 +1,4 @@
-"""Heartbeat of the displayed person, which runs by the clock and is not a part of the viewer state."""
+"""Heartbeat of the displayed person in real time; it is not part of the viewer state."""
 
 from __future__ import annotations
 
