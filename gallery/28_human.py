@@ -2,7 +2,8 @@
 
 The average person of MakeHuman's parametric human, which is part of the package: no scan, no file, no
 network. With scattering above, without below: dry skin reflects as much light, but as a Lambertian surface.
-The nose in the light of a small lamp at the side shows the difference best, at the edge of the shadow.
+The nose, without hair in front of a small lamp at the side, shows the difference best, at the edge of
+the shadow.
 
 Deck: S11
 Columns: 3
@@ -13,7 +14,7 @@ import numpy as np
 import dermis
 from dermis.apps.gallery.script import run_gallery_script
 
-NOSE_MM, OFFSET_MM, FRAME_MM = (0.0, -35.0, 25.0), (-150.0, -10.0, 500.0), 85.0
+NOSE_MM, OFFSET_MM, FRAME_MM = (0.0, -42.0, 25.0), (-150.0, -10.0, 500.0), 72.0
 
 
 def draw(studio):
@@ -28,7 +29,8 @@ def draw(studio):
     panels = {}
     for technique, note in {"texture-space": "", "none": ", dry"}.items():
         for name, scene in scenes.items():
-            panels[name + note] = studio.render(scene, technique=technique)
+            strands = scene.camera is not nose
+            panels[name + note] = studio.render(scene, technique=technique, strands=strands)
     return panels
 
 

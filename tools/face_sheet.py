@@ -94,9 +94,13 @@ def main(
         Seed of the first person; each further person has the next seed.
     side:
         Side of each picture [pixel].
+    adapter:
+        Adapter that renders the pictures.
     """
     if sheet not in SHEETS:
         refuse("sheet", f"one of {', '.join(SHEETS)}", f"got {sheet}", "Correct it")
+    if people < 1:
+        refuse("people", "at least 1", f"got {people}", "Raise it")
     sampled = [dermis.Human.sampled(first_seed + index) for index in range(people)]
     settings = Settings(size=(side, side), atlas=1024, shadow_size=1024, **PHOTOGRAPHIC_SETTINGS)
     renderer, rows = Renderer(adapter), list[NDArray[np.uint8]]()

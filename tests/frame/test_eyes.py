@@ -11,10 +11,20 @@ from setups import frontal, head_of, probe, run_frame, scene_of, settings_of
 
 from dermis import Human
 from dermis.base.errors import DermisError
+from dermis.frame.features.surface.painting.painted_head import paint_eye
 from dermis.frame.renderer import Renderer
 from dermis.gpu.textures import texture_from_array
 from dermis.mesh.eye_look import EyeLook
-from dermis.mesh.eyeball import CORNEA_MM, IRIS_MM, LIMBUS_MM, apex_mm, cornea_centre_mm, iris_plane_mm
+from dermis.mesh.eyeball import (
+    CORNEA_MM,
+    IRIS_MM,
+    LIMBUS_MM,
+    UV_RADIUS_FALLOFF_RADIANS,
+    UV_RADIUS_OF_BACK,
+    apex_mm,
+    cornea_centre_mm,
+    iris_plane_mm,
+)
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.pose import Pose
@@ -139,6 +149,32 @@ def test_iris_receives_the_sky_of_traced_rays(renderer: Renderer) -> None:
         total += by_light[within].mean() * 2 * np.sin(turn) * np.radians(7.5)
     # the cornea reflects more of the steep light than a flat surface does
     assert sky[within].mean() == pytest.approx(total, rel=0.05)
+
+
+def test_pictures_of_eyes_are_lit_as_the_iris_is(renderer: Renderer) -> None:
+    """As a diffuse surface, the picture is lit by two opposite lights in the ratio of traced rays.
+
+    The ratio does not depend on the colour of the iris.
+    """
+    side, across = 512, (np.arange(512) + 0.5) / 512 - 0.5
+    normals = paint_eye(renderer.device, EyeLook(), side).normal[side // 2].astype(np.float64)
+    limit = 1 - np.exp(-np.pi / UV_RADIUS_FALLOFF_RADIANS)
+    angle = -UV_RADIUS_FALLOFF_RADIANS * np.log(1 - np.minimum(across / UV_RADIUS_OF_BACK, 1) * limit)
+    seen = (across > 0.01) & (angle < 0.42)
+    sine, height = np.sin(angle[seen]), cornea_centre_mm()
+    along = height * np.cos(angle[seen]) + np.sqrt(CORNEA_MM**2 - (height * sine) ** 2)
+    p = along[:, None] * np.stack([sine, 0 * sine, np.cos(angle[seen])], axis=-1)
+    film = (p - [0, 0, height]) / CORNEA_MM
+    right = np.stack([film[:, 2], 0 * sine, -film[:, 0]], axis=-1)
+    normal = normals[seen][:, :1] * right + normals[seen][:, 2:] * film
+    x = traced(p[None], np.tile([0.0, 0.0, -1.0], (1, len(p), 1)))[0, :, 0]
+    bins, turn = 24, 0.6
+    middle = (np.arange(bins) + 0.5) / bins * 2 * IRIS_MM - IRIS_MM
+    lights = [np.array([sign * np.sin(turn), 0, np.cos(turn)]) for sign in (1, -1)]
+    rows = slice(bins // 2 - 1, bins // 2 + 1)
+    expected = [np.interp(x, middle, traced_light(one, bins)[rows].mean(axis=0)) for one in lights]
+    found = [normal @ one for one in lights]
+    np.testing.assert_allclose(found[0] / found[1], expected[0] / expected[1], atol=0.08)
 
 
 def probed(renderer: Renderer, places: Floats, ways: Floats) -> tuple[Floats, Floats]:

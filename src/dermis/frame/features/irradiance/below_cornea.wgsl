@@ -4,7 +4,7 @@
 struct BelowCornea {
     position: vec3f, // from the axis of the eye
     axis: vec3f, // of the eye, unit
-    share: f32, // part of the light that the surface scatters which the iris scatters; 0 for other surfaces
+    share: f32, // fraction of the albedo of the surface that is that of the iris; 0 without an iris
 }
 
 const NO_CORNEA: BelowCornea = BelowCornea(vec3f(0.0), vec3f(0.0), 0.0);

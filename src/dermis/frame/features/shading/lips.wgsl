@@ -1,4 +1,4 @@
-// Part of the sky that a point behind the lips sees through the opening between them, whose edge is stored in `shade.lips`.
+// Fraction of the sky that a point behind the lips sees through the opening between them. `shade.lips` stores the edge of the opening.
 
 const LIP_POINTS: u32 = 38u; // points of the edge, from the middle of the upper lip
 const LIP_CORNER: f32 = 9.0; // index of the left corner
@@ -11,8 +11,8 @@ fn lip_direction(index: u32, p: vec3f, n: vec3f, teeth: vec3f) -> vec3f {
     return normalize(d - min(dot(d, n), 0.0) * n + vec3f(0.0, 0.0, 1e-6));
 }
 
-// Fraction of the irradiance by a uniform sky: the form factor of the polygon, which is clockwise as seen from outside. Where the edge is unknown,
-// the fraction is that of the mesh.
+// Fraction of the irradiance by a uniform sky: the form factor of the polygon, which is clockwise as seen from outside.
+// of_mesh: result if the edge is unknown
 fn open_between_lips(p: vec3f, n: vec3f, teeth: vec3f, of_mesh: f32) -> f32 {
     let known = select(0u, LIP_POINTS, shade.lips[0].w > 0.0);
     var a = lip_direction(LIP_POINTS - 1u, p, n, teeth);

@@ -5,7 +5,6 @@
 
 const EYE_ETA: f32 = 1.336; // of the cornea and the aqueous humour as one medium
 //#fill const IRIS_MM: f32 = {iris_mm}; // radius
-const CONCAVE: f32 = 0.30; // slope of the iris normal at its rim: the cornea focuses light on the opposite side
 // Radiance of a diffuse disc under the cornea: light that leaves the medium spreads over a solid angle larger by the squared
 // index, and the cornea concentrates incident light on the iris.
 const FOCUS_MM: f32 = EYE_ETA * CORNEA_MM / (EYE_ETA - 1.0); // behind the apex
@@ -108,9 +107,4 @@ fn clearness(p: vec3f) -> f32 {
 // Point of the iris plane, clamped to the iris.
 fn clamped_to_iris(q: vec2f) -> vec2f {
     return q * min(1.0, IRIS_MM / max(length(q), 1e-3));
-}
-
-// Normal of the iris at a point, tilted to imitate the focusing by the cornea.
-fn iris_normal(on_iris: vec2f) -> vec3f {
-    return normalize(vec3f(-CONCAVE * on_iris / IRIS_MM, 1.0));
 }
