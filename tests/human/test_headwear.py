@@ -180,6 +180,17 @@ def test_pictures_of_seeds_are_dressed_unless_the_name_says_bare() -> None:
     assert [dressed_name(one) for one in names] == ["human:7?dressed", *names[1:]]
 
 
+def test_portraits_show_the_whole_headwear() -> None:
+    """A turban is in the frame with a margin, and bare heads keep the usual frame."""
+    turban = dermis.Human(hair=dermis.HairLook("none"), headwear="turban").head(subdivide=0, hairs=0.05)
+    top_mm = turban.mesh.positions[:, 1].max() - turban.centre_mm[1]
+    camera, usual = dermis.portrait(turban), dermis.portrait(turban.body)
+    assert usual == dermis.Camera(position=(0.0, -25.0, 1100.0), target=(0.0, -25.0, 0.0))
+    assert usual.target[1] + 0.5 * usual.frame_mm < top_mm + 10.0 < camera.target[1] + 0.5 * camera.frame_mm
+    bottom_mm = [one.target[1] - 0.5 * one.frame_mm for one in (usual, camera)]
+    assert bottom_mm[0] == pytest.approx(bottom_mm[1])
+
+
 def test_rims_are_symmetric_and_above_the_brows() -> None:
     """Headwear leaves the eyes free: its lowest point in front of the face is above them."""
     control = bald_head(0).control_rig.positions_mm.astype(np.float64)

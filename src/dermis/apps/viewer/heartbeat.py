@@ -1,4 +1,4 @@
-"""Heartbeat of the displayed person, which runs by the clock and is not a part of the viewer state."""
+"""Heartbeat of the displayed person, which depends on a clock and is not part of the viewer state."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ class Heartbeat:
     """Heartbeat that changes the skin of the displayed person with time.
 
     clock : function that returns the time [s]
-
-    pulse : pulse to show; None for none
+    pulse : pulse that is shown, or None
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
