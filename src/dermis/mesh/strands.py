@@ -66,7 +66,7 @@ class Strands(ShortRepr):
     @property
     def without_hidden(self) -> Strands:
         """Return the strands without those that headwear hides completely, whose radius is 0 at all knots."""
-        is_visible = (self.radius_mm > 0.0).any(axis=1)
+        is_visible: Mask = np.asarray((self.radius_mm > 0.0).any(axis=1))
         return self if is_visible.all() else self.select(is_visible)
 
     def knot_positions_mm(self, mesh: Mesh, points_mm: NDArray[np.floating]) -> Doubles:
