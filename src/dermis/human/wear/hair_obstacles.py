@@ -169,11 +169,13 @@ def fit_groom(groom: Groom, points_mm: Doubles, obstacles: Sequence[Obstacle]) -
         found = [obstacle.limits(knots, grown) for obstacle in obstacles]
         move = np.sum([one.displacement_mm for one in found], axis=0).reshape(knots.shape)
         move[:, 0] = 0.0  # roots stay in the skin
+        if step == 0:
+            guides = _with_heights(guides, found)
+        if not move[grown].any():  # as for short hair and clothing
+            break
         if step < _PASSES - 2:
             move = _smooth_along(move)
         guides = _displaced(guides, points_mm, move)
-        if step == 0:
-            guides = _with_heights(guides, found)
     return replace(groom, guides=guides)
 
 

@@ -8,7 +8,7 @@ from dermis.base.arrays import Floats, Index, Ints
 
 
 class Worn(NamedTuple):
-    """Mesh of a garment, of glasses or of headwear without the positions of its points, which depend on the person.
+    """Mesh of a worn item without the positions of its points, which depend on the person.
 
     point : (v,) index of the point of each vertex
     uv : (v, 2) texture coordinates

@@ -1,4 +1,4 @@
-"""Commands that compare random people with a spectral archive of measured people, and check their hair and clothes.
+"""Commands that compare random people with measured spectra, and check what they wear and their hair.
 
 The comparisons need the archive in the folder DERMIS_DATA, see docs/measured.md.
 """
