@@ -11,8 +11,11 @@ import pytest
 from test_clothing import skin_depths_mm
 
 import dermis
+from dermis.apps.export.hair_curves import curve_groups
 from dermis.apps.validation.people.wear_penetration import wear_penetration
 from dermis.base.errors import DermisError
+from dermis.formats.deformable_mesh import DeformableMesh
+from dermis.formats.gltf.hair_ribbons import RibbonPrimitive
 from dermis.human.labels.classes import class_number, label_classes
 from dermis.human.labels.fields import mesh_labels
 from dermis.human.person import outfit
@@ -22,6 +25,7 @@ from dermis.human.wear.headwear import STYLES, headwear_room, headwear_solids
 from dermis.human.wear.look import HEADWEAR_STYLES, Headwear
 from dermis.mesh.groom import HIDDEN_CEILING_MM
 from dermis.mesh.grown_strands import grow_strands
+from dermis.mesh.strand_groups import SCALP_HAIR, strand_groups
 from dermis.scene.heads import dressed_name, load_person
 
 PEOPLE = tuple(range(10))
@@ -93,6 +97,23 @@ def test_hair_below_headwear_is_hidden_and_long_hair_comes_out(style: str) -> No
     assert low > 0.8 * low_bare > 0.1
 
 
+def test_exports_contain_only_visible_hair() -> None:
+    """Hidden strands are left out, and long hair from below a cap is as wide as that of a bare head."""
+    widths, counts = [], []
+    for style in ("none", "cap"):
+        head = long_haired(style)
+        strands = strand_groups(head, 800)[SCALP_HAIR]
+        assert (strands.radius_mm.max(axis=1) > 0.0).all()
+        ribbons = RibbonPrimitive(DeformableMesh(head), strands, 10**6).vertices()[0]
+        edges = ribbons.reshape(len(strands), -1, 3)[:, :-1].reshape(len(strands), -1, 2, 3)
+        low = edges[..., 0, 1] < -60.0
+        widths.append(float(np.median(np.linalg.norm(edges[:, :, 1] - edges[:, :, 0], axis=-1)[low])))
+        counts.append(len(strands))
+        assert all(np.isfinite(group.optical_depth).all() for group in curve_groups(head))
+    assert widths[1] == pytest.approx(widths[0], rel=0.1) and widths[0] > 0.0
+    assert counts[1] < counts[0]
+
+
 def test_hair_of_bare_heads_has_no_ceiling() -> None:
     """Only guides below headwear are hidden; the guides of people with a bare head are shared."""
     person = dermis.Human(hair=dermis.HairLook("long"))
@@ -157,6 +178,17 @@ def test_pictures_of_seeds_are_dressed_unless_the_name_says_bare() -> None:
     """The commands for pictures dress "human:7", and leave other names as they are."""
     names = "human:7", "human:7?bare", "human", "face.obj"
     assert [dressed_name(one) for one in names] == ["human:7?dressed", *names[1:]]
+
+
+def test_portraits_show_the_whole_headwear() -> None:
+    """A turban is in the frame with a margin, and bare heads keep the usual frame."""
+    turban = dermis.Human(hair=dermis.HairLook("none"), headwear="turban").head(subdivide=0, hairs=0.05)
+    top_mm = turban.mesh.positions[:, 1].max() - turban.centre_mm[1]
+    camera, usual = dermis.portrait(turban), dermis.portrait(turban.body)
+    assert usual == dermis.Camera(position=(0.0, -25.0, 1100.0), target=(0.0, -25.0, 0.0))
+    assert usual.target[1] + 0.5 * usual.frame_mm < top_mm + 10.0 < camera.target[1] + 0.5 * camera.frame_mm
+    bottom_mm = [one.target[1] - 0.5 * one.frame_mm for one in (usual, camera)]
+    assert bottom_mm[0] == pytest.approx(bottom_mm[1])
 
 
 def test_rims_are_symmetric_and_above_the_brows() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dermis
-from dermis.base.errors import DermisError
+from dermis.base.errors import DermisError, DermisWarning
 from dermis.human.labels.classes import class_number
 from dermis.human.labels.fields import mesh_labels
 from dermis.human.makehuman import mesh_point_count
@@ -39,7 +39,7 @@ def write_garment(folder: Path, *, changed: tuple[str, str] = ("", "")) -> Path:
     lines += [f"{axis}_scale {skin[0]} {skin[-1]} {SCALE_LENGTH}" for axis in "x"] + ["verts 0"]
     lines += [f"{skin[0]}"]
     lines += [f"{a} {b} {a} 0.5 0.5 0.0 {OFFSET} 0 0" for a, b in pairwise(skin)]
-    lines += ["13000", "delete_verts", "100 - 120"]
+    lines += ["13000"]
     text = "\n".join(lines) + "\n"
     (folder / "bib.mhclo").write_text(text.replace(*changed) if changed[0] else text)
     count = len(skin) + 1
@@ -97,6 +97,14 @@ def test_changed_files_are_read_again(tmp_path: Path) -> None:
     write_garment(tmp_path, changed=(f" {OFFSET} 0 0", f" {2 * OFFSET:.3f} 0 0"))
     after = read_garment(str(file)).points_mm(control)
     assert np.abs(after - before).max() > 0.5
+
+
+def test_garments_that_delete_skin_leave_it_with_a_note(tmp_path: Path) -> None:
+    """The list of vertices to delete is not read as a part of the garment, and a note says so."""
+    file = write_garment(tmp_path, changed=("13000\n", "13000\ndelete_verts\n100 - 120\n"))
+    with pytest.warns(DermisWarning, match="delete_verts is not supported"):
+        garment = read_garment(str(file))
+    assert len(garment.base) == 12
 
 
 @pytest.mark.parametrize(

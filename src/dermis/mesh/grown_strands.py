@@ -70,13 +70,14 @@ def grow_strands(
 
 
 def hair_strands(head: Head, points_mm: NDArray[np.floating] | None = None) -> Strands | None:
-    """Return the strands of a head's hair for exports and path tracing; None for a head without hair.
+    """Return the visible strands of a head's hair for path tracing; None for a head without hair.
 
     points_mm : (p, 3) points of the mesh in a pose; at rest by default [mm]
     """
     if head.hair is None:
         return None
-    return grow_strands(head.hair, head.mesh, head.mesh.points_mm if points_mm is None else points_mm)
+    points = head.mesh.points_mm if points_mm is None else points_mm
+    return grow_strands(head.hair, head.mesh, points).without_hidden
 
 
 def is_beard(groom: Groom, max_strands: int = MAX_EXPORTED_STRANDS) -> Mask:

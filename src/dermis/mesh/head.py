@@ -55,7 +55,7 @@ class Head:
     file_vertices : FileVertices, optional
         Correspondence between points and vertices of the mesh file, for mesh sequences.
     undressed : Head, optional
-        The same head without clothing and glasses, whose points, vertices, triangles and materials come first
+        The same head without what it wears, whose points, vertices, triangles and materials come first
         in this head; None for a head that wears nothing.
 
     Examples
@@ -100,7 +100,7 @@ class Head:
 
     @property
     def body(self) -> Head:
-        """Return the head without clothing and glasses."""
+        """Return the head without clothing, glasses and headwear."""
         return self.undressed or self
 
     @cached_property
@@ -150,7 +150,7 @@ class Head:
     def skull_centre_mm(self) -> Point | None:
         """Return the centre of the skull [mm]; None for a mesh without a head.
 
-        Neck, shoulders, body, clothing and glasses do not shift this centre. If the mesh is a whole body
+        Neck, shoulders, body and worn items do not shift this centre. If the mesh is a whole body
         whose skeleton has a head bone, it is the centre of the points that follow this bone.
         """
         if self.undressed is not None:

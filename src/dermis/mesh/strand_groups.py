@@ -18,7 +18,9 @@ _SAMPLE_COUNT = 2000  # strands from which the deviation is estimated
 
 
 def strand_groups(head: Head, max_grown_strands: int = MAX_EXPORTED_STRANDS) -> dict[str, Strands]:
-    """Return the strands of a head in the groups "brows", "lashes", "beard" and "hair", without empty groups.
+    """Return the visible strands of a head in the groups "brows", "lashes", "beard" and "hair".
+
+    Groups without strands are left out.
 
     max_grown_strands : largest number of strands of beard and hair, see `grow_strands`
     """
@@ -29,7 +31,7 @@ def strand_groups(head: Head, max_grown_strands: int = MAX_EXPORTED_STRANDS) -> 
     if head.hair is not None:
         grown = grow_strands(head.hair, head.mesh, head.mesh.points_mm, max_grown_strands)
         beard = is_beard(head.hair, max_grown_strands)
-        groups |= {"beard": grown.select(beard), SCALP_HAIR: grown.select(~beard)}
+        groups |= {"beard": grown.select(beard), SCALP_HAIR: grown.select(~beard).without_hidden}
     return {name: strands for name, strands in groups.items() if len(strands)}
 
 

@@ -63,6 +63,12 @@ class Strands(ShortRepr):
             None if self.is_lash is None else self.is_lash[mask],
         )
 
+    @property
+    def without_hidden(self) -> Strands:
+        """Return the strands without those that headwear hides completely, whose radius is 0 at all knots."""
+        is_visible: Mask = np.asarray((self.radius_mm > 0.0).any(axis=1))
+        return self if is_visible.all() else self.select(is_visible)
+
     def knot_positions_mm(self, mesh: Mesh, points_mm: NDArray[np.floating]) -> Doubles:
         """Return the positions of the knots (n, k, 3) on a posed skin [mm].
 

@@ -21,6 +21,7 @@ from dermis.scene.opencv import OpenCvCamera, camera_fields, extrinsics, intrins
 _DEFAULT_DISTANCE_MM = 1100.0  # as in portrait photography; from closer, the nose looks large
 _MIN_DISTANCE_PER_MESH_SIZE = 3.0  # least distance relative to the size of a mesh that is shown completely
 _FRAME_SIZE_PER_MESH_SIZE = 1.08  # size of the frame relative to a mesh that is shown completely
+_TARGET_HEIGHT_MM, _MARGIN_ABOVE_HEADWEAR_MM = -25.0, 12.0  # relative to the centre of the head
 _WORLD_UP = (0.0, 1.0, 0.0)
 # Preset "headshot": from the front left and slightly above, with free space on the side where the face looks
 _HEADSHOT_AZIMUTH_DEGREES, _HEADSHOT_ELEVATION_DEGREES, _HEADSHOT_FRAME_MM = 26.0, 3.0, 208.0
@@ -154,7 +155,7 @@ class Camera(FrozenModel):
 
 
 def portrait(head: Head) -> Camera:
-    """Return a camera that shows head and shoulders from the front.
+    """Return a camera that shows head and shoulders from the front, and high headwear completely.
 
     Parameters
     ----------
@@ -341,10 +342,15 @@ def find_camera_preset(preset_name: str) -> Callable[[Head], Camera] | None:
 def _camera_at_azimuth(head: Head, azimuth_degrees: float) -> Camera:
     if head.skull_centre_mm is None:
         return _camera_showing_all(head, azimuth_degrees)
-    middle = (0.0, -25.0, 0.0)
+    frame_mm, extension_mm = Camera.model_fields["frame_mm"].default, 0.0
+    if head.undressed is not None:  # the frame is extended upwards for high headwear
+        top_mm = float(head.mesh.positions[:, 1].max()) - head.centre_mm[1] + _MARGIN_ABOVE_HEADWEAR_MM
+        extension_mm = max(top_mm - (_TARGET_HEIGHT_MM + 0.5 * frame_mm), 0.0)
+    middle = (0.0, _TARGET_HEIGHT_MM + 0.5 * extension_mm, 0.0)
     return Camera(
         position=_offset_point(middle, _direction_at_azimuth(azimuth_degrees), _DEFAULT_DISTANCE_MM),
         target=middle,
+        frame_mm=frame_mm + extension_mm,
     )
 
 

@@ -40,7 +40,7 @@ class CurveGroup(NamedTuple):
 def curve_groups(head: Head) -> Iterator[CurveGroup]:
     """Yield the brows, lashes and hair of a head in groups; nothing for a head without hair."""
     groom, mesh = head.hair, head.mesh
-    hair = None if groom is None else grow_strands(groom, mesh, mesh.points_mm, MAX_CURVES)
+    hair = None if groom is None else grow_strands(groom, mesh, mesh.points_mm, MAX_CURVES).without_hidden
     for name, strands in (("brows_and_lashes", head.strands), ("hair", hair)):
         if strands is not None and len(strands):
             yield from _groups_of(name, head, strands)

@@ -105,7 +105,8 @@ class RibbonPrimitive:
         across = np.cross(tangent, outward)
         side = np.cos(_MAX_ROLL * roll) * across + np.sin(_MAX_ROLL * roll) * outward
         width_factor = len(self.strands) / len(strands)
-        half_width = strands.radius_mm[:, :1, None] * width_factor
+        widest = strands.radius_mm.max(axis=1, keepdims=True)
+        half_width = (widest * (strands.radius_mm > 0.0))[..., None] * width_factor  # 0 below headwear
         edges = np.stack([knots - half_width * side, knots + half_width * side], axis=2)
         normal = _unit(outward + _MAX_NORMAL_TURN * turn * across)
         return _join_tips(edges, knots), _join_tips(np.stack([normal, normal], axis=2), normal)

@@ -1,1 +1,1 @@
-"""Clothing and glasses: meshes that are bound to the skin of the parametric human."""
+"""Clothing, glasses and headwear: meshes that are bound to the skin of the parametric human."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cache
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,6 +34,8 @@ from dermis.human.wear.worn import Worn
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, build_mesh
 from dermis.mesh.rig import MorphTargets, Rig, Stencils
+
+_MAX_TEMPLATES = 32  # about 12 MB each; people dressed by chance wear hundreds of combinations of items
 
 Outfit = tuple[Item, ...]
 """Items that a person wears."""
@@ -146,7 +148,7 @@ def dress(head: Head, outfit: Outfit, template: Head | None) -> Head:
 
 
 def dressed_template(layout: Layout, levels: int, outfit: Outfit) -> Head:
-    """Return the head of the mean person in an outfit, cached.
+    """Return the head of the mean person in an outfit, cached for the last outfits.
 
     It is the template of all people who wear these items in any colour, and who share its atlas.
     """
@@ -154,7 +156,7 @@ def dressed_template(layout: Layout, levels: int, outfit: Outfit) -> Head:
     return _dressed_template(layout, levels, tuple(item.without_colour for item in outfit), stamps)
 
 
-@cache
+@lru_cache(_MAX_TEMPLATES)
 def _dressed_template(
     layout: Layout, levels: int, outfit: Outfit, stamps: tuple[tuple[int, int] | None, ...]
 ) -> Head:

@@ -18,7 +18,7 @@ _BORDER_MM = 9.0  # distance beyond the border of cloth within which the cloth i
 _REACH_MM = 60.0  # depth in clothing from which hair is moved out
 _MIN_WALL_COSINE = 0.5  # between normals of cloth and the direction from the axis of the neck, on walls
 _WALL_COLUMNS, _WALL_ROW_MM = 72, 6.0
-_HANG_DECAY, _RISE_DECAY = 0.94, 0.75  # of the push by a collar, from knot to knot below and above it
+_HANG_DECAY, _RISE_DECAY = 0.85, 0.88  # of the push by a collar, from knot to knot below and above it
 _HANGING_MM = 70.0  # distance below the top of a garment that hair over its collar reaches
 _ROOM_FRACTION = 0.55  # height of pressed hair relative to the outside of headwear
 _HIDDEN_MM = 10.0  # distance inside the rim of headwear from which hair is hidden
@@ -169,11 +169,13 @@ def fit_groom(groom: Groom, points_mm: Doubles, obstacles: Sequence[Obstacle]) -
         found = [obstacle.limits(knots, grown) for obstacle in obstacles]
         move = np.sum([one.displacement_mm for one in found], axis=0).reshape(knots.shape)
         move[:, 0] = 0.0  # roots stay in the skin
+        if step == 0:
+            guides = _with_heights(guides, found)
+        if not move[grown].any():  # as for short hair and clothing
+            break
         if step < _PASSES - 2:
             move = _smooth_along(move)
         guides = _displaced(guides, points_mm, move)
-        if step == 0:
-            guides = _with_heights(guides, found)
     return replace(groom, guides=guides)
 
 

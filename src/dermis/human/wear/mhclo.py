@@ -84,6 +84,8 @@ def _read_garment(path: str, stamp: tuple[int, int] | None) -> FileGarment:
         refuse(file, _EXPECTED, f"it is for {values['basemesh'][0]}", "Choose another garment")
     if "obj_file" not in values:
         refuse(file, _EXPECTED, "it has no line obj_file", "Correct it")
+    if "delete_verts" in values:
+        notify(f"{path}: delete_verts is not supported, so the skin below the garment is kept")
     numbers = [[float(word) for word in row] for row in rows]
     count = len(base_mesh().offset_mm)
     base, weight, offset = _bindings(file, numbers, count)

@@ -1,4 +1,4 @@
-"""Meshes of garments and glasses without positions, which all people share."""
+"""Meshes of worn items without positions, which all people share."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dermis.base.arrays import Floats, Index, Ints
 
 
 class Worn(NamedTuple):
-    """Mesh of a garment or of glasses without the positions of its points, which depend on the person.
+    """Mesh of a worn item without the positions of its points, which depend on the person.
 
     point : (v,) index of the point of each vertex
     uv : (v, 2) texture coordinates

@@ -1,4 +1,4 @@
-"""Commands that compare random people with a spectral archive of measured people, and check their hair.
+"""Commands that compare random people with measured spectra, and check what they wear and their hair.
 
 The comparisons need the archive in the folder DERMIS_DATA, see docs/measured.md.
 """
@@ -24,6 +24,10 @@ COMMANDS = {
     "hair": (
         f"{PACKAGE}.hair_penetration:print_hair_penetration",
         "Print how much hair is inside the skin of people, by hair style; needs no archive.",
+    ),
+    "wear": (
+        f"{PACKAGE}.wear_penetration:print_wear_penetration",
+        "Count points of worn items inside skin, and hair inside clothing; needs no archive.",
     ),
 }
 """Function and description of each command, by its name."""

@@ -1,7 +1,4 @@
-"""Depth of worn items in the skin, and of hair in worn items.
-
-Run `python -m dermis.apps.validation.people.wear_penetration --people 200` to count them for all items.
-"""
+"""Depth of worn items in the skin, and of hair in clothing."""
 
 from __future__ import annotations
 
@@ -11,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dermis.base.arrays import Doubles
-from dermis.base.command_line import run_script
 from dermis.base.console import print_report
 from dermis.human.hair.skin_surface import SkinSurface
 from dermis.human.person import Human, outfit
@@ -22,6 +18,7 @@ from dermis.mesh.head import Head
 
 _MAX_DEPTH_MM = 25.0  # points deeper than this are on the other side of a thin part
 _LIMIT_MM = 0.5
+_BESIDE_MM = 6.0  # distance along the cloth from its border beyond which points are not behind it
 
 
 class WearPenetration(NamedTuple):
@@ -79,22 +76,19 @@ def _hair_inside(head: Head, cloth_mm: Doubles, normals: Doubles, max_strands: i
     return total, counts[0], counts[1]
 
 
-_BESIDE_MM = 6.0  # distance along the cloth from its border beyond which points are not behind it
-
-
 def _depths(surface: SkinSurface, points_mm: Doubles) -> Doubles:
     """Return the depths (n,) of points below a surface; depths are negative outside [mm]."""
     base, normal = surface.project(points_mm)
     return np.asarray(((base - points_mm) * normal).sum(axis=1))
 
 
-def main(*, people: int = 10, first_seed: int = 0, as_json: bool = False) -> None:
-    """Count penetrations for each garment, frame and headwear on people by seed.
+def print_wear_penetration(*, people: int = 10, first_seed: int = 0, as_json: bool = False) -> None:
+    """Print how many points of each item are inside the skin of people, and how much hair inside clothing.
 
     Parameters
     ----------
     people:
-        Number of people.
+        Number of people, sampled at random.
     first_seed:
         Seed of the first person.
     as_json:
@@ -120,7 +114,3 @@ def main(*, people: int = 10, first_seed: int = 0, as_json: bool = False) -> Non
         for name, one in report.items()
     )
     print_report(as_json, report, lambda: list(lines))
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -43,7 +43,7 @@ from dermis.apps.viewer.views import ATLAS_LAYERS, VIEW_NAMES
 from dermis.formats.samples import SAMPLES
 from dermis.scene.environment import Environment
 from dermis.scene.frozen_model import SliderRange, field_choices, fields_under
-from dermis.scene.heads import HUMAN
+from dermis.scene.heads import BARE, DRESSED, HUMAN
 from dermis.scene.lights import LIGHTS, Light, SpotLight, light_presets
 from dermis.scene.talk_comparisons import COMPARISONS_HEADING
 
@@ -294,10 +294,10 @@ def draw_head_chooser(session: Session) -> None:
     record_position(session, "seed")
     draw_tooltip("Seed of a random person; press Enter to show the person.")
     if is_entered:
-        session.heads.open(f"{HUMAN}:{max(0, new_seed)}")
+        session.heads.open(_person_name(session, max(0, new_seed)))
     imgui.same_line()
     if draw_button(session, "dice"):
-        session.heads.open(f"{HUMAN}:{random.randrange(_PERSON_SEED_COUNT)}")
+        session.heads.open(_person_name(session, random.randrange(_PERSON_SEED_COUNT)))
     draw_tooltip("Another random person.")
     if session.request_file is None:
         hint = "path of a file"
@@ -325,8 +325,14 @@ def _draw_head_list(session: Session) -> None:
 
 def _person_seed(session: Session) -> int:
     """Return the seed of the displayed random person; 0 if the head is not a random person."""
-    seed = str(session.state.head.get("name", "")).removeprefix(f"{HUMAN}:")
+    seed = str(session.state.head.get("name", "")).removeprefix(f"{HUMAN}:").partition("?")[0]
     return int(seed) if seed.isdecimal() else 0
+
+
+def _person_name(session: Session, seed: int) -> str:
+    """Return the name of a random person who is dressed by chance, or bare like the displayed person."""
+    is_bare = str(session.state.head.get("name", "")).endswith(f"?{BARE}")
+    return f"{HUMAN}:{seed}?{BARE if is_bare else DRESSED}"
 
 
 class Section(NamedTuple):

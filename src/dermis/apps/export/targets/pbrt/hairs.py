@@ -19,7 +19,7 @@ def hair_directives(curve_group: CurveGroup) -> Lines:
     """Return the directives of a group of hairs: a material, and a shape for each hair.
 
     The material measures lengths in radii of a fibre. The width of a curve varies linearly
-    from its root to its tip.
+    from its root to its tip; hair below headwear has the width of its visible part.
     """
     material: DirectiveParameters = {
         "rgb sigma_a": curve_group.optical_depth,
@@ -29,7 +29,8 @@ def hair_directives(curve_group: CurveGroup) -> Lines:
         "float alpha": CUTICLE_TILT_DEGREES,
     }
     points = bspline_control_points(curve_group.knots_mm)
-    ends = 2.0 * curve_group.radius_mm[:, [0, -1]].astype(np.float64)
+    radius_mm = curve_group.radius_mm.astype(np.float64)
+    ends = 2.0 * np.where(radius_mm > 0.0, radius_mm, radius_mm.max(axis=1, keepdims=True))[:, [0, -1]]
     shapes = [
         format_directive(
             "Shape",

@@ -111,7 +111,8 @@ def _add_hairs(usd_stage: Usd.Stage, root_path: Sdf.Path, hairs: Mapping[str, Ha
     for name, hair in hairs.items():
         curves = hair.define(usd_stage, root_path.AppendChild(name))
         strands = hair.strands
-        definition = hair_material(strands.absorption, float(np.median(strands.radius_mm)))
+        visible_radii = strands.radius_mm[strands.radius_mm > 0.0]
+        definition = hair_material(strands.absorption, float(np.median(visible_radii)))
         material = _add_material(usd_stage, root_path.AppendPath(f"materials/{name}"), definition, "")
         UsdShade.MaterialBindingAPI.Apply(curves.GetPrim()).Bind(material)
 
