@@ -93,7 +93,7 @@ class SkinLook:
         Density of pitted scars of acne, 0 to 1 [-].
     vellus : float
         Density of vellus hair, which shines at the outline of the face in light from the side, 0 to 1;
-        0.5 is typical [-].
+        0 leaves it out, 0.5 is typical [-].
 
     Raises
     ------

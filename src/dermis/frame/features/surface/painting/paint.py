@@ -73,7 +73,7 @@ _SKIN_SHADER, _TEXEL_TRIANGLE_SHADER = "surface/painting/skin.wgsl", "surface/pa
 _MAX_PAINTED_TRIANGLES = 1 << 20  # limit by the bits of a triangle index in painted_surface.wgsl
 # Reflectance of a scalp in short hair by that of a dense layer of hair: factor, and constant. It exceeds that
 # of the hair, because the scalp lies in the shadow of the hair; fitted to pictures of cropped hair.
-_SCALP_FACTOR, _SCALP_REFLECTANCE = 1.55, 0.06
+_SCALP_FACTOR, _SCALP_REFLECTANCE = 1.7, 0.066
 _TRIANGLE_ROW_PADDING = (0, 0), (0, 2)  # padding from two to four columns
 _PAINTED_CACHE_FOLDER = "painted"
 _WORD_BYTES = 4
