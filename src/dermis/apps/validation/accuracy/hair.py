@@ -221,6 +221,7 @@ def write_hair_page(
         cases=case_rows(results["cases"]),
         summary=summary_text(results["cases"]),
         costs=cost_rows(results.get("costs", {})),
+        costs_adapter=results.get("costs_adapter", results["adapter"]),
         details=detail_rows(results.get("details", {})),
     )
 
@@ -248,7 +249,8 @@ def _measure(renderer: Renderer, size: int, paths: int, variant: str, seconds: f
             result = results["cases"][case.key] = hair_result(comparison)
             write_results(RESULTS_FILE, results, digits=5)
             print_lines(f"{case.key}: {result['error']} {result['energy']}")
-            pictures = comparison.tone_mapped(comparison.ours), comparison.tone_mapped(comparison.reference)
+            shown = replace(comparison, mask=comparison.reference.max(axis=2) > 0.0)  # exposed for the skin
+            pictures = shown.tone_mapped(shown.ours), shown.tone_mapped(shown.reference)
             cached = {"pair": np.hstack(pictures)}
             try_save_arrays(_PICTURE_FOLDER, key, cached)
         panels[f"{case.key}: frame, path-traced"] = cached["pair"]
@@ -257,6 +259,7 @@ def _measure(renderer: Renderer, size: int, paths: int, variant: str, seconds: f
     for name, measured in (("costs", density_costs), ("details", detail_errors)):
         if name not in results and not is_over():
             results[name] = measured(renderer)
+            results["costs_adapter"] = device
             write_results(RESULTS_FILE, results, digits=5)
 
 
