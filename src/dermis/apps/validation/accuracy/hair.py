@@ -310,9 +310,11 @@ def _style_rows(
 
 def cost_rows(costs: JsonObject) -> str:
     """Return Markdown rows with the time of hair by style and density [ms]."""
-    return _style_rows(
-        costs, tuple(f"{density:g}" for density in DENSITIES), lambda one: f"{one:.3g}", NOT_MEASURED
-    )
+
+    def cell(time_ms: float) -> str:
+        return f"{time_ms:.0f}" if time_ms >= 100.0 else f"{time_ms:.3g}"
+
+    return _style_rows(costs, tuple(f"{density:g}" for density in DENSITIES), cell, NOT_MEASURED)
 
 
 def detail_rows(details: JsonObject) -> str:
