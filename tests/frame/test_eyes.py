@@ -178,7 +178,7 @@ def test_pictures_of_eyes_are_lit_as_the_iris_is(renderer: Renderer) -> None:
 
 
 def probed(renderer: Renderer, places: Floats, ways: Floats) -> tuple[Floats, Floats]:
-    """Return (n, n, 4) results of the shader: what is seen, and light that is received."""
+    """Return (n, n, 4) results of the shader: the visible part of the sky, and the light received."""
     lit = run_frame(renderer, scene_of(head_of(plane(50.0)), frontal())).bindings
     bound = {
         name: texture_from_array(renderer.device, np.dstack([one, np.ones((SIZE, SIZE))]), "rgba32float")

@@ -149,7 +149,7 @@ def test_words_describe_headwear(tmp_path) -> None:
 
 @pytest.mark.parametrize("seed", [7, 18])
 def test_dressed_people_are_the_same_people(seed: int) -> None:
-    """A dressed person of a seed differs from the bare one only in what is worn, which the seed repeats."""
+    """A dressed person of a seed differs from the bare one only in the worn items of that seed."""
     dressed, bare = load_person(f"human:{seed}?dressed"), load_person(f"human:{seed}")
     assert load_person(f"human:{seed}?bare") == bare
     assert replace(dressed, clothing=None, glasses=None, headwear=None) == bare

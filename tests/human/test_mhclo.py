@@ -119,7 +119,7 @@ def test_garments_that_delete_skin_leave_it_with_a_note(tmp_path: Path) -> None:
     ],
 )
 def test_unusable_garments_are_refused(tmp_path: Path, changed: tuple[str, str], message: str) -> None:
-    """Errors name the file and what is wrong with it."""
+    """Errors name the file and its fault."""
     file = write_garment(tmp_path, changed=changed)
     with pytest.raises(DermisError, match=message):
         read_garment(str(file))

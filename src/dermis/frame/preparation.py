@@ -32,6 +32,7 @@ from dermis.frame.features.outputs.stage_inputs import PreviousScene
 from dermis.frame.features.shading.shade import shade_program
 from dermis.frame.features.shading.view import (
     EyePoses,
+    Pinhole,
     camera_views,
     with_camera,
     with_mouth,
@@ -42,7 +43,7 @@ from dermis.frame.features.shape.shape import PoseBytes, rest_pose_bytes
 from dermis.frame.features.surface.bands import head_in_bands, light_in_bands
 from dermis.frame.hair_motion import HairFrame, HairMotion
 from dermis.frame.inputs import FrameInputs
-from dermis.frame.lights.environment import add_suns, load_environment_map, peak_irradiance
+from dermis.frame.lights.environment import EnvironmentMap, add_suns, load_environment_map, peak_irradiance
 from dermis.frame.lights.records import light_constants, light_part_counts, light_records, light_shadow_views
 from dermis.frame.limits import out_of_memory_error
 from dermis.frame.projection import Views, shadow_map_views
@@ -57,7 +58,9 @@ from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import PoseArrays
 from dermis.optics.bands import Bands
+from dermis.scene.environment import Environment
 from dermis.scene.lights import Light
+from dermis.scene.living import SkinState
 from dermis.scene.model import Scene
 from dermis.scene.outputs import OUTPUTS
 from dermis.scene.settings import Settings
@@ -138,10 +141,9 @@ class Preparation:
         cached, device = self.memo.get, self.device
         if bands is not None:
             scene = _scene_in_bands(self.memo, scene, bands)
-        head, environment = scene.head.without_maps, scene.environment
+        head = scene.head.without_maps
         (profile, *others), blend_weights = self._profiles(scene.skin, technique, bands)
-        name = environment.name if environment else None
-        environment_map = cached(load_environment_map, device, name, bands, min_cache_size=_KEPT_ENVIRONMENTS)
+        environment_map = self._environment_map(scene.environment, bands)
         scene = add_suns(self.memo, scene, environment_map)
         state = self._head_state(head, scene.pose_arrays)
         light_inputs = head, tuple(scene.lights), state.outline, settings.shadow_size
@@ -154,7 +156,7 @@ class Preparation:
             profile=profile,
             rest_positions_mm=_rest_positions_mm(scene),
             settings=settings,
-            environment=environment,
+            environment=scene.environment,
             environment_map=environment_map,
             technique=technique,
             light_part_counts=part_counts,
@@ -178,7 +180,6 @@ class Preparation:
         constants += interreflection_constants(resources)
         texel_format = resources.diffusion.levels.texel_format
         scale = half_precision_scale(texel_format, peak_irradiance(scene, environment_map))
-        record = with_mouth(with_camera(resources.view, camera, state.eyes), state.mouth_edge_mm)
         animated = resources.expression_maps is not None
         return FrameInputs(
             resources=resources,
@@ -193,9 +194,15 @@ class Preparation:
             camera_views=camera_views(camera, state.outline, settings.samples),
             image_rectangle=camera.image_rectangle,
             sky_view=self._sky_view(head, scene.pose_arrays, state.outline) if resources.sky else None,
-            view=with_redness(record, head, scene.state),
+            view=_view_record(resources.view, camera, state, head, scene.state),
             constants=resources.constants + constants,
             centre_mm=head.centre_mm,
+        )
+
+    def _environment_map(self, environment: Environment | None, bands: Bands | None) -> EnvironmentMap:
+        name = environment.name if environment else None
+        return self.memo.get(
+            load_environment_map, self.device, name, bands, min_cache_size=_KEPT_ENVIRONMENTS
         )
 
     def _profiles(self, skin: Skin, technique: Technique, bands: Bands | None) -> ProfileMix:
@@ -286,6 +293,14 @@ def _scene_in_bands(memo: Memo, scene: Scene, bands: Bands) -> Scene:
     """Return the scene with the colours of head and lights at three wavelengths."""
     lights = tuple(light_in_bands(light, bands) for light in scene.lights)
     return replace(scene, head=memo.get(head_in_bands, scene.head, bands), lights=lights)
+
+
+def _view_record(
+    record: UniformRecord, camera: Pinhole, state: HeadState, head: Head, skin_state: SkinState | None
+) -> UniformRecord:
+    """Return a Shade record with the camera, the eyes and the mouth of a head, and states of its skin."""
+    record = with_mouth(with_camera(record, camera, state.eyes), state.mouth_edge_mm)
+    return with_redness(record, head, skin_state)
 
 
 def _pose_bytes(head: Head, pose_arrays: PoseArrays, rest_bytes: PoseBytes) -> PoseBytes:

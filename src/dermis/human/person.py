@@ -151,7 +151,7 @@ class Human:
             0 to 2**32 - 1; the same seed gives the same person.
         **given
             Fields that are not sampled, such as `age=70`; for targets, skin, eyes and hair also some of the
-            values, such as `skin={"melanin": 0.1}`; "sampled" for what is worn by chance. Skin and hair fit
+            values, such as `skin={"melanin": 0.1}`; "sampled" for random worn items. Skin and hair fit
             age, sex and ancestry; with `ita` alone, the ancestry is that of measured people with this angle.
 
         Returns

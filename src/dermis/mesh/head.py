@@ -55,7 +55,7 @@ class Head:
     file_vertices : FileVertices, optional
         Correspondence between points and vertices of the mesh file, for mesh sequences.
     undressed : Head, optional
-        The same head without what it wears, whose points, vertices, triangles and materials come first
+        The same head without worn items, whose points, vertices, triangles and materials come first
         in this head; None for a head that wears nothing.
 
     Examples

@@ -209,7 +209,7 @@ def load_subject(
 
 
 def _person_with_options(name: str, loaded: Head, head_options: Mapping[str, Any]) -> Human:
-    """Return the person of a loaded head, with eyes and what is worn from the options of the head."""
+    """Return the person of a loaded head, with the eyes and worn items of the head's options."""
     changed = {item: head_options[item] for item in ITEM_TYPES if head_options.get(item)}
     if head_options.get("eye") and loaded.eyes is not None:
         changed["eyes"] = loaded.eyes.look

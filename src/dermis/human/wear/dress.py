@@ -1,4 +1,4 @@
-"""Dressed heads: mesh, rig and materials of a head, followed by those of what is worn."""
+"""Dressed heads: mesh, rig and materials of a head, followed by those of worn items."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Commands that compare random people with measured spectra, and check what they wear and their hair.
+"""Commands that compare random people with measured spectra, and check their hair and worn items.
 
 The comparisons need the archive in the folder DERMIS_DATA, see docs/measured.md.
 """
