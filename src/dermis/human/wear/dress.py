@@ -18,7 +18,7 @@ from dermis.human.wear.clothing import (
     garment_points_mm,
     worn_garment,
 )
-from dermis.human.wear.eyewear import glasses_materials, glasses_points_mm, worn_glasses
+from dermis.human.wear.eyewear import GLASSES_MESHES, glasses_materials
 from dermis.human.wear.file_clothing import (
     file_garment_materials,
     file_garment_obstacle,
@@ -26,7 +26,7 @@ from dermis.human.wear.file_clothing import (
     worn_file_garment,
 )
 from dermis.human.wear.hair_obstacles import HeadwearObstacle, Obstacle, fit_groom
-from dermis.human.wear.hats import headwear_materials, headwear_points_mm, worn_headwear
+from dermis.human.wear.hats import HEADWEAR_MESHES, headwear_materials
 from dermis.human.wear.headwear import headwear_room
 from dermis.human.wear.look import Clothing, FileClothing, Glasses, Headwear, Item
 from dermis.human.wear.skin_sheet import point_normals
@@ -70,10 +70,10 @@ WEARABLES: Mapping[type[Item], Wearable] = {
         file_garment_materials,
         lambda points, control, item: file_garment_obstacle(points, item),
     ),
-    Glasses: Wearable(worn_glasses, glasses_points_mm, glasses_materials),
+    Glasses: Wearable(GLASSES_MESHES.worn, GLASSES_MESHES.points_mm, glasses_materials),
     Headwear: Wearable(
-        worn_headwear,
-        headwear_points_mm,
+        HEADWEAR_MESHES.worn,
+        HEADWEAR_MESHES.points_mm,
         headwear_materials,
         lambda points, control, item: HeadwearObstacle(headwear_room(item.style, control)),
     ),

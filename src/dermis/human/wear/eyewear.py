@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cache
-
-import numpy as np
-
-from dermis.base.arrays import Doubles, Floats
-from dermis.human.model import MEAN_PERSON_WEIGHTS, control_points_mm
 from dermis.human.wear.fabrics import linear_colour
 from dermis.human.wear.glasses import FRAMES, glasses_solids
 from dermis.human.wear.look import Glasses
-from dermis.human.wear.rigid import rigid_worn, solid_points_mm, solid_slots
-from dermis.human.wear.tubes import Solid
-from dermis.human.wear.worn import Worn
+from dermis.human.wear.rigid import RigidItems
 from dermis.mesh.mesh import Material
 
 _LABEL = "glasses"
@@ -21,22 +13,7 @@ _METAL_ROUGHNESS, _ACETATE_ROUGHNESS, _LENS_ROUGHNESS = 0.32, 0.3, 0.12
 _PAD_COLOUR, _LENS_COLOUR = (0.55, 0.53, 0.5), (0.012, 0.011, 0.01)
 
 
-def glasses_points_mm(control_mm: Floats, glasses: Glasses) -> Doubles:
-    """Return the points (m, 3) of glasses on a person [mm].
-
-    control_mm : (p, 3) control points of the person at rest
-    """
-    return solid_points_mm(glasses_solids(glasses.style, control_mm.astype(np.float64)))
-
-
-def worn_glasses(glasses: Glasses) -> Worn:
-    """Return the mesh of glasses, which does not depend on their colour."""
-    return _worn_glasses(glasses.style)
-
-
-@cache
-def _worn_glasses(style: str) -> Worn:
-    return rigid_worn(_mean_solids(style))
+GLASSES_MESHES = RigidItems(glasses_solids)
 
 
 def glasses_materials(glasses: Glasses) -> tuple[Material, ...]:
@@ -50,9 +27,4 @@ def glasses_materials(glasses: Glasses) -> tuple[Material, ...]:
         "lens": Material("dark lens", "opaque", _LENS_COLOUR, roughness=_LENS_ROUGHNESS, label=_LABEL),
         "pad": Material("nose pad", "opaque", _PAD_COLOUR, roughness=_ACETATE_ROUGHNESS, label=_LABEL),
     }
-    return tuple(of_slot[slot] for slot in solid_slots(_mean_solids(glasses.style)))
-
-
-@cache
-def _mean_solids(style: str) -> list[Solid]:
-    return glasses_solids(style, control_points_mm(MEAN_PERSON_WEIGHTS).astype(np.float64))
+    return tuple(of_slot[slot] for slot in GLASSES_MESHES.slots(glasses))

@@ -2,17 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 
-from dermis.base.arrays import Doubles
+from dermis.base.arrays import Doubles, Floats
 from dermis.human.makehuman import makehuman_arrays
+from dermis.human.model import MEAN_PERSON_WEIGHTS, control_points_mm
+from dermis.human.wear.look import Glasses, Headwear
 from dermis.human.wear.panels import PanelVertices
 from dermis.human.wear.tubes import Solid
 from dermis.human.wear.worn import Worn
 from dermis.mesh.fabric import MM_PER_UV
 from dermis.mesh.rig import BONES_PER_POINT
+
+Styled = Glasses | Headwear
+
+
+class RigidItems:
+    """Meshes of a kind of item in several styles, such as glasses; colour and cloth do not matter.
+
+    make_solids : function that returns the parts of a style on a person, from the control points (p, 3) of
+        the person at rest [mm]
+    """
+
+    def __init__(self, make_solids: Callable[[str, Doubles], list[Solid]]) -> None:
+        self._make_solids = make_solids
+        self._mean_solids = cache(self._solids_of_mean_person)
+        self._worn = cache(lambda style: rigid_worn(self._mean_solids(style)))
+
+    def points_mm(self, control_mm: Floats, item: Styled) -> Doubles:
+        """Return the points (m, 3) of an item on a person [mm].
+
+        control_mm : (p, 3) control points of the person at rest
+        """
+        return solid_points_mm(self._make_solids(item.style, control_mm.astype(np.float64)))
+
+    def worn(self, item: Styled) -> Worn:
+        """Return the mesh of an item."""
+        return self._worn(item.style)
+
+    def slots(self, item: Styled) -> tuple[str, ...]:
+        """Return the names of the materials of an item, in the order of the material indices of its mesh."""
+        return solid_slots(self._mean_solids(item.style))
+
+    def _solids_of_mean_person(self, style: str) -> list[Solid]:
+        return self._make_solids(style, control_points_mm(MEAN_PERSON_WEIGHTS).astype(np.float64))
 
 
 def solid_points_mm(solids: Sequence[Solid]) -> Doubles:
